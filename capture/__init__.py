@@ -1,0 +1,1 @@
+"""Cameras: the seam, the back ends and the grabber."""

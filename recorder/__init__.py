@@ -1,0 +1,1 @@
+"""Triplet assembly, MCAP log, ZeroMQ publication, verification and replay."""

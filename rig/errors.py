@@ -1,0 +1,45 @@
+"""The error tree, split by what the caller does next.
+
+Every message is one line that names what is wrong and ends in what to do about it. The command line prints
+it without a traceback and exits with `exit_code`.
+"""
+
+
+class SvevError(Exception):
+    """Base of all errors that a person can act on."""
+
+    exit_code = 1
+
+
+class BadInputError(SvevError):
+    """What was handed in is wrong: a file, a key, an option, an address. Correct it and call again."""
+
+    exit_code = 2
+
+
+class CameraNotFoundError(BadInputError):
+    """A camera that the rig file names does not answer."""
+
+
+class CameraError(SvevError):
+    """A camera that answered refuses or fails. The grabber tears it down and connects again."""
+
+    exit_code = 5
+
+
+class StorageError(SvevError):
+    """The log cannot be written any further: disk full, device gone. What is written stays readable."""
+
+    exit_code = 4
+
+
+class ProcessDiedError(SvevError):
+    """One of our own processes ended without being asked to."""
+
+    exit_code = 6
+
+
+class LogDamagedError(SvevError):
+    """A log that is truncated or inconsistent; what could be read has been reported."""
+
+    exit_code = 3

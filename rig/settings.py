@@ -1,0 +1,135 @@
+"""The rig file's model: cameras in order from left to right, trigger, recorder, network, simulation.
+
+Strict: an unknown or misspelt key is an error, never ignored. `rig.rigfile` reads it and words the errors.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from rig.topics import DEFAULT_PUBLISH
+
+Backend = Literal["aravis", "iidc", "sim", "replay"]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Region(_Strict):
+    """The part of the sensor that is read out, in px."""
+
+    x: int = Field(0, ge=0, description="first column")
+    y: int = Field(0, ge=0, description="first row")
+    width: int = Field(640, gt=0, le=16384)
+    height: int = Field(480, gt=0, le=16384)
+
+
+class CameraSettings(_Strict):
+    """One camera. The order of the cameras in the file is their order in the triplet, left to right."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$", description="short name, e.g. K1")
+    backend: Backend
+    address: str = Field("", description="aravis: IP address; iidc: GUID (hexadecimal); replay: path of a log")
+    region: Region = Region()
+    pixel_format: Literal["Mono8"] = "Mono8"
+    exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
+    gain_db: float = Field(0.0, ge=0, le=60)
+    trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
+    trigger_edge: Literal["rising", "falling"] = "rising"
+
+    @property
+    def frame_bytes(self) -> int:
+        """Bytes of one frame."""
+        return self.region.width * self.region.height
+
+    @model_validator(mode="after")
+    def _address_where_needed(self) -> "CameraSettings":
+        if self.backend != "sim" and not self.address:
+            raise ValueError(f'backend "{self.backend}" needs an address: add address = "..."')
+        return self
+
+
+class TriggerSettings(_Strict):
+    """The pulse train that exposes all cameras at the same instant."""
+
+    source: Literal["external"] = Field("external", description="who makes the pulses; external: not svev")
+    rate_hz: float = Field(30.0, gt=0, le=1000, description="pulses per second")
+    settle_s: float = Field(5.0, gt=0, le=120, description="wait at most this long for the first pulses")
+
+    @property
+    def period_ns(self) -> int:
+        """Nominal time between two pulses, ns."""
+        return round(1e9 / self.rate_hz)
+
+
+class RecorderSettings(_Strict):
+    """Where recordings go and how much is buffered on the way."""
+
+    directory: Path = Field(Path("recordings"), description="relative to the working directory")
+    ring_s: float = Field(2.0, gt=0, le=60, description="each camera's ring in shared memory, seconds of frames")
+    triplets_s: float = Field(1.0, gt=0, le=60, description="triplets waiting for the disk, seconds")
+    reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
+
+
+class NetworkSettings(_Strict):
+    """How frames arrive and triplets leave."""
+
+    publish: str = Field(DEFAULT_PUBLISH, pattern=r"^(tcp|ipc)://.+", description="ZeroMQ PUB address")
+    packet_size: int = Field(
+        9000,
+        ge=576,
+        le=65500,
+        description="GigE Vision packet size in bytes, IP header included; at most the MTU",
+    )
+    packet_socket: Literal["auto", "on", "off"] = Field(
+        "auto", description="receive through a packet socket: cheaper at high rates, needs CAP_NET_RAW"
+    )
+    resend: bool = Field(True, description="ask the camera again for lost packets")
+
+
+class SimulationSettings(_Strict):
+    """Stand-in cameras for tests and demonstrations."""
+
+    scenario: Path = Field(description="scenario file of the simulated hill, relative to the rig file")
+
+
+class RigSettings(_Strict):
+    """One rig: everything the service has to know to record."""
+
+    name: str = Field(min_length=1, max_length=80)
+    cameras: Annotated[tuple[CameraSettings, ...], Field(min_length=1, max_length=8)]
+    trigger: TriggerSettings = TriggerSettings()
+    recorder: RecorderSettings = RecorderSettings()
+    network: NetworkSettings = NetworkSettings()
+    simulation: SimulationSettings | None = None
+
+    @model_validator(mode="after")
+    def _cameras_fit_together(self) -> "RigSettings":
+        names = [camera.name for camera in self.cameras]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise ValueError(f"camera name {', '.join(sorted(twice))} is used twice: give each camera its own name")
+        addresses = [(c.backend, c.address) for c in self.cameras if c.address]
+        if doubled := {address for address in addresses if addresses.count(address) > 1}:
+            raise ValueError(
+                f"address {', '.join(a for _, a in sorted(doubled))} is used twice: give each camera its own address"
+            )
+        if len({camera.region.height for camera in self.cameras}) > 1:
+            raise ValueError("cameras differ in region.height: frames stand side by side, so make the heights equal")
+        if self.simulation is None and any(camera.backend == "sim" for camera in self.cameras):
+            raise ValueError('backend "sim" needs a [simulation] table: add scenario = "../scenarios/training.toml"')
+        return self
+
+    @property
+    def triplet_shape(self) -> tuple[int, int]:
+        """Rows and columns of the triplet: the frames side by side (paper, Fig. 3)."""
+        return self.cameras[0].region.height, sum(camera.region.width for camera in self.cameras)
+
+    def columns(self) -> tuple[tuple[int, int], ...]:
+        """For each camera: first column and one past the last column of its block."""
+        blocks, first = [], 0
+        for camera in self.cameras:
+            blocks.append((first, first + camera.region.width))
+            first += camera.region.width
+        return tuple(blocks)

@@ -1,0 +1,34 @@
+"""The one table of topics that publisher, recorder, replay and panel read."""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One channel of the log and its twin on ZeroMQ.
+
+    Attributes:
+        name: channel of the MCAP log.
+        schema: name of the message schema.
+        encoding: encoding of the messages in the log.
+        live: topic of the ZeroMQ message, None where the topic is not published on its own.
+    """
+
+    name: str
+    schema: str
+    encoding: str
+    live: str | None
+
+
+TRIPLET: Final = Topic("/triplet", "foxglove.RawImage", "protobuf", "triplet")
+TAG: Final = Topic("/triplet/tag", "svev.TripletTag", "json", None)
+EVENTS: Final = Topic("/events", "foxglove.Log", "protobuf", "event")
+HEALTH: Final = Topic("/health", "svev.Health", "json", "health")
+
+PROFILE: Final = "svev"
+SESSION_METADATA: Final = "svev.session"
+RIG_METADATA: Final = "svev.rig"
+RIG_ATTACHMENT: Final = "rig.toml"
+CALIBRATION_ATTACHMENT: Final = "calibration.json"
+DEFAULT_PUBLISH: Final = "tcp://127.0.0.1:5556"

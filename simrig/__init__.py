@@ -1,0 +1,1 @@
+"""The simulated hill: scenario, jumper, renderer, camera simulators, faults."""

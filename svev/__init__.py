@@ -1,0 +1,1 @@
+"""The front door: command line, composition of the running system, process table."""

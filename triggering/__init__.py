@@ -1,0 +1,1 @@
+"""Pulses: device clocks on a common time line, pulse numbering and pairing."""

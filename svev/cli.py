@@ -1,0 +1,58 @@
+"""The command line: `svev COMMAND`.
+
+Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, 4 storage failed, 5 a camera failed,
+6 one of our processes died, 130 interrupted. Errors are one line; `--debug` anywhere shows the traceback.
+"""
+
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+import typer
+
+from rig.errors import SvevError
+from svev import console
+from svev.commands import schema
+
+app = typer.Typer(
+    name="svev",
+    help="Live capture and photogrammetry for three synchronized cameras at a ski jump.",
+    epilog="Add --debug anywhere to see the traceback of an error. Start with: svev demo",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("schema")(schema.schema)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns:
+        The exit code, see the module's description.
+    """
+    argv = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in argv
+    argv = [argument for argument in argv if argument != "--debug"]
+    try:
+        result = app(argv, prog_name="svev", standalone_mode=False)
+    except SvevError as error:
+        code, line = error.exit_code, str(error)
+    except click.exceptions.Abort:
+        code, line = 130, "interrupted"
+    except KeyboardInterrupt:
+        code, line = 130, "interrupted"
+    except click.ClickException as error:
+        code, line = error.exit_code, f"{error.format_message()} See: svev --help"
+    except BrokenPipeError:
+        # Whoever read our output went away; there is nobody left to tell.
+        sys.stderr.close()
+        return 1
+    else:
+        return result if isinstance(result, int) else 0
+    if debug:
+        traceback.print_exc()
+    console.complain(line)
+    return code

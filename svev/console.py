@@ -1,0 +1,47 @@
+"""What the commands print: plain lines, progress on long work, one JSON object with `--json`."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+#: People read this one; with `--json` standard output belongs to the JSON object alone.
+_stderr = Console(stderr=True, highlight=False, soft_wrap=True)
+_stdout = Console(highlight=False, soft_wrap=True)
+
+
+def say(line: str, *, aside: bool = False) -> None:
+    """Print one line for people; `aside` sends it to standard error (commentary beside a `--json` result)."""
+    (_stderr if aside else _stdout).print(line, markup=False)
+
+
+def print_json(result: dict[str, Any]) -> None:
+    """Print the result as one JSON object, the last thing on standard output."""
+    sys.stdout.write(json.dumps(result, indent=2) + "\n")
+    sys.stdout.flush()
+
+
+def complain(line: str) -> None:
+    """Print one line of error."""
+    _stderr.print(f"svev: {line}", style="bold red", markup=False)
+
+
+@contextmanager
+def progress(label: str, total: int | None) -> Iterator[Callable[[int], None]]:
+    """A progress bar on standard error; silent when that is no terminal.
+
+    Args:
+        label: what is going on.
+        total: number of steps, None if unknown.
+
+    Yields:
+        A function that is told how many steps are done so far.
+    """
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=_stderr, disable=not _stderr.is_terminal, transient=True) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.update(task, completed=done)

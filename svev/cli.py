@@ -8,7 +8,6 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-import click
 import typer
 
 from rig.errors import SvevError
@@ -24,6 +23,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+@app.callback()
+def _every_command() -> None:
+    """Live capture and photogrammetry for three synchronized cameras at a ski jump."""
+
+
 app.command("schema")(schema.schema)
 
 
@@ -37,21 +43,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in argv
     argv = [argument for argument in argv if argument != "--debug"]
     try:
-        result = app(argv, prog_name="svev", standalone_mode=False)
+        app(argv, prog_name="svev")
+    except SystemExit as end:  # --help, a wrong option, or a command that ends with a code of its own
+        return end.code if isinstance(end.code, int) else 1
     except SvevError as error:
         code, line = error.exit_code, str(error)
-    except click.exceptions.Abort:
-        code, line = 130, "interrupted"
-    except KeyboardInterrupt:
-        code, line = 130, "interrupted"
-    except click.ClickException as error:
-        code, line = error.exit_code, f"{error.format_message()} See: svev --help"
     except BrokenPipeError:
         # Whoever read our output went away; there is nobody left to tell.
         sys.stderr.close()
         return 1
     else:
-        return result if isinstance(result, int) else 0
+        return 0
     if debug:
         traceback.print_exc()
     console.complain(line)

@@ -1,0 +1,107 @@
+"""What goes wrong on the simulated hill: the kinds of fault, one fault, and one camera's plan of faults.
+
+Pulses are counted from 0 here: the hill's own pulse index (`simrig.pulse_train`), not the number of a recording.
+"""
+
+import threading
+from collections.abc import Iterable
+from enum import StrEnum
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from rig.errors import BadInputError
+
+
+class FaultKind(StrEnum):
+    """What goes wrong. The first five befall single frames, the last three the camera for a while."""
+
+    MISSED_PULSE = "missed_pulse"  #: the camera does not see the pulse: no frame, no frame id, no trigger count
+    LOST_FRAME = "lost_frame"  #: taken and counted, but none of its packets arrives, nor does a resend
+    LOST_PACKETS = "lost_packets"  #: the named packets do not arrive
+    LOST_LEADER = "lost_leader"  #: the packet that opens the frame does not arrive
+    DAMAGED_FRAME = "damaged_frame"  #: arrives, but the camera says that it is not whole
+    FROZEN = "frozen"  #: answers nothing and sends nothing for a while, then goes on
+    RESTART = "restart"  #: the camera dies and comes back with default settings
+    SLOW_LINK = "slow_link"  #: the cable carries only so many Mbit/s for a while
+
+
+LASTING = frozenset({FaultKind.FROZEN, FaultKind.RESTART, FaultKind.SLOW_LINK})
+
+
+class Fault(BaseModel):
+    """One fault of one camera. Strict: a field that the kind has no use for is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: FaultKind
+    camera: str = Field(min_length=1, description="name of the camera")
+    at_pulse: int | None = Field(None, ge=0, description="hill pulse, counted from 0; none: the next one")
+    count: int = Field(1, ge=1, description="so many pulses in a row")
+    packets: tuple[int, ...] = Field((), description="lost_packets: packet numbers, 1 = first one with pixels")
+    resend: bool = Field(True, description="lost_packets, lost_leader: whether the camera resends them when asked")
+    duration_s: float | None = Field(None, gt=0, le=3600, description="frozen, restart, slow_link: how long")
+    mbit_s: float | None = Field(None, gt=0, description="slow_link: what is left of the link")
+
+    @model_validator(mode="after")
+    def _fields_fit_kind(self) -> "Fault":
+        kind = self.kind
+        needed = {
+            "packets": (bool(self.packets), kind is FaultKind.LOST_PACKETS),
+            "duration_s": (self.duration_s is not None, kind in LASTING),
+            "mbit_s": (self.mbit_s is not None, kind is FaultKind.SLOW_LINK),
+        }
+        for key, (given, wanted) in needed.items():
+            if given != wanted:
+                raise ValueError(
+                    f'fault "{kind}" ' + (f"needs {key}: add it" if wanted else f"has no {key}: remove it")
+                )
+        if kind in LASTING and self.count != 1:
+            raise ValueError(f'fault "{kind}" lasts for duration_s: remove count')
+        if any(packet < 1 for packet in self.packets):
+            raise ValueError("packets are counted from 1; use lost_leader for packet 0")
+        return self
+
+    @property
+    def duration_ns(self) -> int:
+        """How long a lasting fault lasts, ns; 0 for the others."""
+        return round((self.duration_s or 0.0) * 1e9)
+
+    def hits(self, pulse: int) -> bool:
+        """Whether this fault befalls hill pulse `pulse`; never before `at_pulse` is known."""
+        return self.at_pulse is not None and self.at_pulse <= pulse < self.at_pulse + self.count
+
+
+class FaultPlan:
+    """The faults that still await one camera. Any thread may inject while another takes."""
+
+    def __init__(self, faults: Iterable[Fault] = ()) -> None:
+        self._lock = threading.Lock()
+        self._pending: list[Fault] = list(faults)
+        self._latest = -1
+
+    def inject(self, fault: Fault) -> None:
+        """Add a fault while the camera runs; `at_pulse` None means the next pulse.
+
+        Raises:
+            BadInputError: its pulses are all past already.
+        """
+        with self._lock:
+            if fault.at_pulse is not None and fault.at_pulse + fault.count - 1 <= self._latest:
+                raise BadInputError(
+                    f"fault {fault.kind} at pulse {fault.at_pulse}: pulse {self._latest} is past; name a later one"
+                )
+            self._pending.append(fault)
+
+    def take(self, pulse: int) -> tuple[Fault, ...]:
+        """The faults that befall hill pulse `pulse`; to be called once per pulse, in ascending order.
+
+        A fault whose pulses went by without a call (the camera was off) is forgotten.
+        """
+        if not self._pending:  # the common case costs no lock
+            self._latest = pulse
+            return ()
+        with self._lock:
+            self._latest = pulse
+            due = [f.model_copy(update={"at_pulse": pulse}) if f.at_pulse is None else f for f in self._pending]
+            self._pending = [f for f in due if f.at_pulse is not None and f.at_pulse + f.count - 1 > pulse]
+            return tuple(f for f in due if f.hits(pulse))

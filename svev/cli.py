@@ -52,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output went away; there is nobody left to tell.
         sys.stderr.close()
         return 1
+    except OSError as error:
+        code, line = 2, f"{error.filename or 'system call'}: {error.strerror}; check the path and its permissions"
     else:
         return 0
     if debug:

@@ -1,0 +1,81 @@
+# Svev. `make demo` and `make test` do all their own set-up on a fresh Debian 12; the second time it takes no time.
+# ARGS goes to the program behind the target:  make test ARGS="tests/rig -x"   make demo ARGS="--seconds 5"
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+.PHONY: help demo run bench test check style wheel lock clean setup system
+
+ARGS ?=
+BIN := .venv/bin
+# pip: quiet, errors stay visible; locked versions with hashes, nothing else.
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
+VENV := .venv/.setup-venv
+LOCKED := .venv/.setup-locked
+SVEV := .venv/.setup-svev
+NPM_LOCK := $(wildcard tests/recorder/npm/package-lock.json)
+NPM := $(if $(NPM_LOCK),tests/recorder/npm/node_modules/.setup-npm)
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' Makefile
+
+demo: setup ## the main job on the simulated hill: three GigE Vision cameras, one jump, a log and a contact sheet
+	@$(BIN)/svev demo $(ARGS)
+
+run: setup ## ten seconds of the demo (`svev serve` will stand here once it exists)
+	@$(BIN)/svev demo --seconds 10 $(ARGS)
+
+bench: setup ## the benchmarks, side by side with GStreamer
+	@$(BIN)/svev bench $(ARGS)
+
+test: setup $(NPM) ## all tests
+	@$(BIN)/pytest -n 2 $(ARGS)
+
+check: style test ## what CI does before it tries the wheel: format, lint, types, layers, tests
+
+style: setup
+	@$(BIN)/ruff format --check --quiet . || { echo "format: run .venv/bin/ruff format ." >&2; exit 1; }
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+wheel: setup ## build a wheel and try it in an empty environment outside the checkout
+	@.ci/try-wheel
+
+lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
+	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install --quiet uv; }
+	@build/uv/bin/uv pip compile pyproject.toml --group dev --python-version 3.11 --quiet --generate-hashes \
+	  --no-emit-index-url --no-header --no-annotate --output-file requirements.lock $(ARGS)
+
+clean: ## remove everything that make made; recordings stay
+	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf tests/recorder/npm/node_modules
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Set-up. A stamp is made when its step is done, so an interrupted step starts over.
+setup: $(SVEV)
+
+system:
+	@.ci/system-packages
+
+$(VENV): | system
+	@echo "setting up .venv from the distribution's Python"
+	@/usr/bin/python3 -m venv --clear --system-site-packages .venv
+	@touch $@
+
+$(LOCKED): requirements.lock $(VENV)
+	@echo "installing the locked packages"
+	@$(PIP) install --quiet --require-hashes -r requirements.lock
+	@touch $@
+
+$(SVEV): pyproject.toml $(LOCKED) | system
+	@$(PIP) install --quiet --no-deps --no-build-isolation -e .
+	@touch $@
+
+ifneq ($(NPM),)
+$(NPM): $(NPM_LOCK) | system
+	@echo "installing the npm packages of the tests"
+	@npm ci --prefix $(dir $(NPM_LOCK)) --no-audit --no-fund --loglevel=error
+	@touch $@
+endif

@@ -83,8 +83,10 @@ class NetworkSettings(_Strict):
         le=65500,
         description="GigE Vision packet size in bytes, IP header included; at most the MTU",
     )
-    packet_socket: Literal["auto", "on", "off"] = Field(
-        "auto", description="receive through a packet socket: cheaper at high rates, needs CAP_NET_RAW"
+    packet_socket: Literal["auto", "off"] = Field(
+        "auto",
+        description="auto: receive through a packet socket where permitted (CAP_NET_RAW), much cheaper at high rates; "
+        "off: plain sockets, a few ms sooner at low rates",
     )
     resend: bool = Field(True, description="ask the camera again for lost packets")
 

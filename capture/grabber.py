@@ -1,0 +1,122 @@
+"""The grabber's loop: one camera, its ring, and nothing else.
+
+It opens the camera, reads its clock against the host's, and queues one record per arrival. When the camera fails,
+or the recorder asks for it because the camera fell silent, it tears the camera down, sets it up from scratch and
+begins a new epoch; it never gives up and never blocks the other cameras.
+"""
+
+import os
+import select
+from collections.abc import Callable
+from typing import Final
+
+from capture.seam import Arrival, Camera, OpenCamera
+from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now
+from rig.errors import CameraError, CameraNotFoundError
+from rig.frame import NO_SLOT, Record, RecordKind
+from rig.ring import CameraRing
+
+_LATCHES_AT_START: Final = 16
+_LATCH_EVERY_NS: Final = NS_PER_S // 4
+_COUNT_EVERY_NS: Final = NS_PER_S
+_RECEIVE_S: Final = 0.05
+_RETRY_S: Final = 0.5
+
+
+class Grabber:
+    """Drives one camera until told to stop.
+
+    Args:
+        open_camera: connects and configures the camera from scratch.
+        ring: where frames and records go; the only writer.
+        doorbell: eventfd that wakes the recorder.
+        stopping: tells whether the loop shall end; asked at least every 50 ms while the camera answers.
+        stop_fd: becomes readable when `stopping` may have changed, so that waiting for a retry ends at once.
+    """
+
+    def __init__(
+        self, open_camera: OpenCamera, ring: CameraRing, doorbell: int, stopping: Callable[[], bool], stop_fd: int
+    ) -> None:
+        self._open, self._ring, self._doorbell = open_camera, ring, doorbell
+        self._stopping, self._stop_fd = stopping, stop_fd
+        self._epoch = 0
+        self._frames = self._damaged = 0
+        self._last_failure = ""
+
+    def run(self) -> None:
+        """Grab until told to stop."""
+        self._ring.reclaim()
+        while not self._stopping():
+            try:
+                camera = self._open()
+            except (CameraError, CameraNotFoundError) as error:
+                self._report_failure(str(error))
+                select.select([self._stop_fd], [], [], _RETRY_S)
+                continue
+            try:
+                self._stream(camera)
+            except CameraError as error:
+                self._report_failure(str(error))
+            finally:
+                camera.close()
+
+    def _stream(self, camera: Camera) -> None:
+        """One epoch: from a fresh connection to its end."""
+        self._epoch += 1
+        self._last_failure = ""
+        asked = self._ring.reconnect_requests()
+        self._put(RecordKind.CONNECTED, text=camera.description)
+        for _ in range(_LATCHES_AT_START):
+            self._put_latch(camera.latch())
+        next_latch = next_count = host_now()
+        while not self._stopping():
+            if self._ring.reconnect_requests() != asked:
+                raise CameraError("no frame while the other cameras have theirs; connecting again")
+            arrival = camera.receive(_RECEIVE_S)
+            if arrival is not None:
+                self._put_arrival(arrival)
+            # Clock and counters are read just after a frame, when the next one is farthest away.
+            now = host_now()
+            if now >= next_latch:
+                self._put_latch(camera.latch())
+                next_latch = HostNs(now + _LATCH_EVERY_NS)
+            elif now >= next_count:
+                self._count(camera)
+                next_count = HostNs(now + _COUNT_EVERY_NS)
+
+    def _put_arrival(self, arrival: Arrival) -> None:
+        if not arrival.whole:
+            self._damaged += 1
+            self._put(RecordKind.DAMAGED, host_time=arrival.host_time)
+            return
+        self._frames += 1
+        record = Record(
+            RecordKind.FRAME, self._epoch, arrival.host_time, arrival.slot, arrival.frame_id, arrival.id_modulus,
+            arrival.device_time, arrival.trigger_count,
+        )  # fmt: skip
+        self._queue(record)
+
+    def _put_latch(self, latch: ClockLatch) -> None:
+        time, device, round_trip = latch.host, latch.device, latch.round_trip_ns
+        self._queue(Record(RecordKind.LATCH, self._epoch, time, device_time=device, value=round_trip))
+
+    def _report_failure(self, reason: str) -> None:
+        """Say it once, not at every retry."""
+        if reason != self._last_failure:
+            self._put(RecordKind.DISCONNECTED, text=reason)
+        self._last_failure = reason
+
+    def _put(self, kind: RecordKind, *, text: str = "", host_time: HostNs | None = None) -> None:
+        self._queue(Record(kind, self._epoch, host_now() if host_time is None else host_time, text=text))
+
+    def _queue(self, record: Record) -> None:
+        if not self._ring.put(record) and record.slot != NO_SLOT:
+            self._ring.return_slot(record.slot)
+        os.eventfd_write(self._doorbell, 1)
+
+    def _count(self, camera: Camera) -> None:
+        self._ring.count("frames", self._frames)
+        self._ring.count("damaged", self._damaged)
+        self._ring.count("reconnects", self._epoch - 1)
+        for name, value in camera.counters().items():
+            self._ring.count(name, value)

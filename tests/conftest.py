@@ -1,0 +1,21 @@
+"""Every test runs under the watch of `tests.support.plugin`."""
+
+from tests.support.plugin import (
+    _nothing_left_behind,
+    loopback,
+    pytest_addoption,
+    pytest_collection_modifyitems,
+    pytest_runtest_makereport,
+    run_token,
+    short_path,
+)
+
+__all__ = [
+    "_nothing_left_behind",
+    "loopback",
+    "pytest_addoption",
+    "pytest_collection_modifyitems",
+    "pytest_runtest_makereport",
+    "run_token",
+    "short_path",
+]

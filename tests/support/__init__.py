@@ -1,0 +1,1 @@
+"""What the tests of all rooms share: waiting, private loopback addresses, and the watch for leftovers."""

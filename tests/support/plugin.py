@@ -1,0 +1,91 @@
+"""The fixtures of all rooms' tests, as a pytest plugin (so that they can be tested themselves)."""
+
+import os
+import shutil
+import tempfile
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support import loopback as loopback_blocks
+from tests.support import processes
+from tests.support.leaks import Leaks, Snapshot, await_nothing_left
+from tests.support.loopback import Loopback
+
+#: GLib and ZeroMQ keep a few event descriptors from their first use on.
+_SPARE_EVENTS_TEST = 2
+_SPARE_EVENTS_SESSION = 8
+
+_failed = pytest.StashKey[bool]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Options of our own."""
+    parser.addoption("--hardware", action="store_true", help="also run the tests that need real cameras")
+    parser.addoption("--leak-grace", type=float, default=2.0, help="seconds that what a test started has to go away")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without --hardware the tests that need real cameras are skipped, and say so."""
+    if config.getoption("--hardware"):
+        return
+    for item in items:
+        if item.get_closest_marker("hardware"):
+            item.add_marker(pytest.mark.skip(reason="needs real cameras; run with --hardware"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Remember whether the test itself failed: its traceback then keeps things alive that are no leak."""
+    report = yield
+    if isinstance(report, pytest.TestReport) and report.when != "teardown" and report.failed:
+        item.stash[_failed] = True
+    return report
+
+
+@pytest.fixture(scope="session", autouse=True)
+def run_token(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Marks every process that this run starts; at its end none may be left."""
+    token = uuid.uuid4().hex
+    os.environ[processes.TOKEN_VARIABLE] = token
+    before = Snapshot.take(token)
+    yield token
+    grace_s: float = request.config.getoption("--leak-grace")
+    _complain("the test session", await_nothing_left(before, token, grace_s, _SPARE_EVENTS_SESSION, all_kinds=True))
+    del os.environ[processes.TOKEN_VARIABLE]
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind(request: pytest.FixtureRequest, run_token: str) -> Iterator[None]:
+    """After every test: no process, thread, socket, file or shared memory more than before it."""
+    before = Snapshot.take(run_token)
+    yield
+    grace_s: float = request.config.getoption("--leak-grace")
+    whole = not request.node.stash.get(_failed, False)
+    _complain(request.node.name, await_nothing_left(before, run_token, grace_s, _SPARE_EVENTS_TEST, all_kinds=whole))
+
+
+def _complain(who: str, left: Leaks) -> None:
+    if not left:
+        return
+    for process in left.processes:
+        processes.end(process)
+    pytest.fail(f"{who} left behind (close or stop it in the test, best in a with block):\n{left}", pytrace=False)
+
+
+@pytest.fixture(scope="session")
+def loopback(worker_id: str) -> Iterator[Loopback]:
+    """This worker's own block of loopback addresses."""
+    number = 0 if worker_id == "master" else int(worker_id.removeprefix("gw"))
+    with loopback_blocks.claim(number) as block:
+        yield block
+
+
+@pytest.fixture
+def short_path() -> Iterator[Path]:
+    """A folder with a short path: a Unix socket's has at most 107 characters."""
+    folder = Path(tempfile.mkdtemp(prefix="svev"))
+    yield folder
+    shutil.rmtree(folder)

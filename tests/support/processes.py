@@ -1,0 +1,87 @@
+"""Finds the processes that this test process started, by /proc: children, their children, and orphans.
+
+An orphan (its parent was killed) is no longer a descendant. It is known by a token in its environment, which every
+process inherits from the test process that started it.
+"""
+
+import os
+import signal
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+TOKEN_VARIABLE = "SVEV_TEST_TOKEN"  # noqa: S105 - marks processes, guards nothing
+
+#: Lives as long as the interpreter once anything of multiprocessing was used, and ends with it.
+_RESOURCE_TRACKER = "multiprocessing.resource_tracker"
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """One process; `started` (clock ticks since boot) tells it from a later one with the same pid."""
+
+    pid: int
+    parent: int
+    started: int
+    state: str
+    command: str
+
+    def __str__(self) -> str:
+        """For people."""
+        if self.state == "Z":
+            return f"process {self.pid} ended but nobody waited for it: {self.command}"
+        return f"process {self.pid} still runs: {self.command}"
+
+
+def own_processes(token: str) -> frozenset[Process]:
+    """All processes below this one and all that carry `token` in their environment."""
+    everyone = {process.pid: process for entry in Path("/proc").glob("[0-9]*") if (process := _read(entry))}
+    here = os.getpid()
+    return frozenset(
+        process
+        for process in everyone.values()
+        if process.pid != here
+        and _RESOURCE_TRACKER not in process.command
+        and (_descends(process, here, everyone) or _carries(process.pid, token))
+    )
+
+
+def end(process: Process) -> None:
+    """Kill a process that a test left, so that it does not disturb the next one."""
+    now = _read(Path(f"/proc/{process.pid}"))
+    if now is None or now.started != process.started:
+        return
+    with suppress(ProcessLookupError):
+        os.kill(process.pid, signal.SIGKILL)
+    with suppress(ChildProcessError):  # an orphan or a grandchild is not ours to wait for
+        os.waitpid(process.pid, 0)
+
+
+def _read(entry: Path) -> Process | None:
+    """The process of one folder of /proc, None if it has just gone."""
+    try:
+        stat = (entry / "stat").read_text()
+        command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+    except OSError:
+        return None
+    # The name stands in parentheses and may hold anything, a closing parenthesis included.
+    name, fields = stat[stat.index("(") + 1 : stat.rindex(")")], stat[stat.rindex(")") + 2 :].split()
+    return Process(int(entry.name), int(fields[1]), int(fields[19]), fields[0], command or f"[{name}]")
+
+
+def _descends(process: Process, ancestor: int, everyone: dict[int, Process]) -> bool:
+    seen = set()
+    current: Process | None = process
+    while current is not None and current.pid not in seen:
+        if current.parent == ancestor:
+            return True
+        seen.add(current.pid)
+        current = everyone.get(current.parent)
+    return False
+
+
+def _carries(pid: int, token: str) -> bool:
+    try:
+        return f"{TOKEN_VARIABLE}={token}".encode() in Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return False

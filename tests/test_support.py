@@ -1,0 +1,163 @@
+"""The watch over the tests is watched itself: tests that leak on purpose are caught, and the culprit is named."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support import loopback as loopback_blocks
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+ROOT = Path(__file__).resolve().parent.parent
+
+LEAKING = """
+import os, socket, subprocess, sys, threading
+from pathlib import Path
+import pytest, zmq
+
+kept = []
+SLEEP = [sys.executable, "-c", "import time; time.sleep(60)"]
+
+def test_child():
+    kept.append(subprocess.Popen(SLEEP))
+
+def test_zombie():
+    child = subprocess.Popen([sys.executable, "-c", ""], stdout=subprocess.PIPE)
+    child.stdout.read()
+    child.stdout.close()
+    kept.append(child)
+
+def test_orphan():
+    # The middle process is gone at once, so its child has another parent than us.
+    middle = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])"
+    subprocess.run([sys.executable, "-c", middle], check=True)
+
+def test_thread():
+    event = threading.Event()
+    kept.append(event)
+    threading.Thread(target=event.wait, name="forgotten", daemon=True).start()
+
+def test_context():
+    context = zmq.Context()
+    context.socket(zmq.PUB).close()
+    kept.append(context)
+
+def test_listening():
+    server = socket.socket()
+    server.bind(("127.0.0.1", 0))
+    server.listen()
+    kept.append(server)
+
+def test_memory():
+    path = Path(f"/dev/shm/svev-leak-{os.getpid()}")
+    path.touch()
+    kept.append(path)
+
+def test_memfd():
+    kept.append(os.memfd_create("ring"))
+
+def test_file(tmp_path):
+    kept.append((tmp_path / "log").open("wb"))
+
+def test_events():
+    kept.extend(os.eventfd(0) for _ in range(3))
+
+def test_failure_is_not_drowned_in_complaints():
+    server = socket.socket()
+    kept.append(server)
+    raise ValueError("the test's own failure")
+
+def test_clean():
+    with zmq.Context() as context, context.socket(zmq.PUB) as publisher:
+        publisher.bind("tcp://127.0.0.1:0")
+    subprocess.run([sys.executable, "-c", ""], check=True)
+
+def teardown_module():
+    for thing in kept:
+        if isinstance(thing, Path):
+            thing.unlink()
+"""
+
+CULPRITS = {
+    "test_child": r"process \d+ still runs: .*time\.sleep\(60\)",
+    "test_zombie": r"process \d+ ended but nobody waited for it",
+    "test_orphan": r"process \d+ still runs: .*time\.sleep\(60\)",
+    "test_thread": r"thread still runs: forgotten",
+    "test_context": r"library thread still runs: ZMQbg",
+    "test_listening": r"socket still open: tcp 127\.0\.0\.1:\d+ listening",
+    "test_memory": r"shared memory still there: /dev/shm/svev-leak-\d+",
+    "test_memfd": r"file still open: /memfd:ring",
+    "test_file": r"file still open: .*/log",
+    "test_events": r"file still open: anon_inode:\[eventfd\]",
+}
+
+
+def _pytest(folder: Path, source: str, *options: str) -> str:
+    (folder / "test_inner.py").write_text(source)
+    command = [
+        sys.executable, "-m", "pytest", "-p", "tests.support.plugin", "-p", "no:cacheprovider", "-p", "no:xdist",
+        "--leak-grace", "0.2", "--rootdir", str(folder), "-c", "/dev/null", "-rs", *options, str(folder),
+    ]  # fmt: skip
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return _pytest(tmp_path_factory.mktemp("leaking"), LEAKING)
+
+
+@pytest.mark.parametrize(("test", "culprit"), CULPRITS.items())
+def test_what_a_test_leaves_behind_is_named(report: str, test: str, culprit: str) -> None:
+    part = re.search(rf"ERROR at teardown of {test} _+\n(.*?)(?=\n_{{3,}}|\n={{3,}})", report, re.DOTALL)
+    assert part, report
+    assert f"{test} left behind" in part[1]
+    assert re.search(culprit, part[1])
+
+
+def test_clean_tests_and_failed_tests_get_no_complaint(report: str) -> None:
+    assert "test_clean left behind" not in report
+    assert "the test's own failure" in report
+    assert "teardown of test_failure" not in report
+    # The session's own check complains once more, in the last test's teardown, about what the tests kept.
+    assert f"1 failed, {len(CULPRITS) + 1} passed, {len(CULPRITS) + 1} errors" in report
+
+
+def test_a_session_fixture_that_leaks_is_caught(tmp_path: Path) -> None:
+    source = """
+import subprocess, sys
+import pytest
+
+@pytest.fixture(scope="session")
+def camera():
+    return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+
+def test_it(camera):
+    assert camera.poll() is None
+"""
+    assert re.search(r"the test session left behind.*\n.*process \d+ still runs", _pytest(tmp_path, source))
+
+
+def test_hardware_tests_run_only_when_asked_for(tmp_path: Path) -> None:
+    source = "import pytest\n\n@pytest.mark.hardware\ndef test_camera(): pass\n"
+    assert "needs real cameras; run with --hardware" in _pytest(tmp_path, source)
+    assert "1 passed" in _pytest(tmp_path, source, "--hardware")
+
+
+def test_two_runs_at_once_get_different_addresses(loopback: Loopback) -> None:
+    worker = int(loopback.block.split(".")[1]) - 10
+    with loopback_blocks.claim(worker) as other:
+        assert other.block != loopback.block
+        assert not set(other.cameras(3)) & set(loopback.cameras(3))
+
+
+def test_what_does_not_come_true_is_named() -> None:
+    with pytest.raises(AssertionError, match=r"after 0.05 s still not so: the camera is back"):
+        wait_until(lambda: False, "the camera is back", timeout_s=0.05)
+
+
+def test_a_short_path_is_short(short_path: Path) -> None:
+    assert len(str(short_path / "publish.sock")) < 60

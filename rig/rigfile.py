@@ -35,7 +35,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
     except tomllib.TOMLDecodeError as error:
-        raise BadInputError(f"{path}: not valid TOML: {error}; correct that line") from None
+        raise BadInputError(f"{path}: not valid TOML: {error}; correct it there") from None
 
 
 def validate(model: type[Model], data: dict[str, Any], source: Path | str) -> Model:

@@ -34,6 +34,10 @@ class ChildContext:
             self._stop = any(m.get("command") == "quit" for m in self.control.receive(0)) or self.control.ended
         return self._stop
 
+    def terminated(self) -> bool:
+        """Whether the process got SIGTERM. For a main loop that reads the control channel itself."""
+        return self._stop
+
     def ask_to_stop(self, *_: object) -> None:
         """Signal handler."""
         self._stop = True

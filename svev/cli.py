@@ -46,17 +46,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         app(argv, prog_name="svev")
     except SystemExit as end:  # --help, a wrong option, or a command that ends with a code of its own
         return end.code if isinstance(end.code, int) else 1
-    except SvevError as error:
-        code, line = error.exit_code, str(error)
     except BrokenPipeError:
         # Whoever read our output went away; there is nobody left to tell.
         sys.stderr.close()
         return 1
-    except OSError as error:
-        code, line = 2, f"{error.filename or 'system call'}: {error.strerror}; check the path and its permissions"
-    else:
-        return 0
-    if debug:
-        traceback.print_exc()
-    console.complain(line)
-    return code
+    except (SvevError, OSError) as error:
+        if debug:
+            traceback.print_exc()
+        console.complain(_one_line(error))
+        return error.exit_code if isinstance(error, SvevError) else 2
+    return 0
+
+
+def _one_line(error: SvevError | OSError) -> str:
+    """The error for people: what is wrong and what to do."""
+    if isinstance(error, SvevError):
+        return str(error)
+    return f"{error.filename or 'system call'}: {error.strerror}; check the path and its permissions"

@@ -1,0 +1,77 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer.main
+from typer.core import TyperGroup
+
+from rig.rigfile import rig_schema
+from svev import cli
+
+
+def _commands() -> list[str]:
+    group = typer.main.get_command(cli.app)
+    assert isinstance(group, TyperGroup)
+    return sorted(group.commands)
+
+
+def _run(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "svev", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("command", _commands())
+def test_every_command_explains_itself_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([command, "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "Example" in text
+    assert f"svev {command}" in text.split("Example")[1]
+
+
+def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--help"]) == 0
+    listed = capsys.readouterr().out
+    assert all(f"\n  {command} " in listed for command in _commands())
+
+
+def test_schema_is_the_rig_files_schema(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert cli.main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(rig_schema())
+    assert cli.main(["schema", "-o", str(tmp_path / "schema.json")]) == 0
+    assert (tmp_path / "schema.json").read_text() == rig_schema()
+
+
+@pytest.mark.parametrize("arguments", [["nonsense"], ["schema", "--nonsense"], ["schema", "-o"], ["schema", "extra"]])
+def test_wrong_usage_ends_with_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(arguments) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_path_that_fails_is_one_line(tmp_path: Path) -> None:
+    done = _run("schema", "-o", str(tmp_path / "none" / "schema.json"))
+    assert done.returncode == 2
+    assert done.stdout == ""
+    path = tmp_path / "none" / "schema.json"
+    assert done.stderr == f"svev: {path}: No such file or directory; check the path and its permissions\n"
+
+
+def test_debug_shows_where_it_went_wrong(tmp_path: Path) -> None:
+    done = _run("schema", "--debug", "-o", str(tmp_path / "none" / "schema.json"))
+    assert done.returncode == 2
+    assert "Traceback" in done.stderr
+    assert "FileNotFoundError" in done.stderr
+
+
+def test_a_reader_that_goes_away_is_no_crash() -> None:
+    # The pipe's reading end is closed before anything is written.
+    with subprocess.Popen(
+        [sys.executable, "-m", "svev", "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        errors = process.stderr.read()
+        assert process.wait(timeout=60) == 1
+    assert errors == ""

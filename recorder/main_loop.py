@@ -38,9 +38,7 @@ class RecorderLoop:
         control: channel to the service process.
     """
 
-    def __init__(
-        self, rig: RigSettings, rings: Sequence[CameraRing], doorbell: int, control: ControlChannel
-    ) -> None:
+    def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], doorbell: int, control: ControlChannel) -> None:
         self._rig, self._rings, self._doorbell, self._control = rig, rings, doorbell, control
         count = max(_LEAST_TRIPLETS, round(rig.recorder.triplets_s * rig.trigger.rate_hz))
         self._buffers = TripletBuffers(rig.triplet_shape, count)
@@ -98,10 +96,10 @@ class RecorderLoop:
         if slot is not None and pulse.cargo is None:
             self._buffers.pixels(slot).fill(0)
         tag = recording.tag(pulse)
-        if slot is not None:
-            self._publisher.triplet(tag.encode(), self._buffers, slot)
+        encoded = tag.encode()
+        self._publisher.triplet(encoded, self._buffers, slot)
         try:
-            recording.write(tag, slot)
+            recording.write(tag, slot, encoded)
         except SvevError as error:
             self._fail(error)
 
@@ -208,5 +206,5 @@ class RecorderLoop:
             deadlines.append(HostNs(now + NS_PER_S // 1000))
         return max(0.0, (min(deadlines) - now) / 1e6)
 
-    def _report(self, report: str, **content: Any) -> None:  # noqa: ANN401
+    def _report(self, report: str, **content: Any) -> None:
         self._control.send({"report": report, **content})

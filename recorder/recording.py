@@ -59,9 +59,7 @@ class Tally:
 class Recording:
     """Writes the pulses from `begin` on into one log, numbered from 1."""
 
-    def __init__(
-        self, order: RecordingOrder, rig: RigSettings, assembler: Assembler, buffers: TripletBuffers
-    ) -> None:
+    def __init__(self, order: RecordingOrder, rig: RigSettings, assembler: Assembler, buffers: TripletBuffers) -> None:
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
         self._anchor = UtcAnchor.take()
         self._begin = host_now()
@@ -110,16 +108,16 @@ class Recording:
             self.tally.pulses + 1, self._anchor.utc(pulse.time), session, self._order.recording, self._shape, cameras
         )  # fmt: skip
 
-    def write(self, tag: TripletTag, slot: int | None) -> None:
+    def write(self, tag: TripletTag, slot: int | None, encoded: bytes) -> None:
         """Write one pulse; the log holds the buffer until it is on disk."""
         self.tally.pulses += 1
         self.tally.complete += tag.complete
         self.tally.causes.update(camera.status for camera in tag.cameras if camera.status is not FrameStatus.OK)
         ready = self._anchor.utc(host_now())
         if slot is None:
-            self.log.write_tag_only(tag, pulse_time=tag.time, log_time=ready)
+            self.log.write_tag_only(tag, pulse_time=tag.time, log_time=ready, encoded=encoded)
         else:
-            self.log.write_triplet(slot, tag, pulse_time=tag.time, log_time=ready)
+            self.log.write_triplet(slot, tag, pulse_time=tag.time, log_time=ready, encoded=encoded)
 
     def event(self, level: str, message: str, source: str = "recorder") -> None:
         """Write one event."""

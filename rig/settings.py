@@ -69,7 +69,7 @@ class RecorderSettings(_Strict):
 
     directory: Path = Field(Path("recordings"), description="relative to the working directory")
     ring_s: float = Field(2.0, gt=0, le=60, description="each camera's ring in shared memory, seconds of frames")
-    triplets_s: float = Field(1.0, gt=0, le=60, description="triplets waiting for the disk, seconds")
+    triplets_s: float = Field(2.0, gt=0, le=60, description="triplets waiting for the disk, seconds")
     reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
 
 

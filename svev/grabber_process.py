@@ -22,9 +22,9 @@ def _opener(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> Op
 
     def open_sim() -> Camera:
         from capture.sim_camera import SimCamera  # noqa: PLC0415
-        from svev.sim_scene import sim_scene  # noqa: PLC0415
+        from svev.sim_scene import SimScene  # noqa: PLC0415
 
-        return SimCamera(settings, ring, sim_scene(rig, index, epoch))
+        return SimCamera(settings, ring, SimScene(rig, index, epoch))
 
     match settings.backend:
         case "aravis":

@@ -36,10 +36,15 @@ class ProcessSpec:
 
 
 class Child:
-    """A started row."""
+    """A started row.
+
+    Attributes:
+        started: when, on the host's monotonic clock, s.
+    """
 
     def __init__(self, spec: ProcessSpec) -> None:
         self.spec = spec
+        self.started = time.monotonic()
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(

@@ -59,7 +59,9 @@ def run_recording(
 def _stop_signals() -> Iterator[Callable[[], bool]]:
     """Within, Ctrl-C and SIGTERM only set a flag, so that the log is finished properly."""
     caught: list[int] = []
-    before = {number: signal.signal(number, lambda n, _: caught.append(n)) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {
+        number: signal.signal(number, lambda n, _: caught.append(n)) for number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield lambda: bool(caught)
     finally:

@@ -29,9 +29,10 @@ from rig.errors import (
 )
 from rig.ring import MAX_SLOTS, CameraRing
 from rig.settings import RigSettings
-from svev.process_table import ProcessSpec, ProcessTable
+from svev.process_table import Child, ProcessSpec, ProcessTable
 
 _START_S: Final = 20.0
+_RESTART_S: Final = 1.0
 _LEAST_SLOTS: Final = 16
 _ERRORS: Final[Mapping[str, type[SvevError]]] = {
     kind.__name__: kind for kind in (BadInputError, CameraError, LogDamagedError, StorageError)
@@ -61,6 +62,7 @@ class RunningRig:
         self._present = [False] * len(rig.cameras)
         self._reasons = [""] * len(rig.cameras)
         self._warm = False
+        self._mourned: list[Child] = []
         self._path: Path | None = None
         self.health: Message = {}
 
@@ -190,17 +192,22 @@ class RunningRig:
         self._on_event(f"{name} {'connected' if message['present'] else 'gone'}: {message['text']}")
 
     def _tend_processes(self) -> None:
-        """Start dead grabbers again; a dead recorder ends everything."""
+        """Start dead grabbers again, each at most once a second; a dead recorder ends everything."""
         names = [camera.name for camera in self._rig.cameras]
         for child in self._processes.dead():
             name, ending = child.spec.name, child.ending()
             if name == RECORDER:
                 kept = f"; the log until then is readable: svev verify {self._path}" if self._path else ""
                 raise ProcessDiedError(f"the recorder process ended ({ending}){kept}; then start again")
-            self._on_event(f"the grabber process of {name} ended ({ending}); starting it again")
-            gone = {"command": "camera_gone", "camera": names.index(name), "reason": f"grabber process ended ({ending})"}
-            self._processes[RECORDER].control.send(gone)
-            self._start_grabber(names.index(name))
+            index = names.index(name)
+            if child not in self._mourned:
+                self._mourned.append(child)
+                self._on_event(f"the grabber process of {name} ended ({ending}); starting it again")
+                reason = f"grabber process ended ({ending})"
+                self._processes[RECORDER].control.send({"command": "camera_gone", "camera": index, "reason": reason})
+            if time.monotonic() >= child.started + _RESTART_S:
+                self._mourned.remove(child)
+                self._start_grabber(index)
 
     def _raise_absent(self) -> None:
         absent = [i for i, present in enumerate(self._present) if not present]

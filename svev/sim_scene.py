@@ -34,9 +34,7 @@ class SimScene:
         settings = rig.cameras[index]
         camera = scenario.camera_index(settings.name)
         self._train = PulseTrain(epoch, rig.trigger.rate_hz, scenario.pauses)
-        self._view = CameraView(
-            scenario, camera, settings.region.width, settings.region.height, rig.trigger.rate_hz
-        )
+        self._view = CameraView(scenario, camera, settings.region.width, settings.region.height, rig.trigger.rate_hz)
         self._clock = DeviceClock(scenario, camera, epoch)
         self._plan = FaultPlan(scenario.faults_of(settings.name))
         self._dark_until = HostNs(0)

@@ -3,10 +3,11 @@
 import ipaddress
 from contextlib import AbstractContextManager, nullcontext
 
+from simrig.simulated_hill import SimulatedHill
+
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.settings import CameraSettings, RigSettings
-from simrig.simulated_hill import SimulatedHill
 
 
 def simulated_hill(rig: RigSettings, epoch: HostNs, **options: int) -> AbstractContextManager[SimulatedHill | None]:

@@ -62,6 +62,8 @@ def _aside(line: str) -> None:
 
 def _print_result(result: Message) -> None:
     causes = ", ".join(f"{count} {cause}" for cause, count in result["causes"].items() if count)
-    console.say(f"{result['pulses']} pulses, {result['complete']} complete" + (f" (frames: {causes})" if causes else ""))
+    console.say(
+        f"{result['pulses']} pulses, {result['complete']} complete" + (f" (frames: {causes})" if causes else "")
+    )
     console.say(f"{result['bytes'] / 1e6:.1f} MB in {result['log']}")
     console.say(f"check it: svev verify {result['log']}")

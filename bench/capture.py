@@ -1,0 +1,90 @@
+"""Receive, pair, compose, checksum, index, publish and write: what it costs beside GStreamer's plain receiving.
+
+The simulated cameras are the same for all, and are not counted.
+"""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from simrig.simulated_hill import SimulatedHill
+
+from bench.gstreamer import SINKS, run_gstreamer
+from bench.loads import PRERENDERED, Load
+from bench.processes import cpu_seconds
+from rig.clocks import host_now
+from svev.process_table import ProcessSpec, ProcessTable
+from svev.recording_run import new_log_path
+from svev.running_rig import RunningRig
+from svev.simulation import simulated_hill
+
+_SUBSCRIBER_S = 10.0
+
+
+def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> dict[str, Any]:
+    """Svev beside `! fakesink` and `! filesink` under one load.
+
+    Returns:
+        Figures of each, and the ratios of CPU-seconds per GB.
+    """
+    rig = load.rig(directory, publish)
+    epoch = host_now()
+    options = {"prerendered": PRERENDERED, "link_mbit_s": load.link_mbit_s}
+    with simulated_hill(rig, epoch, **options) as hill:
+        assert isinstance(hill, SimulatedHill)  # noqa: S101  (the rig has a [simulation] table)
+        result: dict[str, Any] = {"load": load.name, "MB_per_s": round(load.bytes_per_s / 1e6, 1), "seconds": seconds}
+        result["svev"] = _record(load, seconds, directory, publish, subscribe=False)
+        result["svev, one subscriber"] = _record(load, seconds, directory, publish, subscribe=True)
+        for sink in SINKS:
+            result[sink] = run_gstreamer(load, rig, sink, seconds, directory)
+    ours = result["svev"]["cpu_s_per_GB"]
+    result["ratios"] = {f"svev / {sink}": round(ours / result[sink]["cpu_s_per_GB"], 3) for sink in SINKS}
+    return result
+
+
+def _record(load: Load, seconds: float, directory: Path, publish: str, *, subscribe: bool) -> dict[str, Any]:
+    """One recording; the log is removed afterwards."""
+    rig = load.rig(directory, publish)
+    path = new_log_path(directory)
+    pulses = round(seconds * load.rate_hz)
+    subscriber = ProcessTable()
+    try:
+        with RunningRig(rig, "", lambda _: None) as running:
+            running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+            if subscribe:
+                subscriber.start(ProcessSpec("subscriber", "svev.subscriber_process", {"address": publish}))
+                _await_report(subscriber, "ready")
+            before, began = cpu_seconds(running.pids.values()), time.monotonic()
+            running.start_recording(path, recording="bench", session={}, pulses=pulses, seconds=seconds)
+            report = running.wait_until_finished(lambda _: None, lambda: False)
+            cpu, elapsed = cpu_seconds(running.pids.values()) - before, time.monotonic() - began
+            figures = _figures(load, report, cpu, elapsed)
+            figures["slowest_write_ms"] = running.health.get("recording", {}) and running.health["recording"]
+            if subscribe:
+                subscriber["subscriber"].control.send({"command": "quit"})
+                counted = _await_report(subscriber, "counted")
+                figures |= {key: counted[key] for key in ("received", "missing", "latency_ms")}
+            return figures
+    finally:
+        subscriber.stop()
+        path.unlink(missing_ok=True)
+
+
+def _figures(load: Load, report: dict[str, Any], cpu: float, elapsed: float) -> dict[str, Any]:
+    gigabytes = report["pulses"] * load.bytes_per_s / load.rate_hz / 1e9
+    return {
+        **{key: report[key] for key in ("pulses", "complete", "causes")},
+        "GB": round(gigabytes, 3),
+        "MB_per_s": round(gigabytes * 1e3 / elapsed, 1),
+        "cpu_s": round(cpu, 2),
+        "cpu_s_per_GB": round(cpu / gigabytes, 3),
+    }
+
+
+def _await_report(table: ProcessTable, wanted: str) -> dict[str, Any]:
+    deadline = time.monotonic() + _SUBSCRIBER_S
+    while time.monotonic() < deadline:
+        for _, message in table.receive(0.1):
+            if message["report"] == wanted:
+                return message
+    raise TimeoutError(f"the subscriber did not report {wanted} within {_SUBSCRIBER_S} s")

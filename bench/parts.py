@@ -1,0 +1,67 @@
+"""Parts of the frame path on their own, each beside what the machine can do at best."""
+
+import time
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from isal.isal_zlib import crc32
+
+_SHAPE = (1216, 1936)
+_FRAMES = 24  # more than fits into the cache: memory is read cold, as in a ring
+
+
+def run_parts(seconds: float) -> list[dict[str, Any]]:
+    """Compose and checksum triplets of three 1936 x 1216 frames, each part for a fraction of `seconds`.
+
+    Returns:
+        Cases with name, value, unit, baseline and what the baseline is.
+    """
+    budget = min(2.0, seconds / 8)
+    rows, columns = _SHAPE
+    frames = np.random.default_rng(1).integers(0, 255, (_FRAMES, rows, columns), np.uint8)
+    triplets = np.zeros((_FRAMES // 3, rows, 3 * columns), np.uint8)
+    flat = np.zeros_like(frames)
+    size = rows * columns / 1e9
+
+    def compose(i: int) -> None:
+        camera = i % 3
+        np.copyto(triplets[i // 3 % len(triplets), :, camera * columns : (camera + 1) * columns], frames[i % _FRAMES])
+
+    def copy(i: int) -> None:
+        np.copyto(flat[i % _FRAMES], frames[(i + 1) % _FRAMES])
+
+    def ours_crc(i: int) -> None:
+        crc32(frames[i % _FRAMES])
+
+    def zlib_crc(i: int) -> None:
+        zlib.crc32(frames[i % _FRAMES])
+
+    return [
+        _case("compose, GB/s", size, compose, copy, "plain copy of a frame", budget),
+        _case("checksum, GB/s", size, ours_crc, zlib_crc, "zlib", budget),
+    ]
+
+
+def _case(
+    name: str,
+    amount: float,
+    ours: Callable[[int], Any],
+    theirs: Callable[[int], Any],
+    what: str,
+    budget: float,
+) -> dict[str, Any]:
+    """Amount per second of both, taken in turns so that the machine's moods hit both."""
+    rates: tuple[list[float], list[float]] = ([], [])
+    end = time.perf_counter() + budget
+    i = 0
+    while time.perf_counter() < end:
+        for kept, work in zip(rates, (ours, theirs), strict=True):
+            before = time.perf_counter()
+            for step in range(i, i + 12):
+                work(step)
+            kept.append(12 * amount / (time.perf_counter() - before))
+        i += 12
+    value, baseline = (float(np.median(kept)) for kept in rates)
+    return {"name": name, "value": round(value, 3), "baseline": round(baseline, 3), "baseline_is": what}

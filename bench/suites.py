@@ -1,0 +1,46 @@
+"""The suites of `svev bench` by name: each measures, writes its JSON, and makes a table for people."""
+
+import socket
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from bench.capture import run_capture
+from bench.gstreamer import SINKS
+from bench.loads import LOADS
+from bench.parts import run_parts
+from bench.results import write_results
+
+Suite = Callable[[float, Path], dict[str, Any]]
+
+
+def _capture(name: str, seconds: float, directory: Path) -> dict[str, Any]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        publish = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
+    result = run_capture(LOADS[name], seconds, directory, publish)
+    result["file"] = str(write_results(f"capture-{name}", [result], directory))
+    return result | {"table": _capture_table(result)}
+
+
+def _capture_table(result: dict[str, Any]) -> list[str]:
+    lines = [f"{result['MB_per_s']} MB/s for {result['seconds']:g} s", f"{'':22}{'CPU-s/GB':>9}{'MB/s':>8}  triplets"]
+    for name in ("svev", "svev, one subscriber", *SINKS):
+        case = result[name]
+        triplets = f"{case['complete']} of {case['pulses']}" if "pulses" in case else ""
+        if "latency_ms" in case:
+            latency = case["latency_ms"]
+            triplets += f"; subscriber got {case['received']}, latency {latency['median']} / {latency['p99']} ms"
+        lines.append(f"{name:22}{case['cpu_s_per_GB']:9.3f}{case['MB_per_s']:8.1f}  {triplets}")
+    return lines + [f"{name}: {ratio}" for name, ratio in result["ratios"].items()]
+
+
+def _parts(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_parts(seconds)
+    path = write_results("parts", cases, directory)
+    table = [f"{c['name']:22}{c['value']:9.2f}   {c['baseline_is']}: {c['baseline']:.2f}" for c in cases]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
+SUITES: dict[str, Suite] = {**{name: partial(_capture, name) for name in LOADS}, "parts": _parts}

@@ -1,0 +1,104 @@
+"""The main job on the simulated hill: record a few jumps, publish, count, verify, show."""
+
+import socket
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final, Literal
+
+from recorder.contact_sheet import write_contact_sheet
+from recorder.verify import verify
+
+from rig.clocks import host_now
+from rig.control import Message
+from rig.errors import BadInputError, ProcessDiedError
+from rig.rigfile import CONFIG, load_rig
+from rig.settings import RigSettings
+from svev.process_table import ProcessSpec, ProcessTable
+from svev.recording_run import new_log_path, run_recording
+from svev.running_rig import RunningRig
+from svev.simulation import simulated_hill
+from svev.truth_file import write_truth
+
+Bus = Literal["gige", "firewire", "sim"]
+
+_RIGS: Final = {"gige": "sim-gige.toml", "sim": "sim.toml"}
+_GVCP_PORT: Final = 3956
+_BLOCKS: Final = 64
+_SUBSCRIBER_S: Final = 15.0
+
+
+def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) -> Message:
+    """Record for `seconds` on the simulated hill, with a subscriber that counts.
+
+    Returns:
+        The recording's result, what the subscriber counted, the verdict, and the files made.
+    """
+    if bus == "firewire":
+        raise BadInputError("the emulated FireWire bus is not built yet: use --bus gige or --bus sim")
+    rig_file = CONFIG / "rigs" / _RIGS[bus]
+    rig = _on_free_addresses(load_rig(rig_file))
+    path = new_log_path(out)
+    epoch = host_now()
+    with ExitStack() as stack:
+        hill = stack.enter_context(simulated_hill(rig, epoch))
+        say(f"three simulated cameras{' speak GigE Vision' if hill else ''}; pulses at {rig.trigger.rate_hz:g} Hz")
+        running = stack.enter_context(RunningRig(rig, rig_file.read_text(encoding="utf-8"), say, epoch))
+        subscriber = ProcessTable()
+        stack.callback(subscriber.stop)
+        subscriber.start(ProcessSpec("subscriber", "svev.subscriber_process", {"address": rig.network.publish}))
+        _await_report(subscriber, "ready")
+        session = {"session": "demo", "athlete": "simulated jumper"}
+        result = run_recording(running, rig, path, seconds, allow_absent=False, session=session)
+        subscriber["subscriber"].control.send({"command": "quit"})
+        counted = _await_report(subscriber, "counted")
+    say("checking the log")
+    report = verify(path)
+    sheet, truth = path.with_suffix(".png"), write_truth(path, rig)
+    write_contact_sheet(path, sheet)
+    del counted["report"]
+    return result | {
+        "rate_hz": rig.trigger.rate_hz,
+        "subscriber": counted,
+        "verdict": report.verdict,
+        "contact_sheet": str(sheet),
+        "truth": str(truth),
+    }
+
+
+def _on_free_addresses(rig: RigSettings) -> RigSettings:
+    """The rig with a port of its own for publication and, if they are taken, other loopback addresses."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    network = rig.network.model_copy(update={"publish": f"tcp://127.0.0.1:{port}"})
+    for block in range(_BLOCKS):
+        addresses = [camera.address.replace("127.0.0.", f"127.0.{block}.") for camera in rig.cameras]
+        if all(_is_free(address) for address in addresses if address):
+            cameras = tuple(
+                camera.model_copy(update={"address": address})
+                for camera, address in zip(rig.cameras, addresses, strict=True)
+            )
+            return rig.model_copy(update={"cameras": cameras, "network": network})
+    raise BadInputError(f"{_BLOCKS} blocks of loopback addresses are all in use: stop the other simulated cameras")
+
+
+def _is_free(address: str) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((address, _GVCP_PORT))
+        except OSError:
+            return False
+    return True
+
+
+def _await_report(table: ProcessTable, wanted: str) -> Message:
+    deadline = time.monotonic() + _SUBSCRIBER_S
+    while time.monotonic() < deadline:
+        for _, message in table.receive(0.1):
+            if message["report"] == wanted:
+                return message
+        if table.dead():
+            break
+    raise ProcessDiedError("the subscriber process does not answer: start again")

@@ -1,0 +1,53 @@
+"""Rigs for tests: the simulated hill behind each back end, with the faults that a test asks for."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rig.rigfile import CONFIG, load_rig
+from rig.settings import RigSettings
+from tests.support.loopback import Loopback
+
+SCENARIO = CONFIG / "scenarios" / "training.toml"
+
+
+def write_rig(
+    directory: Path,
+    backend: str,
+    loopback: Loopback,
+    *,
+    faults: list[dict[str, Any]] | None = None,
+    scenario: str = "",
+    rate_hz: float = 30.0,
+    **network: Any,
+) -> Path:
+    """Write a rig file and its scenario.
+
+    Args:
+        directory: where.
+        backend: "sim" or "aravis".
+        loopback: addresses of the simulated cameras and of the publication.
+        faults: faults of the scenario, as in its TOML.
+        scenario: more TOML for the top of the scenario.
+        rate_hz: of the pulses.
+        network: more keys of the [network] table.
+    """
+    tables = "".join("\n[[faults]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in f.items()) for f in faults or [])
+    (directory / "scenario.toml").write_text(f'base = "{SCENARIO}"\nname = "test"\n{scenario}\n{tables}\n')
+    lines = ['name = "test rig"', "[trigger]", f"rate_hz = {rate_hz}", "[simulation]", 'scenario = "scenario.toml"']
+    lines += [
+        "[network]",
+        f'publish = "{loopback.endpoint()}"',
+        *(f"{k} = {json.dumps(v)}" for k, v in network.items()),
+    ]
+    for index, address in enumerate(loopback.cameras(3)):
+        lines += ["[[cameras]]", f'name = "K{index + 1}"', f'backend = "{backend}"']
+        lines += [f'address = "{address}"'] if backend == "aravis" else []
+    path = directory / "rig.toml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def make_rig(directory: Path, backend: str, loopback: Loopback, **options: Any) -> RigSettings:
+    """The rig of `write_rig`, read."""
+    return load_rig(write_rig(directory, backend, loopback, **options))

@@ -1,0 +1,156 @@
+"""What never moves: sky, forest, snow, take-off table and balls, rendered once per camera."""
+
+import math
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simrig.blob import Blob
+from simrig.canvas import Canvas
+from simrig.hill_profile import HillProfile
+from simrig.projection import Projection
+from simrig.scenario import BRIGHTEST, Scenario
+
+Array = NDArray[np.float64]
+
+PLATE = 36.0  #: radiance of the black plates behind the balls
+PLATE_MARGIN_PX = 5.0  #: of plate around the image of a ball
+_POLE = 92.0
+_NEAREST_M = 2.0
+_TABLE_END_M = -45.0
+
+
+def paint(scenario: Scenario, projection: Projection) -> NDArray[np.float32]:
+    """Radiance of the empty hill as this camera sees it, without noise; shape (h, w)."""
+    rng = np.random.default_rng((scenario.seed, 77))  # the same forest for all cameras
+    painter = _Painter(scenario, projection, rng)
+    painter.paint_land_and_forest()
+    painter.paint_table()
+    painter.paint_poles()
+    image = painter.canvas.image().astype(np.float32)
+    image += _texture(image.shape, projection.width / 640, rng)
+    image = cv2.GaussianBlur(image, (0, 0), scenario.image.blur_sigma_px).astype(np.float32)
+    _put_balls(image, scenario, projection)
+    return np.clip(image, 0, BRIGHTEST)
+
+
+class _Painter:
+    """Paints polygons of the hill from far to near."""
+
+    def __init__(self, scenario: Scenario, projection: Projection, rng: np.random.Generator) -> None:
+        self._scenario = scenario
+        self._profile = HillProfile(scenario.hill)
+        self._projection = projection
+        self._rng = rng
+        self.canvas = Canvas(_sky(projection), fine=2)
+
+    def paint_land_and_forest(self) -> None:
+        things = [(self._far(quad), quad, grey) for quad, grey in self._land()]
+        things += [(self._far(tree[:1]), tree, grey) for trees in self._trees() for tree, grey in trees]
+        for _, corners, grey in sorted(things, key=lambda thing: -thing[0]):
+            self._fill(corners, grey)
+
+    def paint_table(self) -> None:
+        """The take-off table: a wedge of boards with two tracks and a dark line at the edge."""
+        half, foot = self._scenario.hill.table_width_m / 2, float(self._profile.ground(0.0))
+        xs = np.linspace(_TABLE_END_M, 0.0, 16)
+        spans = [(a, b, float(self._profile.table(a)), float(self._profile.table(b))) for a, b in pairwise(xs)]
+        near = -half if self._projection.X0[1] < 0 else half
+        for a, b, za, zb in spans:
+            self._fill([(a, near, za), (b, near, zb), (b, near, foot), (a, near, foot)], 98.0)
+            self._fill([(a, near, za), (b, near, zb), (b, near, zb - 0.3), (a, near, za - 0.3)], 60.0)
+        if self._projection.X0[0] > 0:
+            self._fill([(0, -half, 0), (0, half, 0), (0, half, foot), (0, -half, foot)], 78.0)
+            self._fill([(0, -half, 0), (0, half, 0), (0, half, -0.12), (0, -half, -0.12)], 45.0)
+        if self._projection.X0[2] > float(self._profile.table(self._projection.X0[0])):
+            for a, b, za, zb in spans:
+                self._fill([(a, -half, za), (b, -half, zb), (b, half, zb), (a, half, za)], 168.0)
+                for y in (-0.17, 0.17):
+                    self._fill([(a, y - 0.06, za), (b, y - 0.06, zb), (b, y + 0.06, zb), (a, y + 0.06, za)], 128.0)
+
+    def paint_poles(self) -> None:
+        """A thin pole below every ball."""
+        for ball in self._scenario.balls:
+            x, y, z = ball.X
+            foot = min(float(self._profile.ground(x)), z)
+            a, b = self._projection.pixels([(x, y, z), (x, y, foot)])
+            if self._far([ball.X]) > _NEAREST_M:
+                self.canvas.capsule(a, b, 0.5, 0.5, _POLE)
+
+    def _land(self) -> list[tuple[Array, float]]:
+        """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest."""
+        xs, ys = np.arange(-60.0, 150.0, 3.0), np.arange(-27.0, 75.0, 3.0)
+        quads = []
+        for x in xs:
+            for y in ys:
+                corners = np.array(
+                    [(u, v, self._height(u, v)) for u, v in ((x, y), (x + 3, y), (x + 3, y + 3), (x, y + 3))]
+                )
+                normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
+                light = float(normal @ (-0.45, -0.2, 0.87)) / float(np.linalg.norm(normal))
+                knoll = abs(y + 1.5) < self._scenario.hill.knoll_width_m / 2 and x >= 0
+                quads.append((corners, 106 + 62 * light + (9 if knoll else self._rng.normal(0, 2.0))))
+        return quads
+
+    def _trees(self) -> list[list[tuple[Array, float]]]:
+        """Spruces in rows, the farther the mistier."""
+        trees = []
+        for y, gap, mist in ((70.0, 2.0, 128.0), (52.0, 2.2, 116.0), (38.0, 2.6, 106.0), (26.0, 4.0, 98.0)):
+            for x in np.arange(-60.0, 150.0, gap):
+                where = (x + self._rng.uniform(-1, 1), y + self._rng.uniform(-3, 3))
+                trees.append(self._spruce(*where, self._rng.uniform(7, 15), mist + self._rng.normal(0, 4)))
+        return trees
+
+    def _spruce(self, x: float, y: float, tall: float, grey: float) -> list[tuple[Array, float]]:
+        """A tree as four tiers of triangles that face the camera, each with snow on one flank."""
+        foot, right = np.array((x, y, self._height(x, y))), self._projection.R[:, 0]
+        up, tiers = np.array((0.0, 0.0, tall)), []
+        for k in range(4):
+            low, high, wide = 0.08 + 0.22 * k, min(1.0, 0.45 + 0.2 * k), 0.19 * tall * (1 - 0.2 * k)
+            left, tip = foot + low * up - wide * right, foot + high * up
+            tiers.append((np.stack((left, foot + low * up + wide * right, tip)), grey))
+            tiers.append((np.stack((left, foot + (low + 0.05) * up - 0.5 * wide * right, tip)), grey + 34))
+        return tiers
+
+    def _height(self, x: float, y: float) -> float:
+        """Height of the snow; it rises towards the forest and falls towards the cameras."""
+        beside = max(0.0, abs(y) - self._scenario.hill.knoll_width_m / 2)
+        return float(self._profile.ground(x)) + (0.12 if y > 0 else -0.05) * beside
+
+    def _far(self, corners: ArrayLike) -> float:
+        return float(np.mean(self._projection.distance(corners)))
+
+    def _fill(self, corners: ArrayLike, grey: float) -> None:
+        if np.min(self._projection.distance(corners)) > _NEAREST_M:
+            self.canvas.polygon(self._projection.pixels(corners), grey)
+
+
+def _sky(projection: Projection) -> NDArray[np.uint8]:
+    """Overcast sky, brighter towards the horizon; shape (h, w)."""
+    rows = np.linspace(158, 186, projection.height)
+    return np.repeat(np.rint(rows).astype(np.uint8)[:, None], projection.width, axis=1)
+
+
+def _texture(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Fine and coarse irregularities of snow and trees, grey values; shape (h, w)."""
+    height, width = shape
+    texture = np.zeros(shape, np.float32)
+    for sigma, strength in ((1.2, 2.2), (9.0, 3.0)):
+        field = rng.standard_normal((math.ceil(height / scale), math.ceil(width / scale))).astype(np.float32)
+        field = cv2.GaussianBlur(field, (0, 0), sigma).astype(np.float32)
+        texture += strength / field.std() * cv2.resize(field, (width, height), interpolation=cv2.INTER_LINEAR)
+    return texture
+
+
+def _put_balls(image: NDArray[np.float32], scenario: Scenario, projection: Projection) -> None:
+    """Each ball on its plate, far ones first."""
+    blur = scenario.image.blur_sigma_px
+    for ball in sorted(scenario.balls, key=lambda b: -float(projection.distance(b.X))):
+        distance = float(projection.distance(ball.X))
+        if distance > _NEAREST_M:
+            x, y = projection.pixels(ball.X)
+            radius = scenario.ball_radius_m * projection.c / distance
+            Blob(radius + PLATE_MARGIN_PX, blur).draw(image, x, y, PLATE)
+            Blob(radius, blur).draw(image, x, y, BRIGHTEST)

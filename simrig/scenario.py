@@ -1,0 +1,227 @@
+"""The scenario: one seeded TOML file is the truth for everything that the simulated hill shows and does.
+
+Frame: origin at the take-off edge, X horizontal along the flight, Z up, Y to the left (right-handed); m, s, degrees.
+Times of the jumper count from the moment in which the middle of the skis passes the edge.
+"""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from rig.errors import BadInputError
+from rig.rigfile import read_toml, validate
+from simrig.faults import Fault
+from simrig.keyframes import Keyframe
+from simrig.projection import Projection, look_at
+
+REFERENCE_WIDTH = 640  #: px; principal distances in a scenario belong to images of this width
+#: Radiance of the brightest things, grey values at gain 1 above the black level: markers, balls and skis.
+BRIGHTEST = 225.0
+
+Vector = tuple[float, float, float]
+
+
+def _ascending(keyframes: tuple[Keyframe, ...]) -> tuple[Keyframe, ...]:
+    times = [time for time, _ in keyframes]
+    if any(late <= early for early, late in pairwise(times)):
+        raise ValueError("times of keyframes must ascend: put them in order, each time once")
+    return keyframes
+
+
+Keyframes = Annotated[tuple[Keyframe, ...], Field(min_length=1), AfterValidator(_ascending)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Hill(_Strict):
+    """Profile of the hill (`simrig.hill_profile`); the defaults are those of a K120 hill."""
+
+    table_angle_deg: float = Field(11.0, ge=0, le=20, description="slope of the take-off table")
+    table_height_m: float = Field(3.0, gt=0, description="from the knoll's foot up to the edge")
+    table_width_m: float = Field(3.0, gt=0)
+    knoll_angle_deg: float = Field(6.0, ge=0, le=30, description="slope of the knoll below the edge")
+    knoll_width_m: float = Field(12.0, gt=0, description="width of the prepared snow")
+    p_x_m: float = Field(87.5, gt=20, description="horizontal distance from the edge to the P point")
+    p_z_m: float = Field(-48.0, lt=0, description="height of the P point")
+    p_angle_deg: float = Field(37.0, gt=0, le=45, description="slope at the P point")
+
+
+class Jumper(_Strict):
+    """The jumper: flight by gravity, lift and drag, posture by keyframes [time_s, value]."""
+
+    takeoff_speed_m_s: float = Field(26.0, gt=5, le=40)
+    takeoff_angle_deg: float = Field(-5.8, ge=-20, le=20, description="direction of flight at the edge, up positive")
+    mass_kg: float = Field(68.0, gt=20, le=200, description="with equipment")
+    air_density_kg_m3: float = Field(1.25, ge=0, le=2)
+    drag_area_m2: Keyframes = ((0.0, 0.32), (0.3, 0.46), (1.0, 0.58))
+    lift_area_m2: Keyframes = ((0.0, 0.06), (0.3, 0.34), (1.0, 0.66))
+    ski_length_m: float = Field(2.63, gt=0.5, le=4)
+    ski_slope_deg: Keyframes = ((0.0, -11.0), (0.25, -2.0), (0.55, 7.0), (0.9, 11.0))
+    ski_slope_difference_deg: Keyframes = ((0.0, 0.0), (0.4, 1.5), (0.9, 0.6))
+    ski_opening_deg: Keyframes = ((0.02, 0.0), (0.3, 11.0), (0.9, 29.0))
+    ski_gap_m: Keyframes = ((0.0, 0.34), (0.5, 0.5), (0.9, 0.6))
+    leg_length_m: Keyframes = ((-0.35, 0.5), (0.04, 0.86), (0.5, 0.84))
+    leg_angle_deg: Keyframes = ((-0.35, 96.0), (0.0, 76.0), (0.25, 58.0), (0.55, 44.0), (0.9, 37.0))
+    torso_length_m: float = Field(0.72, gt=0.2, le=1.5, description="from hip to helmet marker")
+    torso_angle_deg: Keyframes = ((-0.35, 12.0), (0.0, 41.0), (0.25, 31.0), (0.55, 22.0), (0.9, 19.0))
+    marker_radius_m: float = Field(0.05, gt=0.01, le=0.1)
+
+
+class Variation(_Strict):
+    """Standard deviations by which the jumps of one scenario differ; all zero: every jump is the same."""
+
+    speed_m_s: float = Field(0.2, ge=0, le=2)
+    takeoff_angle_deg: float = Field(0.25, ge=0, le=3)
+    lift: float = Field(0.05, ge=0, le=0.3, description="part of the lift and drag areas")
+    posture_deg: float = Field(1.0, ge=0, le=5, description="slope, leg and torso angles after take-off")
+    side_m_s: float = Field(0.08, ge=0, le=1, description="sideways speed")
+    yaw_deg: float = Field(0.8, ge=0, le=5)
+
+
+class ImageEffects(_Strict):
+    """From radiance to grey values: grey = black_level + gain * radiance + noise."""
+
+    black_level: float = Field(8.0, ge=0, le=100)
+    noise_sigma: float = Field(2.5, ge=0, le=20, description="grey values")
+    blur_sigma_px: float = Field(0.55, ge=0.4, le=3, description="of the lens")
+    snow_flakes: int = Field(60, ge=0, le=5000, description="in the image at any time")
+
+
+class SceneCamera(_Strict):
+    """One camera of the hill: where it stands, how it sees, what its clock says."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$")
+    c: float = Field(gt=100, description="principal distance in px of a 640 px wide image")
+    X0: Vector = Field(description="projection centre")
+    look_at: Vector | None = Field(None, description="point on the optical axis")
+    roll_deg: float = Field(0.0, ge=-180, le=180, description="clockwise as seen from behind the camera")
+    R: tuple[Vector, Vector, Vector] | None = Field(None, description="rotation row by row, instead of look_at")
+    gain: float = Field(1.0, gt=0.05, le=2)
+    offset_s: float = Field(0.0, description="device clock minus host clock when both start")
+    drift_ppm: float = Field(0.0, ge=-1000, le=1000, description="by how much the device clock runs fast")
+    exposure_jitter_us: float = Field(
+        1.0, ge=0, le=5000, description="scatter of the exposure's device time about the pulse; the image is not moved"
+    )
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> "SceneCamera":
+        if (self.look_at is None) == (self.R is None):
+            raise ValueError(f"camera {self.name} needs either look_at or R: give one of them")
+        if self.R is not None:
+            R = np.array(self.R)  # noqa: N806
+            if not np.allclose(R.T @ R, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
+                raise ValueError(f"camera {self.name}: R is no rotation: give orthonormal columns r1, r2, r3")
+            if self.roll_deg:
+                raise ValueError(f"camera {self.name}: R holds the roll already: remove roll_deg")
+        elif self.look_at is not None and np.hypot(*(np.array(self.X0) - self.look_at)[:2]) < 1e-3:
+            raise ValueError(f"camera {self.name} looks straight up or down: move X0 or look_at sideways, or give R")
+        return self
+
+    def rotation(self) -> NDArray[np.float64]:
+        """R, shape (3, 3), columns r1, r2, r3 of Eq. (A1)."""
+        if self.look_at is None:
+            return np.array(self.R, float)
+        return look_at(self.X0, self.look_at, self.roll_deg)
+
+    def projection(self, width: int, height: int) -> Projection:
+        """The camera with an image of `width` x `height` px: the same view, scaled to the width."""
+        c = self.c * width / REFERENCE_WIDTH
+        return Projection(np.array(self.X0, float), self.rotation(), c, width, height)
+
+
+class Ball(_Strict):
+    """One signalised static point: a reflective handball on a black plate."""
+
+    name: str = Field(min_length=1, max_length=16)
+    role: Literal["control", "tie"] = Field(description="control: surveyed reference ball; tie: unknown")
+    X: Vector
+
+
+class Scenario(_Strict):
+    """Everything about one simulated session on the hill."""
+
+    name: str = Field(min_length=1, max_length=80)
+    seed: int = Field(ge=0, le=2**32 - 1)
+    jump_every_s: float = Field(4.0, ge=2.5, description="from one jump to the next")
+    first_takeoff_s: float = Field(1.0, ge=0, description="scene time at which the first jumper leaves the edge")
+    stamp: bool = Field(True, description="write camera and hill pulse into the image (`simrig.stamp`)")
+    pauses: tuple[tuple[int, int], ...] = Field((), description="hill pulses [from, to) that are not fired")
+    hill: Hill = Hill()
+    jumper: Jumper = Jumper()
+    variation: Variation = Variation()
+    image: ImageEffects = ImageEffects()
+    cameras: Annotated[tuple[SceneCamera, ...], Field(min_length=1, max_length=8)]
+    balls: tuple[Ball, ...] = ()
+    ball_radius_m: float = Field(0.095, gt=0.02, le=0.3)
+    faults: tuple[Fault, ...] = ()
+
+    @model_validator(mode="after")
+    def _parts_fit_together(self) -> "Scenario":
+        for what, names in (("camera", [c.name for c in self.cameras]), ("ball", [b.name for b in self.balls])):
+            if twice := sorted({name for name in names if names.count(name) > 1}):
+                raise ValueError(f"{what} name {', '.join(twice)} is used twice: give each {what} its own name")
+        known = [camera.name for camera in self.cameras]
+        for fault in self.faults:
+            if fault.camera not in known:
+                raise ValueError(f'fault of camera "{fault.camera}": no such camera; name one of {", ".join(known)}')
+        for first, end in self.pauses:
+            if not 0 <= first < end:
+                raise ValueError(f"pauses: [{first}, {end}] is empty: give a first pulse of at least 0 and a later end")
+        for camera in self.cameras:
+            top = self.image.black_level + camera.gain * BRIGHTEST + 4 * self.image.noise_sigma
+            if top > 255:
+                raise ValueError(
+                    f"camera {camera.name} saturates at grey value {top:.0f}: lower gain, black_level or noise_sigma"
+                )
+        return self
+
+    def camera_index(self, name: str) -> int:
+        """Index of the camera called `name`, 0 for the leftmost.
+
+        Raises:
+            BadInputError: the scenario has no such camera.
+        """
+        names = [camera.name for camera in self.cameras]
+        if name not in names:
+            raise BadInputError(f'scenario "{self.name}" has no camera "{name}"; name one of {", ".join(names)}')
+        return names.index(name)
+
+    def faults_of(self, name: str) -> tuple[Fault, ...]:
+        """The planned faults of the camera called `name`."""
+        return tuple(fault for fault in self.faults if fault.camera == name)
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read and check a scenario file.
+
+    A key `base` names another scenario file, relative to this one: it says everything that this file does not. Tables
+    are merged key by key, lists replace each other.
+
+    Raises:
+        BadInputError: the file is missing, broken or says something that is no scenario; names file, key and remedy.
+    """
+    own = read_toml(path)
+    base = own.pop("base", None)
+    if base is None:
+        return validate(Scenario, own, path)
+    if not isinstance(base, str):
+        raise BadInputError(f'{path}: key "base" = {base!r}: give the name of a scenario file')
+    below = read_toml(path.parent / base)
+    if "base" in below:
+        raise BadInputError(f'{path}: base "{base}" has a base itself; name a scenario file that stands alone')
+    return validate(Scenario, _merged(below, own), path)
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    tables = {key: {**below[key], **value} for key, value in above.items() if _both_tables(below.get(key), value)}
+    return {**below, **above, **tables}
+
+
+def _both_tables(below: object, above: object) -> bool:
+    return isinstance(below, dict) and isinstance(above, dict)

@@ -1,0 +1,1 @@
+"""Calibration, pose estimation, intersection: the paper's photogrammetry as pure functions."""

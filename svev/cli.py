@@ -1,7 +1,8 @@
 """The command line: `svev COMMAND`.
 
-Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, 4 storage failed, 5 a camera failed,
-6 one of our processes died, 130 interrupted. Errors are one line; `--debug` anywhere shows the traceback.
+Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete or `doctor` found a FAIL, 4 storage failed,
+5 a camera failed, 6 one of our processes died, 130 interrupted. Errors are one line; `--debug` anywhere shows the
+traceback.
 """
 
 import sys
@@ -12,7 +13,7 @@ import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import schema
+from svev.commands import doctor, schema
 
 app = typer.Typer(
     name="svev",
@@ -30,6 +31,7 @@ def _every_command() -> None:
     """Live capture and photogrammetry for three synchronized cameras at a ski jump."""
 
 
+app.command("doctor")(doctor.doctor)
 app.command("schema")(schema.schema)
 
 

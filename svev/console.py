@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 #: People read this one; with `--json` standard output belongs to the JSON object alone.
 _stderr = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -17,6 +18,11 @@ _stdout = Console(highlight=False, soft_wrap=True)
 def say(line: str, *, aside: bool = False) -> None:
     """Print one line for people; `aside` sends it to standard error (commentary beside a `--json` result)."""
     (_stderr if aside else _stdout).print(line, markup=False)
+
+
+def say_marked(mark: str, style: str, line: str) -> None:
+    """Print one indented line for people behind a coloured mark, e.g. PASS."""
+    _stdout.print(Text.assemble("  ", (mark, style), "  ", line))
 
 
 def print_json(result: dict[str, Any]) -> None:

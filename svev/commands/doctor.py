@@ -1,0 +1,59 @@
+"""`svev doctor`: examines the machine, the rig file's cameras and the disk."""
+
+from dataclasses import asdict
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from rig.rigfile import CONFIG, load_rig
+from svev import console
+from svev.doctor.examination import probes, run_probe
+from svev.doctor.finding import Finding, Level
+
+_STYLES: Final = {Level.PASS: "green", Level.WARN: "yellow", Level.FAIL: "bold red"}
+_SOMETHING_FAILS: Final = 3
+
+
+def doctor(
+    rig: Annotated[
+        Path,
+        typer.Option(help="rig file to examine the machine for; the simulated hill if left out", show_default=False),
+    ] = CONFIG / "rigs" / "sim-gige.toml",
+    out: Annotated[Path | None, typer.Option(help="recording directory; the rig file's if left out")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
+) -> None:
+    """Examine machine, network, disk and cameras before a recording: PASS, WARN or FAIL, and what to do.
+
+    Writes up to 256 MB to the recording directory and removes them again. Touches no camera's settings.
+
+    Exit codes: 0 nothing fails, 2 bad input, 3 at least one FAIL.
+
+    Example: svev doctor --rig config/rigs/hill-gige.toml
+    """
+    settings = load_rig(rig)
+    todo = probes(settings, out or settings.recorder.directory)
+    findings: list[Finding] = []
+    with console.progress("examining", len(todo)) as advance:
+        for done, probe in enumerate(todo, start=1):
+            findings += run_probe(probe)
+            advance(done)
+    counts = {level: sum(finding.level is level for finding in findings) for level in Level}
+    if as_json:
+        result = {"rig": settings.name, "findings": [asdict(finding) for finding in findings], "counts": counts}
+        console.print_json(result)
+    else:
+        _print(settings.name, findings, counts)
+    if counts[Level.FAIL]:
+        raise typer.Exit(_SOMETHING_FAILS)
+
+
+def _print(rig: str, findings: list[Finding], counts: dict[Level, int]) -> None:
+    console.say(f"examined for: {rig}")
+    for topic, group in groupby(findings, key=lambda finding: finding.topic):
+        console.say(topic)
+        for finding in group:
+            remedy = f" -> {finding.remedy}" if finding.remedy else ""
+            console.say_marked(finding.level, _STYLES[finding.level], finding.what + remedy)
+    console.say(", ".join(f"{count} {level}" for level, count in counts.items()))

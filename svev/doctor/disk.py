@@ -1,0 +1,162 @@
+"""Can the recording directory be written, how fast, and how much fits?"""
+
+import errno
+import fcntl
+import mmap
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rig.settings import RigSettings
+from svev.doctor.finding import Finding, Topic, failure, passed, warning
+
+_MB = 1_000_000
+_GB = 1_000_000_000
+_BLOCK = 8 << 20
+_TRIAL = 256 << 20
+_LONGEST_S = 4.0  # a slow disk is judged by what it took in this time
+_HEADROOM = 1.5  # speed wanted over speed needed: disks stall
+_ENOUGH_MIN = 10.0
+_JUMP_S = 10.0  # a jump with what comes before and after it
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What writing and reading back showed.
+
+    Attributes:
+        direct: whether the file system takes direct I/O.
+        write_bps: bytes written per second.
+        read_bps: bytes read back per second.
+        same: whether what was read is what was written.
+    """
+
+    direct: bool
+    write_bps: float
+    read_bps: float
+    same: bool
+
+
+def rate_needed(rig: RigSettings) -> float:
+    """Bytes per second of the rig's recording."""
+    return sum(camera.frame_bytes for camera in rig.cameras) * rig.trigger.rate_hz
+
+
+def existing_part(directory: Path) -> Path:
+    """The directory itself, or the nearest one above it that exists: a recording makes the rest."""
+    path = directory.absolute()
+    while not path.exists() and path != path.parent:
+        path = path.parent
+    return path
+
+
+def look_at_disk(rig: RigSettings, directory: Path) -> Iterator[Finding]:
+    """A file of up to 256 MB is written to the recording directory, read back and removed."""
+    place = existing_part(directory)
+    try:
+        with _unnamed_file(place) as fd:
+            yield passed(Topic.DISK, f"{directory} can be written")
+            disk = os.fstatvfs(fd)
+            free = disk.f_bavail * disk.f_frsize
+            yield look_at_room(rig, directory, free)
+            if free < 2 * _TRIAL:
+                return
+            yield from judge_trial(rig, directory, try_disk(fd))
+    except OSError as error:
+        yield failure(
+            Topic.DISK,
+            f"{directory} cannot be written: {error.strerror}",
+            "correct its permissions, or choose another recorder.directory or --out",
+        )
+
+
+def look_at_room(rig: RigSettings, directory: Path, free: int) -> Finding:
+    """How long a recording fits into `free` bytes, with the reserve kept."""
+    usable = max(0.0, free - rig.recorder.reserve_gb * _GB)
+    minutes = usable / rate_needed(rig) / 60
+    jumps = int(minutes * 60 / _JUMP_S)
+    what = f"{free / _GB:.1f} GB free in {directory}: {minutes:.0f} min of recording, {jumps} jumps of {_JUMP_S:.0f} s"
+    remedy = "remove old recordings, or choose another disk with recorder.directory or --out"
+    if jumps < 1:
+        return failure(Topic.DISK, what, remedy)
+    return passed(Topic.DISK, what) if minutes >= _ENOUGH_MIN else warning(Topic.DISK, what, remedy)
+
+
+def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Finding]:
+    """What the trial means for this rig."""
+    if not trial.same:
+        yield failure(
+            Topic.DISK,
+            f"{directory} does not give back what was written",
+            "the disk is failing: look at `dmesg`, replace it",
+        )
+    if not trial.direct:
+        yield warning(
+            Topic.DISK,
+            f"the file system of {directory} has no direct I/O: recording costs several times the processor time",
+            "record to ext4 or xfs on a local disk",
+        )
+    needed = rate_needed(rig)
+    writes, reads = trial.write_bps / _MB, trial.read_bps / _MB
+    what = f"the disk writes {writes:.0f} and reads {reads:.0f} MB/s, {needed / _MB:.0f} MB/s are needed"
+    remedy = "record to a faster disk (NVMe), or lower trigger.rate_hz or the regions"
+    if trial.write_bps < needed:
+        yield failure(Topic.DISK, what, remedy)
+    elif trial.write_bps < _HEADROOM * needed:
+        yield warning(Topic.DISK, what, remedy)
+    else:
+        yield passed(Topic.DISK, what)
+
+
+def try_disk(fd: int, size: int = _TRIAL) -> Trial:
+    """Write up to `size` bytes past the page cache, read them back.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    with mmap.mmap(-1, _BLOCK) as pattern, mmap.mmap(-1, _BLOCK) as back:
+        pattern.write(os.urandom(_BLOCK))  # nothing that a file system could compress
+        direct = _take_direct(fd, pattern)
+        begin = time.monotonic()
+        written = 0
+        while written < size and time.monotonic() - begin < _LONGEST_S:
+            if os.pwrite(fd, pattern, written) < _BLOCK:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            written += _BLOCK
+        os.fdatasync(fd)
+        middle = time.monotonic()
+        same, place = True, 0
+        while place < written and time.monotonic() - middle < _LONGEST_S:
+            same = os.preadv(fd, [back], place) == _BLOCK and back[:] == pattern[:] and same
+            place += _BLOCK
+        end = time.monotonic()
+    return Trial(direct, written / (middle - begin), place / (end - middle), same)
+
+
+@contextmanager
+def _unnamed_file(directory: Path) -> Iterator[int]:
+    """A file without a name: it is gone however this program ends."""
+    fd, name = tempfile.mkstemp(prefix=".svev-doctor-", dir=directory)
+    Path(name).unlink()
+    try:
+        yield fd
+    finally:
+        os.close(fd)
+
+
+def _take_direct(fd: int, block: mmap.mmap) -> bool:
+    """Switch direct I/O on; whether the file system takes it (some refuse only the first write)."""
+    flags = fcntl.fcntl(fd, fcntl.F_GETFL)
+    try:
+        fcntl.fcntl(fd, fcntl.F_SETFL, flags | os.O_DIRECT)
+        os.pwrite(fd, block, 0)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+        fcntl.fcntl(fd, fcntl.F_SETFL, flags)
+        return False
+    return True

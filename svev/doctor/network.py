@@ -1,0 +1,130 @@
+"""Can the packets of the cameras be received, and the triplets be published?"""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from ipaddress import IPv4Address
+from pathlib import Path
+
+import zmq
+
+from rig.settings import CameraSettings, RigSettings
+from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.interfaces import Interface, interface_to
+
+_MIB = 1 << 20
+_SOCKET_BUFFER = 8 * _MIB  # what the Aravis back end asks for
+_CAP_NET_RAW = 13  # linux/capability.h
+_FULL = 0.9  # a link that is fuller than this has no room for packets that are sent again
+
+
+def gige_cameras(rig: RigSettings) -> list[CameraSettings]:
+    """The cameras whose frames come by network."""
+    return [camera for camera in rig.cameras if camera.backend == "aravis"]
+
+
+def look_at_packet_sockets(rig: RigSettings) -> Iterator[Finding]:
+    """Packet sockets receive at a fraction of the processor time; the kernel gives them to the privileged."""
+    wish: str = rig.network.packet_socket
+    if not gige_cameras(rig) or wish == "off":
+        return
+    if _may_use_packet_sockets():
+        yield passed(Topic.NETWORK, "frames are received through packet sockets")
+        return
+    judge = failure if wish == "on" else warning
+    yield judge(
+        Topic.NETWORK,
+        "no right to packet sockets (CAP_NET_RAW): receiving costs several times the processor time",
+        "run svev as root, or by: sudo setpriv --reuid=$USER --regid=$USER --init-groups --inh-caps=+net_raw "
+        '--ambient-caps=+net_raw "$(which svev)" record ...',
+    )
+
+
+def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
+    """Buffers for plain sockets: too small ones lose packets, above all those of the first frame."""
+    cameras = gige_cameras(rig)
+    if not cameras:
+        return
+    used = rig.network.packet_socket == "off" or not _may_use_packet_sockets()
+    # The large buffer is asked for when the first packet is already there, so the first frame has to fit into the
+    # default one; the kernel counts its own overhead in, about as much again.
+    first = max(_MIB, 2 * max(camera.frame_bytes for camera in cameras))
+    for name, wanted in {"rmem_max": _SOCKET_BUFFER, "rmem_default": first}.items():
+        value = int(Path(f"/proc/sys/net/core/{name}").read_text())
+        what = f"net.core.{name} is {value}"
+        if value >= wanted:
+            yield passed(Topic.NETWORK, what)
+        elif not used:
+            yield passed(Topic.NETWORK, f"{what}, small, but packet sockets do without")
+        else:
+            remedy = f"run: sudo sysctl -w net.core.{name}={wanted} (for good: a line in /etc/sysctl.d/90-svev.conf)"
+            yield warning(Topic.NETWORK, f"{what}, {wanted} is wanted: packets may be lost", remedy)
+
+
+def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
+    """The way to each camera: packet size, subnet, and whether the link carries all that comes over it."""
+    behind: dict[Interface, list[CameraSettings]] = defaultdict(list)
+    for camera in gige_cameras(rig):
+        try:
+            interface = interface_to(str(IPv4Address(camera.address)))
+        except ValueError:
+            what = f"{camera.name}: {camera.address} is no IPv4 address"
+            yield failure(Topic.NETWORK, what, "correct its address in the rig file")
+            continue
+        if interface is None:
+            remedy = "give a network port an address in the camera's subnet"
+            yield failure(Topic.NETWORK, f"{camera.name}: no network leads to {camera.address}", remedy)
+        else:
+            behind[interface].append(camera)
+    for interface, cameras in behind.items():
+        yield judge_interface(rig, interface, cameras)
+
+
+def judge_interface(rig: RigSettings, interface: Interface, cameras: list[CameraSettings]) -> Finding:
+    """Whether `interface` is fit for the cameras behind it."""
+    names = ", ".join(camera.name for camera in cameras)
+    link = f", {interface.speed_mbps} Mbit/s" if interface.speed_mbps else ""
+    what = f"{names} by {interface.name}: MTU {interface.mtu}{link}"
+    if interface.mtu < rig.network.packet_size:
+        return failure(
+            Topic.NETWORK,
+            f"{what}, but packets of {rig.network.packet_size} bytes are asked for: no frame will arrive",
+            f"run: sudo ip link set {interface.name} mtu {rig.network.packet_size}; or set network.packet_size = "
+            f"{interface.mtu} in the rig file",
+        )
+    if not all(IPv4Address(camera.address) in interface.network for camera in cameras):
+        return warning(
+            Topic.NETWORK,
+            f"{what}, but not every camera is in its subnet {interface.network}: frames go through a router",
+            "give the network port an address in the camera's subnet",
+        )
+    load_mbps = sum(camera.frame_bytes for camera in cameras) * 8 * rig.trigger.rate_hz / 1e6
+    if interface.speed_mbps and load_mbps > _FULL * interface.speed_mbps:
+        return failure(
+            Topic.NETWORK,
+            f"{what}, but the frames are {load_mbps:.0f} Mbit/s",
+            "give each camera a port of its own, check the cable, or lower trigger.rate_hz or the regions",
+        )
+    return passed(Topic.NETWORK, what)
+
+
+def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
+    """The address at which triplets are published is free."""
+    address = rig.network.publish
+    with zmq.Context() as context, context.socket(zmq.PUB) as publisher:
+        try:
+            publisher.bind(address)
+        except zmq.ZMQError as error:
+            yield failure(
+                Topic.NETWORK,
+                f"triplets cannot be published at {address}: {error.strerror}",
+                "end the program that uses it (another svev?), or choose another network.publish",
+            )
+            return
+    yield passed(Topic.NETWORK, f"triplets can be published at {address}")
+
+
+def _may_use_packet_sockets() -> bool:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("CapEff:"):
+            return bool(int(line.split()[1], 16) >> _CAP_NET_RAW & 1)
+    return False

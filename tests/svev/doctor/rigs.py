@@ -1,0 +1,27 @@
+"""Rig files for the doctor to look at."""
+
+from pathlib import Path
+
+from rig.rigfile import CONFIG, load_rig
+from rig.settings import RigSettings
+from tests.support.loopback import Loopback
+
+SIM = load_rig(CONFIG / "rigs" / "sim.toml")
+
+
+def write_rig(folder: Path, loopback: Loopback, *, backend: str = "aravis", simulated: bool = True) -> Path:
+    """Write a rig file with three cameras of this test's own addresses."""
+    text = f'name = "examined"\n[network]\npublish = "{loopback.endpoint()}"\n'
+    if simulated:
+        text += f'[simulation]\nscenario = "{CONFIG / "scenarios" / "training.toml"}"\n'
+    for index, address in enumerate(loopback.cameras(3), start=1):
+        text += f'[[cameras]]\nname = "K{index}"\nbackend = "{backend}"\naddress = "{address}"\n'
+    path = folder / "rig.toml"
+    path.write_text(text)
+    return path
+
+
+def rig_with(folder: Path, loopback: Loopback, **network: object) -> RigSettings:
+    """Such a rig with other network settings."""
+    rig = load_rig(write_rig(folder, loopback))
+    return rig.model_copy(update={"network": rig.network.model_copy(update=network)})

@@ -4,6 +4,7 @@ The copy is made the moment the frame arrives, while it is still in the processo
 free again at once. If the disk is behind and no triplet buffer is free, frames wait in the cameras' rings.
 """
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,16 @@ _HOLD_PERIODS = 4
 _HOLD_NS = 130_000_000
 
 
+def hold_ns(period_ns: int) -> int:
+    """How long after a pulse it is decided at the latest, ns."""
+    return _HOLD_NS + _HOLD_PERIODS * period_ns
+
+
+def least_buffers(period_ns: int) -> int:
+    """With fewer triplet buffers, pulses that wait for a dead camera could hold all of them."""
+    return 2 * (hold_ns(period_ns) // period_ns + 1)
+
+
 @dataclass(frozen=True, slots=True)
 class CameraChange:
     """A camera came, went, or fell silent."""
@@ -31,6 +42,34 @@ class CameraChange:
     present: bool
     text: str
     time: HostNs
+
+
+class _Composition:
+    """Where the frames of a pulse come together: the cargo of its `OpenPulse`.
+
+    Attributes:
+        slot: triplet buffer; None while there is none free.
+        pending: frames that wait for it in their rings.
+    """
+
+    __slots__ = ("pending", "slot")
+
+    def __init__(self) -> None:
+        self.slot: int | None = None
+        self.pending: list[tuple[int, Record]] = []
+
+
+@dataclass(frozen=True, slots=True)
+class Triplet:
+    """A decided pulse with its pixels.
+
+    Attributes:
+        pulse: what became of it in every camera.
+        slot: triplet buffer, the caller's to release; blocks of missing frames are black. None if no frame came.
+    """
+
+    pulse: ClosedPulse
+    slot: int | None
 
 
 class Assembler:
@@ -53,37 +92,47 @@ class Assembler:
         self._columns = rig.columns()
         self._shapes = [(camera.region.height, camera.region.width) for camera in rig.cameras]
         self._blocks: dict[int, list[NDArray[np.uint8]]] = {}
-        self._waiting: tuple[int, Record, OpenPulse] | None = None
+        self._waiting: list[_Composition] = []
+        self._decided: deque[ClosedPulse] = deque()
         self._changes: list[CameraChange] = []
         self._asked = [False] * len(rings)
         period = rig.trigger.period_ns
-        self.hold_ns = _HOLD_NS + _HOLD_PERIODS * period
+        self.hold_ns = hold_ns(period)
         self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns)
         self.connected = [False] * len(rings)
 
-    def pump(self, now: HostNs) -> list[ClosedPulse]:
+    def pump(self, now: HostNs) -> list[Triplet]:
         """Take in what the grabbers have queued.
 
         Returns:
-            The pulses that are now decided, in order. The cargo of each is its triplet buffer (None if no frame
-            came for it), with the blocks of missing frames black; it is the caller's to release.
+            The pulses that are now decided, in order.
         """
-        if not self._place_waiting():
-            return []
-        for camera, ring in enumerate(self._rings):
-            while (record := ring.get()) is not None:
-                if not self._take(camera, record):
-                    return []
-        closed = self.pairer.advance(now)
+        self._serve_waiting()
+        for camera in range(len(self._rings)):
+            self._read(camera)
+        # A camera whose frame waits for a buffer has more to say than we have read: time stands still for the pairing
+        # until it is read, or its unread frames would be taken for missing ones.
+        waiting = [record.host_time for part in self._waiting for _, record in part.pending]
+        self._decided.extend(self.pairer.advance(min(waiting, default=now)))
         self._ask_silent_cameras()
-        for pulse in closed:
-            self._blacken(pulse)
-        return closed
+        return list(self._ready())
+
+    def _ready(self) -> Iterator[Triplet]:
+        """Decided pulses whose frames are all copied, up to the first whose are not."""
+        while self._decided:
+            part = self._decided[0].cargo
+            if isinstance(part, _Composition) and part.pending:
+                return
+            pulse = self._decided.popleft()
+            slot = part.slot if isinstance(part, _Composition) else None
+            if slot is not None:
+                self._blacken(pulse, slot)
+            yield Triplet(pulse, slot)
 
     @property
     def backlog(self) -> bool:
         """A frame waits for a free triplet buffer; nobody rings when the disk frees one."""
-        return self._waiting is not None
+        return bool(self._waiting)
 
     def changes(self) -> list[CameraChange]:
         """Cameras that came or went since the last call."""
@@ -111,11 +160,23 @@ class Assembler:
                 name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset
             )  # fmt: skip
 
-    def _take(self, camera: int, record: Record) -> bool:
-        """Handle one record; False if a frame has to wait for a buffer."""
+    def _read(self, camera: int) -> None:
+        """Take in what one camera has queued, up to a frame that has to wait for a buffer."""
+        ring = self._rings[camera]
+        while not self._is_waiting(camera) and (record := ring.get()) is not None:
+            if record.kind is not RecordKind.FRAME:
+                self._note(camera, record)
+            elif (pulse := self.pairer.frame(camera, record)) is None:
+                ring.release(record.slot)
+            else:
+                self._place(camera, record, pulse)
+
+    def _is_waiting(self, camera: int) -> bool:
+        return any(camera == waiting for part in self._waiting for waiting, _ in part.pending)
+
+    def _note(self, camera: int, record: Record) -> None:
+        """Handle a record that is no frame."""
         match record.kind:
-            case RecordKind.FRAME:
-                return self._frame(camera, record)
             case RecordKind.DAMAGED:
                 self.pairer.damaged(camera, record)
             case RecordKind.LATCH:
@@ -126,35 +187,38 @@ class Assembler:
                 self._changes.append(CameraChange(camera, True, record.text, record.host_time))
             case RecordKind.DISCONNECTED:
                 self._leave(camera, record.text, record.host_time)
-        return True
 
     def _leave(self, camera: int, reason: str, time: HostNs) -> None:
         self.pairer.disconnected(camera, time)
         self.connected[camera] = False
         self._changes.append(CameraChange(camera, False, reason, time))
 
-    def _frame(self, camera: int, record: Record) -> bool:
-        pulse = self.pairer.frame(camera, record)
-        if pulse is None:
-            self._rings[camera].release(record.slot)
-            return True
-        self._waiting = (camera, record, pulse)
-        return self._place_waiting()
+    def _place(self, camera: int, record: Record, pulse: OpenPulse) -> None:
+        """Copy a frame into its triplet, or let it wait until there is a buffer for it."""
+        part = pulse.cargo
+        if not isinstance(part, _Composition):
+            part = pulse.cargo = _Composition()
+            part.slot = self._buffers.acquire()
+        if part.slot is not None:
+            self._copy(camera, record, part.slot)
+            return
+        part.pending.append((camera, record))
+        if part not in self._waiting:
+            self._waiting.append(part)
 
-    def _place_waiting(self) -> bool:
-        """Copy the frame at hand into its triplet; False if there is no buffer for it yet."""
-        if self._waiting is None:
-            return True
-        camera, record, pulse = self._waiting
-        if pulse.cargo is None:
-            pulse.cargo = self._buffers.acquire()
-            if pulse.cargo is None:
-                return False
-        self._waiting = None
+    def _serve_waiting(self) -> None:
+        """Give buffers that have become free to the pulses that wait for one, in the order in which they came."""
+        while self._waiting and (slot := self._buffers.acquire()) is not None:
+            part = self._waiting.pop(0)
+            part.slot = slot
+            for camera, record in part.pending:
+                self._copy(camera, record, slot)
+            part.pending.clear()
+
+    def _copy(self, camera: int, record: Record, slot: int) -> None:
         frame = self._rings[camera].frame(record.slot).reshape(self._shapes[camera])
-        np.copyto(self._blocks_of(pulse.cargo)[camera], frame)
+        np.copyto(self._blocks_of(slot)[camera], frame)
         self._rings[camera].release(record.slot)
-        return True
 
     def _blocks_of(self, slot: int) -> list[NDArray[np.uint8]]:
         """Views of the cameras' column blocks of one buffer, made once."""
@@ -163,10 +227,8 @@ class Assembler:
             self._blocks[slot] = [pixels[:, first:end] for first, end in self._columns]
         return self._blocks[slot]
 
-    def _blacken(self, pulse: ClosedPulse) -> None:
-        if pulse.cargo is None or all(outcome.status is FrameStatus.OK for outcome in pulse.outcomes):
-            return
-        for block, outcome in zip(self._blocks_of(pulse.cargo), pulse.outcomes, strict=True):
+    def _blacken(self, pulse: ClosedPulse, slot: int) -> None:
+        for block, outcome in zip(self._blocks_of(slot), pulse.outcomes, strict=True):
             if outcome.status is not FrameStatus.OK:
                 block.fill(0)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from recorder.assembler import Assembler, CameraChange
+from recorder.assembler import Assembler, CameraChange, Triplet, least_buffers
 from recorder.publisher import Publisher
 from recorder.recording import Recording, RecordingOrder
 from recorder.triplet_buffers import TripletBuffers
@@ -25,7 +25,6 @@ from triggering.pairing import ClosedPulse
 
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _WARM_PULSES: Final = 3
-_LEAST_TRIPLETS: Final = 8
 
 
 class RecorderLoop:
@@ -40,7 +39,7 @@ class RecorderLoop:
 
     def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], doorbell: int, control: ControlChannel) -> None:
         self._rig, self._rings, self._doorbell, self._control = rig, rings, doorbell, control
-        count = max(_LEAST_TRIPLETS, round(rig.recorder.triplets_s * rig.trigger.rate_hz))
+        count = max(least_buffers(rig.trigger.period_ns), round(rig.recorder.triplets_s * rig.trigger.rate_hz))
         self._buffers = TripletBuffers(rig.triplet_shape, count)
         self._assembler = Assembler(rig, rings, self._buffers)
         self._publisher = Publisher(rig.network.publish)
@@ -69,8 +68,8 @@ class RecorderLoop:
         self._wind_up()
 
     def _step(self, now: HostNs) -> None:
-        for pulse in self._assembler.pump(now):
-            self._dispose(pulse)
+        for triplet in self._assembler.pump(now):
+            self._dispose(triplet)
         for change in self._assembler.changes():
             self._camera_changed(change)
         if self._recording is not None and self._recording.finished(now):
@@ -83,18 +82,17 @@ class RecorderLoop:
             self._next_health = HostNs(now + NS_PER_S)
             self._tell_health()
 
-    def _dispose(self, pulse: ClosedPulse) -> None:
+    def _dispose(self, triplet: Triplet) -> None:
         """A decided pulse goes into the recording, or nowhere."""
-        slot = pulse.cargo if isinstance(pulse.cargo, int) else None
+        pulse, slot = triplet.pulse, triplet.slot
         recording = self._recording
         if recording is None or not recording.takes(pulse):
             self._warm_up(pulse)
             if slot is not None:
                 self._buffers.release(slot)
             return
-        slot = self._buffers.acquire() if slot is None else slot
-        if slot is not None and pulse.cargo is None:
-            self._buffers.pixels(slot).fill(0)
+        if slot is None and (slot := self._buffers.acquire()) is not None:
+            self._buffers.pixels(slot).fill(0)  # no frame came at all: a black triplet
         tag = recording.tag(pulse)
         encoded = tag.encode()
         self._publisher.triplet(encoded, self._buffers, slot)

@@ -173,7 +173,7 @@ def test_closing_gives_all_slots_back_and_the_camera_opens_again(bench: OpenBenc
 def test_a_recorder_that_holds_all_slots_costs_frames_but_nothing_breaks(bench: OpenBench) -> None:
     made = bench(slots=4)
     with _open(made) as camera:
-        held = []
+        held: list[Arrival] = []
         while len(held) < 4:
             if (arrival := camera.receive(0.2)) is not None:
                 held.append(arrival)

@@ -1,0 +1,130 @@
+"""The grabber's loop with an in-process camera: epochs, records in order, failures said once, a full ring."""
+
+import os
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from capture.grabber import Grabber
+from capture.seam import Camera
+from capture.sim_camera import SimCamera
+from rig.clocks import host_now
+from rig.errors import CameraNotFoundError
+from rig.frame import Record, RecordKind
+from rig.ring import CameraRing
+from svev.sim_scene import SimScene
+from tests.capture.rigs import make_rig
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+
+class Station:
+    """A grabber in a thread, and the recorder's end of its ring."""
+
+    def __init__(self, open_camera: Callable[[CameraRing], Camera], ring: CameraRing) -> None:
+        self.ring = ring
+        self.records: list[Record] = []
+        self.doorbell = os.eventfd(0, os.EFD_NONBLOCK)
+        self._stop = threading.Event()
+        self._ours, self._theirs = socket.socketpair()
+        grabber = Grabber(lambda: open_camera(ring), ring, self.doorbell, self._stop.is_set, self._theirs.fileno())
+        self._thread = threading.Thread(target=grabber.run)
+
+    def __enter__(self) -> "Station":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._ours.close()
+        self._thread.join(10)
+        assert not self._thread.is_alive()
+        self._theirs.close()
+        os.close(self.doorbell)
+
+    def take(self, *, release: bool = True) -> None:
+        """Read all records, as the recorder does."""
+        for record in iter(self.ring.get, None):
+            self.records.append(record)
+            if release and record.kind is RecordKind.FRAME:
+                self.ring.release(record.slot)
+
+    def await_records(self, kind: RecordKind, count: int, *, release: bool = True) -> None:
+        """Read until so many records of a kind have come."""
+
+        def enough() -> bool:
+            self.take(release=release)
+            return sum(record.kind is kind for record in self.records) >= count
+
+        wait_until(enough, f"{count} records {kind.name}", 10)
+
+
+@pytest.fixture
+def ring() -> Iterator[CameraRing]:
+    made = CameraRing.create("K2", 640 * 480, 8)
+    yield made
+    made.close()
+
+
+@contextmanager
+def _station(directory: Path, loopback: Loopback, ring: CameraRing) -> Iterator[Station]:
+    rig, epoch = make_rig(directory, "sim", loopback), host_now()
+    with Station(lambda it: SimCamera(rig.cameras[1], it, SimScene(rig, 1, epoch)), ring) as station:
+        yield station
+
+
+def test_an_epoch_begins_with_its_connection_then_the_clock_then_frames(
+    tmp_path: Path, loopback: Loopback, ring: CameraRing
+) -> None:
+    with _station(tmp_path, loopback, ring) as station:
+        station.await_records(RecordKind.FRAME, 5)
+    kinds = [record.kind for record in station.records]
+    assert kinds[0] is RecordKind.CONNECTED
+    assert set(kinds[1:17]) == {RecordKind.LATCH}
+    assert {record.epoch for record in station.records} == {1}
+
+
+def test_a_request_to_reconnect_begins_a_new_epoch(tmp_path: Path, loopback: Loopback, ring: CameraRing) -> None:
+    with _station(tmp_path, loopback, ring) as station:
+        station.await_records(RecordKind.FRAME, 2)
+        ring.request_reconnect()
+        station.await_records(RecordKind.CONNECTED, 2)
+        station.await_records(RecordKind.FRAME, 5)
+    kinds = [record.kind for record in station.records]
+    assert kinds.index(RecordKind.DISCONNECTED) < len(kinds) - kinds[::-1].index(RecordKind.CONNECTED)
+    assert max(record.epoch for record in station.records) == 2
+
+
+def test_a_camera_that_is_not_there_is_tried_again_and_reported_once(ring: CameraRing) -> None:
+    tried = threading.Semaphore(0)
+
+    def fail(_: CameraRing) -> Camera:
+        tried.release()
+        raise CameraNotFoundError("camera K2 does not answer: check its cable")
+
+    with Station(fail, ring) as station:
+        for _ in range(3):
+            assert tried.acquire(timeout=10)
+        station.take()
+    assert [(record.kind, record.text) for record in station.records] == [
+        (RecordKind.DISCONNECTED, "camera K2 does not answer: check its cable")
+    ]
+
+
+def test_a_recorder_that_stands_still_loses_frames_but_they_are_counted(
+    tmp_path: Path, loopback: Loopback, ring: CameraRing
+) -> None:
+    with _station(tmp_path, loopback, ring) as station:
+        station.await_records(RecordKind.FRAME, ring.slots, release=False)
+        wait_until(lambda: ring.counters()["underruns"] > 0, "underruns are counted", 10)
+        for record in station.records:
+            if record.kind is RecordKind.FRAME:
+                ring.release(record.slot)
+        station.await_records(RecordKind.FRAME, ring.slots + 3)
+    ids = [record.frame_id for record in station.records if record.kind is RecordKind.FRAME]
+    assert ids == sorted(set(ids))
+    assert ids[-1] - ids[0] > len(ids) - 1  # the ids show the hole

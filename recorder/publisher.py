@@ -6,6 +6,7 @@ subscriber for images nothing is handed to ZeroMQ at all.
 
 import json
 import threading
+import time
 import weakref
 from collections.abc import Mapping
 from typing import Any
@@ -33,7 +34,7 @@ class Publisher:
 
     Attributes:
         address: where it is bound; a port that was left open (`tcp://127.0.0.1:*`) is filled in.
-        sent: triplets handed to ZeroMQ.
+        sent: triplets handed to ZeroMQ, where anybody wanted them.
         dropped: triplets that were wanted and that nobody got, because too many slots were still being sent.
     """
 
@@ -71,7 +72,13 @@ class Publisher:
 
     def wait_for_subscriber(self, timeout_s: float) -> bool:
         """Wait until somebody subscribes to triplets; False if nobody has within `timeout_s`."""
-        return self._wanted(_TRIPLET) or (self._socket.poll(round(timeout_s * 1000)) != 0 and self._wanted(_TRIPLET))
+        deadline = time.monotonic() + timeout_s
+        while not self._wanted(_TRIPLET):
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return False
+            self._socket.poll(round(left * 1000) + 1)
+        return True
 
     def triplet(self, tag: bytes, buffers: TripletBuffers, slot: int | None) -> None:
         """Publish a triplet without copying it; the slot is held until ZeroMQ has let go of it.
@@ -85,7 +92,7 @@ class Publisher:
         if not self._wanted(_TRIPLET):
             return
         if slot is None:
-            self.triplet_copy(tag, b"")
+            self.parts([_TRIPLET, tag, b""])
             return
         if self._held >= buffers.count - max(_SPARE_SLOTS, buffers.count // 4):
             self.dropped += 1
@@ -99,24 +106,19 @@ class Publisher:
         self._socket.send_multipart([_TRIPLET, tag, view], zmq.DONTWAIT, copy=False)
         self.sent += 1
 
-    def triplet_copy(self, tag: bytes, image: bytes | memoryview) -> None:
-        """Publish a triplet whose pixels are not in a slot; they are copied."""
-        if self._wanted(_TRIPLET):
-            self._socket.send_multipart([_TRIPLET, tag, image], zmq.DONTWAIT)
-            self.sent += 1
+    def parts(self, parts: list[bytes | memoryview]) -> None:
+        """Publish a message as it is, topic first; its parts are copied."""
+        if self._wanted(bytes(parts[0])):
+            self._socket.send_multipart(parts, zmq.DONTWAIT)
+            self.sent += parts[0] == _TRIPLET
 
     def event(self, event: Mapping[str, Any]) -> None:
         """Publish an event (`recorder.events.Event.to_json`)."""
-        self.message(_EVENT, event)
+        self.parts([_EVENT, _encode(event)])
 
     def health(self, health: Mapping[str, Any]) -> None:
         """Publish a health record."""
-        self.message(_HEALTH, health)
-
-    def message(self, topic: bytes, content: Mapping[str, Any]) -> None:
-        """Publish `[topic, JSON]`."""
-        if self._wanted(topic):
-            self._socket.send_multipart([topic, json.dumps(content, separators=(",", ":")).encode()], zmq.DONTWAIT)
+        self.parts([_HEALTH, _encode(health)])
 
     def close(self, linger_s: float = 0.0) -> None:
         """Unbind and let go of all slots; a second call does nothing.
@@ -141,3 +143,7 @@ class Publisher:
         with self._lock:
             self._held -= 1
         buffers.release(slot)
+
+
+def _encode(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, separators=(",", ":")).encode()

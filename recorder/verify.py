@@ -1,0 +1,107 @@
+"""Checks a log from the first to the last byte and says, pulse by pulse, what is missing."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from recorder.events import Event
+from recorder.findings import Findings
+from recorder.ledger import Ledger, numbers
+from recorder.log_items import Chunk, Damage, Item
+from recorder.log_reader import LogReader
+from recorder.pulse_check import PulseCheck
+from recorder.structure_check import StructureCheck
+
+_PULSES_MAX = 10_000
+
+
+class Verdict(StrEnum):
+    """What a log is worth."""
+
+    CLEAN = "clean"  #: every pulse complete, everything consistent
+    PARTIAL = "partial"  #: consistent; some pulses lack frames, and their tags say which and why
+    DAMAGED = "damaged"  #: not closed, unreadable in part, or inconsistent
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyReport:
+    """What `verify` found.
+
+    Attributes:
+        closed: the log was closed properly.
+        ledger: what became of every pulse.
+        findings: what is wrong with the log itself, one sentence each.
+        events: events in the log.
+    """
+
+    path: Path
+    bytes: int
+    closed: bool
+    ledger: Ledger
+    findings: tuple[str, ...]
+    events: tuple[Event, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The result in one word."""
+        if self.findings or not self.closed or self.ledger.missing:
+            return Verdict.DAMAGED
+        return Verdict.CLEAN if self.ledger.complete == self.ledger.pulses else Verdict.PARTIAL
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as one JSON object."""
+        return {
+            "log": str(self.path),
+            "verdict": self.verdict.value,
+            "closed": self.closed,
+            **self.ledger.counts(),
+            "bytes": self.bytes,
+            "missing_pulses": numbers(self.ledger.missing, _PULSES_MAX),
+            "incomplete_pulses": [pulse.to_json() for pulse in self.ledger.incomplete[:_PULSES_MAX]],
+            "findings": list(self.findings),
+            "events": [event.to_json() for event in self.events],
+        }
+
+
+def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyReport:
+    """Read and check everything: checksums, indexes, summary, tags against images, pulses without gaps.
+
+    Args:
+        path: the log.
+        progress: told how many bytes have been read.
+
+    Raises:
+        BadInputError: no such file, no MCAP log, or not one of ours.
+    """
+    findings = Findings()
+    with LogReader(path) as reader:
+        pulses, structure = PulseCheck(findings), StructureCheck(reader, findings)
+        for item in reader.items():
+            if text := _flaw(item):
+                findings.add(text)
+            elif isinstance(item, Chunk):
+                pulses.take(item)
+            structure.take(item)
+            if progress is not None:
+                progress(item.offset + item.length)
+        pulses.finish()
+        structure.finish()
+        if not reader.closed:
+            findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
+        return VerifyReport(path, reader.size, reader.closed, pulses.ledger, findings.lines(), tuple(pulses.events))
+
+
+def _flaw(item: Item) -> str:
+    """What is wrong with an item of the log, empty if nothing."""
+    match item:
+        case Damage(torn=True):
+            return f"the last {item.length} bytes, from byte {item.offset} on, are an unfinished record"
+        case Damage():
+            return f"{item.length} bytes from byte {item.offset} on: {item.text}"
+        case Chunk(flaw=flaw) if flaw:
+            pulses = sorted({message.sequence for message in item.messages})
+            about = f" (pulse {pulses[0]}?)" if pulses else ""
+            return f"chunk at byte {item.offset}{about}: {flaw}"
+    return ""

@@ -1,0 +1,85 @@
+"""The ideal camera of the paper's appendix A: pinhole, no image errors, Eq. A1.
+
+All closed solutions (intersection, resection, relative orientation, DLT) speak of this camera. Their image
+coordinates are reduced ones: metric frame (x right, y up), principal point and distortion taken off.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class IdealCamera:
+    """Principal distance and pose.
+
+    Attributes:
+        c: principal distance, image unit, positive.
+        X0: (3,) projection centre, object unit.
+        R: (3, 3) rotation; its columns r1, r2, r3 are the camera's axes in the object system (Eq. A1).
+    """
+
+    c: float
+    X0: Array
+    R: Array
+
+    def project(self, points: ArrayLike) -> Array:
+        """Image coordinates by Eq. A1.
+
+        Args:
+            points: (..., 3) object coordinates.
+
+        Returns:
+            (..., 2) image coordinates; not finite for a point in the plane of the projection centre.
+        """
+        d = (np.asarray(points, float) - self.X0) @ self.R
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(-self.c * d[..., :2] / d[..., 2:])
+
+    def in_front(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether the points (..., 3) lie before the camera, which looks along -r3."""
+        return np.asarray((np.asarray(points, float) - self.X0) @ self.R[:, 2] < 0)
+
+    def rays(self, xy: ArrayLike) -> Array:
+        """Unit vectors (..., 3) in the object system from the projection centre to the image points (..., 2)."""
+        return unit_rays(xy, self.c) @ self.R.T
+
+    def matrix(self) -> Array:
+        """The (3, 4) projection matrix P = K R^T (I, -X0) of Eq. A2b, with K = diag(-c, -c, 1)."""
+        rotated = np.diag((-self.c, -self.c, 1.0)) @ self.R.T
+        return np.column_stack((rotated, -rotated @ self.X0))
+
+
+def unit_rays(xy: ArrayLike, c: float) -> Array:
+    """Unit vectors (..., 3) in the camera system towards the object: (x, y, -c) normalised."""
+    xy = np.asarray(xy, float)
+    rays = np.concatenate((xy, np.full((*xy.shape[:-1], 1), -c)), axis=-1)
+    return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
+
+
+def rotation_from_vector(vector: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) by Rodrigues' formula from rotation vectors (..., 3), rad."""
+    vector = np.asarray(vector, float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    skew = cross_matrix(vector)
+    # sinc keeps both coefficients exact for the smallest angles
+    sine = np.sinc(angle / np.pi)
+    cosine = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + sine * skew + cosine * (skew @ skew))
+
+
+def cross_matrix(vector: Array) -> Array:
+    """Matrices (..., 3, 3) that form the cross product with the vectors (..., 3) from the left."""
+    out = np.zeros((*vector.shape[:-1], 3, 3))
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = vector[..., 0], vector[..., 1], vector[..., 2]
+    return out - np.swapaxes(out, -1, -2)
+
+
+def nearest_rotation(matrix: Array) -> Array:
+    """The proper rotation (3, 3) closest to a matrix (Frobenius norm)."""
+    left, _, right = np.linalg.svd(matrix)
+    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])
+    return np.asarray((left * sign) @ right)

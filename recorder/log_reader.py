@@ -7,19 +7,23 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 from isal.isal_zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata
+from numpy.typing import NDArray
 
 from recorder.file_window import FileWindow
 from recorder.log_items import Chunk, Damage, Item, Message, Small
 from recorder.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, RECORD
+from recorder.raw_image import pixels, view_image
 from recorder.record_walk import CHUNK_HEAD, RawRecord, is_closed, walk
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
-from rig.topics import PROFILE
+from rig.tag import TripletTag
+from rig.topics import PROFILE, TAG, TRIPLET
 
 #: What the `mcap` library raises on bytes that are no such record.
 UNREADABLE = (struct.error, ValueError, McapError)
@@ -197,6 +201,27 @@ class LogReader:
             topic, channel, sequence, UtcNs(log_time), UtcNs(publish_time), position - first,
             offset, following - offset, data,
         )  # fmt: skip
+
+
+def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
+    """Every pulse of a log: its tag, and its image, (rows, columns), valid until the next one is taken.
+
+    The block of a camera that is not ok is black; so is the whole image of a pulse that has none. Pulses in parts of
+    the log that are damaged are left out.
+
+    Raises:
+        BadInputError: no such file, no MCAP log, or not one of ours.
+        ValueError: a chunk is sound, but what it holds is no tag or no image.
+    """
+    with LogReader(path) as reader:
+        for item in reader.items():
+            if isinstance(item, Chunk) and not item.flaw:
+                images = {message.sequence: message.data for message in item.messages if message.topic == TRIPLET.name}
+                for message in item.messages:
+                    if message.topic == TAG.name and message.data is not None:
+                        tag = TripletTag.decode(message.data)
+                        data = images.get(tag.pulse)
+                        yield tag, np.zeros(tag.shape, np.uint8) if data is None else pixels(view_image(data))
 
 
 def stream(body: bytes) -> Any:

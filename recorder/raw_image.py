@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
+from numpy.typing import NDArray
 
 from rig.clocks import UtcNs
 
@@ -65,6 +67,19 @@ def view_image(message: memoryview) -> ImageView:
         pixels_at,
         pixels,
     )
+
+
+def pixels(image: ImageView) -> NDArray[np.uint8]:
+    """The pixels of a mono8 image in place, (rows, columns).
+
+    Raises:
+        ValueError: it is another encoding, has gaps between its rows, or not as many pixels as it says.
+    """
+    if image.encoding != "mono8" or image.step != image.columns:
+        raise ValueError(f'the image is "{image.encoding}" with {image.step} bytes per row, not mono8 without gaps')
+    if len(image.pixels) != image.rows * image.columns:
+        raise ValueError(f"the image has {len(image.pixels)} pixels instead of {image.rows * image.columns}")
+    return np.frombuffer(image.pixels, np.uint8).reshape(image.rows, image.columns)
 
 
 def _field_length(message: memoryview, position: int, wire_type: int) -> tuple[int, int]:

@@ -50,6 +50,16 @@ class VerifyReport:
             return Verdict.DAMAGED
         return Verdict.CLEAN if self.ledger.complete == self.ledger.pulses else Verdict.PARTIAL
 
+    @property
+    def damaged(self) -> bool:
+        """Whether the log itself is not what it should be."""
+        return self.verdict is Verdict.DAMAGED
+
+    @property
+    def pulses(self) -> int:
+        """Pulses that have a tag."""
+        return self.ledger.pulses
+
     def to_json(self) -> dict[str, Any]:
         """The report as one JSON object."""
         return {

@@ -26,8 +26,10 @@ _TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
 _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
 
 _IDS_16_BIT = 65535
-_QUEUE_S = 0.2  # seconds of frames that stand in Aravis's queue
-_QUEUE_LEAST = 6
+# How many empty buffers stand in Aravis's queue: half a second of frames, but not more than stay in the cache.
+_QUEUE_S = 0.5
+_QUEUE_BYTES = 24 << 20
+_QUEUE_LEAST = 8
 
 
 class AravisCamera:
@@ -44,7 +46,8 @@ class AravisCamera:
         self._buffers: dict[int, int] = {}
         self._of_slot: list[Aravis.Buffer] = []
         self._in_aravis = 0
-        self._depth = min(ring.slots, max(_QUEUE_LEAST, round(_QUEUE_S * NS_PER_S / period_ns)))
+        wanted = min(round(_QUEUE_S * NS_PER_S / period_ns), _QUEUE_BYTES // settings.frame_bytes)
+        self._depth = min(ring.slots, max(_QUEUE_LEAST, wanted))
         try:
             self._camera = Aravis.Camera.new(settings.address)
         except GLib.Error as error:
@@ -55,8 +58,6 @@ class AravisCamera:
             self._configure(settings, network)
             self._tick_hz = self._timestamp_frequency()
             self._stream = self._open_stream(network, period_ns)
-            self._top_up()
-            self._camera.start_acquisition()
         except GLib.Error as error:
             self.close()
             raise CameraError(
@@ -75,6 +76,14 @@ class AravisCamera:
             f"{camera.get_vendor_name()} {camera.get_model_name()} serial {camera.get_device_serial_number()} "
             f"at {self._address}, {camera.gv_get_packet_size()}-byte packets"
         )
+
+    def start(self) -> None:
+        """See `capture.seam.Camera.start`."""
+        self._top_up()
+        try:
+            self._camera.start_acquisition()
+        except GLib.Error as error:
+            raise CameraError(f"camera {self._name} does not start: {error.message}; check its power") from None
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """See `capture.seam.Camera.receive`."""

@@ -68,6 +68,7 @@ class Grabber:
         self._put(RecordKind.CONNECTED, text=camera.description)
         for _ in range(_LATCHES_AT_START):
             self._put_latch(camera.latch())
+        camera.start()
         next_latch = next_count = host_now()
         while not self._stopping():
             if self._ring.reconnect_requests() != asked:

@@ -36,11 +36,19 @@ class Arrival:
 
 
 class Camera(Protocol):
-    """A connected, configured camera that waits for trigger pulses."""
+    """A connected, configured camera; after `start` it waits for trigger pulses."""
 
     @property
     def description(self) -> str:
         """Vendor, model, serial number, and what was set, in one line for people."""
+        ...
+
+    def start(self) -> None:
+        """Begin to take frames.
+
+        Raises:
+            CameraError: the camera refuses.
+        """
         ...
 
     def receive(self, timeout_s: float) -> Arrival | None:

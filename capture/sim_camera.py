@@ -64,12 +64,16 @@ class SimCamera:
         self._delay = round(settings.exposure_us * NS_PER_US) + _TRANSPORT_NS
         self._frame_id = 0
         self._underruns = 0
-        self._pulse = scene.next_pulse(host_now())
+        self._pulse = 0
 
     @property
     def description(self) -> str:
         """What it is."""
         return f"simulated camera {self._settings.name}, {self._shape[1]} x {self._shape[0]}"
+
+    def start(self) -> None:
+        """From the next pulse on."""
+        self._pulse = self._scene.next_pulse(host_now())
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """See `capture.seam.Camera.receive`."""

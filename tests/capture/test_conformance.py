@@ -70,6 +70,7 @@ def bench(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) ->
 def _open(bench: Bench) -> Iterator[Camera]:
     camera = bench.open()
     try:
+        camera.start()
         yield camera
     finally:
         camera.close()
@@ -188,6 +189,7 @@ def test_a_recorder_that_holds_all_slots_costs_frames_but_nothing_breaks(bench: 
 def test_a_dead_camera_is_an_error_in_bounded_time_and_comes_back_from_scratch(bench: OpenBench) -> None:
     made = bench(faults=[{"kind": "restart", "camera": "K2", "at_pulse": 20, "duration_s": 0.5}])
     camera = made.open()
+    camera.start()
     try:
         with pytest.raises(CameraError):
             _use_until_it_fails(made, camera)
@@ -201,6 +203,7 @@ def test_a_dead_camera_is_an_error_in_bounded_time_and_comes_back_from_scratch(b
         except CameraError:
             continue
         break
+    camera.start()
     try:
         assert all(arrival.whole for arrival, _ in _collect(made, camera, 3))
     finally:

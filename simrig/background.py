@@ -12,6 +12,7 @@ from simrig.canvas import Canvas
 from simrig.hill_profile import HillProfile
 from simrig.projection import Projection
 from simrig.scenario import BRIGHTEST, Scenario
+from simrig.stroke import stroke
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,7 @@ def paint(scenario: Scenario, projection: Projection) -> NDArray[np.float32]:
     painter = _Painter(scenario, projection, rng)
     painter.paint_land_and_forest()
     painter.paint_table()
-    painter.paint_poles()
-    image = painter.canvas.image().astype(np.float32)
+    image = painter.canvas.image()
     image += _texture(image.shape, projection.width / 640, rng)
     image = cv2.GaussianBlur(image, (0, 0), scenario.image.blur_sigma_px).astype(np.float32)
     _put_balls(image, scenario, projection)
@@ -44,7 +44,7 @@ class _Painter:
         self._profile = HillProfile(scenario.hill)
         self._projection = projection
         self._rng = rng
-        self.canvas = Canvas(_sky(projection), fine=2)
+        self.canvas = Canvas(_sky(projection))
 
     def paint_land_and_forest(self) -> None:
         things = [(self._far(quad), quad, grey) for quad, grey in self._land()]
@@ -70,15 +70,6 @@ class _Painter:
                 for y in (-0.17, 0.17):
                     self._fill([(a, y - 0.06, za), (b, y - 0.06, zb), (b, y + 0.06, zb), (a, y + 0.06, za)], 128.0)
 
-    def paint_poles(self) -> None:
-        """A thin pole below every ball."""
-        for ball in self._scenario.balls:
-            x, y, z = ball.X
-            foot = min(float(self._profile.ground(x)), z)
-            a, b = self._projection.pixels([(x, y, z), (x, y, foot)])
-            if self._far([ball.X]) > _NEAREST_M:
-                self.canvas.capsule(a, b, 0.5, 0.5, _POLE)
-
     def _land(self) -> list[tuple[Array, float]]:
         """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest."""
         xs, ys = np.arange(-60.0, 150.0, 3.0), np.arange(-27.0, 75.0, 3.0)
@@ -86,7 +77,7 @@ class _Painter:
         for x in xs:
             for y in ys:
                 corners = np.array(
-                    [(u, v, self._height(u, v)) for u, v in ((x, y), (x + 3, y), (x + 3, y + 3), (x, y + 3))]
+                    [(u, v, self._profile.snow(u, v)) for u, v in ((x, y), (x + 3, y), (x + 3, y + 3), (x, y + 3))]
                 )
                 normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
                 light = float(normal @ (-0.45, -0.2, 0.87)) / float(np.linalg.norm(normal))
@@ -105,7 +96,7 @@ class _Painter:
 
     def _spruce(self, x: float, y: float, tall: float, grey: float) -> list[tuple[Array, float]]:
         """A tree as four tiers of triangles that face the camera, each with snow on one flank."""
-        foot, right = np.array((x, y, self._height(x, y))), self._projection.R[:, 0]
+        foot, right = np.array((x, y, self._profile.snow(x, y))), self._projection.R[:, 0]
         up, tiers = np.array((0.0, 0.0, tall)), []
         for k in range(4):
             low, high, wide = 0.08 + 0.22 * k, min(1.0, 0.45 + 0.2 * k), 0.19 * tall * (1 - 0.2 * k)
@@ -113,11 +104,6 @@ class _Painter:
             tiers.append((np.stack((left, foot + low * up + wide * right, tip)), grey))
             tiers.append((np.stack((left, foot + (low + 0.05) * up - 0.5 * wide * right, tip)), grey + 34))
         return tiers
-
-    def _height(self, x: float, y: float) -> float:
-        """Height of the snow; it rises towards the forest and falls towards the cameras."""
-        beside = max(0.0, abs(y) - self._scenario.hill.knoll_width_m / 2)
-        return float(self._profile.ground(x)) + (0.12 if y > 0 else -0.05) * beside
 
     def _far(self, corners: ArrayLike) -> float:
         return float(np.mean(self._projection.distance(corners)))
@@ -145,12 +131,15 @@ def _texture(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> 
 
 
 def _put_balls(image: NDArray[np.float32], scenario: Scenario, projection: Projection) -> None:
-    """Each ball on its plate, far ones first."""
-    blur = scenario.image.blur_sigma_px
-    for ball in sorted(scenario.balls, key=lambda b: -float(projection.distance(b.X))):
-        distance = float(projection.distance(ball.X))
-        if distance > _NEAREST_M:
-            x, y = projection.pixels(ball.X)
-            radius = scenario.ball_radius_m * projection.c / distance
-            Blob(radius + PLATE_MARGIN_PX, blur).draw(image, x, y, PLATE)
-            Blob(radius, blur).draw(image, x, y, BRIGHTEST)
+    """Thin poles, then each ball on its plate, far ones first."""
+    blur, profile = scenario.image.blur_sigma_px, HillProfile(scenario.hill)
+    seen = [(float(projection.distance(ball.X)), ball.X) for ball in scenario.balls]
+    balls = sorted(((distance, X) for distance, X in seen if distance > _NEAREST_M), reverse=True)
+    for _, (x, y, z) in balls:
+        top, foot = projection.pixels([(x, y, z), (x, y, min(profile.snow(x, y), z))])
+        stroke(image, top, foot, 0.4, 0.4, _POLE)
+    for distance, X in balls:  # noqa: N806
+        x, y = projection.pixels(X)
+        radius = scenario.ball_radius_m * projection.c / distance
+        Blob(radius + PLATE_MARGIN_PX, blur).draw(image, x, y, PLATE)
+        Blob(radius, blur).draw(image, x, y, BRIGHTEST)

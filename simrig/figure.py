@@ -11,23 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simrig.blob import Blob
-from simrig.canvas import Canvas, Pixels
 from simrig.jumper import Pose
 from simrig.projection import Projection
 from simrig.scenario import BRIGHTEST, Scenario, SceneCamera
+from simrig.stroke import stroke
 
 Array = NDArray[np.float64]
+Pixels = NDArray[np.float64]  #: x, y in px
+Sprite = NDArray[np.float32]
 
 PATCH = 34.0  #: radiance of the dark patches below the markers
 _SUIT, _SUIT_LIGHT, _BOOT, _GLOVE, _FACE = 44.0, 66.0, 38.0, 120.0, 150.0
 _SKI = 222.0
 _SKI_RADIUS_M = 0.04  #: drawn as a thin capsule, whose middle line is the ski line from wherever it is seen
-_PATCH_MARGIN_PX = 4.0
+_PATCH_MARGIN_PX = 2.6  #: of patch around the whole image of a marker; its border fades over half of that
 _PATCH_RADIUS_M = 0.16
 _THIGH_M = _SHANK_M = 0.45
 _HIP_ASIDE_M, _SHOULDER_ASIDE_M, _HAND_ASIDE_M = 0.11, 0.19, 0.3
 _ANKLE_UP_M = 0.1
 _PADDING_M = 0.3
+_NEAREST_M = 1.0  #: nearer than this a projection says little
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +63,9 @@ class Figure:
         self._clean = clean
         self._half_ski_m = scenario.jumper.ski_length_m / 2
         self._black, self._gain = scenario.image.black_level, camera.gain
-        self._fine = 4 if projection.width <= 960 else 2
         self._middle_m = float(projection.distance((10.0, 0.0, -1.8)))
         px_per_m = projection.c / self._middle_m
-        self._marker_radius_px = scenario.jumper.marker_radius_m * px_per_m
-        self._marker = Blob(self._marker_radius_px, scenario.image.blur_sigma_px)
+        self._marker = Blob(scenario.jumper.marker_radius_m * px_per_m, scenario.image.blur_sigma_px)
 
     def draw(self, pose: Pose) -> tuple[slice, slice, NDArray[np.float32]] | None:
         """Draw a pose.
@@ -73,7 +74,7 @@ class Figure:
             Rows and columns of the image that change, and their grey values without noise; None if out of sight.
         """
         joints = _joints(pose, self._half_ski_m)
-        if self._projection.distance(pose.origin) <= 1.0:
+        if float(self._projection.distance(joints).min()) < _NEAREST_M:
             return None
         pixels = self._projection.pixels(joints)
         px_per_m = self._projection.c / float(self._projection.distance(pose.origin))
@@ -81,52 +82,64 @@ class Figure:
         if box is None:
             return None
         rows, columns = box
-        canvas = Canvas(self._clean[rows, columns], columns.start, rows.start, self._fine)
-        sides = sorted((0, 1), key=lambda i: -self._projection.distance(pose.markers[2 + i]))
-        self._draw_body(canvas, pixels, [_side(pixels, i) for i in sides], px_per_m)
-        markers = pixels[:4]
-        scales = self._middle_m / self._projection.distance(pose.markers)
-        for marker, scale in zip(markers, scales, strict=True):
-            self._patch(canvas, marker, float(scale), px_per_m)
-        sprite = canvas.image().astype(np.float32)
-        for (x, y), scale in zip(markers, scales, strict=True):
-            self._marker.draw(sprite, x - columns.start, y - rows.start, self._grey(BRIGHTEST), float(scale))
+        sprite = self._clean[rows, columns].astype(np.float32)
+        pixels -= (columns.start, rows.start)
+        self._draw_person(sprite, pose, pixels, px_per_m)
+        self._draw_markers(sprite, pose, pixels[:4], px_per_m)
         return rows, columns, sprite
 
-    def _draw_body(self, canvas: Canvas, pixels: Pixels, sides: list[_Side], px_per_m: float) -> None:
-        helmet, hip, neck = pixels[0], pixels[1], pixels[4]
-        far, near = sides
-        self._draw_limbs(canvas, far, px_per_m, 0.8)
-        self._limb(canvas, hip, neck, (0.15, 0.19), px_per_m, 1.0)
-        canvas.capsule(neck, helmet, 0.06 * px_per_m, 0.08 * px_per_m, self._grey(_FACE))
-        canvas.disc(helmet, 0.145 * px_per_m, self._grey(PATCH))
-        self._draw_limbs(canvas, near, px_per_m, 1.0)
-
-    def _draw_limbs(self, canvas: Canvas, side: _Side, px_per_m: float, light: float) -> None:
+    def _draw_person(self, sprite: Sprite, pose: Pose, pixels: Pixels, px_per_m: float) -> None:
+        """Skis and limbs from far to near; the skis hide the body if they are seen from below."""
+        far, near = sorted((0, 1), key=lambda i: -float(self._projection.distance(pose.markers[2 + i])))
+        sides = _side(pixels, far), _side(pixels, near)
+        from_below = pose.axes[2] @ (self._projection.X0 - pose.origin) < 0
+        if from_below:
+            self._draw_body(sprite, pixels, *sides, px_per_m)
         thick = _SKI_RADIUS_M * px_per_m
-        canvas.capsule(side.tail, side.tip, thick, thick, self._grey(_SKI))
-        self._limb(canvas, side.ankle, side.knee, (0.07, 0.085), px_per_m, light)
-        self._limb(canvas, side.knee, side.hip, (0.085, 0.12), px_per_m, light)
-        canvas.disc(side.ankle, 0.09 * px_per_m, self._grey(_BOOT))
-        self._limb(canvas, side.shoulder, side.hand, (0.075, 0.05), px_per_m, light)
-        canvas.disc(side.hand, 0.06 * px_per_m, self._grey(_GLOVE))
+        for side in sides:
+            stroke(sprite, side.tail, side.tip, thick, thick, self._grey(_SKI))
+        if not from_below:
+            self._draw_body(sprite, pixels, *sides, px_per_m)
+
+    def _draw_body(self, sprite: Sprite, pixels: Pixels, far: _Side, near: _Side, px_per_m: float) -> None:
+        helmet, hip, neck = pixels[0], pixels[1], pixels[4]
+        self._draw_limbs(sprite, far, px_per_m, 0.8)
+        self._limb(sprite, hip, neck, (0.15, 0.19), px_per_m, 1.0)
+        stroke(sprite, neck, helmet, 0.06 * px_per_m, 0.08 * px_per_m, self._grey(_FACE))
+        self._disc(sprite, helmet, 0.145 * px_per_m, PATCH)
+        self._draw_limbs(sprite, near, px_per_m, 1.0)
+
+    def _draw_limbs(self, sprite: Sprite, side: _Side, px_per_m: float, light: float) -> None:
+        self._limb(sprite, side.ankle, side.knee, (0.07, 0.085), px_per_m, light)
+        self._limb(sprite, side.knee, side.hip, (0.085, 0.12), px_per_m, light)
+        self._disc(sprite, side.ankle, 0.09 * px_per_m, _BOOT)
+        self._limb(sprite, side.shoulder, side.hand, (0.075, 0.05), px_per_m, light)
+        self._disc(sprite, side.hand, 0.06 * px_per_m, _GLOVE)
 
     def _limb(
-        self, canvas: Canvas, a: Pixels, b: Pixels, radii_m: tuple[float, float], px_per_m: float, light: float
+        self, sprite: Sprite, a: Pixels, b: Pixels, radii_m: tuple[float, float], px_per_m: float, light: float
     ) -> None:
         """A capsule with a lighter stripe where the sky lights it."""
         ra, rb = radii_m[0] * px_per_m, radii_m[1] * px_per_m
-        canvas.capsule(a, b, ra, rb, self._grey(_SUIT * light))
+        stroke(sprite, a, b, ra, rb, self._grey(_SUIT * light))
         up = np.array((0.0, -0.35))
-        canvas.capsule(a + up * ra, b + up * rb, 0.45 * ra, 0.45 * rb, self._grey(_SUIT_LIGHT * light))
+        stroke(sprite, a + up * ra, b + up * rb, 0.45 * ra, 0.45 * rb, self._grey(_SUIT_LIGHT * light))
 
-    def _patch(self, canvas: Canvas, marker: Pixels, scale: float, px_per_m: float) -> None:
-        radius = max(_PATCH_RADIUS_M * px_per_m, self._marker_radius_px * scale + _PATCH_MARGIN_PX)
-        canvas.disc(marker, radius, self._grey(PATCH))
+    def _disc(self, sprite: Sprite, centre: Pixels, radius: float, radiance: float) -> None:
+        stroke(sprite, centre, centre, radius, radius, self._grey(radiance))
+
+    def _draw_markers(self, sprite: Sprite, pose: Pose, markers: Pixels, px_per_m: float) -> None:
+        """All patches first, so that none covers another's marker."""
+        scales = self._middle_m / self._projection.distance(pose.markers)
+        for marker, scale in zip(markers, scales, strict=True):
+            patch = max(_PATCH_RADIUS_M * px_per_m, self._marker.reach_px * float(scale) + _PATCH_MARGIN_PX)
+            self._disc(sprite, marker, patch, PATCH)
+        for (x, y), scale in zip(markers, scales, strict=True):
+            self._marker.draw(sprite, x, y, self._grey(BRIGHTEST), float(scale))
 
     def _box(self, pixels: Pixels, padding: float) -> tuple[slice, slice] | None:
         """Rows and columns that the figure may touch, cut to the image; None if there are none."""
-        padding += self._marker_radius_px + _PATCH_MARGIN_PX
+        padding += self._marker.reach_px + 2 * _PATCH_MARGIN_PX
         left, top = (max(0, math.floor(v)) for v in pixels.min(axis=0) - padding)
         right, bottom = (math.ceil(v) for v in pixels.max(axis=0) + padding)
         right, bottom = min(self._projection.width, right + 1), min(self._projection.height, bottom + 1)

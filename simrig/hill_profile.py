@@ -38,3 +38,8 @@ class HillProfile:
         beyond = np.maximum(x - hill.p_x_m, 0.0)
         height: NDArray[np.float64] = knoll - steep * beyond
         return height
+
+    def snow(self, x: float, y: float) -> float:
+        """Height of the snow anywhere: beside the knoll it rises to the left and falls gently to the right."""
+        beside = max(0.0, abs(y) - self.hill.knoll_width_m / 2)
+        return float(self.ground(x)) + (0.12 if y > 0 else -0.05) * beside

@@ -1,0 +1,270 @@
+"""The camera's sensor: waits for triggers, exposes, and hands the frames over for transmission.
+
+Triggers of the hill and of scheduled actions are known in advance, so their image is rendered before they come. What
+a frame says about its time is the trigger's time, however late this process was scheduled.
+"""
+
+import heapq
+import threading
+from dataclasses import dataclass
+
+from rig.clocks import NS_PER_S, HostNs, host_now
+from simrig.faults import Fault, FaultKind, FaultPlan
+from simrig.gige import freeze
+from simrig.gige.camera_clock import CameraClock
+from simrig.gige.counters import Counters
+from simrig.gige.features import AcquisitionMode, ExposureMode, TriggerSource
+from simrig.gige.frame_store import FrameStore, Shot, Slot
+from simrig.gige.image_source import Painter
+from simrig.gige.link import Link
+from simrig.gige.registers import RegisterMap
+from simrig.gige.transmitter import Transmitter
+from simrig.pulse_train import PulseTrain
+
+LINE_NS = 5_000  #: read-out time of one line of the sensor
+PULSE_WIDTH_NS = 500_000  #: of the hill's trigger pulses; the falling edge comes so much later
+_LATE_NS = 5_000_000  # a trigger that is served later than this raises the question whether we were frozen
+_STOP_S = 5.0
+_IDS_16_BIT = 65535
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Trigger:
+    """One moment at which the sensor should begin to expose, and the hill pulse that the frame is to show."""
+
+    time: HostNs
+    pulse: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Ahead:
+    """An image rendered before its trigger."""
+
+    store: FrameStore
+    slot: Slot
+    pulse: int
+
+
+class Sensor:
+    """A thread that exposes.
+
+    Args:
+        train: the hill's trigger pulses, which arrive at Line0.
+        faults: what goes wrong.
+        painter: makes the images.
+        clock: makes the timestamps.
+        registers: the settings; those of the format are locked while the sensor acquires.
+        transmitter: gets the frames.
+        link: gets the fault "slow link".
+        counters: what is counted.
+        first_block_id: block id of the first frame after each start of acquisition.
+    """
+
+    def __init__(
+        self,
+        train: PulseTrain,
+        faults: FaultPlan,
+        painter: Painter,
+        clock: CameraClock,
+        registers: RegisterMap,
+        transmitter: Transmitter,
+        link: Link,
+        counters: Counters,
+        first_block_id: int,
+    ) -> None:
+        self._train, self._faults, self._painter, self._clock = train, faults, painter, clock
+        self._registers, self._transmitter, self._link, self._counters = registers, transmitter, link, counters
+        self._first_block_id = first_block_id
+        self._condition = threading.Condition()
+        self._stopping = False
+        self._store: FrameStore | None = None  # None: not acquiring
+        self._changes = 0
+        self._since = HostNs(0)  # triggers up to here are done with
+        self._pending: list[HostNs] = []  # software triggers and scheduled actions, a heap
+        self._busy_until = HostNs(0)
+        self._ahead: _Ahead | None = None
+        self._next_id = first_block_id
+        self._latest_pulse = -1
+        self.block_id = 0
+        self._thread = threading.Thread(target=self._run, name="sensor")
+
+    @property
+    def acquiring(self) -> bool:
+        """Whether triggers are listened to."""
+        return self._store is not None
+
+    @property
+    def waiting_triggers(self) -> int:
+        """Scheduled actions and software triggers that have not been served."""
+        return len(self._pending)
+
+    def start(self) -> None:
+        """Start the thread; it does not acquire yet."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        with self._condition:
+            self._stopping = True
+            self._condition.notify_all()
+        self._thread.join(_STOP_S)
+
+    def acquire(self, store: FrameStore | None) -> None:
+        """Begin to acquire into `store`, counting block ids anew; None: stop."""
+        with self._condition:
+            self._store = store
+            self._registers.locked = store is not None
+            self._next_id, self.block_id = self._first_block_id, 0
+            self._busy_until = HostNs(0)
+            freeze.was_frozen()
+        self.settings_changed()
+
+    def settings_changed(self) -> None:
+        """Trigger settings were written: only triggers from now on count, by the new settings."""
+        with self._condition:
+            self._since = host_now()
+            self._pending.clear()
+            self._look_again()
+
+    def trigger(self, source: TriggerSource, time: HostNs) -> None:
+        """A software trigger or an action at a host time; ignored where the settings do not wait for it."""
+        with self._condition:
+            if self._source() is source:
+                heapq.heappush(self._pending, time)
+                self._look_again()
+
+    def _look_again(self) -> None:
+        self._changes += 1
+        self._condition.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                trigger = self._next_trigger()
+                while trigger is None and not self._stopping:
+                    self._condition.wait()
+                    trigger = self._next_trigger()
+                if self._stopping or trigger is None:
+                    return
+                changes, store = self._changes, self._store
+            self._render(store, trigger.pulse)
+            with self._condition:
+                while changes == self._changes and (early_ns := trigger.time - host_now()) > 0:
+                    self._condition.wait(early_ns / NS_PER_S)
+                if changes == self._changes:
+                    self._serve(trigger)
+
+    def _source(self) -> TriggerSource | None:
+        """What triggers at present, None: nothing, the camera runs free."""
+        if not self._registers.number("TriggerMode"):
+            return None
+        return TriggerSource(self._registers.number("TriggerSource"))
+
+    def _next_trigger(self) -> Trigger | None:
+        """The next one that is known of."""
+        if self._store is None:
+            return None
+        match self._source():
+            case None:
+                time = HostNs(max(self._since + self._free_period_ns(), self._busy_until, self._since + 1))
+            case TriggerSource.LINE0:
+                delay = PULSE_WIDTH_NS if self._registers.number("TriggerActivation") else 0
+                pulse = self._train.next_index(HostNs(self._since - delay))
+                return Trigger(HostNs(self._train.time(pulse) + delay), pulse)
+            case TriggerSource.SOFTWARE | TriggerSource.ACTION0 if self._pending:
+                time = self._pending[0]
+            case _:
+                return None
+        return Trigger(time, self._train.next_index(HostNs(time - 1)))
+
+    def _free_period_ns(self) -> int:
+        if not self._registers.number("AcquisitionFrameRateEnable"):
+            return 0  # as fast as the sensor can
+        return round(NS_PER_S / self._registers.real("AcquisitionFrameRate"))
+
+    def _exposure_ns(self) -> int:
+        if self._registers.number("ExposureMode") == ExposureMode.TRIGGER_WIDTH:
+            return PULSE_WIDTH_NS
+        return round(self._registers.real("ExposureTime") * 1000)
+
+    def _render(self, store: FrameStore | None, pulse: int) -> None:
+        """Have the image of `pulse` ready in a slot, if there is a free one."""
+        ahead = self._ahead
+        if store is None or (ahead is not None and ahead.store is store and ahead.pulse == pulse):
+            return
+        slot = ahead.slot if ahead is not None and ahead.store is store else store.take()
+        if slot is not None:
+            self._painter.paint(store.format, slot, pulse)
+            self._ahead = _Ahead(store, slot, pulse)
+
+    def _serve(self, trigger: Trigger) -> None:
+        """The moment of `trigger` has come; called with the lock held."""
+        now = host_now()
+        if now - trigger.time > _LATE_NS and freeze.was_frozen():
+            self._skip_to(now)
+            return
+        self._since = trigger.time
+        if self._pending:
+            heapq.heappop(self._pending)
+        faults: tuple[Fault, ...] = ()
+        if trigger.pulse > self._latest_pulse:  # running free, frames may be more than pulses
+            self._latest_pulse = trigger.pulse
+            faults = self._faults.take(trigger.pulse)
+        for fault in faults:
+            if fault.kind is FaultKind.SLOW_LINK and fault.mbit_s is not None:
+                self._link.slow_down(fault.mbit_s, HostNs(trigger.time + fault.duration_ns))
+        if any(fault.kind is FaultKind.MISSED_PULSE for fault in faults):
+            self._counters.missed += 1
+            return
+        self._counters.triggers += 1
+        self._counters.frame_triggers += 1
+        ahead = self._ahead
+        if trigger.time < self._busy_until or ahead is None or ahead.pulse != trigger.pulse:
+            self._counters.overruns += 1
+            return
+        self._expose(trigger, ahead, faults)
+
+    def _skip_to(self, now: HostNs) -> None:
+        """Miss all triggers up to now."""
+        while (trigger := self._next_trigger()) is not None and trigger.time <= now:
+            self._counters.missed += 1
+            self._since = trigger.time
+            if self._pending:
+                heapq.heappop(self._pending)
+
+    def _expose(self, trigger: Trigger, ahead: _Ahead, faults: tuple[Fault, ...]) -> None:
+        frame = ahead.store.format
+        ready = HostNs(trigger.time + self._exposure_ns())
+        self._busy_until = HostNs(ready + frame.height * LINE_NS)
+        modulus = 1 << 64 if frame.extended else _IDS_16_BIT
+        self.block_id = (self._next_id - 1) % modulus + 1
+        self._next_id = self.block_id + 1
+        ticks = self._clock.exposure_ticks(trigger.time, trigger.pulse)
+        shot = Shot(ahead.slot, trigger.pulse, self.block_id, ticks, ready)
+        spoil(shot, faults)
+        self._ahead = None
+        self._transmitter.submit(shot)
+        if self._registers.number("AcquisitionMode") == AcquisitionMode.SINGLE_FRAME:
+            self._store, self._registers.locked = None, False
+            self._changes += 1
+
+
+def spoil(shot: Shot, faults: tuple[Fault, ...]) -> None:
+    """Let the faults of single frames befall a frame."""
+    everything = frozenset(range(shot.slot.table.count))
+    for fault in faults:
+        match fault.kind:
+            case FaultKind.LOST_FRAME:
+                lost, resend = everything, False
+            case FaultKind.LOST_PACKETS:
+                lost, resend = frozenset(fault.packets), fault.resend
+            case FaultKind.LOST_LEADER:
+                lost, resend = frozenset({0}), fault.resend
+            case FaultKind.DAMAGED_FRAME:
+                last = shot.slot.table.count - 2
+                shot.damaged = frozenset(range(last - last // 4, last + 1))
+                continue
+            case _:
+                continue
+        shot.lost |= lost
+        shot.gone |= frozenset() if resend else lost

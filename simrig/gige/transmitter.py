@@ -1,0 +1,124 @@
+"""Sends exposed frames one after the other, and single packets again when they are asked for."""
+
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator
+
+from rig.clocks import NS_PER_S, host_now
+from simrig.gige.counters import Counters
+from simrig.gige.frame_store import FrameStore, Shot
+from simrig.gige.gvsp import unavailable
+from simrig.gige.link import Link
+
+_STOP_S = 5.0
+
+
+class Transmitter:
+    """A thread that empties the queue of exposed frames into the link.
+
+    Args:
+        link: where to.
+        counters: what is counted.
+    """
+
+    def __init__(self, link: Link, counters: Counters) -> None:
+        self._link, self._counters = link, counters
+        self._store: FrameStore | None = None
+        self._condition = threading.Condition()
+        self._queue: deque[Shot] = deque()
+        self._sending = self._stopping = False
+        self._aborts = 0
+        self._thread = threading.Thread(target=self._run, name="transmitter")
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Drop what is not sent yet and end the thread."""
+        with self._condition:
+            self._stopping = True
+            self._aborts += 1
+            self._condition.notify_all()
+        self._thread.join(_STOP_S)
+
+    def restart(self, store: FrameStore) -> None:
+        """Drop what is not sent yet; the frames to come stand in `store`."""
+        with self._condition:
+            self._aborts += 1
+            self._condition.notify_all()
+            self._condition.wait_for(lambda: not self._sending, _STOP_S)
+            if self._store is not None:
+                for shot in self._queue:
+                    self._store.give_back(shot.slot)
+                self._store.forget()
+            self._queue.clear()
+            self._store = store
+
+    def submit(self, shot: Shot) -> None:
+        """Send a frame after those submitted before, and not before its exposure has ended."""
+        with self._condition:
+            self._queue.append(shot)
+            self._condition.notify_all()
+
+    def resend(self, block_id: int, first: int, last: int) -> None:
+        """Send packets of a frame again; to be called by one thread only."""
+        self._counters.resend_requests += 1
+        store = self._store
+        if store is None:
+            return
+        frame = store.format
+        with store.lock:  # as long as it is held the slot is not used for another frame
+            shot = store.find(block_id)
+            if shot is None:
+                self._link.send_datagram(unavailable(block_id, first, extended=frame.extended))
+                return
+            end = min(last + 1, shot.sent)
+            for packet in shot.damaged.intersection(range(first, end)):
+                self._link.send_datagram(unavailable(block_id, packet, extended=frame.extended))
+            for start, count in _runs(first, end, shot.gone | shot.damaged):
+                self._link.send(shot.slot, start, count, frame.packet_size)
+                self._counters.resent_packets += count
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._sending = False
+                self._condition.notify_all()
+                self._condition.wait_for(lambda: self._queue or self._stopping)
+                if self._stopping or self._store is None:
+                    return
+                store, shot = self._store, self._queue.popleft()
+                self._sending, aborts = True, self._aborts
+                while aborts == self._aborts and (early_ns := shot.ready - host_now()) > 0:
+                    self._condition.wait(early_ns / NS_PER_S)
+            self._send(store, shot, aborts)
+
+    def _send(self, store: FrameStore, shot: Shot, aborts: int) -> None:
+        packet_size = store.format.packet_size
+        table = shot.slot.table
+        table.prepare(shot.block_id, shot.ticks, shot.damaged)
+        store.remember(shot)
+        self._link.begin_frame()
+        for start, count in _runs(0, table.count, shot.lost):
+            burst = self._link.burst(packet_size)
+            for first in range(start, start + count, burst):
+                if self._aborts != aborts:
+                    return
+                size = min(burst, start + count - first)
+                self._link.send_paced(shot.slot, first, size, packet_size)
+                shot.sent = first + size
+        shot.sent = table.count
+        if len(shot.lost) < table.count:
+            self._counters.frames += 1
+            self._counters.last_packets.append((shot.pulse, host_now()))
+
+
+def _runs(first: int, end: int, without: Iterable[int]) -> Iterator[tuple[int, int]]:
+    """Start and length of the runs of packets from `first` to before `end` that leave out those in `without`."""
+    for gap in sorted(packet for packet in without if first <= packet < end):
+        if gap > first:
+            yield first, gap - first
+        first = gap + 1
+    if end > first:
+        yield first, end - first

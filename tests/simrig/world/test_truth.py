@@ -69,3 +69,13 @@ def test_the_origin_is_the_middle_of_p3_and_p4(known: dict[str, Any]) -> None:
 def test_balls_have_their_roles_and_places(known: dict[str, Any], training: Scenario) -> None:
     assert {name: ball["role"] for name, ball in known["balls"].items()} == {b.name: b.role for b in training.balls}
     assert all(None not in spots.values() for spots in known["ball_images"].values())
+
+
+def test_every_jump_of_the_session_is_in_sight_of_every_camera(training: Scenario) -> None:
+    known = truth(training, range(0, 1200, 3), RATE_HZ)
+    flying = [pulse for pulse in known["pulses"] if pulse.get("in_flight")]
+    assert {pulse["jump"] for pulse in flying} == set(range(10))
+    for pulse in flying:
+        for spots in pulse["images"].values():
+            assert None not in spots.values()
+            assert np.hypot(*np.subtract(spots["P3"], spots["P4"])) > 7  # so that both can be measured

@@ -13,7 +13,7 @@ import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import doctor, schema
+from svev.commands import bench, demo, doctor, info, record, replay, schema, verify
 
 app = typer.Typer(
     name="svev",
@@ -31,8 +31,14 @@ def _every_command() -> None:
     """Live capture and photogrammetry for three synchronized cameras at a ski jump."""
 
 
+app.command("demo")(demo.demo)
+app.command("record")(record.record)
 app.command("doctor")(doctor.doctor)
+app.command("info")(info.info_command)
+app.command("replay")(replay.replay_command)
 app.command("schema")(schema.schema)
+app.command("verify")(verify.verify_command)
+app.command("bench")(bench.bench)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

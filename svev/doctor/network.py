@@ -7,6 +7,8 @@ from pathlib import Path
 
 import zmq
 
+from recorder.zmq_address import bind
+from rig.errors import BadInputError
 from rig.settings import CameraSettings, RigSettings
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 from svev.doctor.interfaces import Interface, interface_to
@@ -112,13 +114,10 @@ def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
     address = rig.network.publish
     with zmq.Context() as context, context.socket(zmq.PUB) as publisher:
         try:
-            publisher.bind(address)
-        except zmq.ZMQError as error:
-            yield failure(
-                Topic.NETWORK,
-                f"triplets cannot be published at {address}: {error.strerror}",
-                "end the program that uses it (another svev?), or choose another network.publish",
-            )
+            bind(publisher, address)
+        except BadInputError as error:
+            remedy = "end the program that uses it (another svev?), or correct network.publish"
+            yield failure(Topic.NETWORK, f"triplets cannot be published: {error}", remedy)
             return
     yield passed(Topic.NETWORK, f"triplets can be published at {address}")
 

@@ -37,6 +37,13 @@ def test_the_rig_files_of_the_contract_are_shipped() -> None:
     assert {"hill-iidc", "hill-gige", "sim"} <= {path.stem for path in RIGS}
 
 
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_the_scenario_of_a_shipped_rig_file_exists(path: Path) -> None:
+    simulation = load_rig(path).simulation
+    if simulation is not None:
+        assert simulation.scenario.is_file()
+
+
 def test_the_shipped_schema_is_up_to_date() -> None:
     assert (CONFIG / "rig.schema.json").read_text(encoding="utf-8") == rig_schema(), (
         "run: svev schema -o config/rig.schema.json"

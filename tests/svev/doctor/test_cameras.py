@@ -1,4 +1,5 @@
 import socket
+import struct
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from rig.rigfile import CONFIG, load_rig
+from simrig.simulated_hill import SimulatedHill
 from svev.doctor import cameras
 from svev.doctor.finding import Level
 from svev.doctor.gvcp import ask_camera
 from tests.support.loopback import Loopback
-from tests.svev.doctor.rigs import SIM, write_rig
+from tests.support.rigs import SIM, write_rig
 
 
 @contextmanager
@@ -58,6 +60,23 @@ def test_cameras_that_do_not_answer_are_named_one_by_one(tmp_path: Path, loopbac
     assert [finding.level for finding in findings] == [Level.FAIL] * 3
     expected = [f"K{i} at {address} does not answer" for i, address in enumerate(loopback.cameras(3), start=1)]
     assert [finding.what for finding in findings] == expected
+
+
+def test_a_camera_says_who_it_is_and_whether_somebody_controls_it(tmp_path: Path, loopback: Loopback) -> None:
+    rig = load_rig(write_rig(tmp_path, loopback, simulated=False))
+    names = {camera.name: camera.address for camera in rig.cameras}
+    with SimulatedHill(CONFIG / "scenarios" / "training.toml", names, 30.0, test_pattern=True):
+        findings = list(cameras.look_at_cameras(rig))
+        assert [finding.level for finding in findings] == [Level.PASS] * 3
+        assert all("serial" in finding.what for finding in findings)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+            other.settimeout(2.0)
+            take_control = struct.pack(">BBHHHII", 0x42, 1, 0x0082, 8, 1, 0x0A00, 2)
+            other.sendto(take_control, (rig.cameras[1].address, 3956))
+            assert other.recv(1024)[:4] == b"\0\0\0\x83"
+            taken = list(cameras.look_at_cameras(rig))
+    assert [finding.level for finding in taken] == [Level.PASS, Level.FAIL, Level.PASS]
+    assert "is controlled by another program" in taken[1].what
 
 
 def test_an_address_of_a_simulated_camera_must_be_free(tmp_path: Path, loopback: Loopback) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from svev.doctor import disk
 from svev.doctor.finding import Level
-from tests.svev.doctor.rigs import SIM
+from tests.support.rigs import SIM
 
 GOOD = disk.Trial(direct=True, write_bps=1e9, read_bps=1e9, same=True)
 
@@ -53,7 +53,7 @@ def test_a_disk_that_stops_taking_data_fails(tmp_path: Path) -> None:
     # The limit holds for a process and what it starts, so it takes a process of its own.
     program = (
         "from pathlib import Path\nfrom svev.doctor.disk import look_at_disk\n"
-        "from tests.svev.doctor.rigs import SIM\n"
+        "from tests.support.rigs import SIM\n"
         f"for finding in look_at_disk(SIM, Path({str(tmp_path)!r})): print(finding.level, finding.what)"
     )
     done = subprocess.run(

@@ -13,8 +13,8 @@ from svev.doctor import examination, machine, memory, software
 from svev.doctor.examination import Probe, run_probe
 from svev.doctor.finding import Finding, Level, Topic, passed
 from tests.support.loopback import Loopback
+from tests.support.rigs import SIM, write_rig
 from tests.support.waiting import wait_until
-from tests.svev.doctor.rigs import SIM, write_rig
 
 
 def test_a_probe_that_hangs_is_a_finding() -> None:

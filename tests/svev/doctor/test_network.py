@@ -12,7 +12,7 @@ from svev.doctor import network
 from svev.doctor.finding import Level
 from svev.doctor.interfaces import Interface, interface_to
 from tests.support.loopback import Loopback
-from tests.svev.doctor.rigs import SIM, rig_with, write_rig
+from tests.support.rigs import SIM, rig_with, write_rig
 
 HILL = load_rig(CONFIG / "rigs" / "hill-gige.toml")
 PORT = Interface("eth1", mtu=9000, speed_mbps=1000, network=IPv4Network("192.168.11.0/24"))
@@ -117,7 +117,7 @@ def test_an_address_that_is_taken_cannot_be_published_at(tmp_path: Path, loopbac
         other.bind(rig.network.publish)
         (taken,) = network.look_at_publication(rig)
     assert taken.level is Level.FAIL
-    assert "Address already in use" in taken.what
+    assert f"{rig.network.publish}: address in use" in taken.what
 
 
 def test_a_port_with_small_packets_is_found_in_a_network_of_its_own(tmp_path: Path, loopback: Loopback) -> None:

@@ -1,4 +1,4 @@
-"""Rig files for the doctor to look at."""
+"""Rig files of the tests, each with loopback addresses of its own."""
 
 from pathlib import Path
 

@@ -1,0 +1,140 @@
+"""The documentation is true: examples run, links lead somewhere, commands exist, messages are those of the code."""
+
+import ast
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+import typer.main
+from _pytest.mark.structures import ParameterSet
+from typer.core import TyperGroup
+
+from svev import cli
+from tests.support.loopback import Loopback
+from tests.support.rigs import write_rig
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+SOURCES = [
+    path
+    for room in ("svev", "recorder", "capture", "triggering", "simrig", "rig")
+    for path in (ROOT / room).rglob("*.py")
+]
+FENCE = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
+RUN = re.compile(
+    r"<!-- run(?: beside svev replay(?P<replay>.*?))?, prints: (?P<prints>.*?) -->\n```python\n(?P<code>.*?)```",
+    re.DOTALL,
+)
+#: Commands of later versions that a page may name because it says that they do not exist yet.
+LATER = {"serve"}
+
+
+def _name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def _anchor(heading: str) -> str:
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)]+)\)", page.read_text()):
+        if target.startswith("https://"):
+            continue
+        path, _, anchor = target.partition("#")
+        there = (page.parent / path).resolve() if path else page
+        assert there.exists(), target
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", there.read_text(), re.MULTILINE)
+            assert anchor in {_anchor(heading) for heading in headings}, target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_commands_and_targets_exist(page: Path) -> None:
+    text = re.sub(r"^### .*$", "", page.read_text(), flags=re.MULTILINE)  # headings may quote error messages
+    code = " ; ".join([*re.findall(r"`([^`\n]+)`", text), *(body for _, body in FENCE.findall(text))])
+    group = typer.main.get_command(cli.app)
+    assert isinstance(group, TyperGroup)
+    assert set(re.findall(r"(?<![\w/])svev ([a-z]+)", code)) <= set(group.commands) | LATER
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"\bmake ([a-z]+)", code)) <= targets
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_options_in_the_examples_exist(page: Path) -> None:
+    group = typer.main.get_command(cli.app)
+    assert isinstance(group, TyperGroup)
+    for language, body in FENCE.findall(page.read_text()):
+        for command, rest in re.findall(r"^svev ([a-z]+)(.*)$", body if language == "sh" else "", re.MULTILINE):
+            known = {option for parameter in group.commands[command].params for option in parameter.opts}
+            assert set(re.findall(r"--[a-z-]+", rest)) <= known, f"svev {command}{rest}"
+
+
+def _messages() -> list[str]:
+    """Every text in the code, with `…` where something is filled in."""
+    found = []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                found.append("".join(str(p.value) if isinstance(p, ast.Constant) else "…" for p in node.values))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.append(node.value)
+    return found
+
+
+def test_troubleshooting_quotes_the_code() -> None:
+    text = (ROOT / "docs" / "troubleshooting.md").read_text()
+    quoted = re.findall(r"^### `(.*)`$", text, re.MULTILINE)
+    assert len(quoted) > 20
+    messages = _messages()
+    for words in quoted:
+        pieces = [re.escape(piece.strip()) for piece in words.split("…") if piece.strip()]
+        pattern = re.compile(".*".join(pieces), re.DOTALL)
+        assert any(pattern.search(message) for message in messages), words
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory, loopback: Loopback) -> Path:
+    """A recording of the simulated hill, made as the quick start says."""
+    folder = tmp_path_factory.mktemp("docs")
+    rig = write_rig(folder, loopback, backend="sim")
+    command = f"{sys.executable} -m svev record --rig {rig} --seconds 1 --out {folder} --json".split()
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=True)
+    return Path(json.loads(done.stdout)["log"])
+
+
+@contextmanager
+def _replay(log: Path, address: str, *options: str) -> Iterator[None]:
+    """Another terminal, in which the log is replayed."""
+    command = [sys.executable, "-m", "svev", "replay", str(log), "--bind", address, *options]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
+            process.communicate(timeout=30)
+
+
+def _examples() -> Iterator[ParameterSet]:
+    for page in PAGES:
+        for number, match in enumerate(RUN.finditer(page.read_text()), start=1):
+            yield pytest.param(match, id=f"{_name(page)}-{number}")
+
+
+@pytest.mark.parametrize("example", list(_examples()))
+def test_examples_run(example: re.Match[str], log: Path, loopback: Loopback, tmp_path: Path) -> None:
+    address = loopback.endpoint()
+    program = tmp_path / "example.py"
+    program.write_text(f"LOG = {str(log)!r}\nADDRESS = {address!r}\n{example['code']}")
+    with ExitStack() as stack:
+        if example["replay"] is not None:
+            stack.enter_context(_replay(log, address, *example["replay"].split()))
+        done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert example["prints"] in done.stdout

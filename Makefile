@@ -9,7 +9,7 @@ SHELL := /bin/bash
 
 ARGS ?=
 BIN := .venv/bin
-# pip: quiet, errors stay visible; locked versions with hashes, nothing else.
+# pip: only its errors are shown (-qq); locked versions with hashes, nothing else.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 VENV := .venv/.setup-venv
 LOCKED := .venv/.setup-locked
@@ -44,7 +44,7 @@ wheel: setup ## build a wheel and try it in an empty environment outside the che
 	@.ci/try-wheel
 
 lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
-	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install --quiet uv; }
+	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install -qq uv; }
 	@build/uv/bin/uv pip compile pyproject.toml --group dev --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file requirements.lock $(ARGS)
 
@@ -66,11 +66,11 @@ $(VENV): | system
 
 $(LOCKED): requirements.lock $(VENV)
 	@echo "installing the locked packages"
-	@$(PIP) install --quiet --require-hashes -r requirements.lock
+	@$(PIP) install -qq --require-hashes -r requirements.lock
 	@touch $@
 
 $(SVEV): pyproject.toml $(LOCKED) | system
-	@$(PIP) install --quiet --no-deps --no-build-isolation -e .
+	@$(PIP) install -qq --no-deps --no-build-isolation -e .
 	@touch $@
 
 ifneq ($(NPM),)

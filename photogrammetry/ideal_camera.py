@@ -58,28 +58,3 @@ def unit_rays(xy: ArrayLike, c: float) -> Array:
     xy = np.asarray(xy, float)
     rays = np.concatenate((xy, np.full((*xy.shape[:-1], 1), -c)), axis=-1)
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
-
-
-def rotation_from_vector(vector: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) by Rodrigues' formula from rotation vectors (..., 3), rad."""
-    vector = np.asarray(vector, float)
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    skew = cross_matrix(vector)
-    # sinc keeps both coefficients exact for the smallest angles
-    sine = np.sinc(angle / np.pi)
-    cosine = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    return np.asarray(np.eye(3) + sine * skew + cosine * (skew @ skew))
-
-
-def cross_matrix(vector: Array) -> Array:
-    """Matrices (..., 3, 3) that form the cross product with the vectors (..., 3) from the left."""
-    out = np.zeros((*vector.shape[:-1], 3, 3))
-    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = vector[..., 0], vector[..., 1], vector[..., 2]
-    return out - np.swapaxes(out, -1, -2)
-
-
-def nearest_rotation(matrix: Array) -> Array:
-    """The proper rotation (3, 3) closest to a matrix (Frobenius norm)."""
-    left, _, right = np.linalg.svd(matrix)
-    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])
-    return np.asarray((left * sign) @ right)

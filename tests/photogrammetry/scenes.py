@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogrammetry.ideal_camera import Array, IdealCamera, rotation_from_vector
+from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.rotation import rotation_from_vector
 
 SIGMA_PX = 0.33
 HALF_SKI_M = 2.63 / 2
@@ -16,7 +17,7 @@ def look_at(centre: Array, target: Array, roll: float = 0.0) -> Array:
     r3 = r3 / np.linalg.norm(r3)
     r1 = np.cross((0.0, 0.0, 1.0), r3)
     r1 /= np.linalg.norm(r1)
-    return np.column_stack((r1, np.cross(r3, r1), r3)) @ rotation_from_vector((0.0, 0.0, roll))
+    return np.column_stack((r1, np.cross(r3, r1), r3)) @ rotation_from_vector(np.array((0.0, 0.0, roll)))
 
 
 def hill_cameras(rng: np.random.Generator) -> list[IdealCamera]:

@@ -237,6 +237,8 @@ class LogWriter:
             return self.summary
 
     def _check(self) -> None:
+        if self.summary is not None:
+            raise StorageError(f"{self.path}: the log is closed; open another one")
         if self._thread.error is not None:
             raise StorageError(*self._thread.error.args) from self._thread.error.__cause__
 

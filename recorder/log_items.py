@@ -31,28 +31,6 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
-    """A chunk and the messages in it.
-
-    Attributes:
-        offset: where the record starts in the file.
-        length: bytes of the whole record.
-        start_time, end_time: what its head says about the log times in it.
-        size: bytes of the records in it.
-        messages: those that could be read.
-        flaw: why its content is not to be trusted, empty if it is.
-    """
-
-    offset: int
-    length: int
-    start_time: UtcNs
-    end_time: UtcNs
-    size: int
-    messages: tuple[Message, ...]
-    flaw: str
-
-
-@dataclass(frozen=True, slots=True)
 class Small:
     """Any other record; `body` is what follows opcode and length."""
 
@@ -64,6 +42,30 @@ class Small:
     def length(self) -> int:
         """Bytes of the whole record."""
         return 9 + len(self.body)
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A chunk and the messages in it.
+
+    Attributes:
+        offset: where the record starts in the file.
+        length: bytes of the whole record.
+        start_time, end_time: what its head says about the log times in it.
+        size: bytes of the records in it.
+        messages: those that could be read.
+        declarations: schemas and channels that are declared in it (svev declares them before the first chunk).
+        flaw: why its content is not to be trusted, empty if it is.
+    """
+
+    offset: int
+    length: int
+    start_time: UtcNs
+    end_time: UtcNs
+    size: int
+    messages: tuple[Message, ...]
+    declarations: tuple[Small, ...]
+    flaw: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,7 +121,7 @@ class LogReader:
             )
         return str(header.library)
 
-    def _small(self, record: RawRecord) -> Item:
+    def _small(self, record: RawRecord) -> Small | Damage:
         body = bytes(self._window.read(record.offset + RECORD.size, record.length - RECORD.size))
         try:
             match record.opcode:
@@ -150,46 +150,52 @@ class LogReader:
             self._window.read(record.offset, record.length)
         start_time, end_time, size, crc, name_bytes = CHUNK_HEAD.unpack(self._window.read(begin, CHUNK_HEAD.size))
         first = begin + CHUNK_HEAD.size + name_bytes + 8
-        messages: tuple[Message, ...] = ()
+        messages: list[Message] = []
+        declarations: list[Small] = []
         if name_bytes:
             flaw = "it is compressed; rewrite the log with `mcap decompress`"
-        elif only is None and crc and crc32(self._window.read(first, end - first)) != crc:
-            flaw = "its checksum is wrong"
         else:
-            flaw = ""
-        if not name_bytes:
-            messages, trouble = self._messages(first, end, only)
-            flaw = flaw or trouble
+            wrong = only is None and crc and crc32(self._window.read(first, end - first)) != crc
+            trouble = self._content(first, end, only, messages, declarations)
+            flaw = "its checksum is wrong" if wrong else trouble
         return Chunk(
-            record.offset, record.length, UtcNs(start_time), UtcNs(end_time), size, messages, flaw
+            record.offset, record.length, UtcNs(start_time), UtcNs(end_time), size,
+            tuple(messages), tuple(declarations), flaw,
         )  # fmt: skip
 
-    def _messages(self, first: int, end: int, only: Collection[str] | None) -> tuple[tuple[Message, ...], str]:
-        """The messages of a chunk, and what is wrong with its records."""
-        messages: list[Message] = []
+    def _content(
+        self, first: int, end: int, only: Collection[str] | None, messages: list[Message], declarations: list[Small]
+    ) -> str:
+        """Read the records of a chunk into the two lists; what is wrong with them, empty if nothing."""
         position = first
         while position < end:
-            head = self._window.read(position, min(MESSAGE.size, end - position))
+            head = bytes(self._window.read(position, min(MESSAGE.size, end - position)))
             opcode, length = RECORD.unpack(head[: RECORD.size]) if len(head) >= RECORD.size else (0, end)
             following = position + RECORD.size + length
             if following > end:
-                return tuple(messages), "its records overrun its end"
+                return "its records overrun its end"
             if opcode == Opcode.MESSAGE:
-                if length < MESSAGE.size - RECORD.size:
-                    return tuple(messages), "a message in it is too short"
-                message = self._message(bytes(head), position, first, following, only)
-                if message is None:
-                    return tuple(messages), "a message in it is of a channel that is not declared"
+                message = self._message(head, position, first, following, only)
+                if isinstance(message, str):
+                    return message
                 messages.append(message)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                declaration = self._small(RawRecord(opcode, position, following - position))
+                if not isinstance(declaration, Small):
+                    return f"a declaration in it is an {declaration.text}"
+                declarations.append(declaration)
             position = following
-        return tuple(messages), ""
+        return ""
 
     def _message(
         self, head: bytes, position: int, first: int, following: int, only: Collection[str] | None
-    ) -> Message | None:
+    ) -> Message | str:
+        """The message at `position`, or what is wrong with it."""
+        if following - position < MESSAGE.size:
+            return "a message in it is too short"
         _, _, channel, sequence, log_time, publish_time = MESSAGE.unpack(head)
         if channel not in self.channels:
-            return None
+            return "a message in it is of a channel that is not declared"
         topic = self.channels[channel].topic
         offset = position + MESSAGE.size
         data: memoryview | None = None

@@ -93,6 +93,8 @@ class StructureCheck:
         self._chunk = _OpenChunk(chunk)
         self._chunks += 1
         self._messages.update(message.channel for message in chunk.messages)
+        for declaration in chunk.declarations:
+            self._declare(declaration)
         times = [message.log_time for message in chunk.messages]
         if not times or chunk.flaw:
             return
@@ -116,10 +118,15 @@ class StructureCheck:
             self._findings.add(f"chunk at byte {chunk.offset}: has no message index for some of its messages")
         self._expected[Opcode.CHUNK_INDEX].append(_body(chunk.index()))
 
+    def _declare(self, item: Small) -> None:
+        """Note a schema or channel; the summary has each once, however often it is declared."""
+        if item.body not in self._expected[item.opcode]:
+            self._expected[item.opcode].append(item.body)
+
     def _data_record(self, item: Small) -> None:
         match item.opcode:
             case Opcode.SCHEMA | Opcode.CHANNEL:
-                self._expected[item.opcode].append(item.body)
+                self._declare(item)
             case Opcode.ATTACHMENT:
                 attachment = Attachment.read(stream(item.body))
                 index = AttachmentIndex(
@@ -144,7 +151,8 @@ class StructureCheck:
                     return
                 case Opcode.SUMMARY_OFFSET:
                     offset = SummaryOffset.read(stream(item.body))
-                    self._summary_offsets[int(offset.group_opcode)] = offset.group_start, offset.group_length
+                    if offset.group_length:  # some writers list groups that are empty
+                        self._summary_offsets[int(offset.group_opcode)] = offset.group_start, offset.group_length
                     return
                 case Opcode.STATISTICS:
                     self._statistics(Statistics.read(stream(item.body)))

@@ -7,8 +7,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from simrig.simulated_hill import SimulatedHill
-
 from bench.gstreamer import SINKS, run_gstreamer
 from bench.loads import PRERENDERED, Load
 from bench.processes import cpu_seconds
@@ -29,9 +27,7 @@ def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> di
     """
     rig = load.rig(directory, publish)
     epoch = host_now()
-    options = {"prerendered": PRERENDERED, "link_mbit_s": load.link_mbit_s}
-    with simulated_hill(rig, epoch, **options) as hill:
-        assert isinstance(hill, SimulatedHill)  # noqa: S101  (the rig has a [simulation] table)
+    with simulated_hill(rig, epoch, prerendered=PRERENDERED, link_mbit_s=load.link_mbit_s):
         result: dict[str, Any] = {"load": load.name, "MB_per_s": round(load.bytes_per_s / 1e6, 1), "seconds": seconds}
         result["svev"] = _record(load, seconds, directory, publish, subscribe=False)
         result["svev, one subscriber"] = _record(load, seconds, directory, publish, subscribe=True)

@@ -20,6 +20,10 @@ from rig.settings import CameraSettings, NetworkSettings
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
 
+# Only GigE Vision is asked for cameras: looking on USB as well opens sockets and timers for the life of the process.
+for _interface in ("USB3Vision", "Fake"):
+    Aravis.disable_interface(_interface)
+
 # GigE Vision bootstrap registers (GigE Vision 2.0, section 28)
 _TIMESTAMP_FREQUENCY_HIGH, _TIMESTAMP_FREQUENCY_LOW = 0x093C, 0x0940
 _TIMESTAMP_CONTROL, _LATCH = 0x0944, 2

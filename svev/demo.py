@@ -9,7 +9,6 @@ from typing import Final, Literal
 
 from recorder.contact_sheet import write_contact_sheet
 from recorder.verify import verify
-
 from rig.clocks import host_now
 from rig.control import Message
 from rig.errors import BadInputError, ProcessDiedError

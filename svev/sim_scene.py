@@ -8,7 +8,7 @@ from rig.clocks import DeviceNs, HostNs
 from rig.errors import BadInputError
 from rig.settings import RigSettings
 from simrig.device_clock import DeviceClock
-from simrig.faults import FaultKind, FaultPlan
+from simrig.faults import Fault, FaultKind, FaultPlan
 from simrig.pulse_train import PulseTrain
 from simrig.scenario import load_scenario
 from simrig.view import CameraView
@@ -38,6 +38,10 @@ class SimScene:
         self._clock = DeviceClock(scenario, camera, epoch)
         self._plan = FaultPlan(scenario.faults_of(settings.name))
         self._dark_until = HostNs(0)
+
+    def inject(self, fault: Fault) -> None:
+        """Add a fault while the camera runs."""
+        self._plan.inject(fault)
 
     def next_pulse(self, after: HostNs) -> int:
         """Index of the first pulse strictly later than `after`."""

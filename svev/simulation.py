@@ -3,20 +3,22 @@
 import ipaddress
 from contextlib import AbstractContextManager, nullcontext
 
-from simrig.simulated_hill import SimulatedHill
-
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.settings import CameraSettings, RigSettings
+from simrig.simulated_hill import SimulatedHill
 
 
-def simulated_hill(rig: RigSettings, epoch: HostNs, **options: int) -> AbstractContextManager[SimulatedHill | None]:
+def simulated_hill(
+    rig: RigSettings, epoch: HostNs, *, prerendered: int = 0, link_mbit_s: float = 1000.0
+) -> AbstractContextManager[SimulatedHill | None]:
     """The simulated GigE Vision cameras of a rig with a `[simulation]` table; nothing for any other rig.
 
     Args:
         rig: the rig.
         epoch: host time of hill pulse 0.
-        options: passed to `SimulatedHill`, e.g. `prerendered` for load tests.
+        prerendered: for load tests: draw so many images once and only stamp them anew.
+        link_mbit_s: pace of each camera's packets; 0: as fast as possible.
 
     Raises:
         BadInputError: an address is not on loopback, or in use.
@@ -33,7 +35,8 @@ def simulated_hill(rig: RigSettings, epoch: HostNs, **options: int) -> AbstractC
         rig.trigger.rate_hz,
         epoch=epoch,
         size=(region.width, region.height),
-        **options,
+        prerendered=prerendered,
+        link_mbit_s=link_mbit_s,
     )
 
 

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 from recorder.log_reader import triplets
-
 from rig.settings import RigSettings
 from simrig import stamp
 from simrig.scenario import load_scenario

@@ -1,19 +1,17 @@
 """`svev bench`: figures beside their baselines."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bench.suites import SUITES
+from rig.errors import BadInputError
 from svev import console
-
-Suite = StrEnum("Suite", {name: name for name in SUITES})
 
 
 def bench(
-    suites: Annotated[list[Suite] | None, typer.Argument(help="which; all if left out")] = None,
+    suites: Annotated[list[str] | None, typer.Argument(help=f"which of {', '.join(SUITES)}; all if left out")] = None,
     seconds: Annotated[float, typer.Option(min=1, max=600, help="length of each run")] = 20.0,
     out: Annotated[Path, typer.Option(help="directory for results and for the logs, which are removed")] = Path(
         "bench/results"
@@ -28,11 +26,13 @@ def bench(
 
     Example: svev bench saturated --seconds 10
     """
+    if unknown := [name for name in suites or () if name not in SUITES]:
+        raise BadInputError(f"no benchmark is called {unknown[0]}: choose from {', '.join(SUITES)}")
     out.mkdir(parents=True, exist_ok=True)
     results = {}
-    for suite in suites or list(Suite):
-        console.say(f"{suite.value} ...", aside=True)
-        results[suite.value] = SUITES[suite.value](seconds, out)
+    for name in suites or SUITES:
+        console.say(f"{name} ...", aside=True)
+        results[name] = SUITES[name](seconds, out)
     if as_json:
         console.print_json(results)
     else:

@@ -1,6 +1,7 @@
 """Rigs for tests: the simulated hill behind each back end, with the faults that a test asks for."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ def write_rig(
     faults: list[dict[str, Any]] | None = None,
     scenario: str = "",
     rate_hz: float = 30.0,
+    names: Sequence[str] = ("K1", "K2", "K3"),
     **network: Any,
 ) -> Path:
     """Write a rig file and its scenario.
@@ -30,6 +32,7 @@ def write_rig(
         faults: faults of the scenario, as in its TOML.
         scenario: more TOML for the top of the scenario.
         rate_hz: of the pulses.
+        names: cameras of the scenario.
         network: more keys of the [network] table.
     """
     tables = "".join("\n[[faults]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in f.items()) for f in faults or [])
@@ -40,8 +43,8 @@ def write_rig(
         f'publish = "{loopback.endpoint()}"',
         *(f"{k} = {json.dumps(v)}" for k, v in network.items()),
     ]
-    for index, address in enumerate(loopback.cameras(3)):
-        lines += ["[[cameras]]", f'name = "K{index + 1}"', f'backend = "{backend}"']
+    for name, address in zip(names, loopback.cameras(len(names)), strict=True):
+        lines += ["[[cameras]]", f'name = "{name}"', f'backend = "{backend}"']
         lines += [f'address = "{address}"'] if backend == "aravis" else []
     path = directory / "rig.toml"
     path.write_text("\n".join(lines) + "\n")

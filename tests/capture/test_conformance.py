@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simrig.simulated_hill import SimulatedHill
 
 from capture.aravis_camera import AravisCamera
 from capture.seam import Arrival, Camera
 from capture.sim_camera import SimCamera
 from rig.clocks import host_now
-from rig.errors import CameraError
+from rig.errors import CameraError, CameraNotFoundError
 from rig.ring import CameraRing
 from rig.settings import RigSettings
 from simrig import stamp
+from simrig.faults import Fault
+from simrig.simulated_hill import SimulatedHill
 from svev.sim_scene import SimScene
+from svev.simulation import simulated_hill
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 
@@ -31,19 +33,28 @@ class Bench:
     def __init__(self, rig: RigSettings, slots: int) -> None:
         self.rig = rig
         self.epoch = host_now()
-        self.ring = CameraRing.create("K2", rig.cameras[1].frame_bytes, slots)
+        self.ring = CameraRing.create("K2", rig.cameras[0].frame_bytes, slots)
         self.hill: SimulatedHill | None = None
+        self._scene: SimScene | None = None
 
     def open(self) -> Camera:
         """Connect and configure from scratch."""
-        settings = self.rig.cameras[1]
+        settings = self.rig.cameras[0]
         if settings.backend == "aravis":
             return AravisCamera(settings, self.rig.network, self.ring, self.rig.trigger.period_ns)
-        return SimCamera(settings, self.ring, SimScene(self.rig, 1, self.epoch))
+        self._scene = self._scene or SimScene(self.rig, 0, self.epoch)
+        return SimCamera(settings, self.ring, self._scene)
+
+    def inject(self, kind: str, **fields: Any) -> None:
+        """Let a fault befall the next pulse of the open camera."""
+        fault = Fault.model_validate({"kind": kind, "camera": "K2", **fields})
+        target = self.hill or self._scene
+        assert target is not None
+        target.inject(fault)
 
     def stamp_of(self, arrival: Arrival) -> int:
         """Hill pulse that the frame's own pixels name."""
-        shape = (self.rig.cameras[1].region.height, self.rig.cameras[1].region.width)
+        shape = (self.rig.cameras[0].region.height, self.rig.cameras[0].region.width)
         found = stamp.read(self.ring.frame(arrival.slot).reshape(shape))
         assert found is not None
         assert found.camera == 1
@@ -58,9 +69,9 @@ def bench(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) ->
     with ExitStack() as stack:
 
         def open_bench(slots: int = 16, **options: Any) -> Bench:
-            made = Bench(make_rig(tmp_path, request.param, loopback, **options), slots)
+            made = Bench(make_rig(tmp_path, request.param, loopback, names=["K2"], **options), slots)
             stack.callback(made.ring.close)
-            # made.hill = stack.enter_context(simulated_hill(made.rig, made.epoch))
+            made.hill = stack.enter_context(simulated_hill(made.rig, made.epoch))
             return made
 
         yield open_bench
@@ -123,42 +134,43 @@ def test_without_pulses_receive_comes_back_empty(bench: OpenBench) -> None:
         assert host_now() - before < 1_000_000_000
 
 
-def test_a_missed_pulse_leaves_no_gap_in_the_ids_but_one_in_time(bench: OpenBench) -> None:
-    made = bench(faults=[{"kind": "missed_pulse", "camera": "K2", "at_pulse": 40}])
+@pytest.mark.parametrize(
+    ("kind", "fields", "id_step"),
+    [
+        ("missed_pulse", {}, 1),
+        ("lost_frame", {}, 2),
+        ("damaged_frame", {}, 2),
+        ("lost_leader", {"resend": False}, 2),
+        ("lost_packets", {"packets": [3, 4], "resend": False}, 2),
+    ],
+)
+def test_a_fault_costs_one_frame_and_the_ids_tell_why(
+    bench: OpenBench, kind: str, fields: dict[str, Any], id_step: int
+) -> None:
+    made = bench()
     with _open(made) as camera:
-        frames = _until_pulse(made, camera, 42)
-    step = frames[41][0].frame_id - frames[39][0].frame_id
-    assert 40 not in frames
-    assert step == 1
-    assert frames[41][0].device_time - frames[39][0].device_time > 1.9 * PERIOD_NS
+        arrivals = _collect(made, camera, 3)
+        made.inject(kind, **fields)
+        arrivals += _collect(made, camera, 12)
+    frames = [(pulse, arrival) for arrival, pulse in arrivals if pulse is not None]
+    pulses = np.array([pulse for pulse, _ in frames])
+    ids = np.array([arrival.frame_id for _, arrival in frames])
+    times = np.array([arrival.device_time for _, arrival in frames])
+    (gap,) = np.flatnonzero(np.diff(pulses) != 1)
+    assert np.diff(pulses)[gap] == 2
+    assert np.diff(ids)[gap] == id_step
+    assert np.diff(ids).sum() == len(ids) - 2 + id_step
+    assert abs(np.diff(times)[gap] - 2 * PERIOD_NS) < 200_000
 
 
-def test_a_lost_frame_leaves_a_gap_in_the_ids(bench: OpenBench) -> None:
-    made = bench(faults=[{"kind": "lost_frame", "camera": "K2", "at_pulse": 40}])
+def test_packets_that_are_sent_again_cost_nothing(bench: OpenBench) -> None:
+    made = bench()
     with _open(made) as camera:
-        frames = _until_pulse(made, camera, 42)
-    assert 40 not in frames
-    assert frames[41][0].frame_id - frames[39][0].frame_id == 2
-
-
-@pytest.mark.parametrize("kind", ["damaged_frame", "lost_leader"])
-def test_a_damaged_frame_is_never_handed_over_as_whole(bench: OpenBench, kind: str) -> None:
-    fault: dict[str, Any] = {"kind": kind, "camera": "K2", "at_pulse": 40}
-    made = bench(faults=[fault | ({"resend": False} if kind == "lost_leader" else {})])
-    with _open(made) as camera:
-        frames = _until_pulse(made, camera, 43)
-    assert 40 not in frames
-    assert frames[41][0].frame_id - frames[39][0].frame_id == 2
-
-
-def _until_pulse(bench: Bench, camera: Camera, last: int) -> dict[int, tuple[Arrival, int | None]]:
-    """Whole frames by the pulse in their pixels, until pulse `last`."""
-    frames: dict[int, tuple[Arrival, int | None]] = {}
-    while last not in frames:
-        for arrival, pulse in _collect(bench, camera, 1):
-            if pulse is not None:
-                frames[pulse] = (arrival, pulse)
-    return frames
+        _collect(made, camera, 3)
+        made.inject("lost_packets", packets=[3, 4])
+        pulses = [pulse for _, pulse in _collect(made, camera, 12)]
+    assert pulses[0] is not None
+    assert pulses == list(range(pulses[0], pulses[0] + 12))
 
 
 def test_closing_gives_all_slots_back_and_the_camera_opens_again(bench: OpenBench) -> None:
@@ -187,25 +199,29 @@ def test_a_recorder_that_holds_all_slots_costs_frames_but_nothing_breaks(bench: 
 
 
 def test_a_dead_camera_is_an_error_in_bounded_time_and_comes_back_from_scratch(bench: OpenBench) -> None:
-    made = bench(faults=[{"kind": "restart", "camera": "K2", "at_pulse": 20, "duration_s": 0.5}])
-    camera = made.open()
-    camera.start()
-    try:
+    made = bench()
+    with _open(made) as camera:
+        _collect(made, camera, 3)
+        made.inject("restart", duration_s=0.5)
         with pytest.raises(CameraError):
             _use_until_it_fails(made, camera)
-    finally:
-        camera.close()
+    with _reopened(made) as camera:
+        assert all(arrival.whole for arrival, _ in _collect(made, camera, 3))
+
+
+@contextmanager
+def _reopened(bench: Bench) -> Iterator[Camera]:
+    """Try again, as the grabber does, until the camera is back."""
     deadline = host_now() + 20_000_000_000
     while True:
-        assert host_now() < deadline
         try:
-            camera = made.open()
-        except CameraError:
-            continue
-        break
-    camera.start()
+            camera = bench.open()
+            break
+        except (CameraError, CameraNotFoundError):
+            assert host_now() < deadline
     try:
-        assert all(arrival.whole for arrival, _ in _collect(made, camera, 3))
+        camera.start()
+        yield camera
     finally:
         camera.close()
 

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from rig.control import Message
 from svev.process_table import ProcessSpec, ProcessTable
 from tests.support.waiting import wait_until
 
@@ -17,9 +18,7 @@ ECHO = "tests.svev.echo_process"
 def test_a_child_gets_its_configuration_and_stops_when_asked() -> None:
     table = ProcessTable()
     table.start(ProcessSpec("echo", ECHO, {"value": 42}))
-    received: list[tuple[str, dict[str, object]]] = []
-    wait_until(lambda: bool(received.extend(table.receive(0.1)) or received), "the child has answered")
-    assert received == [("echo", {"report": "config", "value": 42})]
+    assert _receive(table, 1) == [("echo", {"report": "config", "value": 42})]
     assert table.stop() == []
 
 
@@ -45,6 +44,7 @@ def test_a_child_that_does_not_stop_is_killed_at_the_deadline(monkeypatch: pytes
 
 def test_children_end_when_the_parent_is_killed() -> None:
     program = f"""
+from rig.control import Message
 from svev.process_table import ProcessSpec, ProcessTable
 table = ProcessTable()
 child = table.start(ProcessSpec("echo", {ECHO!r}, {{"value": 1}}))
@@ -63,6 +63,17 @@ signal.pause()
     wait_until(lambda: not _alive(pid), "the child is gone")
 
 
+def _receive(table: ProcessTable, count: int) -> list[tuple[str, Message]]:
+    received: list[tuple[str, Message]] = []
+
+    def enough() -> bool:
+        received.extend(table.receive(0.1))
+        return len(received) >= count
+
+    wait_until(enough, f"{count} messages have come", 10)
+    return received
+
+
 def _alive(pid: int) -> bool:
     """Running, not merely waiting to be collected by whoever adopted it."""
     try:
@@ -76,8 +87,7 @@ def test_stopping_takes_no_longer_than_the_slowest_child() -> None:
     table = ProcessTable()
     for name in ("a", "b", "c"):
         table.start(ProcessSpec(name, ECHO, {"value": 1}))
-    answered: list[object] = []
-    wait_until(lambda: bool(answered.extend(table.receive(0.1)) or len(answered) == 3), "all have answered")
+    _receive(table, 3)
     before = time.monotonic()
     assert table.stop() == []
     assert time.monotonic() - before < 8.0  # the deadline is one for all, not one each

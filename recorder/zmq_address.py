@@ -7,9 +7,10 @@ from pathlib import Path
 import zmq
 
 from rig.errors import BadInputError
-from rig.topics import Topic
+from rig.topics import DEFAULT_PUBLISH, Topic
 
 _IPC = "ipc://"
+_LAST_PORT = 65535
 
 
 def live_topic(topic: Topic) -> bytes:
@@ -34,18 +35,24 @@ def bind(socket: zmq.Socket[bytes], address: str) -> str:
     """
     if _somebody_listens(address):
         raise _in_use(address)
+    port = address.rpartition(":")[2]
+    if port.isdecimal() and int(port) > _LAST_PORT:  # ZeroMQ would bind another one
+        raise _not_bound(address, "no such port")
     try:
         socket.bind(address)
     except zmq.ZMQError as error:
         if error.errno == zmq.EADDRINUSE:
             raise _in_use(address) from None
-        reason = zmq.strerror(error.errno or 0)
-        raise BadInputError(f"{address}: cannot be bound ({reason}); use e.g. tcp://127.0.0.1:5556") from None
+        raise _not_bound(address, zmq.strerror(error.errno or 0)) from None
     return socket.get_string(zmq.LAST_ENDPOINT)
 
 
 def _in_use(address: str) -> BadInputError:
     return BadInputError(f"{address}: address in use; stop the other publisher or choose another address")
+
+
+def _not_bound(address: str, reason: str) -> BadInputError:
+    return BadInputError(f"{address}: cannot be bound ({reason}); use e.g. {DEFAULT_PUBLISH}")
 
 
 def _somebody_listens(address: str) -> bool:

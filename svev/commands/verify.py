@@ -50,6 +50,8 @@ def _print(report: VerifyReport) -> None:
 
 
 def _first_flaw(report: VerifyReport) -> str:
+    if not report.closed:
+        return "it was not closed, or is still being written"
     if report.findings:
         more = len(report.findings) - 1
         return report.findings[0] + (f" (and {more} more)" if more else "")

@@ -1,0 +1,162 @@
+"""`svev info`, `verify` and `replay`: exit codes, one line per error, one JSON object at the end."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import zmq
+
+from svev.cli import main
+from tests.recorder.logs import ALL_OK, LOST, OK, write_log
+from tests.support.loopback import Loopback
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """How a command ended and what it printed."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Svev = Callable[..., Done]
+
+
+@pytest.fixture
+def svev(capsys: pytest.CaptureFixture[str]) -> Svev:
+    """Runs a command in this process."""
+
+    def run(*arguments: object) -> Done:
+        code = main([str(argument) for argument in arguments])
+        return Done(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    write_log(tmp_path / "log.mcap", (ALL_OK, (OK, LOST, OK), ALL_OK))
+    return tmp_path / "log.mcap"
+
+
+def test_info_tells_people(log: Path, svev: Svev) -> None:
+    done = svev("info", log)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "3 pulses, 2 complete, 1 partial (frames: 1 lost)" in done.stdout
+    assert "athlete Anna Berg, bib 17" in done.stdout
+    assert "90 x 24 px of K1, K2, K3" in done.stdout
+
+
+def test_verify_tells_people_what_is_missing_and_a_partial_log_is_no_error(log: Path, svev: Svev) -> None:
+    done = svev("verify", log)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"{log}: partial\n")
+    assert "pulse 2: K2 lost" in done.stdout
+    assert "info: recorder: recording started" in done.stdout
+
+
+@pytest.mark.parametrize("command", ["info", "verify"])
+def test_json_is_one_object(log: Path, command: str, svev: Svev) -> None:
+    found = json.loads(svev(command, log, "--json").stdout)
+    assert (found["log"], found["pulses"], found["complete"], found["partial"]) == (str(log), 3, 2, 1)
+    assert found["causes"] == {"lost": 1, "missed": 0, "damaged": 0, "absent": 0}
+
+
+@pytest.mark.parametrize("command", ["info", "verify", "replay"])
+def test_a_log_that_was_cut_off_is_read_and_ends_with_3(
+    log: Path, loopback: Loopback, command: str, svev: Svev
+) -> None:
+    log.write_bytes(log.read_bytes()[:-3000])
+    more = ["--speed", "max", "--wait", "0", "--bind", loopback.endpoint()] if command == "replay" else []
+    done = svev(command, log, "--json", *more)
+    assert done.returncode == 3
+    found = json.loads(done.stdout)
+    assert found["closed"] is False
+    assert found["triplets" if command == "replay" else "pulses"] == 3
+    assert "Traceback" not in done.stderr
+    assert "closed" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("command", ["info", "verify", "replay"])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "no such file"),
+        (b"", "is empty"),
+        (b"\x89PNG\r\n\x1a\nxxxxxxx", "is not an MCAP log"),
+        (
+            b"\x89MCAP0\r\n" + b"\x01\x0c\0\0\0\0\0\0\0" + b"\x04\0\0\0ros2\0\0\0\0",
+            'not written by svev (profile "ros2")',
+        ),
+        (b"\x89MCAP0\r\n\x01", "is cut off or damaged before it says what it is"),
+    ],
+)
+def test_what_is_no_log_is_one_line_and_exit_2(
+    tmp_path: Path, command: str, content: bytes | None, words: str, svev: Svev
+) -> None:
+    path = tmp_path / "foreign.mcap"
+    if content is not None:
+        path.write_bytes(content)
+    done = svev(command, path)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"svev: {path}: ")
+    assert words in line
+
+
+def test_replay_says_what_it_sent(log: Path, loopback: Loopback, svev: Svev) -> None:
+    done = svev("replay", log, "--speed", "max", "--wait", "0", "--bind", loopback.endpoint())
+    assert done.returncode == 0
+    assert "sent 3 triplets" in done.stdout
+    assert "nobody had subscribed when it began" in done.stdout
+
+
+@pytest.mark.parametrize("speed", ["0", "0.05", "11", "fast", "-1", "nan"])
+def test_a_speed_that_is_none_is_one_line_and_exit_2(log: Path, speed: str, svev: Svev) -> None:
+    done = svev("replay", log, f"--speed={speed}")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "not a speed; say a number from 0.1 to 10" in line
+
+
+def test_ctrl_c_ends_a_reliable_replay_with_130(log: Path, loopback: Loopback) -> None:
+    address = loopback.endpoint()
+    command = [
+        sys.executable,
+        "-m",
+        "svev",
+        "replay",
+        str(log),
+        "--reliable",
+        "--bind",
+        address,
+        "--speed",
+        "0.1",
+        "--json",
+    ]
+    with (
+        zmq.Context() as context,
+        context.socket(zmq.PULL) as worker,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process,
+    ):
+        worker.linger = 0
+        worker.connect(address)
+        assert worker.poll(20_000), "nothing came"
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert process.returncode == 130, err
+    assert json.loads(out)["interrupted"] is True
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("command", ["info", "verify", "replay"])
+def test_help_shows_an_example_and_the_exit_codes(command: str, svev: Svev) -> None:
+    text = " ".join(svev(command, "--help").stdout.split())
+    assert f"Example: svev {command} recordings/jump.mcap" in text
+    assert "Exit codes: 0" in text

@@ -1,15 +1,20 @@
 """Child process: the recorder. Attaches the rings and runs the loop."""
 
+from typing import Final
+
 from recorder.main_loop import RecorderLoop
 from rig.errors import SvevError
 from rig.ring import CameraRing
 from rig.settings import RigSettings
 from svev.child import begin
 
+#: Enough to write what waits for the disk and the index.
+_GRACE_S: Final = 20.0
+
 
 def main() -> None:
     """Record until told to quit."""
-    child = begin()
+    child = begin(_GRACE_S)
     rig = RigSettings.model_validate(child.config["rig"])
     rings = [CameraRing(fd) for fd in child.config["rings"]]
     try:

@@ -29,6 +29,7 @@ from rig.errors import (
 )
 from rig.ring import MAX_SLOTS, CameraRing
 from rig.settings import RigSettings
+from svev.backends import check_backends
 from svev.process_table import Child, ProcessSpec, ProcessTable
 
 _START_S: Final = 20.0
@@ -48,11 +49,15 @@ class RunningRig:
         rig_toml: the rig file's text, attached to every log.
         on_event: is told, in one line, of cameras that come and go and of processes that are started again.
         epoch: host time of the simulated hill's pulse 0; now if left out.
+
+    Raises:
+        BadInputError: a camera's back end is not built yet.
     """
 
     def __init__(
         self, rig: RigSettings, rig_toml: str, on_event: Callable[[str], None], epoch: HostNs | None = None
     ) -> None:
+        check_backends(rig)
         self._rig, self._rig_toml, self._on_event = rig, rig_toml, on_event
         self._processes = ProcessTable()
         self._exit = ExitStack()
@@ -210,10 +215,10 @@ class RunningRig:
                 self._start_grabber(index)
 
     def _raise_absent(self) -> None:
-        absent = [i for i, present in enumerate(self._present) if not present]
         reasons = "; ".join(
-            self._reasons[i] or f"camera {self._rig.cameras[i].name} does not answer: check power and cable"
-            for i in absent
+            reason or f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
+            for camera, present, reason in zip(self._rig.cameras, self._present, self._reasons, strict=True)
+            if not present
         )
         raise CameraNotFoundError(reasons)
 

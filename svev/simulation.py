@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager, nullcontext
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.settings import CameraSettings, RigSettings
+from simrig.scenario import load_scenario
 from simrig.simulated_hill import SimulatedHill
 
 
@@ -21,10 +22,15 @@ def simulated_hill(
         link_mbit_s: pace of each camera's packets; 0: as fast as possible.
 
     Raises:
-        BadInputError: an address is not on loopback, or in use.
+        BadInputError: the scenario is broken or lacks a camera; an address is not on loopback, or in use.
     """
+    if rig.simulation is None:
+        return nullcontext()
+    scenario = load_scenario(rig.simulation.scenario)
+    for camera in rig.cameras:
+        scenario.camera_index(camera.name)
     cameras = [camera for camera in rig.cameras if camera.backend == "aravis"]
-    if rig.simulation is None or not cameras:
+    if not cameras:
         return nullcontext()
     for camera in cameras:
         _check_loopback(camera)

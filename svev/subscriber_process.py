@@ -11,6 +11,7 @@ from rig.topics import TRIPLET
 from svev.child import begin
 
 _WAKE_MS: Final = 200
+_GRACE_S: Final = 5.0
 
 
 class Count:
@@ -53,7 +54,7 @@ def _quantile(ordered: list[float], fraction: float) -> float | None:
 
 def main() -> None:
     """Count until told to quit, then report what is left in the socket too."""
-    child = begin()
+    child = begin(_GRACE_S)
     count = Count()
     with zmq.Context() as context, context.socket(zmq.SUB) as socket:
         socket.setsockopt(zmq.SUBSCRIBE, (TRIPLET.live or "").encode())

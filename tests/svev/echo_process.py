@@ -8,7 +8,7 @@ from svev.child import begin
 
 def main() -> None:
     """Run as the process table runs its rows."""
-    child = begin()
+    child = begin(5.0)
     child.control.send({"report": "config", **child.config})
     if child.config.get("deaf"):
         threading.Event().wait(60)

@@ -142,7 +142,7 @@ def test_a_killed_parent_leaves_a_finished_log_and_no_process(tmp_path: Path, lo
         (("[trigger]", "[trigger"), "rig.toml: not valid TOML"),
         (("rate_hz", "rate_herz"), 'unknown key "trigger.rate_herz"; did you mean "rate_hz"?'),
         (('"scenario.toml"', '"nowhere.toml"'), "nowhere.toml: no such file"),
-        (("tcp://127", "tcp://300"), "publish"),
+        (("tcp://127", "tcp://300"), "cannot be bound"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(

@@ -112,4 +112,6 @@ def _lively_run(activity: NDArray[np.float64]) -> tuple[int, int]:
 def _small(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     rows, columns = image.shape
     width = max(1, columns * _SMALL_ROWS // rows)
+    step = max(1, rows // (4 * _SMALL_ROWS))  # of a large image every so many pixels are enough
+    image = np.ascontiguousarray(image[::step, ::step])
     return cv2.resize(image, (width, _SMALL_ROWS), interpolation=cv2.INTER_AREA).astype(np.float32)

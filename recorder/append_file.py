@@ -121,6 +121,11 @@ class AppendFile:
         disk = os.fstatvfs(self._fd)
         return disk.f_bavail * disk.f_frsize
 
+    def discard(self) -> None:
+        """Close and remove the file: nothing in it is worth keeping."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
     def close(self) -> None:
         """Close the file; a second call does nothing."""
         if self._fd >= 0:

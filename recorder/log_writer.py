@@ -106,12 +106,14 @@ class LogWriter:
         self._index = LogIndex(schemas, channels)
         self._file = AppendFile(path)
         attachments = {RIG_ATTACHMENT: rig_toml, CALIBRATION_ATTACHMENT: calibration_json}
+        opening = MAGIC + records(Header(PROFILE, _library()), *schemas, *channels)
         try:
-            opening = MAGIC + records(Header(PROFILE, _library()), *schemas, *channels)
             self._write_opening(opening, {name: data for name, data in attachments.items() if data is not None})
-        except OSError as error:
-            self._file.close()
-            raise storage_error(path, error) from error
+        except BaseException as error:
+            self._file.discard()
+            if isinstance(error, OSError):
+                raise storage_error(path, error) from error
+            raise
         self._thread = WriteThread(self._file, self._index, self._let_go)
         self._write_calibrations()
         if not self._file.direct:

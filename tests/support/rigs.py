@@ -11,7 +11,8 @@ SIM = load_rig(CONFIG / "rigs" / "sim.toml")
 
 def write_rig(folder: Path, loopback: Loopback, *, backend: str = "aravis", simulated: bool = True) -> Path:
     """Write a rig file with three cameras of this test's own addresses."""
-    text = f'name = "examined"\n[network]\npublish = "{loopback.endpoint()}"\n'
+    # A busy machine may take long until simulated cameras have drawn their first image.
+    text = f'name = "examined"\n[trigger]\nsettle_s = 60\n[network]\npublish = "{loopback.endpoint()}"\n'
     if simulated:
         text += f'[simulation]\nscenario = "{CONFIG / "scenarios" / "training.toml"}"\n'
     for index, address in enumerate(loopback.cameras(3), start=1):

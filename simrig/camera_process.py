@@ -22,8 +22,8 @@ _ROOT = Path(__file__).resolve().parent.parent
 class CameraProcess:
     """One camera process, started by the constructor.
 
-    It sits in a process group of its own. So Ctrl-C does not reach it, and if we die while it is frozen the kernel
-    ends it, since it would be a stopped orphan; not frozen, it ends when its standard input does.
+    The kernel kills it, frozen or not, as soon as the *thread* that called the constructor ends: call it in one that
+    lives long enough. It sits in a process group of its own, so that Ctrl-C does not reach it.
     """
 
     def __init__(self, config: CameraConfig) -> None:

@@ -2,16 +2,16 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from rig.clocks import HostNs, UtcAnchor, host_now
 from rig.errors import BadInputError
 from rig.rigfile import validate
-from simrig.camera_process import CameraProcess
+from simrig.camera_process import START_S, CameraProcess
 from simrig.faults import Fault, FaultKind
 from simrig.gige.camera import OF_THE_PROCESS
 from simrig.gige.config import CameraConfig
@@ -22,7 +22,7 @@ from simrig.timetable import Timetable
 
 
 class SimulatedHill:
-    """Simulated GigE Vision cameras; a context manager that starts and stops them.
+    """Simulated GigE Vision cameras; a context manager, to be entered once, that starts and stops them.
 
     Args:
         scenario: scenario file.
@@ -86,6 +86,8 @@ class SimulatedHill:
         self._processes: dict[str, CameraProcess] = {}
         self._lock = threading.RLock()  # the timetable's thread and our caller's both command the processes
         self._timetable = Timetable()
+        # Camera processes end with the thread that started them, so one that lives as long as we do starts them all.
+        self._starter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="camera starter")
 
     def __enter__(self) -> Self:
         """Start all cameras.
@@ -97,7 +99,7 @@ class SimulatedHill:
         with ExitStack() as on_failure:
             on_failure.callback(self.stop)
             for name in self._configs:
-                self._processes[name] = CameraProcess(self._configs[name])
+                self._start(name)
             for process in self._processes.values():
                 process.await_ready()
             for fault in self._planned:
@@ -106,9 +108,7 @@ class SimulatedHill:
             on_failure.pop_all()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Stop all cameras."""
         self.stop()
 
@@ -145,7 +145,7 @@ class SimulatedHill:
         """
         with self._lock:
             self.kill(camera)
-            self._processes[camera] = CameraProcess(self._configs[camera])
+            self._start(camera)
             self._processes[camera].await_ready()
 
     def freeze(self, camera: str) -> None:
@@ -179,6 +179,10 @@ class SimulatedHill:
             for process in self._processes.values():
                 process.stop()
             self._processes.clear()
+        self._starter.shutdown()
+
+    def _start(self, camera: str) -> None:
+        self._processes[camera] = self._starter.submit(CameraProcess, self._configs[camera]).result(START_S)
 
     def _process(self, camera: str) -> CameraProcess:
         if camera not in self._processes:

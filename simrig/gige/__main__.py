@@ -7,9 +7,10 @@ each a JSON object; every line is answered by one JSON object on standard output
     {"command": "statistics"}               -> {"statistics": {...}}
     {"command": "stop"}                     -> {}, and the process ends
 
-When standard input ends, whoever started the process is gone, and it ends too.
+When standard input ends, or the thread that started the process is gone, the process ends too.
 """
 
+import ctypes
 import json
 import os
 import signal
@@ -28,6 +29,7 @@ from simrig.gige.config import CameraConfig
 
 #: so that the thread that sends packets in time need not wait long for the one that renders
 _SWITCH_INTERVAL_S = 0.0005
+_PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
 
 def main() -> int:
@@ -36,6 +38,7 @@ def main() -> int:
     Returns:
         Exit code: 0 stopped, 2 bad configuration.
     """
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # the end of input alone does not end a frozen process
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever started us
     threading.excepthook = _die
     freeze.watch()

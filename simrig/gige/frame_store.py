@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rig.clocks import HostNs
 from simrig.gige.gvsp import FrameFormat, PacketTable
 
-SLOTS = 16
-HISTORY = 4  #: frames that stay after they were sent
+#: Frames that fit into the memory: what a camera that is not scheduled in time, or has a slow link, can still catch up.
+_MEMORY_BYTES, _LEAST_SLOTS, _MOST_SLOTS = 40_000_000, 16, 64
+_HISTORY = 4  # every fourth slot holds a frame that was sent, for resend; no more, or all would leave the cache
 
 
 @dataclass(eq=False, slots=True)
@@ -63,15 +64,16 @@ class FrameStore:
         self.format = frame
         self.lock = threading.Lock()
         stride = -(-frame.payload_bytes // mmap.PAGESIZE) * mmap.PAGESIZE
-        self._memory = mmap.mmap(-1, SLOTS * stride, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | mmap.MAP_POPULATE)
-        pixels = np.frombuffer(self._memory, np.uint8).reshape(SLOTS, stride)
+        count = min(max(_MEMORY_BYTES // stride, _LEAST_SLOTS), _MOST_SLOTS)
+        self._memory = mmap.mmap(-1, count * stride, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | mmap.MAP_POPULATE)
+        pixels = np.frombuffer(self._memory, np.uint8).reshape(count, stride)
         address = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
         self.slots = tuple(
             Slot(
                 pixels[index, : frame.payload_bytes].reshape(frame.height, frame.width),
                 PacketTable(frame, address + index * stride),
             )
-            for index in range(SLOTS)
+            for index in range(count)
         )
         self._free = list(self.slots)
         self._history: deque[Shot] = deque()
@@ -90,7 +92,7 @@ class FrameStore:
         """A frame begins to be sent: from now on its packets may be asked for again, for a while."""
         with self.lock:
             self._history.append(shot)
-            if len(self._history) > HISTORY:
+            if len(self._history) > len(self.slots) // _HISTORY:
                 self._free.append(self._history.popleft().slot)
 
     def find(self, block_id: int) -> Shot | None:

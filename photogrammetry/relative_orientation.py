@@ -1,0 +1,208 @@
+"""Relative orientation of two images without start values (section 1, Fig. 1): many starts, then coplanarity iteration.
+
+The paper tries probable rotations R_j with linearly derived base components. Here the rotations are not guessed: they
+are the closed solutions of several sets of five points. For each, the base follows linearly from all points, and the
+best are refined by damped Gauss-Newton steps. The distinct minima with the points in front of both cameras are the
+solutions; there may be several for five points, and two for points in a plane.
+
+Condition: b . (u x R v) = 0 with u, v = (x, y, -c), divided by the root of the sum of the squared derivatives by the
+four image coordinates: then its square sum is that of the residuals in the image, to second order of the residuals.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogrammetry.essential_matrix import essential_matrices, rotations_of
+from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.rotation import rotation_from_vector
+from rig.errors import BadInputError
+
+_SETS = 16  # sets of five points
+_STARTS = 12  # candidates that are refined
+_STEPS = 30
+_SAME = 1e-3  # rad: rotations and bases closer than that are one solution
+_POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
+_ROUNDING = 1e-7  # of c: residuals that small are none
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeOrientation:
+    """Pose of the second image in the system of the first (X0 = 0, R = I), base of length 1.
+
+    Attributes:
+        rotation: (3, 3), columns are the second camera's axes.
+        base: (3,) its projection centre, unit vector.
+        residuals: (n,) distances, image unit: root of the smallest square sum of the four coordinates' corrections.
+        square_sum: of the residuals.
+        in_front: share of the points that lie before both cameras.
+        parallax: mean angle (rad) between homologous rays.
+        alternatives: other solutions that fit nearly as well, best first (they have no alternatives themselves).
+    """
+
+    rotation: Array
+    base: Array
+    residuals: Array
+    square_sum: float
+    in_front: float
+    parallax: float
+    alternatives: tuple["RelativeOrientation", ...] = ()
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether a second solution fits nearly as well: then only a third image or further points decide."""
+        return bool(self.alternatives)
+
+    def cameras(self, c_first: float, c_second: float) -> tuple[IdealCamera, IdealCamera]:
+        """Both images in the model system."""
+        return IdealCamera(c_first, np.zeros(3), np.eye(3)), IdealCamera(c_second, self.base, self.rotation)
+
+
+def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_second: float) -> RelativeOrientation:
+    """Relative orientation from homologous points.
+
+    Args:
+        first: (n, 2) reduced coordinates in the first image, n >= 5.
+        second: (n, 2) the same points in the second image.
+        c_first: principal distance of the first image.
+        c_second: that of the second.
+
+    Returns:
+        The solution with the smallest residuals, with the others that remain possible.
+
+    Raises:
+        BadInputError: fewer than five points, or points that allow no solution with the points before both cameras.
+    """
+    u, v = _vectors(np.asarray(first, float), c_first), _vectors(np.asarray(second, float), c_second)
+    if len(u) < 5:
+        raise BadInputError(f"a relative orientation has {len(u)} homologous points: give at least five")
+    scale = 0.5 * (c_first + c_second)
+    rotations = _candidates(u / c_first, v / c_second)
+    bases = _linear_bases(rotations, u, v)
+    sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
+    best = np.argsort(sums, kind="stable")[:_STARTS]
+    rotations, bases, sums = _iterate(rotations[best], bases[best], u, v, _STEPS)
+    solutions = _solutions(rotations, bases, sums, u, v, len(u) * (_ROUNDING * scale) ** 2)
+    if not solutions or solutions[0].in_front < 0.5:
+        raise BadInputError(
+            "homologous points allow no relative orientation: check point numbers and principal distance"
+        )
+    limit = max(_POSSIBLE * solutions[0].square_sum, len(u) * (_ROUNDING * scale) ** 2)
+    head, *others = (s for s in solutions if s.square_sum <= limit and s.in_front == solutions[0].in_front)
+    return RelativeOrientation(
+        head.rotation, head.base, head.residuals, head.square_sum, head.in_front, head.parallax, tuple(others)
+    )
+
+
+def _candidates(u: Array, v: Array) -> Array:
+    """Rotations (k, 3, 3) of the closed solutions of sets of five points, and of all points where they are many."""
+    shuffled = np.random.default_rng(len(u))  # the same sets each time
+    sets = [np.arange(len(u))] if len(u) != 6 else []
+    sets += [shuffled.choice(len(u), 5, replace=False) for _ in range(_SETS if len(u) > 5 else 0)]
+    return rotations_of(np.concatenate([essential_matrices(u[chosen], v[chosen]) for chosen in sets]))
+
+
+def _vectors(xy: Array, c: float) -> Array:
+    return np.column_stack((xy, np.full(len(xy), -c)))
+
+
+def _linear_bases(rotations: Array, u: Array, v: Array) -> Array:
+    """For each rotation the base (k, 3) nearest to all epipolar planes."""
+    normals = np.cross(u, v @ rotations.transpose(0, 2, 1))
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
+    return np.asarray(np.linalg.eigh(normals.transpose(0, 2, 1) @ normals)[1][:, :, 0])
+
+
+def _conditions(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[Array, Array]:
+    """Normalised conditions (k, n) and derivatives (k, n, 5): three turns, two shifts of the base across itself."""
+    turned = v @ rotations.transpose(0, 2, 1)
+    normal = np.cross(u, bases[:, None])  # (u x b): derivative by R v
+    closure = np.einsum("kni,kni->kn", normal, turned)
+    by_base = np.cross(turned, u)
+    by_first = np.cross(bases[:, None], turned)[..., :2]
+    in_second = normal @ rotations
+    by_second = in_second[..., :2]
+    root = np.sqrt((by_first**2).sum(axis=2) + (by_second**2).sum(axis=2))
+    by_turn = np.cross(v, in_second)
+    jacobian = np.concatenate((by_turn, np.einsum("kni,kit->knt", by_base, _across(bases))), axis=2)
+    return -closure / root, jacobian / -root[..., None]
+
+
+def _across(bases: Array) -> Array:
+    """Two unit vectors (k, 3, 2) at right angles to each base."""
+    helper = np.eye(3)[np.abs(bases).argmin(axis=1)]
+    first = np.cross(bases, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack((first, np.cross(bases, first)), axis=2)
+
+
+def _iterate(rotations: Array, bases: Array, u: Array, v: Array, steps: int) -> tuple[Array, Array, Array]:
+    """Damped Gauss-Newton from all starts together; a start that gets worse is damped, one that has settled rests."""
+    damping = np.full(len(bases), 1e-3)
+    values, jacobian = _conditions(rotations, bases, u, v)
+    sums = (values**2).sum(axis=1)
+    for _ in range(steps):
+        normal = np.einsum("kni,knj->kij", jacobian, jacobian)
+        gradient = np.einsum("kni,kn->ki", jacobian, values)
+        diagonal = np.einsum("kii->ki", normal)
+        damped = normal + np.einsum("ki,ij->kij", damping[:, None] * diagonal + 1e-12 * diagonal.max(), np.eye(5))
+        step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
+        moved = bases + np.einsum("kit,kt->ki", _across(bases), step[:, 3:])
+        moved /= np.linalg.norm(moved, axis=1, keepdims=True)
+        turned = rotations @ rotation_from_vector(step[:, :3])
+        new_values, new_jacobian = _conditions(turned, moved, u, v)
+        new_sums = (new_values**2).sum(axis=1)
+        better = new_sums < sums
+        settled = np.abs(step).max() < 1e-10
+        rotations = np.where(better[:, None, None], turned, rotations)
+        bases = np.where(better[:, None], moved, bases)
+        values = np.where(better[:, None], new_values, values)
+        jacobian = np.where(better[:, None, None], new_jacobian, jacobian)
+        sums = np.where(better, new_sums, sums)
+        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-12, 1e8)
+        if settled:
+            break
+    return rotations, bases, sums
+
+
+def _solutions(
+    rotations: Array, bases: Array, sums: Array, u: Array, v: Array, rounding: float
+) -> list[RelativeOrientation]:
+    """Distinct minima, those with most points in front first, then by square sum."""
+    kept: list[RelativeOrientation] = []
+    for i in np.argsort(sums):
+        for base in (bases[i], -bases[i]):
+            share = _share_in_front(rotations[i], base, u, v)
+            same = any(
+                np.abs(other.rotation - rotations[i]).max() < _SAME and np.abs(other.base - base).max() < _SAME
+                for other in kept
+            )
+            if share >= 0.5 and not same:
+                residuals = _conditions(rotations[i][None], base[None], u, v)[0][0]
+                kept.append(
+                    RelativeOrientation(
+                        rotations[i], base, residuals, float(sums[i]), share, _parallax(rotations[i], u, v)
+                    )
+                )
+    least = min((s.square_sum for s in kept), default=0.0)
+    # a few points may lie behind by noise: the share counts in steps, and before a far larger square sum
+    kept.sort(key=lambda s: (s.square_sum > 100 * least + rounding, -round(s.in_front, 1), s.square_sum))
+    return kept
+
+
+def _share_in_front(rotation: Array, base: Array, u: Array, v: Array) -> float:
+    """Share of the points whose rays meet at positive distances from both projection centres."""
+    a, b = u / np.linalg.norm(u, axis=1, keepdims=True), v @ rotation.T
+    b = b / np.linalg.norm(b, axis=1, keepdims=True)
+    dot = (a * b).sum(axis=1)
+    along_a, along_b = a @ base, b @ base
+    first = along_a - dot * along_b
+    second = dot * along_a - along_b
+    return float(((first > 0) & (second > 0)).mean())
+
+
+def _parallax(rotation: Array, u: Array, v: Array) -> float:
+    a, b = u / np.linalg.norm(u, axis=1, keepdims=True), v @ rotation.T
+    b = b / np.linalg.norm(b, axis=1, keepdims=True)
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)).mean())

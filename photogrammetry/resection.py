@@ -1,0 +1,155 @@
+"""Direct space resection with known interior orientation: no start values, three or more points, planar too.
+
+Three points and their rays fix the three distances up to at most four solutions (Grunert's quartic). With more points
+the solutions of several well-spread triples are judged by all points, and the best are refined by least squares.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogrammetry.ideal_camera import Array, IdealCamera, unit_rays
+from photogrammetry.pose_refinement import RefinedPose, refine_pose
+from photogrammetry.similarity import fit_similarity
+from rig.errors import BadInputError
+
+_COLLINEAR = 1e-6  # height of a triangle over its longest side
+_TRIPLES = 8
+_REFINED = 4  # candidates that are refined
+_NEARLY_REAL = 0.2  # imaginary part of a root over its modulus: noise pushes double roots off the real axis
+_SAME_TURN = 0.02  # rad
+_ROUNDING = 1e-7  # of c: residuals that small are none
+_AMBIGUOUS = 4.0  # ratio of square sums below which a second pose remains possible
+
+
+@dataclass(frozen=True, slots=True)
+class Resection:
+    """Pose of one image.
+
+    Attributes:
+        camera: the best pose.
+        residuals: (n, 2) computed - observed.
+        alternatives: other poses that fit nearly as well (three points; small planar fields), best first.
+    """
+
+    camera: IdealCamera
+    residuals: Array
+    alternatives: tuple[IdealCamera, ...]
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether another pose fits nearly as well: then only further points decide."""
+        return bool(self.alternatives)
+
+
+def resect(points: ArrayLike, xy: ArrayLike, c: float) -> Resection:
+    """Pose of one image from known points and interior orientation.
+
+    Args:
+        points: (n, 3) object coordinates, n >= 3, not on a line.
+        xy: (n, 2) reduced image coordinates.
+        c: principal distance, image unit.
+
+    Returns:
+        The pose with the smallest residuals and those that the points cannot tell from it.
+
+    Raises:
+        BadInputError: fewer than three points, points on a line, or points and image coordinates that fit no pose.
+    """
+    points, xy = np.asarray(points, float), np.asarray(xy, float)
+    if len(points) < 3:
+        raise BadInputError(f"a resection has {len(points)} known points: give at least three")
+    triples = _triples(points)
+    if not triples:
+        raise BadInputError("the known points of a resection lie on a line: add one beside it")
+    rays = unit_rays(xy, c)
+    candidates = [
+        RefinedPose(camera, _fit(camera, points, rays))
+        for triple in triples
+        for camera in _three_points(points[triple], rays[triple], c)
+    ]
+    candidates = _distinct(candidates)[: _REFINED if len(points) > 3 else None]
+    refined = [refine_pose(candidate.camera, points, xy) for candidate in candidates]
+    refined = _distinct([pose for pose in refined if np.isfinite(pose.square_sum)])
+    if not refined:
+        raise BadInputError("the points of a resection fit no pose: check point numbers and principal distance")
+    best = refined[0]
+    limit = max(_AMBIGUOUS * best.square_sum, (_ROUNDING * c) ** 2)
+    others = (pose.camera for pose in refined[1:] if pose.square_sum < limit)
+    return Resection(best.camera, best.camera.project(points) - xy, tuple(others))
+
+
+def _triples(points: Array) -> list[list[int]]:
+    """Triples of points that span large triangles: the largest first, then those of other points."""
+    left = list(range(len(points)))
+    chosen: list[list[int]] = []
+    pool = list(left)
+    while len(chosen) < _TRIPLES and len(pool) >= 3:
+        a = max(pool, key=lambda i: float(np.linalg.norm(points[i] - points[pool].mean(axis=0))))
+        b = max(pool, key=lambda i: float(np.linalg.norm(points[i] - points[a])))
+        base = points[b] - points[a]
+        heights = np.linalg.norm(np.cross(points[pool] - points[a], base), axis=1)
+        length = float(base @ base)
+        third = pool[int(heights.argmax())]
+        if length == 0 or heights.max() < _COLLINEAR * length:
+            break
+        chosen.append([a, b, third])
+        # the next triple leaves out one point, so that every point has its turn and few points still give several
+        pool = [i for i in pool if i != (a, b, third)[len(chosen) % 3]]
+    return chosen
+
+
+def _three_points(points: Array, rays: Array, c: float) -> list[IdealCamera]:
+    """Poses from three points (3, 3) and unit rays (3, 3) in the camera system."""
+    cameras = []
+    for distances in _distances(points, rays):
+        fit = fit_similarity(rays * distances[:, None], points, scale=1.0).transform
+        cameras.append(IdealCamera(c, fit.translation, fit.rotation))
+    return cameras
+
+
+def _distances(points: Array, rays: Array) -> list[Array]:
+    """Distances (3,) from the projection centre to three points: the positive roots of Grunert's quartic."""
+    a, b, c = (float(((points[i] - points[j]) ** 2).sum()) for i, j in ((1, 2), (0, 2), (0, 1)))
+    cos_a, cos_b, cos_c = (float(rays[i] @ rays[j]) for i, j in ((1, 2), (0, 2), (0, 1)))
+    p, q, s, t = (a - c) / b, (a + c) / b, c / b, a / b
+    quartic = (
+        (p - 1) ** 2 - 4 * s * cos_a**2,
+        4 * (p * (1 - p) * cos_b - (1 - q) * cos_a * cos_c + 2 * s * cos_a**2 * cos_b),
+        2 * (p**2 - 1 + 2 * (p * cos_b) ** 2 + 2 * (1 - s) * cos_a**2 - 4 * q * cos_a * cos_b * cos_c)
+        + 4 * (1 - t) * cos_c**2,
+        4 * (-p * (1 + p) * cos_b + 2 * t * cos_c**2 * cos_b - (1 - q) * cos_a * cos_c),
+        (1 + p) ** 2 - 4 * t * cos_c**2,
+    )
+    found = []
+    for root in np.roots(quartic):
+        v = float(root.real)
+        if v <= 0 or abs(root.imag) > _NEARLY_REAL * abs(root):
+            continue
+        first = np.sqrt(b / (1 + v * v - 2 * v * cos_b))
+        divisor = 2 * (cos_c - v * cos_a)
+        if abs(divisor) < 1e-12:
+            continue
+        u = ((p - 1) * v * v - 2 * p * cos_b * v + 1 + p) / divisor
+        if u > 0:
+            found.append(first * np.array([1.0, u, v]))
+    return found
+
+
+def _fit(camera: IdealCamera, points: Array, rays: Array) -> float:
+    """Median squared sine between rays and points; also finite where a poor candidate has points behind it."""
+    d = (points - camera.X0) @ camera.R
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    square = ((d - rays) ** 2).sum(axis=1)
+    return float(square.mean())
+
+
+def _distinct(poses: list[RefinedPose]) -> list[RefinedPose]:
+    """Poses by square sum, of each bundle of nearly equal ones the best."""
+    kept: list[RefinedPose] = []
+    for pose in sorted(poses, key=lambda candidate: candidate.square_sum):
+        turns = [np.arccos(np.clip((np.trace(other.camera.R.T @ pose.camera.R) - 1) / 2, -1, 1)) for other in kept]
+        if all(turn > _SAME_TURN for turn in turns):
+            kept.append(pose)
+    return kept

@@ -1,11 +1,11 @@
 """A file that only grows: direct I/O where the file system takes it, whole writes or an error."""
 
 import errno
-import fcntl
 import mmap
 import os
 from pathlib import Path
 
+from recorder.direct_io import set_direct
 from recorder.mcap_layout import PAGE
 from rig.errors import BadInputError, StorageError
 
@@ -55,7 +55,7 @@ class AppendFile:
             ) from None
         except OSError as error:
             raise storage_error(path, error) from error
-        self.direct = self._set_direct(wanted=True)
+        self.direct = set_direct(self._fd, wanted=True)
 
     def append(self, pages: memoryview | mmap.mmap) -> None:
         """Write whole pages at the end; after an error the file may have a torn end (`cut`).
@@ -96,7 +96,7 @@ class AppendFile:
         Raises:
             OSError: the disk refuses; `size` is unchanged.
         """
-        self._set_direct(wanted=False)
+        set_direct(self._fd, wanted=False)
         done = 0
         while done < len(rest):
             done += os.pwrite(self._fd, rest[done:], self.size + done)
@@ -139,16 +139,5 @@ class AppendFile:
             # Some file systems accept the flag and refuse the write.
             if error.errno != errno.EINVAL or not self.direct:
                 raise
-            self.direct = self._set_direct(wanted=False)
+            self.direct = set_direct(self._fd, wanted=False)
             return os.pwrite(self._fd, view, offset)
-
-    def _set_direct(self, *, wanted: bool) -> bool:
-        """Switch direct I/O on or off; whether it is on now."""
-        flags = fcntl.fcntl(self._fd, fcntl.F_GETFL)
-        try:
-            fcntl.fcntl(self._fd, fcntl.F_SETFL, flags | os.O_DIRECT if wanted else flags & ~os.O_DIRECT)
-        except OSError as error:
-            if error.errno != errno.EINVAL:
-                raise
-            return False  # a file system without direct I/O
-        return wanted

@@ -1,11 +1,11 @@
 """Reads a file through one reusable window: no memory beyond the longest record, no page cache for long reads."""
 
 import errno
-import fcntl
 import mmap
 import os
 from pathlib import Path
 
+from recorder.direct_io import set_direct
 from recorder.mcap_layout import PAGE, round_up
 from rig.errors import BadInputError
 
@@ -45,7 +45,7 @@ class FileWindow:
         self._begin = self._end = 0
         self._buffer = self._allocate(_READ_ON)
         if direct:
-            self._set_direct(wanted=True)
+            set_direct(self._fd, wanted=True)
 
     def read(self, offset: int, length: int) -> memoryview:
         """The bytes from `offset` on, fewer than `length` only at the end of the file.
@@ -81,7 +81,7 @@ class FileWindow:
             return os.preadv(self._fd, [view], offset)
         except OSError as error:
             if error.errno == errno.EINVAL:  # some file systems accept direct I/O and then refuse it
-                self._set_direct(wanted=False)
+                set_direct(self._fd, wanted=False)
                 try:
                     return os.preadv(self._fd, [view], offset)
                 except OSError as second:
@@ -89,14 +89,6 @@ class FileWindow:
             raise BadInputError(
                 f"{self.path}: cannot be read at byte {offset} ({error.strerror}); look at `dmesg`"
             ) from error
-
-    def _set_direct(self, *, wanted: bool) -> None:
-        flags = fcntl.fcntl(self._fd, fcntl.F_GETFL)
-        try:
-            fcntl.fcntl(self._fd, fcntl.F_SETFL, flags | os.O_DIRECT if wanted else flags & ~os.O_DIRECT)
-        except OSError as error:
-            if error.errno != errno.EINVAL:
-                raise
 
     def _allocate(self, size: int) -> mmap.mmap:
         buffer = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from recorder.mcap_layout import RECORD
 from rig.clocks import UtcNs
 
 
@@ -41,7 +42,7 @@ class Small:
     @property
     def length(self) -> int:
         """Bytes of the whole record."""
-        return 9 + len(self.body)
+        return RECORD.size + len(self.body)
 
 
 @dataclass(frozen=True, slots=True)

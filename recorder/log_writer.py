@@ -100,29 +100,19 @@ class LogWriter:
         self._metadata = {SESSION_METADATA: dict(session), RIG_METADATA: dict(rig)}
         self._written_metadata: dict[str, dict[str, str]] = {}
         self._sequences = {EVENTS_CHANNEL: 0, HEALTH_CHANNEL: 0}
-        self._calibrations = dict(calibrations or {})
-        schemas, channels = schemas_and_channels(self._calibrations)
+        schemas, channels = schemas_and_channels(calibrations or {})
         self._topics = {channel.id: channel.topic for channel in channels}
         self._index = LogIndex(schemas, channels)
         self._file = AppendFile(path)
-        attachments = {RIG_ATTACHMENT: rig_toml, CALIBRATION_ATTACHMENT: calibration_json}
-        opening = MAGIC + records(Header(PROFILE, _library()), *schemas, *channels)
         try:
-            self._write_opening(opening, {name: data for name, data in attachments.items() if data is not None})
+            self._write_opening(records(*schemas, *channels), rig_toml, calibration_json)
         except BaseException as error:
             self._file.discard()
             if isinstance(error, OSError):
                 raise storage_error(path, error) from error
             raise
         self._thread = WriteThread(self._file, self._index, self._let_go)
-        self._write_calibrations()
-        if not self._file.direct:
-            self.write_event(
-                Level.WARNING,
-                "recorder",
-                "the file system takes no direct I/O: writing costs more",
-                UtcNs(time.time_ns()),
-            )
+        self._write_first_messages(calibrations or {})
 
     def __enter__(self) -> "LogWriter":
         return self
@@ -257,16 +247,21 @@ class LogWriter:
         if self._on_released is not None:
             self._on_released(slot)
 
-    def _write_opening(self, opening: bytes, attachments: Mapping[str, bytes]) -> None:
+    def _write_opening(self, declarations: bytes, rig_toml: bytes, calibration_json: bytes | None) -> None:
+        """Everything that says what the log is, in one durable write."""
         now = time.time_ns()
-        out = opening + self._changed_metadata(len(opening))
-        for name, data in attachments.items():
-            media_type = "application/toml" if name == RIG_ATTACHMENT else "application/json"
-            attachment = records(Attachment(now, now, name, media_type, data))
-            self._index.add_attachment(
-                AttachmentIndex(len(out), len(attachment), now, now, len(data), name, media_type)
+        out = MAGIC + records(Header(PROFILE, _library())) + declarations
+        out += self._changed_metadata(len(out))
+        attachments = [Attachment(now, now, RIG_ATTACHMENT, "application/toml", rig_toml)]
+        if calibration_json is not None:
+            attachments.append(Attachment(now, now, CALIBRATION_ATTACHMENT, "application/json", calibration_json))
+        for attachment in attachments:
+            record = records(attachment)
+            index = AttachmentIndex(
+                len(out), len(record), now, now, len(attachment.data), attachment.name, attachment.media_type
             )
-            out += attachment
+            self._index.add_attachment(index)
+            out += record
         with join_pages([out]) as pages:
             self._file.append(pages)
         self._file.sync_entry()
@@ -282,10 +277,12 @@ class LogWriter:
                 out += record
         return out
 
-    def _write_calibrations(self) -> None:
+    def _write_first_messages(self, calibrations: Mapping[str, bytes]) -> None:
         now = UtcNs(time.time_ns())
-        for channel, data in enumerate(self._calibrations.values(), FIRST_CALIBRATION_CHANNEL):
+        for channel, data in enumerate(calibrations.values(), FIRST_CALIBRATION_CHANNEL):
             self._write_small(channel, 1, data, now, now)
+        if not self._file.direct:
+            self.write_event("warning", "recorder", "the file system takes no direct I/O: writing costs more", now)
 
     def _closing_bytes(self) -> bytes:
         metadata = self._changed_metadata(self._file.size)

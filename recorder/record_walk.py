@@ -69,7 +69,7 @@ def _record_at(window: FileWindow, offset: int) -> RawRecord | None:
             plausible = _is_chunk(window, offset + RECORD.size, content)
         case Opcode.FOOTER:
             plausible = content == 8 + 8 + 4
-        case 0x80:
+        case _ if opcode == PADDING_OPCODE:
             plausible = content <= _PADDING_MAX
         case _:
             plausible = Opcode.HEADER <= opcode <= Opcode.DATA_END and content <= _SMALL_MAX

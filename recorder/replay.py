@@ -115,9 +115,8 @@ def replay(
                 ready(sink.address)
             report.attended = sink.wait(options.wait_s, stop)
             if options.reliable and not report.attended and not stop.is_set():
-                raise BadInputError(
-                    f"{sink.address}: no worker connected within {options.wait_s:g} s; start one, or wait longer"
-                )
+                waited = f"{options.wait_s:g} s"
+                raise BadInputError(f"{sink.address}: no worker connected within {waited}; start one, or wait longer")
             _Replay(reader, sink, options, report, stop, progress or (lambda _: None)).run()
             report.interrupted = stop.is_set()
             sink.finish(stop)

@@ -1,9 +1,13 @@
 """What the writer writes, independent readers read: bit for bit."""
 
+import errno
+import fcntl
 import hashlib
 import json
+import os
 import shutil
 import subprocess
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +20,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from recorder.append_file import AppendFile
 from recorder.mcap_layout import PAGE
 from recorder.triplet_buffers import TripletBuffers
+from recorder.verify import verify
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, StorageError
 from tests.recorder.logs import (
@@ -243,3 +248,48 @@ def test_memory_that_direct_writes_refuse_is_written_through_the_cache(tmp_path:
     assert (tmp_path / "file").read_bytes() == bytes(range(256)) * 16
     if direct:
         assert not file.direct
+
+
+def test_nothing_of_the_size_of_an_image_is_allocated_while_recording(tmp_path: Path) -> None:
+    shape = (1216, 5808)
+    buffers = TripletBuffers(shape, 3)
+    with open_writer(tmp_path / "log.mcap", buffers) as log:
+        tracemalloc.start()
+        for pulse in range(1, 7):
+            tag = make_tag(pulse, shape=shape)
+            log.write_triplet(acquire(buffers), tag, pulse_time=tag.time, log_time=tag.time)
+        wait_until(lambda: buffers.free_count == 3, "all on disk")
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert peak < shape[0] * shape[1] // 20
+
+
+def test_a_file_system_without_direct_writes_is_noted_and_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = fcntl.fcntl
+
+    def refuse(descriptor: int, command: int, argument: int = 0) -> int:
+        if command == fcntl.F_SETFL and argument & os.O_DIRECT:
+            raise OSError(errno.EINVAL, "no direct I/O here")
+        return real(descriptor, command, argument)
+
+    monkeypatch.setattr(fcntl, "fcntl", refuse)
+    write_log(tmp_path / "log.mcap", PULSES)
+    report = verify(tmp_path / "log.mcap")
+    assert (report.verdict, report.findings) == ("partial", ())
+    assert report.events[0].message == "the file system takes no direct I/O: writing costs more"
+
+
+def test_a_disk_that_cannot_sync_ends_the_log_with_a_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(descriptor: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    buffers = TripletBuffers((8, 16), 2)
+    log = open_writer(tmp_path / "log.mcap", buffers)
+    monkeypatch.setattr(os, "fdatasync", fail)
+    write_pulse(log, buffers, make_tag(1, (OK, OK), (8, 16)))
+    wait_until(lambda: log._thread.error is not None, "the first sync, a second after the first write")
+    with pytest.raises(StorageError, match=r"log\.mcap: the disk fails: look at `dmesg`"):
+        write_pulse(log, buffers, make_tag(2, (OK, OK), (8, 16)))
+    assert log.abandon() is log.summary
+    wait_until(lambda: buffers.free_count == 2, "all slots are free")
+    assert verify(tmp_path / "log.mcap").closed

@@ -21,6 +21,7 @@ from rig.errors import BadInputError
 
 _SETS = 16  # sets of five points
 _STARTS = 12  # candidates that are refined
+_NEAR = 0.02  # rad: candidates closer than that are refined once
 _STEPS = 30
 _SAME = 1e-3  # rad: rotations and bases closer than that are one solution
 _POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
@@ -81,7 +82,7 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     rotations = _candidates(u / c_first, v / c_second)
     bases = _linear_bases(rotations, u, v)
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
-    best = np.argsort(sums, kind="stable")[:_STARTS]
+    best = _distinct_starts(rotations, sums)
     rotations, bases, sums = _iterate(rotations[best], bases[best], u, v, _STEPS)
     solutions = _solutions(rotations, bases, sums, u, v, len(u) * (_ROUNDING * scale) ** 2)
     if not solutions or solutions[0].in_front < 0.5:
@@ -101,6 +102,17 @@ def _candidates(u: Array, v: Array) -> Array:
     sets = [np.arange(len(u))] if len(u) != 6 else []
     sets += [shuffled.choice(len(u), 5, replace=False) for _ in range(_SETS if len(u) > 5 else 0)]
     return rotations_of(np.concatenate([essential_matrices(u[chosen], v[chosen]) for chosen in sets]))
+
+
+def _distinct_starts(rotations: Array, sums: Array) -> list[int]:
+    """Indices of the best candidates, of each bundle of nearly equal rotations one."""
+    kept: list[int] = []
+    for i in np.argsort(sums, kind="stable"):
+        if not (np.abs(rotations[kept] - rotations[i]).max(axis=(1, 2)) < _NEAR).any():
+            kept.append(int(i))
+            if len(kept) == _STARTS:
+                break
+    return kept
 
 
 def _vectors(xy: Array, c: float) -> Array:

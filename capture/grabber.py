@@ -71,11 +71,14 @@ class Grabber:
         camera.start()
         next_latch = next_count = host_now()
         while not self._stopping():
-            if self._ring.reconnect_requests() != asked:
-                raise CameraError("no frame while the other cameras have theirs; connecting again")
+            requests = self._ring.reconnect_requests()
             arrival = camera.receive(_RECEIVE_S)
             if arrival is not None:
                 self._put_arrival(arrival)
+            elif requests != asked:
+                # Asked before we looked once more: the camera is silent, not we were late.
+                raise CameraError("no frame while the other cameras have theirs; connecting again")
+            asked = requests
             # Clock and counters are read just after a frame, when the next one is farthest away.
             now = host_now()
             if now >= next_latch:

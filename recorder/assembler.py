@@ -183,7 +183,7 @@ class Assembler:
                 self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
             case RecordKind.CONNECTED:
                 self.pairer.connected(camera, record.epoch, record.host_time)
-                self.connected[camera], self._asked[camera] = True, False
+                self.connected[camera] = True
                 self._changes.append(CameraChange(camera, True, record.text, record.host_time))
             case RecordKind.DISCONNECTED:
                 self._leave(camera, record.text, record.host_time)
@@ -233,7 +233,9 @@ class Assembler:
                 block.fill(0)
 
     def _ask_silent_cameras(self) -> None:
-        for camera in self.pairer.silent():
-            if not self._asked[camera]:
-                self._asked[camera] = True
-                self._rings[camera].request_reconnect()
+        """Once per silence, ask the grabber to connect its camera again."""
+        silent = self.pairer.silent()
+        for camera, ring in enumerate(self._rings):
+            if camera in silent and not self._asked[camera]:
+                ring.request_reconnect()
+            self._asked[camera] = camera in silent

@@ -16,6 +16,7 @@ from rig.clocks import host_now
 from rig.errors import CameraNotFoundError
 from rig.frame import Record, RecordKind
 from rig.ring import CameraRing
+from simrig.faults import Fault, FaultKind
 from svev.sim_scene import SimScene
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
@@ -71,16 +72,17 @@ def ring() -> Iterator[CameraRing]:
 
 
 @contextmanager
-def _station(directory: Path, loopback: Loopback, ring: CameraRing) -> Iterator[Station]:
-    rig, epoch = make_rig(directory, "sim", loopback), host_now()
-    with Station(lambda it: SimCamera(rig.cameras[1], it, SimScene(rig, 1, epoch)), ring) as station:
-        yield station
+def _station(directory: Path, loopback: Loopback, ring: CameraRing) -> Iterator[tuple[Station, SimScene]]:
+    rig = make_rig(directory, "sim", loopback)
+    scene = SimScene(rig, 1, host_now())
+    with Station(lambda it: SimCamera(rig.cameras[1], it, scene), ring) as station:
+        yield station, scene
 
 
 def test_an_epoch_begins_with_its_connection_then_the_clock_then_frames(
     tmp_path: Path, loopback: Loopback, ring: CameraRing
 ) -> None:
-    with _station(tmp_path, loopback, ring) as station:
+    with _station(tmp_path, loopback, ring) as (station, _):
         station.await_records(RecordKind.FRAME, 5)
     kinds = [record.kind for record in station.records]
     assert kinds[0] is RecordKind.CONNECTED
@@ -88,15 +90,28 @@ def test_an_epoch_begins_with_its_connection_then_the_clock_then_frames(
     assert {record.epoch for record in station.records} == {1}
 
 
-def test_a_request_to_reconnect_begins_a_new_epoch(tmp_path: Path, loopback: Loopback, ring: CameraRing) -> None:
-    with _station(tmp_path, loopback, ring) as station:
+def test_a_silent_camera_is_set_up_from_scratch_when_the_recorder_asks(
+    tmp_path: Path, loopback: Loopback, ring: CameraRing
+) -> None:
+    with _station(tmp_path, loopback, ring) as (station, scene):
         station.await_records(RecordKind.FRAME, 2)
+        scene.inject(Fault(kind=FaultKind.FROZEN, camera="K2", duration_s=1.0))
         ring.request_reconnect()
         station.await_records(RecordKind.CONNECTED, 2)
         station.await_records(RecordKind.FRAME, 5)
     kinds = [record.kind for record in station.records]
     assert kinds.index(RecordKind.DISCONNECTED) < len(kinds) - kinds[::-1].index(RecordKind.CONNECTED)
     assert max(record.epoch for record in station.records) == 2
+
+
+def test_a_camera_that_delivers_is_left_alone_when_the_recorder_asks_too_late(
+    tmp_path: Path, loopback: Loopback, ring: CameraRing
+) -> None:
+    with _station(tmp_path, loopback, ring) as (station, _):
+        station.await_records(RecordKind.FRAME, 2)
+        ring.request_reconnect()
+        station.await_records(RecordKind.FRAME, 6)
+    assert {record.epoch for record in station.records} == {1}
 
 
 def test_a_camera_that_is_not_there_is_tried_again_and_reported_once(ring: CameraRing) -> None:
@@ -118,7 +133,7 @@ def test_a_camera_that_is_not_there_is_tried_again_and_reported_once(ring: Camer
 def test_a_recorder_that_stands_still_loses_frames_but_they_are_counted(
     tmp_path: Path, loopback: Loopback, ring: CameraRing
 ) -> None:
-    with _station(tmp_path, loopback, ring) as station:
+    with _station(tmp_path, loopback, ring) as (station, _):
         station.await_records(RecordKind.FRAME, ring.slots, release=False)
         wait_until(lambda: ring.counters()["underruns"] > 0, "underruns are counted", 10)
         for record in station.records:

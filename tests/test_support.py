@@ -18,7 +18,7 @@ import os, socket, subprocess, sys, threading
 from pathlib import Path
 import pytest, zmq
 
-kept = []
+kept, shared = [], []
 SLEEP = [sys.executable, "-c", "import time; time.sleep(60)"]
 
 def test_child():
@@ -52,9 +52,10 @@ def test_listening():
     kept.append(server)
 
 def test_memory():
-    path = Path(f"/dev/shm/svev-leak-{os.getpid()}")
-    path.touch()
-    kept.append(path)
+    # It stays open until it is removed, so that tests beside this one see whose it is.
+    memory = Path(f"/dev/shm/svev-leak-{os.getpid()}").open("wb")
+    kept.append(memory)
+    shared.append(memory.name)
 
 def test_memfd():
     kept.append(os.memfd_create("ring"))
@@ -76,9 +77,8 @@ def test_clean():
     subprocess.run([sys.executable, "-c", ""], check=True)
 
 def teardown_module():
-    for thing in kept:
-        if isinstance(thing, Path):
-            thing.unlink()
+    for name in shared:
+        os.unlink(name)
 """
 
 CULPRITS = {

@@ -1,7 +1,6 @@
 """Can the recording directory be written, how fast, and how much fits?"""
 
 import errno
-import fcntl
 import mmap
 import os
 import tempfile
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from recorder.direct_io import set_direct
 from rig.settings import RigSettings
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 
@@ -150,13 +150,12 @@ def _unnamed_file(directory: Path) -> Iterator[int]:
 
 def _take_direct(fd: int, block: mmap.mmap) -> bool:
     """Switch direct I/O on; whether the file system takes it (some refuse only the first write)."""
-    flags = fcntl.fcntl(fd, fcntl.F_GETFL)
+    if not set_direct(fd, wanted=True):
+        return False
     try:
-        fcntl.fcntl(fd, fcntl.F_SETFL, flags | os.O_DIRECT)
         os.pwrite(fd, block, 0)
     except OSError as error:
         if error.errno != errno.EINVAL:
             raise
-        fcntl.fcntl(fd, fcntl.F_SETFL, flags)
-        return False
+        return set_direct(fd, wanted=False)
     return True

@@ -1,8 +1,8 @@
 """The command line: `svev COMMAND`.
 
-Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete or `doctor` found a FAIL, 4 storage failed,
-5 a camera failed, 6 one of our processes died, 130 interrupted. Errors are one line; `--debug` anywhere shows the
-traceback.
+Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, `doctor` found a FAIL, or a network is not solvable,
+4 storage failed or an adjustment did not converge, 5 a camera failed, 6 one of our processes died, 130 interrupted.
+Errors are one line; `--debug` anywhere shows the traceback.
 """
 
 import sys
@@ -13,7 +13,7 @@ import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import bench, demo, doctor, info, record, replay, schema, verify
+from svev.commands import adjust, bench, demo, doctor, info, record, replay, schema, verify
 
 app = typer.Typer(
     name="svev",
@@ -38,6 +38,7 @@ app.command("info")(info.info_command)
 app.command("replay")(replay.replay_command)
 app.command("schema")(schema.schema)
 app.command("verify")(verify.verify_command)
+app.command("adjust")(adjust.adjust)
 app.command("bench")(bench.bench)
 
 

@@ -1,0 +1,153 @@
+"""The adjustment of a network: solved, with covariance, redundancy and tests."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogrammetry.adjustment.datum import FreeDatum, align, datum_points, inner_operator, s_transform
+from photogrammetry.adjustment.normals import SingularError, build_normals, factorise
+from photogrammetry.adjustment.problem import Equations, Problem, build_problem
+from photogrammetry.adjustment.rank import check_rank
+from photogrammetry.adjustment.solver import solve
+from photogrammetry.adjustment.state import Floats, State, state_of
+from photogrammetry.adjustment.statistics import Redundancy, redundancy, w_values
+from photogrammetry.adjustment.unknowns import Integers
+from photogrammetry.diagnosis import Defect, DefectKind, NotSolvableError
+from photogrammetry.network import Network
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Adjustment:
+    """An adjusted network.
+
+    Attributes:
+        problem: the network as adjusted, its columns and weights.
+        state: adjusted values.
+        iterations: steps taken.
+        free: the free motions of a free network (none otherwise).
+        equations: observation equations at the solution, whitened.
+        cofactors: (u, u), Q of all unknowns in the chosen datum; unknowns by `problem.unknowns`.
+        controlled: redundancy of every observation.
+    """
+
+    problem: Problem
+    state: State
+    iterations: int
+    free: FreeDatum
+    equations: Equations
+    cofactors: Floats
+    controlled: Redundancy
+
+    @property
+    def network(self) -> Network:
+        """The network that was adjusted, with the observed values."""
+        return self.problem.network
+
+    @property
+    def redundancy(self) -> int:
+        """Observations - unknowns + datum conditions."""
+        return self.problem.n_observations - self.problem.unknowns.count + self.free.defect
+
+    @property
+    def ratio(self) -> float:
+        """Estimated / a-priori sigma0; 1 where nothing is redundant."""
+        return float(np.sqrt(self.equations.square_sum / self.redundancy)) if self.redundancy else 1.0
+
+    @property
+    def sigma0(self) -> float | None:
+        """Estimated sigma0 in the unit of the file's; None without redundancy."""
+        return self.ratio * self.network.sigma0 if self.redundancy else None
+
+    @property
+    def vtpv(self) -> float:
+        """Weighted sum of squared residuals, weights (sigma0 / sigma)^2."""
+        return self.equations.square_sum * self.network.sigma0**2
+
+    def covariance(self, columns: Integers) -> Floats:
+        """A-posteriori covariance of chosen unknowns, cross terms included: (..., k, k) for columns (..., k).
+
+        Constants (column -1) have zeros.
+        """
+        block = self.cofactors[columns[..., :, None], columns[..., None, :]] * self.ratio**2
+        known = columns >= 0
+        return np.asarray(np.where(known[..., :, None] & known[..., None, :], block, 0.0), dtype=float)
+
+    def sigmas(self, columns: Integers) -> Floats:
+        """A-posteriori standard deviations of unknowns, same shape as `columns`; zero for constants."""
+        variance = np.append(np.diagonal(self.cofactors), 0.0)[columns]
+        return np.asarray(self.ratio * np.sqrt(np.maximum(variance, 0.0)), dtype=float)
+
+    def image_residuals(self) -> Floats:
+        """Residuals adjusted - observed in the metric frame, image unit, problem's order: (n, 2)."""
+        return self.equations.v * self.problem.sigma
+
+    def image_w(self) -> Floats:
+        """Test values of the image coordinates, problem's order: (n, 2); NaN where uncontrolled."""
+        return w_values(self.equations.v, self.controlled.image_numbers, self.ratio)
+
+    def relation_residuals(self) -> Floats:
+        """Residuals of the other observations in their units: (m,)."""
+        return self.equations.relations.v * self.problem.relation_sigma
+
+    def relation_w(self) -> Floats:
+        """Test values of the other observations: (m,)."""
+        return w_values(self.equations.relations.v, self.controlled.relation, self.ratio)
+
+
+def adjust_once(network: Network, start: State | None = None) -> Adjustment:
+    """Adjust with the weights as they are.
+
+    Args:
+        network: the network; its values are the observed ones where they have a sigma.
+        start: start values; the network's own if left out.
+
+    Returns:
+        The adjusted network.
+
+    Raises:
+        NotSolvableError: a rank defect; says which unknowns and why.
+        NotConvergedError: no optimum was reached.
+        BadInputError: a start value is missing.
+    """
+    return adjust_problem(build_problem(network), state_of(network) if start is None else start)
+
+
+def adjust_problem(problem: Problem, start: State) -> Adjustment:
+    """Adjust a problem whose weights may differ from the network's; otherwise as `adjust_once`."""
+    return _adjusted(problem, start, check_rank(problem, start), start)
+
+
+def refine(problem: Problem, adjustment: Adjustment) -> Adjustment:
+    """Adjust the same network again with other weights, from where it was; the datum stays where it is.
+
+    Raises:
+        NotSolvableError, NotConvergedError: as `adjust_once`.
+    """
+    return _adjusted(problem, adjustment.state, adjustment.free, adjustment.state)
+
+
+def _adjusted(problem: Problem, start: State, free: FreeDatum, target: State) -> Adjustment:
+    """Solve, bring a free network next to `target`, and compute what belongs to it."""
+    solution = solve(problem, start, free)
+    state = solution.state
+    points = datum_points(problem.network)
+    if free.defect:
+        state = align(problem, state, free, points, target.xyz)
+    equations = problem.equations(state)
+    cofactors = _cofactors(problem, state, equations, free, points)
+    return Adjustment(
+        problem, state, solution.iterations, free, equations, cofactors, redundancy(problem, equations, cofactors)
+    )
+
+
+def _cofactors(problem: Problem, state: State, equations: Equations, free: FreeDatum, points: Integers) -> Floats:
+    """Q of all unknowns in the datum."""
+    normals = build_normals(problem, equations)
+    moves, conditions = inner_operator(problem, state, free, points)
+    try:
+        factor = factorise(normals, moves / normals.scale[:, None])
+    except SingularError:
+        check_rank(problem, state)
+        message = "at the optimum the network is singular to working precision; estimate fewer camera parameters"
+        raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, message),)) from None
+    return s_transform(factor.cofactors(), moves, conditions)

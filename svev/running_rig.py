@@ -104,22 +104,26 @@ class RunningRig:
             CameraNotFoundError: a camera does not answer in time.
             CameraError: all cameras are there, but no whole triplet came.
         """
-        deadline = time.monotonic() + settle_s
-        give_up = time.monotonic() + _START_S + settle_s
+        began = time.monotonic()
+        complete_since = began
         while not self._warm:
             for _ in self._reports(0.1):
                 pass
-            if not all(self._present):
-                # The clock for the pulses starts when the cameras are there, but cameras do not get for ever.
-                if time.monotonic() > deadline:
-                    if allow_absent and any(self._present):
-                        return
-                    self._raise_absent()
-            elif time.monotonic() > min(deadline + settle_s, give_up):
-                raise CameraError(
-                    f"all cameras are ready, but no complete triplet came within {settle_s:g} s: "
-                    "check the pulse generator, the trigger cables and trigger.rate_hz in the rig file"
-                )
+            now = time.monotonic()
+            if all(self._present):
+                if now > complete_since + settle_s:
+                    raise CameraError(
+                        f"all cameras are ready, but no complete triplet came within {settle_s:g} s: "
+                        "check the pulse generator, the trigger cables and trigger.rate_hz in the rig file"
+                    )
+                continue
+            complete_since = now
+            # A camera that has failed to answer gets `settle_s`; one whose process is still starting gets longer.
+            tried = all(present or reason for present, reason in zip(self._present, self._reasons, strict=True))
+            if now > began + (settle_s if tried else _START_S):
+                if allow_absent and any(self._present):
+                    return
+                self._raise_absent()
 
     def start_recording(
         self,

@@ -1,5 +1,6 @@
 """Events of a recording: arm, start, stop, fault, recovery; in the log, on ZeroMQ and for people."""
 
+import time
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -33,6 +34,11 @@ class Event:
     level: Level
     name: str
     message: str
+
+    @classmethod
+    def now(cls, level: Level, name: str, message: str) -> "Event":
+        """Something that happens now."""
+        return cls(UtcNs(time.time_ns()), level, name, message)
 
     def to_json(self) -> dict[str, Any]:
         """The form of the ZeroMQ message; the 64-bit time is a string."""

@@ -17,6 +17,7 @@ class LogInfo:
 
     Attributes:
         closed: the log was closed properly.
+        truncated: it ends in the middle of a record.
         damaged_bytes: bytes that could not be read.
         ledger: what became of every pulse.
         session, rig: the metadata records, the last of each.
@@ -31,6 +32,7 @@ class LogInfo:
     path: Path
     bytes: int
     closed: bool
+    truncated: bool
     damaged_bytes: int
     ledger: Ledger
     session: dict[str, str]
@@ -53,6 +55,7 @@ class LogInfo:
         return {
             "log": str(self.path),
             "closed": self.closed,
+            "truncated": self.truncated,
             "damaged_bytes": self.damaged_bytes,
             **ledger.counts(),
             "missing_pulses": sum(last - first + 1 for first, last in ledger.missing),
@@ -95,7 +98,7 @@ def info(path: Path) -> LogInfo:
                         first = first or tag
                         ledger.add(tag)
         return LogInfo(
-            path, reader.size, reader.closed, damaged, ledger,
+            path, reader.size, reader.closed, reader.truncated, damaged, ledger,
             reader.metadata.get(SESSION_METADATA, {}),
             reader.metadata.get(RIG_METADATA, {}),
             _text(reader.attachments.get(RIG_ATTACHMENT)),

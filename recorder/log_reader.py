@@ -36,6 +36,7 @@ class LogReader:
         path: the log.
         size: bytes of the file when it was opened.
         closed: the log was closed properly: it ends in a footer.
+        truncated: it ends in the middle of a record, as far as it has been read.
         library: who wrote it.
         channels: by id, as far as the log has been read.
         metadata: fields of the metadata records by name, the last of each, as far as the log has been read.
@@ -56,6 +57,7 @@ class LogReader:
         self.channels: dict[int, Channel] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
+        self.truncated = False
         self._window = FileWindow(path, direct=not skim)
         self.size = self._window.size
         try:
@@ -81,6 +83,7 @@ class LogReader:
         """
         for record in walk(self._window):
             if isinstance(record, Damage):
+                self.truncated = self.truncated or record.torn
                 yield record
             elif record.opcode == Opcode.CHUNK:
                 yield self._chunk(record, only)

@@ -7,17 +7,19 @@ Commands: `{"command": "start", "path", "recording", "session", "pulses", "secon
 
 import os
 import select
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from recorder.assembler import Assembler, CameraChange, Triplet, least_buffers
+from recorder.events import Event, Level
 from recorder.publisher import Publisher
 from recorder.recording import Recording, RecordingOrder
 from recorder.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.control import ControlChannel, Message
-from rig.errors import BadInputError, SvevError
+from rig.errors import BadInputError, StorageError, SvevError
 from rig.frame import FrameStatus
 from rig.ring import CameraRing
 from rig.settings import RigSettings
@@ -42,7 +44,7 @@ class RecorderLoop:
         count = max(least_buffers(rig.trigger.period_ns), round(rig.recorder.triplets_s * rig.trigger.rate_hz))
         self._buffers = TripletBuffers(rig.triplet_shape, count)
         self._assembler = Assembler(rig, rings, self._buffers)
-        self._publisher = Publisher(rig.network.publish)
+        self._publisher = Publisher(rig.network.publish, rig.network.publish_ipc, queue=count // 4)
         self._recording: Recording | None = None
         self._quit = False
         self._warm = 0
@@ -77,7 +79,7 @@ class RecorderLoop:
         if now >= self._next_report:
             self._next_report = HostNs(now + _REPORT_EVERY_NS)
             if self._recording is not None:
-                self._report("progress", **self._recording.tally.to_json())
+                self._report("progress", **self._recording.ledger.counts())
         if now >= self._next_health:
             self._next_health = HostNs(now + NS_PER_S)
             self._tell_health()
@@ -96,10 +98,8 @@ class RecorderLoop:
         tag = recording.tag(pulse)
         encoded = tag.encode()
         self._publisher.triplet(encoded, self._buffers, slot)
-        try:
+        with self._storage_guarded():
             recording.write(tag, slot, encoded)
-        except SvevError as error:
-            self._fail(error)
 
     def _warm_up(self, pulse: ClosedPulse) -> None:
         """Count whole triplets before the first recording: only then is the rig known to work together."""
@@ -139,36 +139,55 @@ class RecorderLoop:
             return
         try:
             summary = recording.close()
-        except SvevError as error:
+        except StorageError as error:
+            recording.log.abandon()
             self._report("failed", kind=type(error).__name__, message=str(error))
             return
+        counts = recording.ledger.counts()
         dropped = self._publisher.dropped
-        self._report(
-            "finished", path=str(recording.path), bytes=summary.bytes, unpublished=dropped, **recording.tally.to_json()
-        )  # fmt: skip
+        self._report("finished", path=str(recording.path), bytes=summary.bytes, unpublished=dropped, **counts)
 
-    def _fail(self, error: SvevError) -> None:
-        """The log cannot be written on; keep what it holds and say so."""
-        self._report("failed", kind=type(error).__name__, message=str(error))
-        recording, self._recording = self._recording, None
-        if recording is not None:
-            recording.log.abandon()
+    @contextmanager
+    def _storage_guarded(self) -> Iterator[None]:
+        """What is written within may fail: then the recording ends, keeps what it holds, and everybody is told."""
+        try:
+            yield
+        except StorageError as error:
+            recording, self._recording = self._recording, None
+            if recording is not None:
+                recording.log.abandon()
+            self._publisher.event(Event.now(Level.FATAL, "recorder", str(error)).to_json())
+            self._report("failed", kind=type(error).__name__, message=str(error))
 
     def _camera_changed(self, change: CameraChange) -> None:
-        name = self._rig.cameras[change.camera].name
-        state = "connected" if change.present else "gone"
         self._report("camera", camera=change.camera, present=change.present, text=change.text)
-        event = {"level": "info" if change.present else "error", "name": name, "message": f"{state}: {change.text}"}
-        self._publisher.event(event)
+        level, state = (Level.INFO, "connected") if change.present else (Level.ERROR, "gone")
+        self._happened(Event.now(level, self._rig.cameras[change.camera].name, f"{state}: {change.text}"))
+
+    def _happened(self, event: Event) -> None:
+        """Publish an event, and write it into the recording if there is one."""
+        self._publisher.event(event.to_json())
         if self._recording is not None:
-            self._recording.event(event["level"], event["message"], source=name)
+            with self._storage_guarded():
+                self._recording.event(event)
 
     def _tell_health(self) -> None:
         health = self._health()
         self._publisher.health(health)
         self._report("health", **health)
-        if self._recording is not None:
+        if self._recording is None:
+            return
+        with self._storage_guarded():
             self._recording.health(health)
+        self._keep_reserve()
+
+    def _keep_reserve(self) -> None:
+        """End the recording, whole, while there is still room to close it."""
+        recording, reserve = self._recording, self._rig.recorder.reserve_gb
+        if recording is None or (free := recording.log.free_bytes()) >= reserve * 1e9:
+            return
+        self._happened(Event.now(Level.ERROR, "recorder", f"only {free / 1e9:.1f} GB free: recording stopped"))
+        self._finish()
 
     def _health(self) -> dict[str, Any]:
         """Rates, queues, drops, clocks, temperature, disk: what the last second looked like."""
@@ -191,7 +210,7 @@ class RecorderLoop:
     def _wind_up(self) -> None:
         if self._recording is not None:
             why = "the service process is gone" if self._control.ended else "told to quit"
-            self._recording.event("error", f"recording ends early: {why}")
+            self._happened(Event.now(Level.ERROR, "recorder", f"recording ends early: {why}"))
             self._finish()
         self._publisher.close()
         self._buffers.close()

@@ -1,19 +1,22 @@
 """One recording: from the pulse after the start to the last pulse, into one log."""
 
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from recorder.assembler import Assembler
+from recorder.events import Event, Level
+from recorder.ledger import Ledger
 from recorder.log_writer import LogSummary, LogWriter
 from recorder.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor, host_now
-from rig.frame import FrameStatus
 from rig.settings import RigSettings
 from rig.tag import TripletTag
 from triggering.pairing import ClosedPulse
+
+#: A pulse generator may be so much slower than the rig file says, and a recording still gets all its pulses.
+_SLOW: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,27 +40,13 @@ class RecordingOrder:
     rig_toml: bytes
 
 
-@dataclass(slots=True)
-class Tally:
-    """What has been recorded so far."""
-
-    pulses: int = 0
-    complete: int = 0
-    causes: Counter[FrameStatus] = field(default_factory=Counter)
-
-    def to_json(self) -> dict[str, Any]:
-        """Counts as the command line reports them; causes count frames, not pulses."""
-        failures = [status for status in FrameStatus if status is not FrameStatus.OK]
-        return {
-            "pulses": self.pulses,
-            "complete": self.complete,
-            "partial": self.pulses - self.complete,
-            "causes": {status.value: self.causes[status] for status in failures},
-        }
-
-
 class Recording:
-    """Writes the pulses from `begin` on into one log, numbered from 1."""
+    """Writes the pulses from now on into one log, numbered from 1.
+
+    Attributes:
+        ledger: what has been recorded so far.
+        log: the log.
+    """
 
     def __init__(self, order: RecordingOrder, rig: RigSettings, assembler: Assembler, buffers: TripletBuffers) -> None:
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
@@ -66,9 +55,10 @@ class Recording:
         self._end: HostNs | None = None
         self._over = False
         if order.seconds is not None:
-            # Pulses are counted; the clock only ends a recording whose pulses have stopped coming.
-            self._end = HostNs(self._begin + round(order.seconds * NS_PER_S) + rig.trigger.period_ns)
-        self.tally = Tally()
+            # Pulses are counted; the clock only ends a recording whose pulses come too slowly, or no more.
+            grace = round(order.seconds * NS_PER_S * _SLOW) + 2 * rig.trigger.period_ns
+            self._end = HostNs(self._begin + round(order.seconds * NS_PER_S) + grace)
+        self.ledger = Ledger()
         cameras = ", ".join(camera.name for camera in rig.cameras)
         self.log = LogWriter(
             order.path,
@@ -78,7 +68,7 @@ class Recording:
             rig_toml=order.rig_toml,
             buffers=buffers,
         )
-        self.event("info", f"recording {order.recording} started")
+        self.event(Event.now(Level.INFO, "recorder", f"recording {order.recording} started"))
 
     @property
     def path(self) -> Path:
@@ -87,7 +77,7 @@ class Recording:
 
     def finished(self, now: HostNs) -> bool:
         """All pulses that were ordered are in, or the time is over and every pulse until then is decided."""
-        if self._over or (self._order.pulses is not None and self.tally.pulses >= self._order.pulses):
+        if self._over or (self._order.pulses is not None and self.ledger.pulses >= self._order.pulses):
             return True
         return self._end is not None and now > self._end + self._assembler.hold_ns
 
@@ -105,30 +95,31 @@ class Recording:
         cameras = self._assembler.camera_tags(pulse, self._anchor)
         session = self._order.session.get("session", "")
         return TripletTag(
-            self.tally.pulses + 1, self._anchor.utc(pulse.time), session, self._order.recording, self._shape, cameras
+            self.ledger.pulses + 1, self._anchor.utc(pulse.time), session, self._order.recording, self._shape, cameras
         )  # fmt: skip
 
     def write(self, tag: TripletTag, slot: int | None, encoded: bytes) -> None:
         """Write one pulse; the log holds the buffer until it is on disk."""
-        self.tally.pulses += 1
-        self.tally.complete += tag.complete
-        self.tally.causes.update(camera.status for camera in tag.cameras if camera.status is not FrameStatus.OK)
+        self.ledger.add(tag)
         ready = self._anchor.utc(host_now())
         if slot is None:
             self.log.write_tag_only(tag, pulse_time=tag.time, log_time=ready, encoded=encoded)
         else:
             self.log.write_triplet(slot, tag, pulse_time=tag.time, log_time=ready, encoded=encoded)
 
-    def event(self, level: str, message: str, source: str = "recorder") -> None:
+    def event(self, event: Event) -> None:
         """Write one event."""
-        self.log.write_event(level, source, message, self._anchor.utc(host_now()))
+        self.log.write_event(event.level, event.name, event.message, event.time)
 
     def health(self, health: Mapping[str, Any]) -> None:
         """Write the health of the last second."""
         self.log.write_health(health, self._anchor.utc(host_now()))
 
     def close(self) -> LogSummary:
-        """Finish the log."""
-        tally = self.tally
-        self.event("info", f"recording stopped: {tally.pulses} pulses, {tally.complete} complete")
+        """Finish the log.
+
+        Raises:
+            StorageError: not everything is in it; what is in it is readable.
+        """
+        self.event(Event.now(Level.INFO, "recorder", f"recording stopped: {self.ledger.summary_line()}"))
         return self.log.close()

@@ -56,6 +56,7 @@ class ReplayReport:
         attended: somebody was there before the first message.
         interrupted: it was stopped before the end.
         closed: the log was closed properly.
+        truncated: it ends in the middle of a record.
         damaged_bytes: bytes of the log that could not be read, and so were not sent.
     """
 
@@ -69,6 +70,7 @@ class ReplayReport:
     attended: bool = False
     interrupted: bool = False
     closed: bool = True
+    truncated: bool = False
     damaged_bytes: int = 0
 
     def to_json(self) -> dict[str, Any]:
@@ -177,7 +179,7 @@ class _Replay:
                 self._report.triplets += 1
                 self._report.bytes += len(message.image)
                 self._progress(self._report.triplets)
-        self._report.damaged_bytes = self._damaged
+        self._report.damaged_bytes, self._report.truncated = self._damaged, self._reader.truncated
 
     def _messages(self) -> Iterator[_Outgoing]:
         """What was published live, from the first pulse that is asked for to the last."""

@@ -31,6 +31,7 @@ class VerifyReport:
 
     Attributes:
         closed: the log was closed properly.
+        truncated: it ends in the middle of a record.
         ledger: what became of every pulse.
         findings: what is wrong with the log itself, one sentence each.
         events: events in the log.
@@ -39,6 +40,7 @@ class VerifyReport:
     path: Path
     bytes: int
     closed: bool
+    truncated: bool
     ledger: Ledger
     findings: tuple[str, ...]
     events: tuple[Event, ...]
@@ -66,6 +68,7 @@ class VerifyReport:
             "log": str(self.path),
             "verdict": self.verdict.value,
             "closed": self.closed,
+            "truncated": self.truncated,
             **self.ledger.counts(),
             "bytes": self.bytes,
             "missing_pulses": numbers(self.ledger.missing, _PULSES_MAX),
@@ -100,7 +103,9 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         structure.finish()
         if not reader.closed:
             findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
-        return VerifyReport(path, reader.size, reader.closed, pulses.ledger, findings.lines(), tuple(pulses.events))
+        return VerifyReport(
+            path, reader.size, reader.closed, reader.truncated, pulses.ledger, findings.lines(), tuple(pulses.events)
+        )  # fmt: skip
 
 
 def _flaw(item: Item) -> str:

@@ -43,3 +43,7 @@ class LogDamagedError(SvevError):
     """A log that is truncated or inconsistent; what could be read has been reported."""
 
     exit_code = 3
+
+
+class LogTruncatedError(BadInputError):
+    """A log that ends in the middle of a record: a part of a file, not what a recorder leaves behind."""

@@ -77,6 +77,9 @@ class NetworkSettings(_Strict):
     """How frames arrive and triplets leave."""
 
     publish: str = Field(DEFAULT_PUBLISH, pattern=r"^(tcp|ipc)://.+", description="ZeroMQ PUB address")
+    publish_ipc: str | None = Field(
+        None, pattern=r"^ipc://.+", description="a second ZeroMQ address, for workers on this machine"
+    )
     packet_size: int = Field(
         9000,
         ge=576,

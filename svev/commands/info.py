@@ -11,6 +11,7 @@ from recorder.info import LogInfo, info
 from rig.clocks import NS_PER_S
 from rig.errors import LogDamagedError
 from svev import console
+from svev.commands.truncation import truncated
 
 
 def info_command(
@@ -21,8 +22,8 @@ def info_command(
 
     Reads tags only, so it takes a moment even on a long log; `svev verify` checks every byte.
 
-    Exit codes: 0; 2 no such file, or no log of svev; 3 the log was not closed or is damaged (what can be read is
-    printed all the same).
+    Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed or is damaged. What can be
+    read is printed all the same.
 
     Example: svev info recordings/jump.mcap
     """
@@ -32,6 +33,8 @@ def info_command(
     else:
         for name, text in _lines(found):
             console.say(f"{name:<10} {text}")
+    if found.truncated:
+        raise truncated(log)
     if not found.closed:
         raise LogDamagedError(f"{log}: the log was not closed, or is still being written; check it with `svev verify`")
     if found.damaged_bytes:

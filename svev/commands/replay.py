@@ -9,6 +9,7 @@ from recorder.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError, LogDamagedError
 from rig.topics import DEFAULT_PUBLISH
 from svev import console
+from svev.commands.truncation import truncated
 
 _INTERRUPTED = 130
 _SLOWEST, _FASTEST = 0.1, 10.0
@@ -31,8 +32,8 @@ def replay_command(
     subscribes in time, the log is published all the same. With --reliable it is a PUSH: workers connect a PULL
     socket, the log waits for them however slow they are, and each message goes to one of them.
 
-    Exit codes: 0; 2 no such log, address in use, no such pulses, or no worker came; 3 the log was not closed or is
-    damaged (what can be read is sent); 130 interrupted.
+    Exit codes: 0; 2 no such log, truncated, address in use, no such pulses, or no worker came; 3 the log was not
+    closed or is damaged; 130 interrupted. What can be read is sent all the same.
 
     Example: svev replay recordings/jump.mcap --speed 0.5 --loop
     """
@@ -45,6 +46,8 @@ def replay_command(
         _print(report)
     if report.interrupted and not loop:
         raise typer.Exit(_INTERRUPTED)
+    if report.truncated:
+        raise truncated(log)
     if report.damaged_bytes or not report.closed:
         raise LogDamagedError(f"{log}: not closed or damaged, sent as far as it can be read; see `svev verify`")
 

@@ -8,6 +8,7 @@ import typer
 from recorder.verify import VerifyReport, verify
 from rig.errors import LogDamagedError
 from svev import console
+from svev.commands.truncation import truncated
 
 _LINES_MAX = 60
 
@@ -22,7 +23,8 @@ def verify_command(
     verdict is "clean" (every pulse complete), "partial" (the log is sound; its tags say which frames are missing and
     why) or "damaged" (not closed, unreadable in part, or inconsistent).
 
-    Exit codes: 0 clean or partial; 2 no such file, or no log of svev; 3 damaged.
+    Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
+    was killed leaves a log that is not closed). What can be read is printed all the same.
 
     Example: svev verify recordings/jump.mcap
     """
@@ -32,6 +34,8 @@ def verify_command(
         console.print_json(report.to_json())
     else:
         _print(report)
+    if report.truncated:
+        raise truncated(log)
     if report.damaged:
         raise LogDamagedError(f"{log}: damaged: {_first_flaw(report)}; the pulses counted above are readable")
 

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 import zmq
 
+from recorder.log_items import Chunk
+from recorder.log_reader import LogReader
 from svev.cli import main
 from tests.recorder.logs import ALL_OK, LOST, OK, write_log
 from tests.support.loopback import Loopback
@@ -69,18 +71,25 @@ def test_json_is_one_object(log: Path, command: str, svev: Svev) -> None:
 
 
 @pytest.mark.parametrize("command", ["info", "verify", "replay"])
-def test_a_log_that_was_cut_off_is_read_and_ends_with_3(
-    log: Path, loopback: Loopback, command: str, svev: Svev
+@pytest.mark.parametrize(
+    ("within_a_record", "code", "words"), [(True, 2, "truncated"), (False, 3, "closed")], ids=["cut", "unclosed"]
+)
+def test_an_unfinished_log_is_read_as_far_as_it_goes(
+    log: Path, loopback: Loopback, command: str, within_a_record: bool, code: int, words: str, svev: Svev
 ) -> None:
-    log.write_bytes(log.read_bytes()[:-3000])
+    with LogReader(log) as reader:
+        last_chunk = [item for item in reader.items() if isinstance(item, Chunk)][-1]
+    end = last_chunk.offset + last_chunk.length
+    log.write_bytes(log.read_bytes()[: end + 5 if within_a_record else end])
     more = ["--speed", "max", "--wait", "0", "--bind", loopback.endpoint()] if command == "replay" else []
     done = svev(command, log, "--json", *more)
-    assert done.returncode == 3
+    assert done.returncode == code
     found = json.loads(done.stdout)
     assert found["closed"] is False
+    assert found["truncated"] is within_a_record
     assert found["triplets" if command == "replay" else "pulses"] == 3
     assert "Traceback" not in done.stderr
-    assert "closed" in done.stderr.splitlines()[-1]
+    assert words in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize("command", ["info", "verify", "replay"])

@@ -13,13 +13,15 @@ from simrig.gige.config import CameraConfig
 from simrig.gige.control_server import ControlServer
 from simrig.gige.counters import CameraStatistics, Counters
 from simrig.gige.device import Device, Parts
-from simrig.gige.features import XML_ADDRESS, Identity, bootstrap, device_registers, features
+from simrig.gige.features import features
 from simrig.gige.genicam import describe
 from simrig.gige.image_source import ImageSource, Painter, TestPattern
 from simrig.gige.link import Link
+from simrig.gige.register_table import all_registers
 from simrig.gige.registers import RegisterMap
 from simrig.gige.sensor import Sensor
 from simrig.gige.transmitter import Transmitter
+from simrig.gige.values import XML_ADDRESS, Identity
 from simrig.pulse_train import PulseTrain
 from simrig.scenario import Scenario, load_scenario
 from simrig.view import CameraView
@@ -108,9 +110,8 @@ def _registers(config: CameraConfig) -> RegisterMap:
     address = int(ipaddress.IPv4Address(config.address))
     sensor = (config.width, config.height)
     identity = Identity(f"SIM-{address & 0xFFFFFF:06X}", config.name, address, sensor, config.tick_hz, config.resend)
-    own = device_registers(sensor)
-    xml = describe(features([*bootstrap(identity, 0), *own]))
-    return RegisterMap([*bootstrap(identity, len(xml)), *own], {XML_ADDRESS: xml})
+    xml = describe(features(all_registers(identity, 0)))
+    return RegisterMap(all_registers(identity, len(xml)), {XML_ADDRESS: xml})
 
 
 def _clock(config: CameraConfig, scenario: Scenario, index: int) -> CameraClock:

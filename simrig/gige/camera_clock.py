@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rig.clocks import NS_PER_S, HostNs
 from simrig.device_clock import DeviceClock
-from simrig.gige.features import PtpStatus
+from simrig.gige.values import PtpStatus
 
 PTP_SETTLE_NS = NS_PER_S // 2  #: from PtpEnable until the clock is synchronised
 

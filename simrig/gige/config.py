@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from simrig.gige.features import MIN_WIDTH
+from simrig.gige.values import MIN_WIDTH
 
 
 def _ipv4(text: str) -> str:

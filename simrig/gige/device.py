@@ -9,7 +9,16 @@ from rig.clocks import NS_PER_S, HostNs, host_now
 from simrig.gige.camera_clock import CameraClock
 from simrig.gige.control_channel import ControlChannel, Peer
 from simrig.gige.counters import Counters
-from simrig.gige.features import (
+from simrig.gige.frame_store import FrameStore
+from simrig.gige.gvcp import Action, Status
+from simrig.gige.gvsp import FrameFormat
+from simrig.gige.image_source import Painter
+from simrig.gige.link import Link
+from simrig.gige.register_table import USER_SET
+from simrig.gige.registers import RegisterError, RegisterMap, Value
+from simrig.gige.sensor import Sensor
+from simrig.gige.transmitter import Transmitter
+from simrig.gige.values import (
     CLOCK_RESET,
     DISCOVERY_BYTES,
     DO_NOT_FRAGMENT,
@@ -19,18 +28,9 @@ from simrig.gige.features import (
     MAX_PACKET_SIZE,
     MIN_PACKET_SIZE,
     PACKET_SIZE_MASK,
-    USER_SET,
     PtpStatus,
     TriggerSource,
 )
-from simrig.gige.frame_store import FrameStore
-from simrig.gige.gvcp import Action, Status
-from simrig.gige.gvsp import FrameFormat
-from simrig.gige.image_source import Painter
-from simrig.gige.link import Link
-from simrig.gige.registers import RegisterError, RegisterMap, Value
-from simrig.gige.sensor import Sensor
-from simrig.gige.transmitter import Transmitter
 
 USER_SET_LOAD_NS = 30_000_000  #: a real camera reads its flash memory meanwhile
 _ACTION_QUEUE = 10

@@ -4,8 +4,9 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
-from simrig.gige.features import MODEL, VENDOR, Feature, Node
+from simrig.gige.features import Feature, Node
 from simrig.gige.registers import WORD, Kind, Register
+from simrig.gige.values import MODEL, VENDOR
 
 _ROOT = {
     "ModelName": MODEL, "VendorName": VENDOR, "ToolTip": "Camera of the simulated hill", "StandardNameSpace": "GEV",

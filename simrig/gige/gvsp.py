@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.gige.features import MONO8
 from simrig.gige.gvcp import Status
+from simrig.gige.values import MONO8
 
 IP_UDP_BYTES = 28  #: headers below GVSP that the packet size counts
 WIRE_BYTES = 38  #: Ethernet header, check sequence, preamble and gap, which it does not count

@@ -11,8 +11,9 @@ from simrig.gige.udp import NOBODY_LISTENS, bound
 
 #: A paced link sends bursts of this length at the link's rate; fewer, longer bursts cost less CPU.
 BURST_NS = 600_000
-#: What a paced link may catch up after the process was not scheduled in time.
-_CATCH_UP_NS = 2_000_000
+#: What may be caught up at once after this process was not scheduled in time: as much as a receiver's socket buffer of
+#: a few MB takes. (A real camera's hardware is never late.)
+_CATCH_UP_NS = 10_000_000
 _UNPACED_BURST = 64  # packets
 _IP_MTU_DISCOVER, _IP_PMTUDISC_DO = 10, 2  # <linux/in.h>; not in Python's socket module
 
@@ -67,9 +68,9 @@ class Link:
         wire_ns = (packet_size + WIRE_BYTES) * 8000 / rate if rate else 0.0
         return wire_ns + self.packet_delay_ns
 
-    def begin_frame(self) -> None:
-        """A cable that lay idle cannot catch up on that time."""
-        self._free_at = max(self._free_at, host_now())
+    def begin_frame(self, ready: HostNs) -> None:
+        """The next packets are those of a frame that was there at `ready`: until then the cable lay idle."""
+        self._free_at = max(self._free_at, ready)
 
     def burst(self, packet_size: int) -> int:
         """Packets to be handed to `send_paced` at once."""

@@ -1,6 +1,6 @@
 """The camera's register space: typed registers over one block of memory, with access rights, limits and hooks.
 
-The table of registers stands in `simrig.gige.features`; this module knows none of them by name.
+The table of registers stands in `simrig.gige.register_table`; this module knows none of them by name.
 """
 
 import struct

@@ -13,12 +13,12 @@ from simrig.faults import Fault, FaultKind, FaultPlan
 from simrig.gige import freeze
 from simrig.gige.camera_clock import CameraClock
 from simrig.gige.counters import Counters
-from simrig.gige.features import AcquisitionMode, ExposureMode, TriggerSource
 from simrig.gige.frame_store import FrameStore, Shot, Slot
 from simrig.gige.image_source import Painter
 from simrig.gige.link import Link
 from simrig.gige.registers import RegisterMap
 from simrig.gige.transmitter import Transmitter
+from simrig.gige.values import AcquisitionMode, ExposureMode, TriggerSource
 from simrig.pulse_train import PulseTrain
 
 LINE_NS = 5_000  #: read-out time of one line of the sensor

@@ -99,7 +99,7 @@ class Transmitter:
         table = shot.slot.table
         table.prepare(shot.block_id, shot.ticks, shot.damaged)
         store.remember(shot)
-        self._link.begin_frame()
+        self._link.begin_frame(shot.ready)
         for start, count in _runs(0, table.count, shot.lost):
             burst = self._link.burst(packet_size)
             for first in range(start, start + count, burst):

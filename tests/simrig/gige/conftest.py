@@ -6,15 +6,17 @@ from typing import Any
 
 import pytest
 
-from rig.clocks import host_now
+from rig.clocks import HostNs, host_now
 from rig.rigfile import CONFIG
+from simrig.device_clock import DeviceClock
 from simrig.gige.camera import Camera
 from simrig.gige.config import CameraConfig
 from simrig.pulse_train import PulseTrain
+from simrig.scenario import load_scenario
 from tests.support.loopback import Loopback
 
 TRAINING = CONFIG / "scenarios" / "training.toml"
-RATE_HZ = 100.0
+RATE_HZ = 60.0
 
 
 class SimulatedCamera:
@@ -23,7 +25,9 @@ class SimulatedCamera:
     def __init__(self, camera: Camera, config: CameraConfig) -> None:
         self.camera, self.config = camera, config
         self.address = config.address
-        self.train = PulseTrain(config.epoch, config.rate_hz)  # type: ignore[arg-type]
+        self.train = PulseTrain(HostNs(config.epoch), config.rate_hz)
+        scenario = load_scenario(config.scenario)
+        self.clock = DeviceClock(scenario, scenario.camera_index(config.name), HostNs(config.epoch))
 
 
 MakeCamera = Callable[..., SimulatedCamera]

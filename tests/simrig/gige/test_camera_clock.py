@@ -6,7 +6,7 @@ from rig.clocks import NS_PER_S, HostNs
 from rig.rigfile import CONFIG
 from simrig.device_clock import DeviceClock
 from simrig.gige.camera_clock import PTP_SETTLE_NS, CameraClock, PtpMaster
-from simrig.gige.features import PtpStatus
+from simrig.gige.values import PtpStatus
 from simrig.scenario import load_scenario
 
 EPOCH = HostNs(5 * NS_PER_S)

@@ -12,7 +12,6 @@ from simrig.gige.gvcp import PORT, Command, Status
 from tests.simrig.gige.conftest import MakeCamera, SimulatedCamera
 from tests.simrig.gige.raw_client import CCP, PENDING_ACK, GvcpClient
 from tests.simrig.gige.receiver import Receiver
-from tests.simrig.gige.test_streaming import clock_of
 from tests.support.waiting import wait_until
 
 gi.require_version("Aravis", "0.8")
@@ -154,7 +153,7 @@ def test_garbage_does_no_harm(make_camera: MakeCamera) -> None:
 
 def test_latch_is_true_within_its_round_trip(make_camera: MakeCamera) -> None:
     simulated = make_camera()
-    clock = clock_of(simulated)
+    clock = simulated.clock
     with Receiver(simulated.address) as receiver:
         for _ in range(20):
             before = host_now()

@@ -36,7 +36,7 @@ def test_missed_pulse_leaves_no_gap_in_the_ids(make_camera: MakeCamera) -> None:
         assert receiver.device.get_integer_feature_value("CounterValue") == frames[-1].block_id
     assert steps(frames, lambda frame: frame.block_id) == [1]
     assert steps(frames, lambda frame: frame.pulse) == [1, 2]
-    assert max(later.device_ns - earlier.device_ns for earlier, later in pairwise(frames)) > 19_000_000
+    assert max(later.device_ns - earlier.device_ns for earlier, later in pairwise(frames)) > 30_000_000
     assert simulated.camera.statistics().missed == 1
 
 
@@ -101,7 +101,7 @@ def test_frames_that_stay_incomplete_time_out(
 
 
 def test_a_camera_that_cannot_resend(make_camera: MakeCamera) -> None:
-    simulated = make_camera(resend=False)
+    simulated = make_camera(resend=False, rate_hz=30.0)
     with Receiver(simulated.address) as receiver:
         frames = around_fault(receiver, simulated, FaultKind.LOST_PACKETS, packets=[3, 4])
     assert sorted(frame.status for frame in frames) == ["missing-packets"] + ["success"] * 10
@@ -110,7 +110,7 @@ def test_a_camera_that_cannot_resend(make_camera: MakeCamera) -> None:
 
 def test_slow_link_delays_and_then_recovers(make_camera: MakeCamera) -> None:
     """50 Mbit/s carry a frame of 320 x 240 px in 12.4 ms, but pulses come every 10 ms: the frame memory fills up."""
-    simulated = make_camera()
+    simulated = make_camera(rate_hz=100.0)
     with Receiver(simulated.address) as receiver:
         before = receiver.frames(1)[0].pulse
         inject(simulated, FaultKind.SLOW_LINK, duration_s=0.3, mbit_s=50.0, at_pulse=before + 10)

@@ -5,9 +5,10 @@ from itertools import pairwise
 
 import pytest
 
-from simrig.gige.features import FIRE_TEST_PACKET, XML_ADDRESS, Identity, bootstrap, device_registers
 from simrig.gige.gvcp import Status
+from simrig.gige.register_table import all_registers
 from simrig.gige.registers import Kind, Register, RegisterError, RegisterMap
+from simrig.gige.values import FIRE_TEST_PACKET, XML_ADDRESS, Identity
 
 
 @pytest.fixture
@@ -109,7 +110,7 @@ def test_reset(registers: RegisterMap) -> None:
 
 def test_no_two_registers_of_the_camera_overlap() -> None:
     identity = Identity("SIM", "K1", 0x7F00000B, (1936, 1216), 10**9, resend=True)
-    table = sorted([*bootstrap(identity, 100), *device_registers(identity.sensor)], key=lambda r: r.address)
+    table = sorted(all_registers(identity, 100), key=lambda register: register.address)
     for first, second in pairwise(table):
         assert first.address + first.length <= second.address, (first.name, second.name)
     assert table[-1].address < XML_ADDRESS

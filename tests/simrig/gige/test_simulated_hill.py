@@ -48,8 +48,8 @@ def test_all_cameras_see_the_same_pulses(loopback: Loopback) -> None:
     for name, camera in statistics.items():
         assert camera.acquiring, name
         assert camera.controlled, name
-        assert camera.frames >= 20, name
-        assert camera.bytes > 20 * 320 * 240, name
+        assert camera.frames >= 19, name  # a frame is received before it is counted
+        assert camera.bytes > 19 * 320 * 240, name
         assert 0 < camera.cpu_s < 30, name
         assert all(sent > simulated.train.time(pulse) for pulse, sent in camera.last_packets.items())
     assert simulated.pids == {}

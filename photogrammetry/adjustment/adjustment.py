@@ -114,7 +114,7 @@ def adjust_once(network: Network, start: State | None = None) -> Adjustment:
 
 def adjust_problem(problem: Problem, start: State) -> Adjustment:
     """Adjust a problem whose weights may differ from the network's; otherwise as `adjust_once`."""
-    return _adjusted(problem, start, check_rank(problem, start), start)
+    return _adjusted(problem, start, check_rank(problem, start).defect, start)
 
 
 def refine(problem: Problem, adjustment: Adjustment) -> Adjustment:
@@ -123,13 +123,13 @@ def refine(problem: Problem, adjustment: Adjustment) -> Adjustment:
     Raises:
         NotSolvableError, NotConvergedError: as `adjust_once`.
     """
-    return _adjusted(problem, adjustment.state, adjustment.free, adjustment.state)
+    return _adjusted(problem, adjustment.state, adjustment.free.defect, adjustment.state)
 
 
-def _adjusted(problem: Problem, start: State, free: FreeDatum, target: State) -> Adjustment:
+def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adjustment:
     """Solve, bring a free network next to `target`, and compute what belongs to it."""
-    solution = solve(problem, start, free)
-    state = solution.state
+    solution = solve(problem, start, defect)
+    state, free = solution.state, solution.free
     points = datum_points(problem.network)
     if free.defect:
         state = align(problem, state, free, points, target.xyz)

@@ -46,6 +46,9 @@ class FreeDatum:
         return int(self.directions.shape[1])
 
 
+NOTHING_FREE = FreeDatum(np.zeros(3), np.zeros((7, 0)))
+
+
 def similarity_directions(problem: Problem, state: State, centre: Floats) -> Floats:
     """What translation (3), rotation (3, rad) and scale do to all unknowns: (u, 7)."""
     unknowns = problem.unknowns
@@ -60,8 +63,18 @@ def similarity_directions(problem: Problem, state: State, centre: Floats) -> Flo
     return out[:-1]
 
 
-def find_free_datum(problem: Problem, normals: Normals, state: State) -> FreeDatum:
-    """Which similarity transformations leave all observations unchanged, by the rank of their images."""
+def find_free_datum(problem: Problem, normals: Normals, state: State, defect: int | None = None) -> FreeDatum:
+    """Which similarity transformations leave all observations unchanged, by the rank of their images.
+
+    They may change from state to state: where two coordinate differences fix the direction of a line, the network turns
+    about that line.
+
+    Args:
+        problem: the network made ready.
+        normals: its normal equations at `state`.
+        state: values.
+        defect: how many there are, where that is known.
+    """
     places = np.concatenate([state.xyz, state.position])
     centre = places.mean(axis=0) if len(places) else np.zeros(3)
     moves = similarity_directions(problem, state, centre) / normals.scale[:, None]
@@ -73,7 +86,8 @@ def find_free_datum(problem: Problem, normals: Normals, state: State) -> FreeDat
     basis = vectors[:, usable] / np.sqrt(values[usable]) / length[:, None]
     orthonormal = moves @ basis
     seen, combos = np.linalg.eigh(orthonormal.T @ normals.times(orthonormal))
-    return FreeDatum(centre, basis @ combos[:, seen < _FREE])
+    count = int(np.sum(seen < _FREE)) if defect is None else defect
+    return FreeDatum(centre, basis @ combos[:, :count])
 
 
 def datum_points(network: Network) -> Integers:

@@ -1,10 +1,10 @@
-"""Damped Gauss-Newton: the damping helps on the way and is gone at the optimum."""
+"""Damped Gauss-Newton: shorter steps, then Levenberg's damping, help on the way and are gone at the optimum."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from photogrammetry.adjustment.datum import FreeDatum, similarity_directions
+from photogrammetry.adjustment.datum import NOTHING_FREE, FreeDatum, find_free_datum, similarity_directions
 from photogrammetry.adjustment.normals import Normals, SingularError, build_normals, factorise
 from photogrammetry.adjustment.problem import Problem
 from photogrammetry.adjustment.state import Floats, State
@@ -12,12 +12,16 @@ from photogrammetry.diagnosis import NotConvergedError
 
 MAX_ITERATIONS = 60
 #: Arrived when the next undamped step moves no quantity by more than this part of its standard deviation.
-ARRIVED = 1e-6
+ARRIVED = 1e-5
 #: Residuals smaller than this part of their a-priori sigmas are rounding (error-free simulated data).
 _EXACT = 1e-3
-_FIRST_DAMPING = 1e-4
+#: A Gauss-Newton step that leads too far is shortened down to this part; after that it is the direction that is wrong.
+_SHORTEST = 1.0 / 32.0
+#: Part of the promised reduction of the square sum that a step must keep.
+_KEPT = 0.1
+_FIRST_DAMPING = 1e-8
 _MOST_DAMPING = 1e8
-_LEAST_DAMPING = 1e-7
+_MORE, _LESS = 10.0, 0.1
 #: A change of the square sum below this part of it cannot be measured any more.
 _ROUNDING = 1e-12
 
@@ -29,10 +33,12 @@ class Solution:
     Attributes:
         state: the optimum.
         iterations: accepted steps.
+        free: the free similarity transformations there.
     """
 
     state: State
     iterations: int
+    free: FreeDatum
 
 
 @dataclass(slots=True)
@@ -46,13 +52,13 @@ class _Progress:
     iterations: int = 0
 
 
-def solve(problem: Problem, start: State, free: FreeDatum) -> Solution:
+def solve(problem: Problem, start: State, defect: int) -> Solution:
     """Minimise the sum of squared weighted residuals.
 
     Args:
         problem: the network made ready.
         start: start values.
-        free: similarity transformations that no observation sees; the way along them is arbitrary but fixed.
+        defect: number of similarity transformations that no observation sees; the way along them is arbitrary.
 
     Raises:
         NotConvergedError: no optimum within `MAX_ITERATIONS`, or none reachable.
@@ -60,59 +66,63 @@ def solve(problem: Problem, start: State, free: FreeDatum) -> Solution:
     progress = _Progress(start, problem.square_sum(start), problem.behind(start))
     if not np.isfinite(progress.square_sum):
         raise NotConvergedError("the start values have no images (a point in a projection centre); give better ones")
-    redundancy = max(1, problem.n_observations - problem.unknowns.count + free.defect)
+    redundancy = max(1, problem.n_observations - problem.unknowns.count + defect)
     while progress.iterations < MAX_ITERATIONS:
         equations = problem.equations(progress.state)
         normals = build_normals(problem, equations)
         sigma0 = max(np.sqrt(equations.square_sum / redundancy), _EXACT)
+        free = find_free_datum(problem, normals, progress.state, defect) if defect else NOTHING_FREE
         if _advance(problem, normals, free, progress, ARRIVED * sigma0):
-            return Solution(progress.state, progress.iterations)
+            return Solution(progress.state, progress.iterations, free)
     raise NotConvergedError(
         f"no optimum after {MAX_ITERATIONS} iterations; give better start values, or estimate fewer camera parameters"
     )
 
 
 def _advance(problem: Problem, normals: Normals, free: FreeDatum, progress: _Progress, enough: float) -> bool:
-    """One accepted step, with as much damping as it takes; True when it was the last one."""
-    while True:
-        step = _step(problem, normals, free, progress)
+    """One accepted step, as short and as damped as it takes; True when it was the last one."""
+    damping = progress.damping
+    while damping <= _MOST_DAMPING:
+        step = _step(problem, normals, free, progress.state, damping)
         if step is not None:
-            drop = -float(normals.gradient @ (step / normals.scale))  # of half the square sum, for a full step
-            if progress.damping == 0.0 and drop <= enough**2:
+            slope = -float(normals.gradient @ (step / normals.scale))  # of half the square sum, along the step
+            if damping == 0.0 and slope <= enough**2:
                 progress.state = problem.unknowns.moved(progress.state, step)
                 progress.iterations += 1
                 return True
-            if _accept(problem, progress, step, drop):
+            shortest = _SHORTEST if damping == 0.0 else 1.0
+            if _descend(problem, progress, step, slope, shortest):
+                progress.damping = damping * _LESS if damping > _FIRST_DAMPING else 0.0
                 return False
-        progress.damping = max(_FIRST_DAMPING, 10.0 * progress.damping)
-        if progress.damping > _MOST_DAMPING:
-            raise NotConvergedError("no step reduces the residuals any more; give better start values")
+        damping = max(_FIRST_DAMPING, damping * _MORE)
+    raise NotConvergedError("no step reduces the residuals any more; give better start values")
 
 
-def _step(problem: Problem, normals: Normals, free: FreeDatum, progress: _Progress) -> Floats | None:
+def _step(problem: Problem, normals: Normals, free: FreeDatum, state: State, damping: float) -> Floats | None:
+    """The step of all unknowns; None where the normal matrix is not positive definite."""
     directions = np.zeros((len(normals.scale), 0))
-    if free.defect and progress.damping == 0.0:
-        moves = similarity_directions(problem, progress.state, free.centre) @ free.directions
+    if free.defect and damping == 0.0:
+        moves = similarity_directions(problem, state, free.centre) @ free.directions
         directions = moves / normals.scale[:, None]
     try:
-        return factorise(normals, directions, progress.damping).solve()
+        return factorise(normals, directions, damping).solve()
     except SingularError:
         return None
 
 
-def _accept(problem: Problem, progress: _Progress, step: Floats, drop: float) -> bool:
-    """Take the step if it reduces the square sum about as much as promised."""
-    state = problem.unknowns.moved(progress.state, step)
-    square_sum, behind = problem.square_sum(state), problem.behind(state)
-    if not np.isfinite(square_sum) or behind > progress.behind or np.any(state.interior[:, 0] <= 0.0):
-        return False
-    if drop > _ROUNDING * progress.square_sum:
-        gain = (progress.square_sum - square_sum) / drop  # 1 for a linear problem, up to 2 with much damping
-        if gain < 1e-3:
-            return False
-        progress.damping = progress.damping / 10.0 if gain > 0.25 else progress.damping * 2.0
-    if progress.damping < _LEAST_DAMPING or drop < _ROUNDING * progress.square_sum:
-        progress.damping = 0.0
-    progress.state, progress.square_sum, progress.behind = state, square_sum, behind
-    progress.iterations += 1
-    return True
+def _descend(problem: Problem, progress: _Progress, step: Floats, slope: float, shortest: float) -> bool:
+    """Take the step, or a shorter one, if it keeps enough of its promise."""
+    part = 1.0
+    while part >= shortest:
+        state = problem.unknowns.moved(progress.state, part * step)
+        square_sum, behind = problem.square_sum(state), problem.behind(state)
+        sound = np.isfinite(square_sum) and behind <= progress.behind and np.all(state.interior[:, 0] > 0.0)
+        # Along a straight way the square sum falls by (2 - part) part slope.
+        promised = (2.0 - part) * part * slope
+        measurable = promised > _ROUNDING * progress.square_sum
+        if sound and (not measurable or progress.square_sum - square_sum >= _KEPT * promised):
+            progress.state, progress.square_sum, progress.behind = state, square_sum, behind
+            progress.iterations += 1
+            return True
+        part *= 0.5
+    return False

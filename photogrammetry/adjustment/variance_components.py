@@ -7,6 +7,7 @@ weights until nothing changes. The paper's way (D5) takes n2 - 7 for the redunda
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogrammetry.adjustment.adjustment import Adjustment, refine
 from photogrammetry.adjustment.problem import Problem
@@ -20,8 +21,8 @@ from rig.errors import BadInputError
 _SETTLED = 1e-8
 _MAX_ROUNDS = 100
 #: A group with less redundancy has none.
-_NO_REDUNDANCY = 1e-6
-#: Standard deviations are not pushed below this part of the a-priori ones: the group fits "perfectly" by chance.
+_NO_REDUNDANCY = 1e-3
+#: A group that is driven below this part of its a-priori sigmas has too little redundancy to be estimated.
 _FLOOR = 1e-4
 _MEMORY = 3  # rounds that the extrapolation looks back
 #: Reference points that equation D5b takes off as if they were conditions.
@@ -69,12 +70,11 @@ def estimate_components(adjustment: Adjustment) -> tuple[tuple[Component, ...], 
     current, rounds = adjustment, _Rounds(len(groups.names))
     for _ in range(_MAX_ROUNDS):
         sums, redundancies = _shares(current, groups)
-        usable = (redundancies > _NO_REDUNDANCY) & (rounds.factors > _FLOOR)
-        change = np.sqrt(np.where(usable, sums / np.where(usable, redundancies, 1.0), 1.0))
-        if np.abs(change - 1.0).max() <= _SETTLED:
-            return _components(base, groups, rounds.factors, redundancies), current
-        factors = rounds.next(np.maximum(change, _FLOOR))
-        current = refine(_reweighted(base, groups, factors), current)
+        rounds.give_up((redundancies < _NO_REDUNDANCY) | (rounds.factors < _FLOOR))
+        change = np.sqrt(np.where(rounds.usable, sums / np.where(rounds.usable, redundancies, 1.0), 1.0))
+        if np.abs(change - 1.0).max() <= _SETTLED and not rounds.gave_up_just_now:
+            return _components(base, groups, rounds.factors, redundancies, rounds.usable), current
+        current = refine(_reweighted(base, groups, rounds.next(np.maximum(change, _FLOOR))), current)
     raise NotConvergedError("the variance components do not settle; merge groups of small redundancy")
 
 
@@ -82,7 +82,8 @@ def _only_one(adjustment: Adjustment, groups: _Groups) -> tuple[tuple[Component,
     """One group alone: the weights cancel, its factor is the ratio of the sigma0."""
     factors = np.array([max(adjustment.ratio, _FLOOR)])
     problem = _reweighted(adjustment.problem, groups, factors)
-    components = _components(adjustment.problem, groups, factors, np.array([float(adjustment.redundancy)]))
+    redundancies = np.array([float(adjustment.redundancy)])
+    components = _components(adjustment.problem, groups, factors, redundancies, redundancies > 0.0)
     return components, refine(problem, adjustment)
 
 
@@ -91,24 +92,32 @@ class _Rounds:
 
     def __init__(self, count: int):
         self.factors = np.ones(count)
+        self.usable = np.ones(count, dtype=bool)
+        self.gave_up_just_now = False
         self._points: list[Floats] = []
         self._moves: list[Floats] = []
 
+    def give_up(self, hopeless: NDArray[np.bool_]) -> None:
+        """Leave groups at their a-priori sigmas for good: nothing controls them, or less with every round."""
+        self.gave_up_just_now = bool(np.any(hopeless & self.usable & (self.factors != 1.0)))
+        self.usable &= ~hopeless
+        if self.gave_up_just_now:
+            self.factors = np.where(self.usable, self.factors, 1.0)
+            self._points, self._moves = [], []
+
     def next(self, change: Floats) -> Floats:
         """New factors, given by how much the estimation wants to change the present ones."""
-        point, move = np.log(self.factors), np.log(change)
-        self._points.append(point)
-        self._moves.append(move)
-        self._points, self._moves = self._points[-_MEMORY:], self._moves[-_MEMORY:]
+        point, move = np.log(self.factors), np.where(self.usable, np.log(change), 0.0)
+        self._points = [*self._points, point][-_MEMORY:]
+        self._moves = [*self._moves, move][-_MEMORY:]
         target = point + move
         if len(self._points) > 1:
             slopes = np.diff(np.array(self._moves), axis=0).T
             steps = np.diff(np.array(self._points), axis=0).T
             weights, *_ = np.linalg.lstsq(slopes, move, rcond=1e-8)
-            leap = target - (steps + slopes) @ weights
             # no further than a factor of e beyond the plain step
-            target = target + np.clip(leap - target, -1.0, 1.0)
-        self.factors = np.maximum(np.exp(target), _FLOOR)
+            target = target - np.clip((steps + slopes) @ weights, -1.0, 1.0)
+        self.factors = np.where(self.usable, np.exp(target), self.factors)
         return self.factors
 
 
@@ -138,7 +147,8 @@ def estimate_by_paper(adjustment: Adjustment) -> tuple[tuple[Component, ...], Ad
         if settled:
             factors = np.where(is_control, relative, 1.0) * sigma0
             redundancies = np.where(is_control, float(r2), float(current.redundancy))
-            return _components(base, groups, factors, redundancies), refine(_reweighted(base, groups, factors), current)
+            components = _components(base, groups, factors, redundancies, factors > 0.0)
+            return components, refine(_reweighted(base, groups, factors), current)
         relative = max(improved, _FLOOR)
         current = refine(_reweighted(base, groups, np.where(is_control, relative, 1.0)), current)
     raise NotConvergedError('the weights of D5 do not settle; set "reweight": true for true group redundancies')
@@ -175,15 +185,16 @@ def _reweighted(problem: Problem, groups: _Groups, factors: Floats) -> Problem:
     )
 
 
-def _components(problem: Problem, groups: _Groups, factors: Floats, redundancies: Floats) -> tuple[Component, ...]:
+def _components(
+    problem: Problem, groups: _Groups, factors: Floats, redundancies: Floats, known: NDArray[np.bool_]
+) -> tuple[Component, ...]:
     components = []
     for i, name in enumerate(groups.names):
         sigmas = np.concatenate(
             [problem.sigma[groups.image == i].ravel(), problem.relation_sigma[groups.relation == i]]
         )
         single = float(sigmas[0]) if np.all(sigmas == sigmas[0]) else None
-        known = bool(redundancies[i] > _NO_REDUNDANCY)
-        factor = float(factors[i]) if known else None
+        factor = float(factors[i]) if known[i] else None
         sigma = single * factor if single is not None and factor is not None else None
         components.append(Component(name, factor, sigma, float(redundancies[i])))
     return tuple(components)

@@ -43,7 +43,7 @@ class Normals:
         """Product of the scaled normal matrix with scaled vectors (u, m)."""
         split = len(self.n11)
         first, second = vectors[:split], vectors[split:]
-        blocks = second.reshape(len(self.n22), 3, -1)
+        blocks = second.reshape(len(self.n22), 3, vectors.shape[1])
         lower = self.n12.T @ first + (self.n22 @ blocks).reshape(second.shape)
         return np.concatenate([self.n11 @ first + self.n12 @ second, lower])
 
@@ -116,12 +116,12 @@ def build_normals(problem: Problem, equations: Equations) -> Normals:
     kept = len(unknowns.kept)
     n11 = np.zeros((split, split))
     n11[:end, :end] = n_gg[:end, :end]
-    n11[:end, end:] = n_gp[:end, :kept].reshape(end, -1)
+    n11[:end, end:] = n_gp[:end, :kept].reshape(end, 3 * kept)
     n11[end:, :end] = n11[:end, end:].T
     rows = end + np.arange(3 * kept).reshape(kept, 3)
     n11[rows[:, :, None], rows[:, None, :]] = n_pp[:kept]
     n12 = np.zeros((split, u - split))
-    n12[:end] = n_gp[:end, kept:].reshape(end, -1)
+    n12[:end] = n_gp[:end, kept:].reshape(end, u - split)
     n22 = n_pp[kept:].copy()
     _add_relations(equations, n11, n22, gradient)
     return _scaled(n11, n12, n22, gradient)
@@ -206,8 +206,8 @@ def reduce_points(normals: Normals, damping: float = 0.0) -> tuple[Floats, Float
         inverse22: Floats = np.asarray(np.linalg.inv(n22), dtype=float)
     except np.linalg.LinAlgError:
         raise SingularError from None
-    gain = inverse22 @ np.ascontiguousarray(normals.n12.T).reshape(-1, 3, split)
-    reduced = normals.n11 - normals.n12 @ gain.reshape(-1, split)
+    gain = inverse22 @ np.ascontiguousarray(normals.n12.T).reshape(len(n22), 3, split)
+    reduced = normals.n11 - normals.n12 @ gain.reshape(3 * len(n22), split)
     reduced[np.diag_indices(split)] += damping
     return reduced, gain, inverse22
 

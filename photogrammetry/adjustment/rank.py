@@ -142,7 +142,7 @@ def _datum_defects(problem: Problem, state: State, free: FreeDatum) -> list[Defe
     if not free.defect:
         return []
     if not is_free(problem.network):
-        parts = _free_parts(free)
+        parts = _free_parts(free, state)
         message = (
             f"no datum: nothing fixes the network's {parts} ({free.defect} undetermined); "
             'add control points, a distance, or take "datum": {"type": "inner"}'
@@ -161,21 +161,24 @@ def _datum_defects(problem: Problem, state: State, free: FreeDatum) -> list[Defe
     return []
 
 
-def _free_parts(free: FreeDatum) -> str:
+def _free_parts(free: FreeDatum, state: State) -> str:
     """Position, rotation and scale as far as they are free, with their numbers."""
+    size = float(np.abs(state.xyz - free.centre).max(initial=0.0)) or 1.0
+    shares = free.directions / np.array([size] * 3 + [1.0] * 4)[:, None]  # of like effect on the network
+    shares /= np.linalg.norm(shares, axis=0)
     # Combinations without scale, then without rotation: the dimensions that each of them adds.
-    without_scale = free.defect - _rank(free.directions[6:])
-    translations = free.defect - _rank(free.directions[3:])
+    without_scale = free.defect - _rank(shares[6:])
+    translations = free.defect - _rank(shares[3:])
     parts = {
         "position": translations,
         "rotation": without_scale - translations,
         "scale": free.defect - without_scale,
     }
-    return ", ".join(f"{name} ({size})" if size > 1 else name for name, size in parts.items() if size)
+    return ", ".join(f"{name} ({count})" if count > 1 else name for name, count in parts.items() if count)
 
 
 def _rank(rows: Floats) -> int:
-    return int(np.linalg.matrix_rank(rows / max(np.abs(rows).max(), 1e-300), tol=1e-6)) if np.any(rows) else 0
+    return int(np.linalg.matrix_rank(rows, tol=1e-6))
 
 
 def _joint_defects(
@@ -195,7 +198,7 @@ def _joint_defects(
     null = vectors[:, values < _ZERO]
     if not null.shape[1]:
         return []
-    full = np.vstack([null, -gain.reshape(-1, len(reduced)) @ null])
+    full = np.vstack([null, -gain.reshape(3 * len(gain), len(reduced)) @ null])
     return [_joint_defect(problem, np.abs(full).max(axis=1), null.shape[1])]
 
 

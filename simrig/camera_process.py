@@ -94,8 +94,7 @@ class CameraProcess:
         try:
             self._process.wait(_STOP_S)
         except subprocess.TimeoutExpired:
-            self.killed = True
-        self._process.kill()
+            self._process.kill()
         self._close()
 
     def kill(self) -> None:
@@ -125,8 +124,10 @@ class CameraProcess:
             selector.register(self._process.stdout, selectors.EVENT_READ)
             while b"\n" not in self._unread:
                 if not selector.select(max(0.0, deadline - time.monotonic())):
+                    self.kill()
                     raise ProcessDiedError(
-                        f"simulated camera {self.config.name} does not answer for {patience_s:.0f} s: stop it"
+                        f"simulated camera {self.config.name} did not answer for {patience_s:.0f} s, so it was ended: "
+                        "restart it"
                     )
                 part = os.read(self._process.stdout.fileno(), 1 << 16)
                 if not part:

@@ -33,7 +33,7 @@ class TestPattern:
 
 
 class Painter:
-    """Puts the sensor's region of interest into frame slots.
+    """Puts the sensor's region of interest into frame slots. Exposure time and gain do not change the picture.
 
     Args:
         source: what the sensor sees.

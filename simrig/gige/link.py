@@ -2,14 +2,13 @@
 
 import errno
 import socket
-import time
 
-from rig.clocks import NS_PER_S, HostNs, host_now
-from simrig.gige.frame_store import Slot
-from simrig.gige.gvsp import IP_UDP_BYTES, WIRE_BYTES
+from rig.clocks import HostNs, host_now
+from simrig.gige.gvsp import IP_UDP_BYTES, WIRE_BYTES, PacketTable
 from simrig.gige.udp import NOBODY_LISTENS, bound
 
-#: A paced link sends bursts of this length at the link's rate; fewer, longer bursts cost less CPU.
+#: A paced link sends bursts of this length. Longer ones cost less CPU, but this is 8 packets of 9000 bytes at 1 Gbit/s,
+#: and a receiver's socket holds only 12 until it has enlarged its buffer.
 BURST_NS = 600_000
 #: What may be caught up at once after this process was not scheduled in time: as much as a receiver's socket buffer of
 #: a few MB takes. (A real camera's hardware is never late.)
@@ -77,23 +76,24 @@ class Link:
         each_ns = self.packet_ns(packet_size, host_now())
         return max(1, int(BURST_NS / each_ns)) if each_ns else _UNPACED_BURST
 
-    def send_paced(self, slot: Slot, first: int, count: int, packet_size: int) -> None:
-        """Send packets once the cable is free."""
-        now = host_now()
-        if self._free_at > now:
-            time.sleep((self._free_at - now) / NS_PER_S)
-            now = host_now()
-        self._free_at = max(self._free_at, now - _CATCH_UP_NS) + round(count * self.packet_ns(packet_size, now))
-        self.send(slot, first, count, packet_size)
+    def busy_ns(self) -> int:
+        """How long the cable is still busy with what was sent; not positive if it is free."""
+        return self._free_at - host_now()
 
-    def send(self, slot: Slot, first: int, count: int, packet_size: int) -> None:
+    def send_paced(self, table: PacketTable, first: int, count: int, packet_size: int) -> None:
+        """Send packets, and keep the cable busy for as long as they take."""
+        now = host_now()
+        self._free_at = max(self._free_at, now - _CATCH_UP_NS) + round(count * self.packet_ns(packet_size, now))
+        self.send(table, first, count, packet_size)
+
+    def send(self, table: PacketTable, first: int, count: int, packet_size: int) -> None:
         """Send packets at once."""
         if self._peer is None:
             return
         end, retried = first + count, False
         while first < end:
             try:
-                sent = slot.table.send(self._socket.fileno(), first, end - first)
+                sent = table.send(self._socket.fileno(), first, end - first)
             except OSError as error:
                 if error.errno not in NOBODY_LISTENS:
                     raise

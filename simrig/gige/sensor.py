@@ -28,7 +28,7 @@ _STOP_S = 5.0
 _IDS_16_BIT = 65535
 
 
-@dataclass(frozen=True, order=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Trigger:
     """One moment at which the sensor should begin to expose, and the hill pulse that the frame is to show."""
 
@@ -117,7 +117,7 @@ class Sensor:
             self._next_id, self.block_id = self._first_block_id, 0
             self._busy_until = HostNs(0)
             freeze.was_frozen()
-        self.settings_changed()
+            self.settings_changed()
 
     def settings_changed(self) -> None:
         """Trigger settings were written: only triggers from now on count, by the new settings."""
@@ -243,7 +243,7 @@ class Sensor:
         shot = Shot(ahead.slot, trigger.pulse, self.block_id, ticks, ready)
         spoil(shot, faults)
         self._ahead = None
-        self._transmitter.submit(shot)
+        self._transmitter.submit(ahead.store, shot)
         if self._registers.number("AcquisitionMode") == AcquisitionMode.SINGLE_FRAME:
             self._store, self._registers.locked = None, False
             self._changes += 1

@@ -1,6 +1,7 @@
 """Sends exposed frames one after the other, and single packets again when they are asked for."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 
@@ -11,6 +12,7 @@ from simrig.gige.gvsp import unavailable
 from simrig.gige.link import Link
 
 _STOP_S = 5.0
+_NAP_NS = 50_000_000  # on a slow link one packet may take seconds; an abort is noticed meanwhile
 
 
 class Transmitter:
@@ -25,7 +27,7 @@ class Transmitter:
         self._link, self._counters = link, counters
         self._store: FrameStore | None = None
         self._condition = threading.Condition()
-        self._queue: deque[Shot] = deque()
+        self._queue: deque[tuple[FrameStore, Shot]] = deque()
         self._sending = self._stopping = False
         self._aborts = 0
         self._thread = threading.Thread(target=self._run, name="transmitter")
@@ -48,17 +50,16 @@ class Transmitter:
             self._aborts += 1
             self._condition.notify_all()
             self._condition.wait_for(lambda: not self._sending, _STOP_S)
-            if self._store is not None:
-                for shot in self._queue:
-                    self._store.give_back(shot.slot)
-                self._store.forget()
+            for old_store, shot in self._queue:
+                old_store.give_back(shot.slot)
             self._queue.clear()
+            store.forget()
             self._store = store
 
-    def submit(self, shot: Shot) -> None:
-        """Send a frame after those submitted before, and not before its exposure has ended."""
+    def submit(self, store: FrameStore, shot: Shot) -> None:
+        """Send a frame of `store` after those submitted before, and not before its exposure has ended."""
         with self._condition:
-            self._queue.append(shot)
+            self._queue.append((store, shot))
             self._condition.notify_all()
 
     def resend(self, block_id: int, first: int, last: int) -> None:
@@ -77,7 +78,7 @@ class Transmitter:
             for packet in shot.damaged.intersection(range(first, end)):
                 self._link.send_datagram(unavailable(block_id, packet, extended=frame.extended))
             for start, count in _runs(first, end, shot.gone | shot.damaged):
-                self._link.send(shot.slot, start, count, frame.packet_size)
+                self._link.send(shot.slot.table, start, count, frame.packet_size)
                 self._counters.resent_packets += count
 
     def _run(self) -> None:
@@ -86,9 +87,9 @@ class Transmitter:
                 self._sending = False
                 self._condition.notify_all()
                 self._condition.wait_for(lambda: self._queue or self._stopping)
-                if self._stopping or self._store is None:
+                if self._stopping:
                     return
-                store, shot = self._store, self._queue.popleft()
+                store, shot = self._queue.popleft()
                 self._sending, aborts = True, self._aborts
                 while aborts == self._aborts and (early_ns := shot.ready - host_now()) > 0:
                     self._condition.wait(early_ns / NS_PER_S)
@@ -103,15 +104,24 @@ class Transmitter:
         for start, count in _runs(0, table.count, shot.lost):
             burst = self._link.burst(packet_size)
             for first in range(start, start + count, burst):
-                if self._aborts != aborts:
+                if not self._await_link(aborts):
                     return
                 size = min(burst, start + count - first)
-                self._link.send_paced(shot.slot, first, size, packet_size)
+                self._link.send_paced(shot.slot.table, first, size, packet_size)
                 shot.sent = first + size
         shot.sent = table.count
         if len(shot.lost) < table.count:
             self._counters.frames += 1
             self._counters.last_packets.append((shot.pulse, host_now()))
+
+    def _await_link(self, aborts: int) -> bool:
+        """Wait until the link is free; False if the frame is not to be sent any further."""
+        while self._aborts == aborts:
+            busy_ns = self._link.busy_ns()
+            if busy_ns <= 0:
+                return True
+            time.sleep(min(busy_ns, _NAP_NS) / NS_PER_S)
+        return False
 
 
 def _runs(first: int, end: int, without: Iterable[int]) -> Iterator[tuple[int, int]]:

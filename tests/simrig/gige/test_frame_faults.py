@@ -9,6 +9,7 @@ from rig.errors import BadInputError
 from simrig.faults import Fault, FaultKind
 from tests.simrig.gige.conftest import MakeCamera, SimulatedCamera
 from tests.simrig.gige.receiver import Received, Receiver
+from tests.support.waiting import wait_until
 
 PACKETS = 11  # of a frame: 320 x 240 px in 9000-byte packets, leader and trailer included
 
@@ -120,6 +121,16 @@ def test_slow_link_delays_and_then_recovers(make_camera: MakeCamera) -> None:
     delay = {p: sent - simulated.train.time(p) for p, sent in statistics.last_packets.items()}
     assert delay[before + 30] > 1_000_000 + 20 * 2_000_000, "every frame came 2 ms later than the one before"
     assert delay[before + 30] > 5 * delay[before + 58], "and then the link caught up"
+
+
+def test_a_frame_under_way_does_not_hold_up_the_end(make_camera: MakeCamera) -> None:
+    """At 0.01 Mbit/s one packet takes 7 s; the fixtures see to it that nothing is left of the camera after the test."""
+    simulated = make_camera()
+    with Receiver(simulated.address) as receiver:
+        pulse = receiver.frames(1)[0].pulse
+        inject(simulated, FaultKind.SLOW_LINK, duration_s=60.0, mbit_s=0.01)
+        wait_until(lambda: simulated.camera.statistics().triggers > 10, "pulses come as before")
+        assert max(simulated.camera.statistics().last_packets) <= pulse + 3
 
 
 def test_scenario_faults_befall_their_own_camera(

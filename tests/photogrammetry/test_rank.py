@@ -74,7 +74,7 @@ def test_several_causes_add_up() -> None:
 
 
 def test_an_image_without_observations_and_one_with_two() -> None:
-    nothing = _only(_keeping(_LAB, lambda i, p: i != 4), DefectKind.IMAGES, 6)
+    nothing = _only(_keeping(_LAB, lambda i, _p: i != 4), DefectKind.IMAGES, 6)
     assert nothing.images == ("lab-05",)
     few = _only(_keeping(_LAB, lambda i, p: i != 4 or p in (2, 3)), DefectKind.IMAGES, 2)
     assert few.images == ("lab-05",)

@@ -1,6 +1,7 @@
 """The baseline: `gst-launch-1.0 aravissrc`, one per camera, into nothing or into a file, without pairing."""
 
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -8,11 +9,11 @@ from typing import Any
 
 from bench.loads import Load
 from bench.processes import cpu_seconds
-from rig.errors import BadInputError
+from rig.errors import BadInputError, CameraError
 from rig.settings import RigSettings
 
 SINKS = ("fakesink", "filesink")
-_WARM_S = 2.0
+_WARM_S = 3.0
 
 
 def run_gstreamer(load: Load, rig: RigSettings, sink: str, seconds: float, directory: Path) -> dict[str, Any]:
@@ -31,12 +32,14 @@ def run_gstreamer(load: Load, rig: RigSettings, sink: str, seconds: float, direc
     try:
         time.sleep(_WARM_S)  # pipelines do not tell when they play
         pids = [pipeline.pid for pipeline in pipelines]
+        if dead := [pipeline.args for pipeline in pipelines if pipeline.poll() is not None]:
+            raise CameraError(f"GStreamer does not play: {dead[0]}; try it by hand")
         before, sizes = cpu_seconds(pids), _sizes(files)
         time.sleep(seconds)
         cpu, written = cpu_seconds(pids) - before, _sizes(files) - sizes
     finally:
         for pipeline in pipelines:
-            pipeline.terminate()
+            pipeline.send_signal(signal.SIGINT)  # ends the stream and leaves control of the camera
         for pipeline in pipelines:
             pipeline.wait(10)
         for file in files:

@@ -32,8 +32,8 @@ _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
 _IDS_16_BIT = 65535
 # How many empty buffers stand in Aravis's queue: half a second of frames, but not more than stay in the cache.
 _QUEUE_S = 0.5
-_QUEUE_BYTES = 24 << 20
-_QUEUE_LEAST = 8
+_QUEUE_BYTES = 12 << 20
+_QUEUE_LEAST = 5
 
 
 class AravisCamera:

@@ -56,7 +56,7 @@ class TripletBuffers:
         with self._lock:
             if not self._free:
                 return None
-            slot = self._free.popleft()
+            slot = self._free.pop()
             self._holders[slot] = 1
             return slot
 

@@ -226,7 +226,7 @@ def _terms(lens: Lens, q: Array) -> Array:
 def _slope(lens: Lens, q: Array) -> Array:
     """Derivative of d(q) by q: (..., 2, 2)."""
     x, y = q[..., 0], q[..., 1]
-    a1, a2, a3, b1, b2, c1, c2 = np.moveaxis(lens.interior[..., 3:], -1, 0)
+    a1, a2, a3, b1, b2, c1, c2 = (lens.interior[..., i] for i in range(3, len(INTERIOR)))
     r2, p2 = x * x + y * y, lens.balance**2
     radial = a1 * (r2 - p2) + a2 * (r2**2 - p2**2) + a3 * (r2**3 - p2**3)
     growth = 2.0 * (a1 + 2.0 * a2 * r2 + 3.0 * a3 * r2**2)

@@ -23,10 +23,12 @@ def skew(vectors: NDArray[Any]) -> NDArray[Any]:
     Returns:
         (..., 3, 3) with skew(a) @ b = a x b.
     """
-    x, y, z = np.moveaxis(np.asarray(vectors), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
-    return np.stack(rows, axis=-2)
+    vectors = np.asarray(vectors)
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    matrices = np.zeros((*vectors.shape, 3), dtype=vectors.dtype)
+    matrices[..., 0, 1], matrices[..., 0, 2], matrices[..., 1, 2] = -z, y, -x
+    matrices[..., 1, 0], matrices[..., 2, 0], matrices[..., 2, 1] = z, -y, x
+    return matrices
 
 
 def rotation_from_vector(vectors: Floats) -> Floats:

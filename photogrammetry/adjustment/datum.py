@@ -17,7 +17,7 @@ _FREE = 1e-12
 #: A datum condition below this (scaled) fixes nothing.
 _FIXED = 1e-9
 _ALIGNMENTS = 30
-_ALIGNED = 1e-14
+_ALIGNED = 1e-11  # of the network's size
 
 
 class DatumError(Exception):
@@ -188,6 +188,7 @@ def align(problem: Problem, state: State, free: FreeDatum, points: Integers, tar
         off = (target[points] - state.xyz[points]).ravel()
         motion, *_ = np.linalg.lstsq(slopes, off, rcond=None)
         state = transform_state(problem, state, free.centre, free.directions @ motion)
-        if np.abs(slopes @ motion).max() <= _ALIGNED * np.abs(slopes).max():
+        size = np.abs(state.xyz[points] - free.centre).max()
+        if np.abs(slopes @ motion).max() <= _ALIGNED * size:
             break
     return state

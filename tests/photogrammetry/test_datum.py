@@ -10,7 +10,7 @@ from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
 from photogrammetry.adjustment.datum import FreeDatum, inner_operator, s_transform
 from photogrammetry.adjustment.state import Floats
 from photogrammetry.network import Datum, DatumType, Difference, Distance, Network, Point, Role
-from tests.photogrammetry.networks import FREE, lab_frame
+from tests.photogrammetry.synthetic import FREE, lab_frame
 
 _POINTS = 20
 

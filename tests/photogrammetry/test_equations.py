@@ -13,7 +13,7 @@ from photogrammetry.adjustment.problem import build_problem
 from photogrammetry.adjustment.state import state_of
 from photogrammetry.network import Network
 from tests.photogrammetry.dense import analytic_jacobian, dense_cofactors, flat_residuals, numeric_jacobian
-from tests.photogrammetry.networks import hill, lab_frame, rods
+from tests.photogrammetry.synthetic import hill, lab_frame, rods
 
 
 def weighted_poses() -> Network:

@@ -10,7 +10,7 @@ from photogrammetry.adjustment.adjustment import adjust_once
 from photogrammetry.camera_model import INTERIOR
 from photogrammetry.diagnosis import Defect, DefectKind, NotSolvableError
 from photogrammetry.network import Datum, Image, Network, Point, Role
-from tests.photogrammetry.networks import FREE, camera, hill, lab_frame, looking_at, observed, rods
+from tests.photogrammetry.synthetic import FREE, camera, hill, lab_frame, looking_at, observed, rods
 
 _LAB = lab_frame(5, points=20).network
 

@@ -63,20 +63,11 @@ class SimulatedHill:
             truth.camera_index(name)
         epoch = host_now() if epoch is None else epoch
         common = {
-            "scenario": scenario.resolve(),
-            "rate_hz": rate_hz,
-            "epoch": epoch,
-            "width": size[0],
-            "height": size[1],
-            "prerendered": prerendered,
-            "link_mbit_s": link_mbit_s,
-            "first_block_id": first_block_id,
-            "tick_hz": tick_hz,
-            "resend": resend,
-            "test_pattern": test_pattern,
-            "broadcast": broadcast,
+            "scenario": scenario.resolve(), "rate_hz": rate_hz, "epoch": epoch, "width": size[0], "height": size[1],
+            "prerendered": prerendered, "link_mbit_s": link_mbit_s, "first_block_id": first_block_id,
+            "tick_hz": tick_hz, "resend": resend, "test_pattern": test_pattern, "broadcast": broadcast,
             "ptp_offset_ns": UtcAnchor.take().offset_ns,
-        }
+        }  # fmt: skip
         self._configs = {
             name: validate(CameraConfig, {"name": name, "address": address, **common}, f"simulated camera {name}")
             for name, address in addresses.items()

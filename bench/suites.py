@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bench.adjustment import run_adjustment
 from bench.capture import run_capture
 from bench.gstreamer import SINKS
 from bench.loads import LOADS
@@ -43,4 +44,15 @@ def _parts(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
-SUITES: dict[str, Suite] = {**{name: partial(_capture, name) for name in LOADS}, "parts": _parts}
+def _adjustment(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_adjustment(seconds)
+    path = write_results("adjustment", cases, directory)
+    table = [f"{c['name']:46}{c['value']:9.3f} {c['unit']:3} {c['baseline_is']}: {c['baseline']:.3f}" for c in cases]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
+SUITES: dict[str, Suite] = {
+    **{name: partial(_capture, name) for name in LOADS},
+    "parts": _parts,
+    "adjustment": _adjustment,
+}

@@ -137,11 +137,11 @@ def test_scenario_faults_befall_their_own_camera(
     make_camera: MakeCamera, scenario_with: Callable[[str], object]
 ) -> None:
     fault = '[[faults]]\nkind = "lost_frame"\ncamera = "{}"\nat_pulse = {}\n'
-    scenario = scenario_with(fault.format("K1", 25) + fault.format("K2", 30))
+    scenario = scenario_with(fault.format("K1", 50) + fault.format("K2", 55))
     simulated = make_camera(scenario=scenario)
     with Receiver(simulated.address) as receiver:
-        frames = receiver.frames(40)
-    assert {25, 30} & {frame.pulse for frame in frames} == {30}
+        frames = receiver.frames(60)
+    assert {50, 55} & {frame.pulse for frame in frames} == {55}
 
 
 def test_faults_that_come_too_late_are_refused(make_camera: MakeCamera) -> None:

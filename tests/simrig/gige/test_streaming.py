@@ -196,11 +196,11 @@ def test_a_line_without_a_cable(make_camera: MakeCamera) -> None:
 
 def test_pauses_in_the_pulse_train(make_camera: MakeCamera, tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.toml"
-    scenario.write_text(f'base = "{CONFIG / "scenarios" / "training.toml"}"\npauses = [[0, 20], [25, 40]]\n')
+    scenario.write_text(f'base = "{CONFIG / "scenarios" / "training.toml"}"\npauses = [[0, 50], [55, 70]]\n')
     simulated = make_camera(scenario=scenario)
     with Receiver(simulated.address) as receiver:
         frames: list[Received] = receiver.frames(10)
-    assert [frame.pulse for frame in frames] == [20, 21, 22, 23, 24, 40, 41, 42, 43, 44]
+    assert [frame.pulse for frame in frames] == [50, 51, 52, 53, 54, 70, 71, 72, 73, 74]
     assert [frame.block_id for frame in frames] == list(range(1, 11))
 
 

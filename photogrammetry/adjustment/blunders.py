@@ -17,7 +17,7 @@ from photogrammetry.adjustment.state import Floats
 from photogrammetry.adjustment.unknowns import NONE, Integers
 
 #: Chance that anything at all is suspected in sound data; and never more than this for a single test (3.29 sigma).
-FAMILY_RISK = 0.05
+FAMILY_RISK = 0.01
 SINGLE_RISK = 0.001
 #: With less redundancy than this, the a-priori sigmas are asked as well: a blunder hides in the estimated sigma0.
 _SMALL_REDUNDANCY = 30

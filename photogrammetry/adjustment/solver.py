@@ -1,9 +1,10 @@
 """Damped Gauss-Newton: shorter steps, then Levenberg's damping, help on the way and are gone at the optimum."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from photogrammetry.adjustment.acceleration import Acceleration
 from photogrammetry.adjustment.datum import NOTHING_FREE, FreeDatum, find_free_datum, similarity_directions
 from photogrammetry.adjustment.normals import Normals, SingularError, build_normals, factorise
 from photogrammetry.adjustment.problem import Problem
@@ -50,6 +51,7 @@ class _Progress:
     behind: int
     damping: float = 0.0
     iterations: int = 0
+    acceleration: Acceleration = field(default_factory=Acceleration)
 
 
 def solve(problem: Problem, start: State, defect: int) -> Solution:
@@ -90,6 +92,8 @@ def _advance(problem: Problem, normals: Normals, free: FreeDatum, progress: _Pro
                 progress.state = problem.unknowns.moved(progress.state, step)
                 progress.iterations += 1
                 return True
+            if damping == 0.0 and _leap(problem, normals, progress, step, slope):
+                return False
             shortest = _SHORTEST if damping == 0.0 else 1.0
             if _descend(problem, progress, step, slope, shortest):
                 progress.damping = damping * _LESS if damping > _FIRST_DAMPING else 0.0
@@ -110,19 +114,38 @@ def _step(problem: Problem, normals: Normals, free: FreeDatum, state: State, dam
         return None
 
 
+def _leap(problem: Problem, normals: Normals, progress: _Progress, step: Floats, slope: float) -> bool:
+    """Take the accelerated step instead, if there is one and it reduces the square sum as a good step would."""
+    proposal = progress.acceleration.propose(normals, step)
+    if proposal is None or not _try(problem, progress, proposal, _KEPT * slope):
+        return False
+    progress.acceleration.record(step, proposal)
+    return True
+
+
 def _descend(problem: Problem, progress: _Progress, step: Floats, slope: float, shortest: float) -> bool:
     """Take the step, or a shorter one, if it keeps enough of its promise."""
     part = 1.0
     while part >= shortest:
-        state = problem.unknowns.moved(progress.state, part * step)
-        square_sum, behind = problem.square_sum(state), problem.behind(state)
-        sound = np.isfinite(square_sum) and behind <= progress.behind and np.all(state.interior[:, 0] > 0.0)
         # Along a straight way the square sum falls by (2 - part) part slope.
-        promised = (2.0 - part) * part * slope
-        measurable = promised > _ROUNDING * progress.square_sum
-        if sound and (not measurable or progress.square_sum - square_sum >= _KEPT * promised):
-            progress.state, progress.square_sum, progress.behind = state, square_sum, behind
-            progress.iterations += 1
+        if _try(problem, progress, part * step, _KEPT * (2.0 - part) * part * slope):
+            if shortest < 1.0:
+                progress.acceleration.record(step, part * step)
+            else:
+                progress.acceleration.forget()
             return True
         part *= 0.5
     return False
+
+
+def _try(problem: Problem, progress: _Progress, move: Floats, wanted: float) -> bool:
+    """Move if that is possible and the square sum falls by what is wanted, as far as that can be measured."""
+    state = problem.unknowns.moved(progress.state, move)
+    square_sum, behind = problem.square_sum(state), problem.behind(state)
+    if not np.isfinite(square_sum) or behind > progress.behind or np.any(state.interior[:, 0] <= 0.0):
+        return False
+    if progress.square_sum - square_sum < wanted and wanted > _ROUNDING * progress.square_sum:
+        return False
+    progress.state, progress.square_sum, progress.behind = state, square_sum, behind
+    progress.iterations += 1
+    return True

@@ -12,16 +12,18 @@ four image coordinates: then its square sum is that of the residuals in the imag
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from photogrammetry.essential_matrix import essential_matrices, rotations_of
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.rotation import rotation_from_vector
+from photogrammetry.rotation import rotation_from_vector, skew
 from rig.errors import BadInputError
 
 _SETS = 16  # sets of five points
-_STARTS = 12  # candidates that are refined
+_STARTS = 12  # candidates that are refined,
+_FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points soon only the best of those with the points in front
 _NEAR = 0.02  # rad: candidates closer than that are refined once
+_MANY = 10
 _STEPS = 30
 _SAME = 1e-3  # rad: rotations and bases closer than that are one solution
 _POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
@@ -82,8 +84,14 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     rotations = _candidates(u / c_first, v / c_second)
     bases = _linear_bases(rotations, u, v)
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
-    best = _distinct_starts(rotations, sums)
-    rotations, bases, sums = _iterate(rotations[best], bases[best], u, v, _STEPS)
+    best = _distinct_starts(rotations, sums) if len(u) > 5 else list(range(len(rotations)))
+    rotations, bases, sums = rotations[best], bases[best], sums[best]
+    if len(u) >= _MANY:
+        rotations, bases, sums = _iterate(rotations, bases, u, v, _FIRST_STEPS)
+        sums = np.where(_possible(rotations, bases, u, v), sums, np.inf)
+        best = [int(i) for i in np.argsort(sums, kind="stable")[:_FIRST_KEPT]]
+        rotations, bases = rotations[best], bases[best]
+    rotations, bases, sums = _iterate(rotations, bases, u, v, _STEPS)
     solutions = _solutions(rotations, bases, sums, u, v, len(u) * (_ROUNDING * scale) ** 2)
     if not solutions or solutions[0].in_front < 0.5:
         raise BadInputError(
@@ -129,15 +137,18 @@ def _linear_bases(rotations: Array, u: Array, v: Array) -> Array:
 def _conditions(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[Array, Array]:
     """Normalised conditions (k, n) and derivatives (k, n, 5): three turns, two shifts of the base across itself."""
     turned = v @ rotations.transpose(0, 2, 1)
-    normal = np.cross(u, bases[:, None])  # (u x b): derivative by R v
+    across_base = skew(bases)
+    normal = u @ across_base  # u x b: derivative by R v
     closure = np.einsum("kni,kni->kn", normal, turned)
-    by_base = np.cross(turned, u)
-    by_first = np.cross(bases[:, None], turned)[..., :2]
+    by_first = (turned @ across_base)[..., :2]
     in_second = normal @ rotations
     by_second = in_second[..., :2]
-    root = np.sqrt((by_first**2).sum(axis=2) + (by_second**2).sum(axis=2))
-    by_turn = np.cross(v, in_second)
-    jacobian = np.concatenate((by_turn, np.einsum("kni,kit->knt", by_base, _across(bases))), axis=2)
+    root = np.sqrt(np.einsum("kni,kni->kn", by_first, by_first) + np.einsum("kni,kni->kn", by_second, by_second))
+    jacobian = np.empty((*closure.shape, 5))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        jacobian[..., i] = v[:, j] * in_second[..., k] - v[:, k] * in_second[..., j]
+    for i, axes in enumerate(np.moveaxis(_across(bases), 2, 0)):
+        jacobian[..., 3 + i] = np.einsum("kni,kni->kn", turned, u @ skew(axes))
     return -closure / root, jacobian / -root[..., None]
 
 
@@ -201,6 +212,15 @@ def _solutions(
     # a few points may lie behind by noise: the share counts in steps, and before a far larger square sum
     kept.sort(key=lambda s: (s.square_sum > 100 * least + rounding, -round(s.in_front, 1), s.square_sum))
     return kept
+
+
+def _possible(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[np.bool_]:
+    """Whether at least half of the points lie in front, with the base or its opposite."""
+    shares = [
+        max(_share_in_front(rotation, sign * base, u, v) for sign in (1, -1))
+        for rotation, base in zip(rotations, bases, strict=True)
+    ]
+    return np.array(shares) >= 0.5
 
 
 def _share_in_front(rotation: Array, base: Array, u: Array, v: Array) -> float:

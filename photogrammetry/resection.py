@@ -15,8 +15,8 @@ from photogrammetry.similarity import fit_similarity
 from rig.errors import BadInputError
 
 _COLLINEAR = 1e-6  # height of a triangle over its longest side
-_TRIPLES = 8
-_REFINED = 4  # candidates that are refined
+_TRIPLES = 5
+_REFINED = 3  # candidates that are refined
 _NEARLY_REAL = 0.2  # imaginary part of a root over its modulus: noise pushes double roots off the real axis
 _SAME_TURN = 0.02  # rad
 _ROUNDING = 1e-7  # of c: residuals that small are none
@@ -82,21 +82,21 @@ def resect(points: ArrayLike, xy: ArrayLike, c: float) -> Resection:
 
 def _triples(points: Array) -> list[list[int]]:
     """Triples of points that span large triangles: the largest first, then those of other points."""
-    left = list(range(len(points)))
     chosen: list[list[int]] = []
-    pool = list(left)
+    pool = np.arange(len(points))
     while len(chosen) < _TRIPLES and len(pool) >= 3:
-        a = max(pool, key=lambda i: float(np.linalg.norm(points[i] - points[pool].mean(axis=0))))
-        b = max(pool, key=lambda i: float(np.linalg.norm(points[i] - points[a])))
-        base = points[b] - points[a]
-        heights = np.linalg.norm(np.cross(points[pool] - points[a], base), axis=1)
-        length = float(base @ base)
-        third = pool[int(heights.argmax())]
-        if length == 0 or heights.max() < _COLLINEAR * length:
+        there = points[pool]
+        a = int(np.linalg.norm(there - there.mean(axis=0), axis=1).argmax())
+        away = there - there[a]
+        b = int(np.linalg.norm(away, axis=1).argmax())
+        heights = np.linalg.norm(np.cross(away, away[b]), axis=1)
+        third = int(heights.argmax())
+        if not heights[third] > _COLLINEAR * float(away[b] @ away[b]):
             break
-        chosen.append([a, b, third])
-        # the next triple leaves out one point, so that every point has its turn and few points still give several
-        pool = [i for i in pool if i != (a, b, third)[len(chosen) % 3]]
+        triple = [int(pool[i]) for i in (a, b, third)]
+        chosen.append(triple)
+        # the next triple leaves out one of these, so that every point has its turn and few points still give several
+        pool = pool[pool != triple[len(chosen) % 3]]
     return chosen
 
 

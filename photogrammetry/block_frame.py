@@ -1,0 +1,196 @@
+"""Absolute orientation: carry a block from its own system into the object system by whatever defines that.
+
+Three known points do it in closed form. Otherwise known points, distances and coordinate differences (Eq. 3: rods) are
+fitted together by the seven parameters, from several starting rotations. What they leave open (a turn about the
+vertical, the whole datum of a free network) keeps a harmless value, and the adjustment says what is missing.
+"""
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogrammetry.ideal_camera import Array
+from photogrammetry.image_block import ImageBlock
+from photogrammetry.network import Network, Role
+from photogrammetry.rotation import rotation_from_vector
+from photogrammetry.similarity import Similarity, fit_similarity
+from rig.errors import BadInputError
+
+_STEPS = 30
+_LENGTH = -1  # in place of an axis
+_SAME_FIT = 1.05  # ratio of square sums up to which two fits are equally good,
+_SMALL_FIT = 1e-6  # and square sum below which all are
+_LEAST_SIGMA = 1e-4  # of the largest sigma or value: error-free points weigh much, but not infinitely
+
+
+def orient_block(block: ImageBlock, network: Network) -> None:
+    """Transform a block into the object system as far as the network's information goes.
+
+    Args:
+        block: in any system; changed in place.
+        network: its control and fixed points, distances and differences are used; failing all these, the approximate
+            coordinates of other points.
+    """
+    known = np.flatnonzero(block.known)
+    given = [int(i) for i in known if network.points[i].role in {Role.CONTROL, Role.FIXED}]
+    transform = _by_points(block, network, given)
+    if transform is None:
+        ties = _ties(block, network, given)
+        if ties is not None:
+            transform = _by_ties(block, network, ties)
+        else:
+            transform = _by_points(block, network, _approximate(block, network))
+    if transform is not None:
+        block.transform(transform)
+
+
+def _approximate(block: ImageBlock, network: Network) -> list[int]:
+    approximate = {Role.TIE, Role.CHECK}
+    points = network.points
+    return [int(i) for i in np.flatnonzero(block.known) if points[i].role in approximate and points[i].xyz is not None]
+
+
+def _by_points(block: ImageBlock, network: Network, points: list[int]) -> Similarity | None:
+    if len(points) < 3:
+        return None
+    try:
+        return fit_similarity(block.xyz[points], np.array([network.points[i].xyz for i in points], float)).transform
+    except BadInputError:
+        return None  # on a line: other information must help
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ties:
+    """q observations of the seven parameters: coordinates of points, of vectors, and lengths.
+
+    Attributes:
+        origin: (3,) in the block, the middle of the known points: turns about it leave them where they are.
+        vectors: (q, 3) point relative to the origin, or difference of two points, in the block.
+        axis: (q,) which component in the object system was observed; _LENGTH: the length.
+        shifted: (q,) 1 for a point, 0 for a vector: whether the translation counts.
+        values: (q,) observed.
+        weights: (q,) reciprocal sigmas.
+    """
+
+    origin: Array
+    vectors: Array
+    axis: NDArray[np.intp]
+    shifted: Array
+    values: Array
+    weights: Array
+
+    def linearised(self, transform: Similarity) -> tuple[Array, Array]:
+        """Weighted residuals (q,) and derivatives (q, 7) by log scale, turns in the object system, translation."""
+        length = self.axis == _LENGTH
+        moved = transform.scale * self.vectors @ transform.rotation.T
+        direction = np.where(length[:, None], moved, np.eye(3)[self.axis])
+        norm = np.linalg.norm(direction, axis=1, keepdims=True)
+        direction = direction / np.where(norm > 0, norm, 1.0)
+        computed = (direction * moved).sum(axis=1)
+        shift = self.shifted[:, None] * direction
+        jacobian = np.column_stack((computed, np.cross(moved, direction), shift))
+        residuals = computed + shift @ transform.translation - self.values
+        return residuals * self.weights, jacobian * self.weights[:, None]
+
+    @property
+    def fixes_scale(self) -> bool:
+        """Whether something in the ties has a size."""
+        points = self.vectors[self.shifted > 0]
+        several = len(points) > 0 and bool(np.ptp(points, axis=0).max() > 0)
+        return several or bool((self.values[self.shifted == 0] != 0).any())
+
+
+def _ties(block: ImageBlock, network: Network, given: list[int]) -> _Ties | None:
+    known = block.known
+    origin = block.xyz[given].mean(axis=0) if given else np.zeros(3)
+    rows: list[tuple[Array, int, int, float, float]] = []
+    for i in given:
+        point = network.points[i]
+        sigma = np.zeros(3) if point.sigma is None else point.sigma
+        xyz = np.zeros(3) if point.xyz is None else point.xyz
+        rows += [(block.xyz[i] - origin, axis, 1, float(xyz[axis]), float(sigma[axis])) for axis in range(3)]
+    for distance in network.distances:
+        if known[distance.start] and known[distance.end]:
+            chord = block.xyz[distance.end] - block.xyz[distance.start]
+            rows.append((chord, _LENGTH, 0, distance.value, distance.sigma))
+    for step in network.differences:
+        if known[step.start] and known[step.end]:
+            chord = block.xyz[step.end] - block.xyz[step.start]
+            rows.append((chord, step.axis, 0, step.value, step.sigma))
+    if not rows:
+        return None
+    vectors, axes, shifted, values, sigmas = (np.array(column, float) for column in zip(*rows, strict=True))
+    largest = max(float(sigmas.max()), _LEAST_SIGMA * float(np.abs(values).max()), np.finfo(float).tiny)
+    return _Ties(origin, vectors, axes.astype(np.intp), shifted, values, 1 / np.maximum(sigmas, _LEAST_SIGMA * largest))
+
+
+def _by_ties(block: ImageBlock, network: Network, ties: _Ties) -> Similarity:
+    fits = [_fitted(ties, rotation) for rotation in _cube_rotations()]
+    least = min(square_sum for _, square_sum in fits)
+    good = [fit for fit, square_sum in fits if square_sum <= _SAME_FIT * least + _SMALL_FIT]
+    shifts = [fit.translation - fit.scale * fit.rotation @ ties.origin for fit in good]
+    moved = [Similarity(fit.scale, fit.rotation, shift) for fit, shift in zip(good, shifts, strict=True)]
+    return min(moved, key=lambda transform: _oddness(block, network, transform))
+
+
+def _cube_rotations() -> list[Array]:
+    """The 24 rotations that carry axes into axes."""
+    found = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        matrix = np.eye(3)[list(order)] * np.array(signs)[:, None]
+        if np.linalg.det(matrix) > 0:
+            found.append(matrix)
+    return found
+
+
+def _fitted(ties: _Ties, rotation: Array) -> tuple[Similarity, float]:
+    """Damped Gauss-Newton from one rotation; parameters that nothing determines do not move."""
+    transform = Similarity(_first_scale(ties), rotation, np.zeros(3))
+    residuals, jacobian = ties.linearised(transform)
+    damping = 1e-3
+    for _ in range(_STEPS):
+        if not ties.fixes_scale:
+            jacobian[:, 0] = 0.0
+        normal = jacobian.T @ jacobian
+        # relative damping; the second term keeps undetermined parameters where they are
+        normal += np.diag(damping * np.diag(normal) + 1e-12 * np.trace(normal))
+        step = np.asarray(np.linalg.solve(normal, -jacobian.T @ residuals), float)
+        candidate = Similarity(
+            float(transform.scale * np.exp(np.clip(step[0], -1, 1))),
+            rotation_from_vector(step[1:4]) @ transform.rotation,
+            transform.translation + step[4:],
+        )
+        new_residuals, new_jacobian = ties.linearised(candidate)
+        if new_residuals @ new_residuals < residuals @ residuals:
+            transform, residuals, jacobian, damping = candidate, new_residuals, new_jacobian, damping / 10
+        else:
+            damping *= 10
+    return transform, float(residuals @ residuals)
+
+
+def _first_scale(ties: _Ties) -> float:
+    """Scale from lengths, else from the spread of known points, else from the largest difference."""
+    norms = np.linalg.norm(ties.vectors, axis=1)
+    lengths = ties.axis == _LENGTH
+    points = ties.shifted > 0
+    if lengths.any():
+        return float(np.abs(ties.values[lengths]).sum() / norms[lengths].sum())
+    if ties.fixes_scale and points.sum() > 3:
+        inside, outside = ties.vectors[points][::3], ties.values[points].reshape(-1, 3)
+        return float(np.linalg.norm(np.ptp(outside, axis=0)) / np.linalg.norm(np.ptp(inside, axis=0)))
+    if ties.fixes_scale:
+        largest = int(np.argmax(np.where(points, 0.0, np.abs(ties.values))))
+        return float(abs(ties.values[largest]) / norms[largest])
+    return 1.0
+
+
+def _oddness(block: ImageBlock, network: Network, transform: Similarity) -> float:
+    """Of several fits the one near approximate coordinates, or with the images upright and X to the right."""
+    rough = _approximate(block, network)
+    if rough:
+        given = np.array([network.points[i].xyz for i in rough], float)
+        return float(((transform.apply(block.xyz[rough]) - given) ** 2).sum())
+    axes = [transform.turn(camera.R) for camera in block.cameras.values()]
+    return -float(sum(turned[2, 1] + turned[0, 0] for turned in axes))

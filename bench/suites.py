@@ -9,6 +9,7 @@ from typing import Any
 from bench.adjustment import run_adjustment
 from bench.capture import run_capture
 from bench.gstreamer import SINKS
+from bench.intersection import run_intersection
 from bench.loads import LOADS
 from bench.parts import run_parts
 from bench.results import write_results
@@ -51,8 +52,16 @@ def _adjustment(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _intersection(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_intersection(seconds)
+    path = write_results("intersection", cases, directory)
+    table = [f"{c['name']:14}{c['value']:12,}   {c['baseline_is']}: {c['baseline']:,}" for c in cases]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
     "parts": _parts,
     "adjustment": _adjustment,
+    "intersection": _intersection,
 }

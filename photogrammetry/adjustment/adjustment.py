@@ -68,6 +68,8 @@ class Adjustment:
 
         Constants (column -1) have zeros.
         """
+        if not self.cofactors.size:
+            return np.zeros((*columns.shape, columns.shape[-1]))
         block = self.cofactors[columns[..., :, None], columns[..., None, :]] * self.ratio**2
         known = columns >= 0
         return np.asarray(np.where(known[..., :, None] & known[..., None, :], block, 0.0), dtype=float)

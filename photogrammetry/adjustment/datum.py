@@ -12,8 +12,8 @@ from photogrammetry.adjustment.unknowns import Integers
 from photogrammetry.network import DatumType, Network, Role
 from photogrammetry.rotation import nearest_rotation, skew
 
-#: A direction whose scaled sum of squares is below this is free. Observations with weights 1e10 apart still count.
-_FREE = 1e-12
+#: A direction whose scaled sum of squares is below this is free; rounding leaves less than 1e-15.
+_FREE = 1e-14
 #: A datum condition below this (scaled) fixes nothing.
 _FIXED = 1e-9
 _ALIGNMENTS = 30

@@ -58,10 +58,12 @@ def check_rank(problem: Problem, state: State) -> FreeDatum:
     normals = build_normals(problem, problem.equations(state))
     free = find_free_datum(problem, normals, state)
     cameras, images, points = _local_defects(problem, normals)
+    local = [*cameras, *images, *points]
+    free = _beyond(problem, state, normals, free, local)
     defects = [_camera_defect(problem, local) for local in cameras]
     defects += _image_defects(problem, images) + _point_defects(problem, points)
     defects += _datum_defects(problem, state, free)
-    defects += _joint_defects(problem, state, normals, free, [*cameras, *images, *points])
+    defects += _joint_defects(problem, state, normals, free, local)
     if defects:
         raise NotSolvableError(tuple(defects))
     return free
@@ -92,6 +94,17 @@ def _singular(index: int, columns: Integers, block: Floats) -> list[_Local]:
     values, vectors = np.linalg.eigh(block)
     null = vectors[:, values < _ZERO]
     return [_Local(index, columns, null)] if null.shape[1] else []
+
+
+def _beyond(problem: Problem, state: State, normals: Normals, free: FreeDatum, local: Sequence[_Local]) -> FreeDatum:
+    """The free motions that are more than motions of single things that are undetermined anyway."""
+    if not local or not free.defect:
+        return free
+    moves = similarity_directions(problem, state, free.centre) @ free.directions / normals.scale[:, None]
+    for single in local:
+        moves[single.columns] -= single.null @ (single.null.T @ moves[single.columns])
+    _, sizes, combos = np.linalg.svd(moves, full_matrices=False)
+    return replace(free, directions=free.directions @ combos[sizes > _SHARE * _SHARE].T)
 
 
 def _camera_defect(problem: Problem, local: _Local) -> Defect:

@@ -119,7 +119,7 @@ def relation_equations(relations: Relations, unknowns: Unknowns, state: State) -
                 d = network.distances[i]
                 along = state.xyz[d.end] - state.xyz[d.start]
                 columns[row] = np.append(unknowns.point[d.start], unknowns.point[d.end])
-                values[row] = np.append(-along, along) / np.linalg.norm(along)
+                values[row] = np.append(-along, along) / (np.linalg.norm(along) or 1.0)  # no direction: no slope
             case Kind.DIFFERENCE:
                 e = network.differences[i]
                 columns[row, :2] = unknowns.point[e.start, e.axis], unknowns.point[e.end, e.axis]

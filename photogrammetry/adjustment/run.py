@@ -10,6 +10,7 @@ from photogrammetry.adjustment.state import State
 from photogrammetry.adjustment.variance_components import Component, estimate_by_paper, estimate_components
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Network, Reweight, Role
+from rig.errors import BadInputError
 
 #: Snooping stops when this part of all observations has been taken out: something else is wrong then.
 _MOST_REMOVED = 0.1
@@ -62,6 +63,8 @@ def adjust(network: Network, start: State | None = None, *, snoop: bool = False)
         BadInputError: a start value is missing, or too few control points for the paper's D5.
     """
     adjustment = adjust_once(network, start)
+    if not adjustment.problem.n_observations:
+        raise BadInputError("the network has no observations: nothing to adjust; add some")
     blunders = find_blunders(adjustment)
     removed: list[Removed] = []
     if snoop:

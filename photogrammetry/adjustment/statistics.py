@@ -48,6 +48,8 @@ def redundancy(problem: Problem, equations: Equations, cofactors: Floats) -> Red
         equations: linearised at the solution.
         cofactors: (u, u), in any datum.
     """
+    if not cofactors.size:  # everything is constant: nothing is explained
+        return Redundancy(np.tile(np.eye(2), (len(problem.image), 1, 1)), np.ones(len(problem.relations)))
     columns = problem.global_columns()
     point = problem.unknowns.point[problem.point]  # (n, 3); what is constant has zero derivatives
     by_global, by_point = equations.by_global, equations.by_point

@@ -65,6 +65,8 @@ def estimate_components(adjustment: Adjustment) -> tuple[tuple[Component, ...], 
         NotConvergedError: the factors do not settle.
     """
     base, groups = adjustment.problem, _groups_of(adjustment.problem)
+    if not groups.names:
+        return (), adjustment
     if len(groups.names) == 1:
         return _only_one(adjustment, groups)
     current, rounds = adjustment, _Rounds(len(groups.names))

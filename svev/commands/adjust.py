@@ -14,6 +14,7 @@ from photogrammetry.adjustment.summary import summarise
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Network, Reweight
 from photogrammetry.network_file import read_network
+from photogrammetry.start_values import complete
 from svev import console
 
 _NOT_SOLVABLE: Final = 3
@@ -62,7 +63,10 @@ def adjust(
 
 
 def _adjusted(network: Network, *, snoop: bool) -> Outcome:
-    return adjust_network(network, state_of(network), snoop=snoop)
+    poses = all(image.position is not None and image.rotation is not None for image in network.images)
+    points = all(point.xyz is not None for point in network.points)
+    started = network if poses and points else complete(network)
+    return adjust_network(network, state_of(started), snoop=snoop)
 
 
 def _without_lists(result: dict[str, Any]) -> dict[str, Any]:

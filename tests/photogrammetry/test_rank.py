@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 
 from photogrammetry.adjustment.adjustment import adjust_once
+from photogrammetry.adjustment.problem import Problem, build_problem
+from photogrammetry.adjustment.rank import check_rank
+from photogrammetry.adjustment.state import State, state_of
 from photogrammetry.camera_model import INTERIOR
 from photogrammetry.diagnosis import Defect, DefectKind, NotSolvableError
 from photogrammetry.network import Datum, Image, Network, Point, Role
+from tests.photogrammetry.dense import analytic_jacobian
 from tests.photogrammetry.synthetic import FREE, camera, hill, lab_frame, looking_at, observed, rods
 
 _LAB = lab_frame(5, points=20).network
@@ -93,6 +97,51 @@ def test_two_parts_that_nothing_ties_together() -> None:
     (defect,) = _defects(network)
     assert (defect.kind, defect.defect, defect.images) == (DefectKind.IMAGES, 7, ("lab-07", "lab-08", "lab-09"))
     assert "2 parts" in defect.message
+
+
+def _broken(seed: int) -> Network:
+    """One of the paper's networks with observations, control or constraints taken away at random."""
+    rng = np.random.default_rng(seed)
+    network = (_LAB, hill(1).network, rods(1).network)[seed % 3]
+    o = network.observations
+    keep = np.ones(len(o.image), dtype=bool)
+    for kind in rng.integers(0, 5, rng.integers(0, 4)):
+        match kind:
+            case 0:
+                keep &= ~((o.point == rng.integers(len(network.points))) & (o.image != rng.integers(3)))
+            case 1:
+                of_one = rng.permutation(np.flatnonzero(o.image == rng.integers(len(network.images))))
+                keep[of_one[rng.integers(0, 5) :]] = False
+            case 2:
+                keep &= rng.random(len(keep)) < 0.4
+            case 3:
+                points = (replace(p, role=Role.TIE, sigma=None) if rng.random() < 0.8 else p for p in network.points)
+                network = replace(network, points=tuple(points))
+            case _:
+                network = replace(network, distances=(), differences=network.differences[: rng.integers(0, 3)])
+    parts = {name: getattr(o, name)[keep] for name in ("image", "point", "xy", "sigma", "group")}
+    return replace(network, observations=replace(o, **parts), datum=Datum())
+
+
+@pytest.mark.parametrize("seed", range(45))
+def test_defects_add_up_to_the_rank_defect_of_the_dense_system(seed: int) -> None:
+    network = _broken(seed)
+    problem, state = build_problem(network), state_of(network)
+    jacobian = analytic_jacobian(problem, problem.equations(state))
+    length = np.linalg.norm(jacobian, axis=0)
+    sizes = np.linalg.svd(jacobian / np.where(length > 0.0, length, 1.0), compute_uv=False)
+    defect = jacobian.shape[1] - int(np.sum(sizes > 3e-7))
+    entries = _entries(problem, state)
+    assert sum(entry.defect for entry in entries) == defect
+    assert all(entry.message and entry.defect > 0 for entry in entries)
+
+
+def _entries(problem: Problem, state: State) -> tuple[Defect, ...]:
+    try:
+        check_rank(problem, state)
+    except NotSolvableError as error:
+        return error.defects
+    return ()
 
 
 def test_principal_distance_from_level_images_of_a_plane() -> None:

@@ -1,0 +1,291 @@
+"""Pulses, cameras with clocks of their own, transport and faults, all in memory; and the truth beside it.
+
+Every frame's `slot` is a key into the truth, which the pairing never reads.
+"""
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
+from rig.frame import FrameStatus, Record, RecordKind
+from triggering.pairing import ClosedPulse, OpenPulse, Pairer
+
+MS = 1_000_000
+US = 1_000
+
+
+@dataclass(frozen=True)
+class Outage:
+    """A camera is away: it sees no pulse from `begin_s` to `end_s` after the start.
+
+    Attributes:
+        told_after_s: when the disconnection is reported, seconds after its begin; None: never, the camera just
+            falls silent and goes on later with the same clock and ids.
+    """
+
+    camera: int
+    begin_s: float
+    end_s: float
+    told_after_s: float | None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything that may go wrong, and how often. Times are in ns unless named otherwise."""
+
+    seed: int = 0
+    cameras: int = 3
+    pulses: int = 300
+    rate_hz: float = 30.0
+    rate_error: float = 0.0
+    jitter_ns: int = 0
+    drift_ppm: tuple[float, ...] = (0.0, 40.0, -60.0)
+    missed: float = 0.0
+    lost: float = 0.0
+    damaged: float = 0.0
+    pauses: dict[int, float] = field(default_factory=dict)  # pulse -> seconds before it
+    faults: dict[tuple[int, int], FrameStatus] = field(default_factory=dict)  # (pulse, camera) -> its fate
+    outages: tuple[Outage, ...] = ()
+    first_id: int = 1
+    modulus: int = 65535
+    latency_ns: tuple[int, int] = (5 * MS, 45 * MS)
+    retention_ns: int = 25 * MS
+    latch_every_s: float = 2.0
+    loaded_latches: float = 0.3
+    trigger_counts: bool = False
+    batch_ns: int = 0  # the recorder wakes only so often and then takes camera after camera
+    hold_periods: float = 3.0
+
+    @property
+    def period_ns(self) -> int:
+        """Nominal period."""
+        return round(NS_PER_S / self.rate_hz)
+
+    @property
+    def hold_ns(self) -> int:
+        """Time that a pulse waits."""
+        return round(self.hold_periods * self.period_ns) + 60 * MS
+
+
+@dataclass
+class Hill:
+    """The truth of a scenario, and the records that come of it.
+
+    Attributes:
+        times: time of each pulse.
+        fates: per pulse and camera, what really became of it.
+        pulse_of: slot of a record -> pulse.
+        events: (arrival, camera, record) in the order of arrival, in each camera's order too.
+    """
+
+    scenario: Scenario
+    times: list[HostNs] = field(default_factory=list)
+    fates: list[list[FrameStatus]] = field(default_factory=list)
+    pulse_of: dict[int, int] = field(default_factory=dict)
+    events: list[tuple[HostNs, int, Record]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        scenario = self.scenario
+        rng = random.Random(scenario.seed)
+        self.start = HostNs(rng.randrange(1, 10**15))
+        self.times = list(_pulse_times(scenario, self.start, rng))
+        self.fates = [[FrameStatus.OK] * scenario.cameras for _ in self.times]
+        for camera in range(scenario.cameras):
+            self.events += _Camera(self, camera, rng).run()
+        self.events.sort(key=lambda event: event[0])  # stable: each camera's order stays
+
+
+def _pulse_times(scenario: Scenario, start: HostNs, rng: random.Random) -> Iterator[HostNs]:
+    period = NS_PER_S / scenario.rate_hz * (1 + scenario.rate_error)
+    time = start + 0.2 * NS_PER_S + rng.random() * period
+    for pulse in range(scenario.pulses):
+        time += scenario.pauses.get(pulse, 0.0) * NS_PER_S
+        yield HostNs(round(time))
+        time += period
+
+
+class _Camera:
+    """One camera of the hill: makes its records."""
+
+    def __init__(self, hill: Hill, camera: int, rng: random.Random) -> None:
+        self.hill, self.camera, self.rng = hill, camera, rng
+        self.scenario = hill.scenario
+        self.rate = 1 + self.scenario.drift_ppm[camera % len(self.scenario.drift_ppm)] * 1e-6
+        self.epoch = 0
+        self.records: list[tuple[HostNs, int, Record]] = []
+
+    def run(self) -> list[tuple[HostNs, int, Record]]:
+        scenario, start = self.scenario, self.hill.start
+        self.outages = sorted(
+            (o for o in scenario.outages if o.camera == self.camera), key=lambda outage: outage.begin_s
+        )
+        self.connect(start)
+        pending = list(self.outages)
+        for pulse, time in enumerate(self.hill.times):
+            while pending and time >= start + pending[0].end_s * NS_PER_S:
+                self.back(pending.pop(0))
+            outage = pending[0] if pending and time >= start + pending[0].begin_s * NS_PER_S else None
+            self.see(pulse, time, outage)
+        for outage in pending:
+            self.back(outage)
+        return sorted(self.records, key=lambda entry: entry[0])  # clock readings slip in between the frames
+
+    def connect(self, host: HostNs) -> None:
+        self.epoch += 1
+        self.offset = self.rng.choice([0, self.rng.randrange(10**12), self.rng.randrange(10**17)])
+        self.zero = self.last_arrival = host
+        self.next_id = self.scenario.first_id if self.epoch == 1 else 1
+        self.triggers = 0
+        self.put(host, Record(RecordKind.CONNECTED, self.epoch, host))
+        self.latch_burst(HostNs(host + MS), 16)
+        self.next_burst = host + self.scenario.latch_every_s * NS_PER_S
+
+    def back(self, outage: Outage) -> None:
+        if outage.told_after_s is None:
+            return
+        begin = self.hill.start + outage.begin_s * NS_PER_S
+        told = HostNs(round(begin + outage.told_after_s * NS_PER_S))
+        for _, _, record in self.records:
+            if record.host_time > begin and record.slot in self.hill.pulse_of:
+                # What was on the way is gone with the camera.
+                self.hill.fates[self.hill.pulse_of.pop(record.slot)][self.camera] = FrameStatus.ABSENT
+        self.records = [entry for entry in self.records if entry[0] <= begin]
+        self.put(told, Record(RecordKind.DISCONNECTED, self.epoch, told))
+        self.connect(HostNs(round(self.hill.start + outage.end_s * NS_PER_S)))
+
+    def device(self, host: float) -> DeviceNs:
+        return DeviceNs(self.offset + round((host - self.zero) * self.rate))
+
+    def latch_burst(self, host: HostNs, count: int) -> None:
+        for index in range(count):
+            loaded = index > 0 and self.rng.random() < self.scenario.loaded_latches
+            round_trip = self.rng.randrange(1 * MS, 10 * MS) if loaded else self.rng.randrange(50 * US, 200 * US)
+            time = HostNs(host + index * 100 * US)
+            read_at = time + self.rng.uniform(-0.5, 0.5) * round_trip
+            device = self.device(read_at)
+            self.put(time, Record(RecordKind.LATCH, self.epoch, time, device_time=device, value=round_trip))
+
+    def see(self, pulse: int, time: HostNs, outage: Outage | None) -> None:
+        fates = self.hill.fates[pulse]
+        if outage is not None:
+            fates[self.camera] = FrameStatus.MISSED if outage.told_after_s is None else FrameStatus.ABSENT
+            return
+        while time > self.next_burst:
+            self.latch_burst(HostNs(round(self.next_burst)), 8)
+            self.next_burst += self.scenario.latch_every_s * NS_PER_S
+        fate = fates[self.camera] = self.fate(pulse)
+        if fate is FrameStatus.MISSED:
+            return
+        frame_id, self.next_id = self.next_id, self.next_id + 1
+        if self.scenario.modulus and self.next_id > self.scenario.modulus:
+            self.next_id = 1
+        self.triggers += 1
+        if fate is FrameStatus.LOST:
+            return
+        slot = pulse * self.scenario.cameras + self.camera
+        self.hill.pulse_of[slot] = pulse
+        retention = self.scenario.retention_ns if fate is FrameStatus.DAMAGED else 0
+        # Frames come in the camera's order: a late one holds up those behind it.
+        arrival = max(self.last_arrival, HostNs(time + self.rng.randint(*self.scenario.latency_ns) + retention))
+        self.last_arrival = arrival
+        if fate is FrameStatus.DAMAGED:
+            # ids and times of a damaged frame are left-overs of another one
+            record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, DeviceNs(123))
+        else:
+            device = self.device(time + self.rng.random() * self.scenario.jitter_ns)
+            count = self.triggers if self.scenario.trigger_counts else -1
+            record = Record(
+                RecordKind.FRAME, self.epoch, arrival, slot, frame_id, self.scenario.modulus, device, count
+            )  # fmt: skip
+        self.put(arrival, record)
+
+    def fate(self, pulse: int) -> FrameStatus:
+        scenario = self.scenario
+        fault = scenario.faults.get((pulse, self.camera))
+        if fault is not None:
+            return fault
+        chances = [scenario.missed, scenario.lost, scenario.damaged]
+        names = [FrameStatus.MISSED, FrameStatus.LOST, FrameStatus.DAMAGED, FrameStatus.OK]
+        return self.rng.choices(names, [*chances, 1 - sum(chances)])[0]
+
+    def put(self, arrival: HostNs, record: Record) -> None:
+        self.records.append((arrival, self.camera, record))
+
+
+@dataclass
+class Run:
+    """A hill, seen through a pairer.
+
+    Attributes:
+        closed: the decided pulses.
+        unplaced: slots of the whole frames that the pairer refused.
+        silent: cameras that were silent at some time.
+        most_open: most pulses undecided at a time.
+    """
+
+    hill: Hill
+    pairer: Pairer = field(init=False)
+    closed: list[ClosedPulse] = field(default_factory=list)
+    unplaced: list[int] = field(default_factory=list)
+    silent: set[int] = field(default_factory=set)
+    most_open: int = 0
+
+    def __post_init__(self) -> None:
+        scenario = self.hill.scenario
+        self.pairer = Pairer(scenario.cameras, scenario.period_ns, hold_ns=scenario.hold_ns)
+        for now, batch in _batches(self.hill.events, scenario.batch_ns):
+            if scenario.batch_ns == 0:
+                self.pass_deadlines(now)
+            for camera, record in batch:
+                self.feed(camera, record)
+            self.advance(now)
+        self.pass_deadlines(None)
+
+    def feed(self, camera: int, record: Record) -> None:
+        match record.kind:
+            case RecordKind.FRAME:
+                pulse = self.pairer.frame(camera, record)
+                if pulse is None:
+                    self.unplaced.append(record.slot)
+                else:
+                    _load(pulse, record)
+            case RecordKind.DAMAGED:
+                self.pairer.damaged(camera, record)
+            case RecordKind.LATCH:
+                self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
+            case RecordKind.CONNECTED:
+                self.pairer.connected(camera, record.epoch, record.host_time)
+            case RecordKind.DISCONNECTED:
+                self.pairer.disconnected(camera, record.host_time)
+
+    def pass_deadlines(self, until: HostNs | None) -> None:
+        while (deadline := self.pairer.next_deadline()) is not None and (until is None or deadline < until):
+            self.advance(deadline)
+
+    def advance(self, now: HostNs) -> None:
+        self.closed += self.pairer.advance(now)
+        self.silent |= set(self.pairer.silent())
+
+
+def _load(pulse: OpenPulse, record: Record) -> None:
+    """What the recorder does: it keeps its own things in the pulse's cargo."""
+    if pulse.cargo is None:
+        pulse.cargo = []
+    assert isinstance(pulse.cargo, list)
+    pulse.cargo.append(record.slot)
+
+
+def _batches(
+    events: list[tuple[HostNs, int, Record]], batch_ns: int
+) -> Iterator[tuple[HostNs, list[tuple[int, Record]]]]:
+    """Events as the recorder finds them when it wakes."""
+    index = 0
+    while index < len(events):
+        now = HostNs(events[index][0] + batch_ns)
+        end = index
+        while end < len(events) and events[end][0] <= now:
+            end += 1
+        batch = [(camera, record) for _, camera, record in events[index:end]]
+        yield now, sorted(batch, key=lambda entry: entry[0])
+        index = end

@@ -1,0 +1,253 @@
+"""Which frame belongs to which pulse, and what became of every pulse in every camera.
+
+Frames are paired by their trigger times alone, on the common time line that each camera's drift-tracked clock
+gives: never by the order of arrival, never by equal ids, never by counting from a first frame. The ids then tell
+why a frame did not come. A pure class: records and times go in, decisions come out.
+"""
+
+from bisect import bisect_left
+from collections.abc import Iterable
+from operator import attrgetter
+from typing import Any, Final
+
+from rig.clocks import ClockLatch, HostNs
+from rig.errors import BadInputError
+from rig.frame import FrameStatus, Record
+from triggering.camera_track import CameraTrack
+from triggering.counters import CameraCounters
+from triggering.pulse_train import PulseTrain
+from triggering.pulses import ClosedPulse, OpenPulse, Outcome
+from triggering.undelivered import undelivered_times
+
+__all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
+
+_TOLERANCE_PERIODS: Final = 0.3
+_SILENT_PERIODS: Final = 3
+_TIME: Final = attrgetter("time")
+_NO_FRAME: Final = {status: Outcome(status) for status in FrameStatus}
+
+
+class Pairer:
+    """Pairs the frames of all cameras by pulse.
+
+    Feed it every record that has come, in each camera's own order, and only then call `advance`.
+
+    Args:
+        cameras: how many cameras there are.
+        period_ns: nominal period of the pulses; the true one is tracked and may be some per cent off.
+        hold_ns: how long after a pulse its frames may still come: exposure, transport, retention of damaged
+            frames, and some periods, so that the camera's next frame can tell what became of a missing one.
+        tolerance_ns: frames whose trigger times are this close are of one pulse; 0.3 periods unless given.
+
+    Raises:
+        BadInputError: an argument makes no sense.
+    """
+
+    def __init__(self, cameras: int, period_ns: int, *, hold_ns: int, tolerance_ns: int | None = None) -> None:
+        tolerance = round(_TOLERANCE_PERIODS * period_ns) if tolerance_ns is None else tolerance_ns
+        if cameras < 1 or period_ns <= 0 or not 0 < tolerance < period_ns / 2 or hold_ns < tolerance:
+            raise BadInputError(
+                f"pairing of {cameras} cameras, period {period_ns} ns, tolerance {tolerance} ns, hold {hold_ns} ns "
+                "cannot work: give at least one camera, a tolerance under half the period and a longer hold"
+            )
+        self._hold_ns, self._tolerance_ns = hold_ns, tolerance
+        self._train = PulseTrain(period_ns)
+        self._tracks = [CameraTrack(self._train, tolerance) for _ in range(cameras)]
+        self._open: list[OpenPulse] = []
+        self._examined: OpenPulse | None = None
+        self._closed = 0
+        self._proven_by_ids = 0
+
+    # -- records in ----------------------------------------------------------------------------------------------
+
+    def frame(self, camera: int, record: Record) -> OpenPulse | None:
+        """Place a whole frame.
+
+        Returns:
+            The pulse that it belongs to, or None if it belongs to none that is open: the camera's clock is not
+            known yet, the pulse is decided already, the frame came twice. `counters` tells which.
+        """
+        track = self._tracks[camera]
+        if not self._is_current(track, record):
+            return None
+        time = track.anchor(record)
+        # A frame that was still queued when its camera was given up is welcome, but proves nothing any more.
+        if time is None or (track.connected and not track.follow(record, time)):
+            return None
+        last = self._train.last
+        if last is not None and time <= last + self._tolerance_ns:
+            track.counters.late += 1
+            return None
+        pulse = self._pulse_at(time)
+        if pulse.frames[camera] is not None:
+            track.counters.duplicate += 1
+            return None
+        if pulse.missing < len(self._tracks):
+            # At once, not when the pulse is decided: errors of a backlog must not be corrected many times over.
+            track.clock.correct(record.device_time, pulse.time - time)
+        pulse.add(camera, record, time)
+        return pulse
+
+    def damaged(self, camera: int, record: Record) -> None:
+        """Something arrived that is no whole frame; of the record only `host_time` is used."""
+        track = self._tracks[camera]
+        if not self._is_current(track, record):
+            return
+        if track.connected:
+            track.damaged(record.host_time)
+        else:
+            track.counters.stale += 1
+
+    def latch(self, camera: int, latch: ClockLatch) -> None:
+        """A reading of the camera's clock; those of an epoch come after its `connected`."""
+        self._tracks[camera].latch(latch)
+
+    def connected(self, camera: int, epoch: int, host: HostNs) -> None:
+        """The camera streams: a new epoch begins. Pulses from now on wait for its frames."""
+        self._tracks[camera].connect(epoch, host)
+
+    def disconnected(self, camera: int, host: HostNs) -> None:
+        """The camera is gone: no pulse waits for it any more."""
+        self._tracks[camera].disconnect(host)
+
+    # -- decisions out -------------------------------------------------------------------------------------------
+
+    def advance(self, now: HostNs) -> list[ClosedPulse]:
+        """Decide what can be decided at host time `now`.
+
+        Returns:
+            The pulses decided now, in the order of time.
+        """
+        closed = []
+        while self._open and self._is_due(self._open[0], now):
+            self._insert_undelivered()
+            closed.append(self._close(self._open.pop(0)))
+        return closed
+
+    def next_deadline(self) -> HostNs | None:
+        """When `advance` must be called at the latest although nothing arrives; None if there is no open pulse."""
+        return HostNs(self._open[0].time + self._hold_ns) if self._open else None
+
+    def silent(self) -> tuple[int, ...]:
+        """The connected cameras that have delivered nothing for three periods while others did."""
+        return tuple(camera for camera, track in enumerate(self._tracks) if track.silent)
+
+    @property
+    def counters(self) -> tuple[CameraCounters, ...]:
+        """Totals of each camera."""
+        return tuple(track.counters for track in self._tracks)
+
+    def health(self) -> dict[str, Any]:
+        """Rhythm, spread and each camera's clock and totals, ready for JSON."""
+        train = self._train
+        return {
+            "pulses": self._closed,
+            "proven_by_ids": self._proven_by_ids,
+            "open": len(self._open),
+            "period_us": round(train.period_ns / 1000, 3),
+            "spread_median_us": train.spread_median_ns / 1000,
+            "spread_max_us": train.spread_max_ns / 1000,
+            "alarm": train.alarm,
+            "cameras": [_camera_health(track) for track in self._tracks],
+        }
+
+    # -- details -------------------------------------------------------------------------------------------------
+
+    def _is_current(self, track: CameraTrack, record: Record) -> bool:
+        """Whether a record is of the camera's present epoch; the very first one may begin without notice."""
+        if record.epoch == track.epoch:
+            return True
+        if track.epoch == 0:
+            track.connect(record.epoch, HostNs(record.host_time - self._hold_ns))
+            return True
+        track.counters.stale += 1
+        return False
+
+    def _pulse_at(self, time: HostNs) -> OpenPulse:
+        """The open pulse nearest to a trigger time, a new one if there is none within the tolerance."""
+        position = bisect_left(self._open, time, key=_TIME)
+        nearest, least = None, self._tolerance_ns
+        for pulse in self._open[max(0, position - 1) : position + 1]:
+            if abs(pulse.time - time) <= least:
+                nearest, least = pulse, abs(pulse.time - time)
+        if nearest is None:
+            nearest = OpenPulse(len(self._tracks), time)
+            self._open.insert(position, nearest)
+        return nearest
+
+    def _is_due(self, pulse: OpenPulse, now: HostNs) -> bool:
+        """Whether the oldest open pulse can be decided."""
+        if pulse.missing == 0 or pulse.proven_by_ids:
+            return True
+        if now >= pulse.time + self._hold_ns:
+            self._notice_silence(pulse)
+            return True
+        return not any(track.may_deliver(pulse.time) for track in self._lacking(pulse))
+
+    def _lacking(self, pulse: OpenPulse) -> Iterable[CameraTrack]:
+        return (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)
+
+    def _notice_silence(self, pulse: OpenPulse) -> None:
+        """At a pulse's deadline: which of the cameras that it lacks are silent?"""
+        for track in self._lacking(pulse):
+            if not track.may_deliver(pulse.time) or track.alive > pulse.time:
+                continue
+            periods, before = track.unanswered, pulse.time
+            for other in self._open:
+                # Younger pulses may well be on their way. One that the others did not deliver either counts too.
+                if other.time - pulse.time < (_SILENT_PERIODS - 0.5) * self._train.period_ns:
+                    periods += 1 + self._train.room(other.time - before)
+                    before = other.time
+            if periods >= _SILENT_PERIODS:
+                track.silent = True
+                track.counters.silences += 1
+
+    def _insert_undelivered(self) -> None:
+        """Put the pulses that nobody delivered before the one that is about to be decided."""
+        pulse = self._open[0]
+        if pulse.proven_by_ids or pulse is self._examined:
+            return
+        self._examined = pulse
+        times = undelivered_times(self._open, self._tracks, self._train, self._tolerance_ns)
+        self._open[:0] = [OpenPulse(len(self._tracks), time, proven_by_ids=True) for time in times]
+
+    def _close(self, pulse: OpenPulse) -> ClosedPulse:
+        outcomes = []
+        for camera, track in enumerate(self._tracks):
+            record, time = pulse.frames[camera], pulse.times[camera]
+            if record is None or time is None:
+                outcome = _NO_FRAME[track.settle(pulse.time, self._rivals(camera, track))]
+            else:
+                track.forget_until(time)
+                offset = time - pulse.time
+                outcome = Outcome(FrameStatus.OK, record, offset)
+            track.counters.outcomes[outcome.status] += 1
+            outcomes.append(outcome)
+        self._train.advance(pulse.time, pulse.spread_ns)
+        self._closed += 1
+        self._proven_by_ids += pulse.proven_by_ids
+        return ClosedPulse(self._closed, pulse.time, tuple(outcomes), pulse.cargo)
+
+    def _rivals(self, camera: int, track: CameraTrack) -> list[HostNs]:
+        """Times of the later pulses that lack the camera too, up to its next frame."""
+        times: list[HostNs] = []
+        if track.has_damaged():
+            for pulse in self._open:
+                if pulse.frames[camera] is not None:
+                    break
+                times.append(pulse.time)
+        return times
+
+
+def _camera_health(track: CameraTrack) -> dict[str, Any]:
+    clock = track.clock
+    return {
+        "connected": track.connected,
+        "silent": track.silent,
+        "clock_known": clock.known,
+        "clock_offset_ns": str(clock.offset_ns),
+        "clock_drift_ppm": round(clock.drift_ppm, 3),
+        "clock_uncertainty_us": round(clock.uncertainty_ns / 1000, 3) if clock.known else None,
+        "latency_ms": round(track.latency_ns / 1e6, 3),
+        **track.counters.to_json(),
+    }

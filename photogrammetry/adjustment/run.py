@@ -6,14 +6,17 @@ import numpy as np
 
 from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
 from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation, find_blunders
-from photogrammetry.adjustment.state import State
+from photogrammetry.adjustment.misfits import find_misfits
+from photogrammetry.adjustment.state import State, state_of
 from photogrammetry.adjustment.variance_components import Component, estimate_by_paper, estimate_components
+from photogrammetry.adjustment.wording import name_of
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Network, Reweight, Role
 from rig.errors import BadInputError
 
 #: Snooping stops when this part of all observations has been taken out: something else is wrong then.
 _MOST_REMOVED = 0.1
+_NAMED = 5  # so many misfits stand in an error message
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,13 +65,13 @@ def adjust(network: Network, start: State | None = None, *, snoop: bool = False)
         NotConvergedError: no optimum was reached, or weights that were asked for do not settle.
         BadInputError: a start value is missing, or too few control points for the paper's D5.
     """
-    adjustment = adjust_once(network, start)
+    adjustment, removed = _first(network, state_of(network) if start is None else start, snoop=snoop)
     if not adjustment.problem.n_observations:
         raise BadInputError("the network has no observations: nothing to adjust; add some")
     blunders = find_blunders(adjustment)
-    removed: list[Removed] = []
     if snoop:
-        adjustment, blunders, removed = _snooped(adjustment, blunders)
+        adjustment, blunders, further = _snooped(adjustment, blunders)
+        removed += further
     components: tuple[Component, ...] | None
     if network.reweight is Reweight.NONE:
         try:
@@ -80,6 +83,26 @@ def adjust(network: Network, start: State | None = None, *, snoop: bool = False)
         components, adjustment = estimate(adjustment)
         blunders = find_blunders(adjustment)
     return Outcome(adjustment, tuple(blunders), components, tuple(removed))
+
+
+def _first(network: Network, start: State, *, snoop: bool) -> tuple[Adjustment, list[Removed]]:
+    """Adjust; where that does not converge, say which observations are to blame, or take them out if that is wanted."""
+    try:
+        return adjust_once(network, start), []
+    except NotConvergedError as error:
+        misfits, state = find_misfits(network, start)
+        if not misfits:
+            raise
+        if not snoop:
+            names = "; ".join(name_of(network, misfit.suspect) for misfit in misfits[:_NAMED])
+            raise NotConvergedError(
+                f"no optimum, because something is grossly wrong: {names}; measure again, or let --snoop take it out"
+            ) from error
+    removed = []
+    for misfit in sorted(misfits, key=lambda misfit: -misfit.suspect.index):  # from behind: indices in front stay
+        removed.append(Removed(misfit, network))
+        network = without(network, misfit.suspect)
+    return adjust_once(network, state), removed
 
 
 def _snooped(adjustment: Adjustment, blunders: list[Blunder]) -> tuple[Adjustment, list[Blunder], list[Removed]]:

@@ -1,6 +1,6 @@
 """Damped Gauss-Newton: shorter steps, then Levenberg's damping, help on the way and are gone at the optimum."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ _MOST_DAMPING = 1e8
 _MORE, _LESS = 10.0, 0.1
 #: A change of the square sum below this part of it cannot be measured any more.
 _ROUNDING = 1e-12
+_ROBUST_STEPS = 40
+_DOUBTFUL = 2.0  # typical residuals: from here on an observation counts less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,20 +67,58 @@ def solve(problem: Problem, start: State, defect: int) -> Solution:
     Raises:
         NotConvergedError: no optimum within `MAX_ITERATIONS`, or none reachable.
     """
-    progress = _Progress(start, problem.square_sum(start), problem.behind(start))
-    if not np.isfinite(progress.square_sum):
-        raise NotConvergedError("the start values have no images (a point in a projection centre); give better ones")
-    redundancy = max(1, problem.n_observations - problem.unknowns.count + defect)
+    progress = _begin(problem, start)
     while progress.iterations < MAX_ITERATIONS:
-        equations = problem.equations(progress.state)
-        normals = build_normals(problem, equations)
-        sigma0 = max(np.sqrt(equations.square_sum / redundancy), _EXACT)
-        free = find_free_datum(problem, normals, progress.state, defect) if defect else NOTHING_FREE
-        if _advance(problem, normals, free, progress, ARRIVED * sigma0):
+        free = _iterate(problem, progress, defect)
+        if free is not None:
             return Solution(progress.state, progress.iterations, free)
     raise NotConvergedError(
         f"no optimum after {MAX_ITERATIONS} iterations; give better start values, or estimate fewer camera parameters"
     )
+
+
+def robust_state(problem: Problem, start: State, defect: int) -> State:
+    """Values that a few gross errors do not draw away: residuals count by their size, not by its square.
+
+    Observations that fit badly get larger standard deviations (Huber), anew after every step. No optimum of anything
+    that is reported; it shows what does not fit.
+
+    Args:
+        problem: the network made ready.
+        start: start values.
+        defect: number of free similarity transformations.
+
+    Raises:
+        NotConvergedError: it leads nowhere.
+    """
+    state = start
+    for _ in range(_ROBUST_STEPS):
+        v = problem.equations(state).v
+        typical = max(float(np.median(np.abs(v))) / 0.6745, 1.0)
+        doubt = np.sqrt(np.maximum(np.linalg.norm(v, axis=1, keepdims=True) / (_DOUBTFUL * typical), 1.0))
+        softened = replace(problem, sigma=problem.sigma * typical * doubt)
+        progress = _begin(softened, state)
+        if _iterate(softened, progress, defect) is not None:
+            return progress.state
+        state = progress.state
+    return state
+
+
+def _begin(problem: Problem, start: State) -> _Progress:
+    progress = _Progress(start, problem.square_sum(start), problem.behind(start))
+    if not np.isfinite(progress.square_sum):
+        raise NotConvergedError("the start values have no images (a point in a projection centre); give better ones")
+    return progress
+
+
+def _iterate(problem: Problem, progress: _Progress, defect: int) -> FreeDatum | None:
+    """One step; the free motions at the optimum when it was the last one."""
+    redundancy = max(1, problem.n_observations - problem.unknowns.count + defect)
+    equations = problem.equations(progress.state)
+    normals = build_normals(problem, equations)
+    sigma0 = max(np.sqrt(equations.square_sum / redundancy), _EXACT)
+    free = find_free_datum(problem, normals, progress.state, defect) if defect else NOTHING_FREE
+    return free if _advance(problem, normals, free, progress, ARRIVED * sigma0) else None
 
 
 def _advance(problem: Problem, normals: Normals, free: FreeDatum, progress: _Progress, enough: float) -> bool:

@@ -9,6 +9,7 @@ from photogrammetry.adjustment.adjustment import adjust_once
 from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation, find_blunders
 from photogrammetry.adjustment.run import adjust
 from photogrammetry.adjustment.wording import blunder_to_json, describe
+from photogrammetry.diagnosis import NotConvergedError
 from photogrammetry.network import Difference, Distance, Network, Role
 from tests.photogrammetry.synthetic import hill, lab_frame, rods
 
@@ -146,3 +147,28 @@ def test_a_blunder_in_a_network_of_little_redundancy_does_not_hide_in_sigma0() -
     row = _row(network, 1, 2)
     found = find_blunders(adjust_once(_spoilt(network, row, (30.0, 30.0))))
     assert any(Observation(BlunderKind.IMAGE, row) in (b.suspect, *b.candidates) for b in found)
+
+
+def _with_a_wild_observation() -> tuple[Network, int]:
+    """So wrong that no optimum is reached."""
+    network = rods(3).network
+    row = _row(network, 1, 12)
+    return _spoilt(network, row, (-200.0, 220.0)), row
+
+
+def test_what_keeps_an_adjustment_from_converging_is_named() -> None:
+    network, row = _with_a_wild_observation()
+    o = network.observations
+    name = f"point {network.points[o.point[row]].name} in image {network.images[o.image[row]].name}"
+    with pytest.raises(NotConvergedError, match=f"grossly wrong: {name}; measure again"):
+        adjust(network)
+
+
+def test_snooping_takes_out_what_keeps_it_from_converging() -> None:
+    network, row = _with_a_wild_observation()
+    outcome = adjust(network, snoop=True)
+    assert outcome.removed[0].blunder.suspect == Observation(BlunderKind.IMAGE, row)
+    # a robust solution is no optimum, but its idea of the error is near: 3 % of it
+    assert np.abs(outcome.removed[0].blunder.estimate - (-200.0, 220.0)).max() < 10.0
+    assert outcome.blunders == ()
+    assert outcome.adjustment.ratio == pytest.approx(1.0, abs=0.2)

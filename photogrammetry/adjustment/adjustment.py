@@ -1,6 +1,6 @@
 """The adjustment of a network: solved, with covariance, redundancy and tests."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from photogrammetry.adjustment.problem import Equations, Problem, build_problem
 from photogrammetry.adjustment.rank import check_rank
 from photogrammetry.adjustment.solver import solve
 from photogrammetry.adjustment.state import Floats, State, state_of
-from photogrammetry.adjustment.statistics import Redundancy, redundancy, w_values
+from photogrammetry.adjustment.statistics import Redundancy, minimal_detectable, redundancy, w_values
 from photogrammetry.adjustment.unknowns import Integers
 from photogrammetry.diagnosis import Defect, DefectKind, NotSolvableError
 from photogrammetry.network import Network
@@ -87,6 +87,10 @@ class Adjustment:
         """Test values of the image coordinates, problem's order: (n, 2); NaN where uncontrolled."""
         return w_values(self.equations.v, self.controlled.image_numbers, self.ratio)
 
+    def image_detectable(self) -> Floats:
+        """Minimal detectable blunder of the image coordinates, image unit: (n, 2); infinite where uncontrolled."""
+        return minimal_detectable(self.problem.sigma * self.ratio, self.controlled.image_numbers)
+
     def relation_residuals(self) -> Floats:
         """Residuals of the other observations in their units: (m,)."""
         return self.equations.relations.v * self.problem.relation_sigma
@@ -94,6 +98,24 @@ class Adjustment:
     def relation_w(self) -> Floats:
         """Test values of the other observations: (m,)."""
         return w_values(self.equations.relations.v, self.controlled.relation, self.ratio)
+
+    def relation_detectable(self) -> Floats:
+        """Minimal detectable blunder of the other observations in their units: (m,)."""
+        return minimal_detectable(self.problem.relation_sigma * self.ratio, self.controlled.relation)
+
+    def in_datum(self, points: Integers) -> "Adjustment":
+        """The same free network in the datum of inner constraints over other points (S-transformation).
+
+        Values stay: the new datum points are where they are now. Only the cofactors change.
+
+        Args:
+            points: indices of the new datum points.
+
+        Raises:
+            DatumError: they do not define a datum.
+        """
+        moves, conditions = inner_operator(self.problem, self.state, self.free, points)
+        return replace(self, cofactors=s_transform(self.cofactors, moves, conditions))
 
 
 def adjust_once(network: Network, start: State | None = None) -> Adjustment:

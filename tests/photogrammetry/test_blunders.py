@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from photogrammetry.adjustment.adjustment import adjust_once
+from photogrammetry.adjustment.adjustment import adjust_once, refine
 from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation, find_blunders
+from photogrammetry.adjustment.problem import build_problem
 from photogrammetry.adjustment.run import adjust
+from photogrammetry.adjustment.state import with_state
 from photogrammetry.adjustment.wording import blunder_to_json, describe
 from photogrammetry.diagnosis import NotConvergedError
 from photogrammetry.network import Difference, Distance, Network, Role
-from tests.photogrammetry.synthetic import hill, lab_frame, rods
+from tests.photogrammetry.synthetic import hill, lab_frame, rods, with_noise
 
 
 def _spoilt(network: Network, row: int, error: tuple[float, float]) -> Network:
@@ -80,6 +82,25 @@ def test_distance_and_difference_are_found() -> None:
     wrong_differences = (replace(more[0], value=0.5), *more[1:])
     found = _worst(replace(network, differences=wrong_differences))
     assert Observation(BlunderKind.DIFFERENCE, 0) in (found.suspect, *found.candidates)
+
+
+def test_minimal_detectable_blunder_is_detected_four_times_out_of_five() -> None:
+    """Significance 0.1 % for a single test, power 80 %: over 150 repetitions the count is 120 +- 5."""
+    made = hill(5, noise=0.0)
+    reference = adjust_once(with_state(made.network, made.truth))
+    place = int(np.flatnonzero(reference.problem.order == _row(made.network, 1, 3))[0])
+    r = reference.controlled.image_numbers[place, 0]
+    size = 4.13 * 0.33 / np.sqrt(r)
+    exact = with_state(made.network, made.truth)
+    rng, found = np.random.default_rng(3), 0
+    for _ in range(150):
+        spoilt = _spoilt(with_noise(exact, rng), _row(exact, 1, 3), (size, 0.0))
+        again = refine(build_problem(spoilt), reference)
+        # with the a-priori sigma0, as the definition has it
+        found += abs(again.image_w()[place, 0]) * again.ratio > 3.29
+    assert found == pytest.approx(120, abs=20)
+    assert reference.image_detectable()[place, 0] == pytest.approx(size * reference.ratio)
+    assert np.all(np.isfinite(reference.relation_detectable()))
 
 
 def test_two_rays_cannot_say_which_of_them_is_wrong() -> None:

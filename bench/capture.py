@@ -10,11 +10,13 @@ from typing import Any
 from bench.gstreamer import SINKS, run_gstreamer
 from bench.loads import PRERENDERED, Load
 from bench.processes import cpu_seconds
-from rig.clocks import host_now
+from rig.clocks import HostNs, UtcAnchor, UtcNs, host_now
+from simrig.simulated_hill import SimulatedHill
 from svev.process_table import ProcessSpec, ProcessTable
 from svev.recording_run import new_log_path
 from svev.running_rig import RunningRig
 from svev.simulation import simulated_hill
+from svev.subscriber_process import median_and_p99
 
 _SUBSCRIBER_S = 10.0
 
@@ -27,10 +29,10 @@ def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> di
     """
     rig = load.rig(directory, publish)
     epoch = host_now()
-    with simulated_hill(rig, epoch, prerendered=PRERENDERED, link_mbit_s=load.link_mbit_s):
+    with simulated_hill(rig, epoch, prerendered=PRERENDERED, link_mbit_s=load.link_mbit_s) as hill:
         result: dict[str, Any] = {"load": load.name, "MB_per_s": round(load.bytes_per_s / 1e6, 1), "seconds": seconds}
-        result["svev"] = _record(load, seconds, directory, publish, subscribe=False)
-        result["svev, one subscriber"] = _record(load, seconds, directory, publish, subscribe=True)
+        result["svev"] = _record(load, seconds, directory, publish)
+        result["svev, one subscriber"] = _record(load, seconds, directory, publish, hill)
         for sink in SINKS:
             result[sink] = run_gstreamer(load, rig, sink, seconds, directory)
     ours = result["svev"]["cpu_s_per_GB"]
@@ -38,8 +40,10 @@ def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> di
     return result
 
 
-def _record(load: Load, seconds: float, directory: Path, publish: str, *, subscribe: bool) -> dict[str, Any]:
-    """One recording; the log is removed afterwards."""
+def _record(
+    load: Load, seconds: float, directory: Path, publish: str, subscribed_hill: SimulatedHill | None = None
+) -> dict[str, Any]:
+    """One recording; the log is removed afterwards. With a hill, a subscriber counts and measures latencies."""
     rig = load.rig(directory, publish)
     path = new_log_path(directory)
     pulses = round(seconds * load.rate_hz)
@@ -47,23 +51,37 @@ def _record(load: Load, seconds: float, directory: Path, publish: str, *, subscr
     try:
         with RunningRig(rig, "", lambda _: None) as running:
             running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
-            if subscribe:
-                subscriber.start(ProcessSpec("subscriber", "svev.subscriber_process", {"address": publish}))
+            if subscribed_hill is not None:
+                config = {"address": publish, "arrivals": True}
+                subscriber.start(ProcessSpec("subscriber", "svev.subscriber_process", config))
                 _await_report(subscriber, "ready")
             before, began = cpu_seconds(running.pids.values()), time.monotonic()
             running.start_recording(path, recording="bench", session={}, pulses=pulses, seconds=seconds)
             report = running.wait_until_finished(lambda _: None, lambda: False)
             cpu, elapsed = cpu_seconds(running.pids.values()) - before, time.monotonic() - began
             figures = _figures(load, report, cpu, elapsed)
-            figures["slowest_write_ms"] = running.health.get("recording", {}) and running.health["recording"]
-            if subscribe:
+            if subscribed_hill is not None:
                 subscriber["subscriber"].control.send({"command": "quit"})
                 counted = _await_report(subscriber, "counted")
                 figures |= {key: counted[key] for key in ("received", "missing", "latency_ms")}
+                figures["latency_from_cable_ms"] = _latency_from_cable(counted["arrivals"], subscribed_hill)
             return figures
     finally:
         subscriber.stop()
         path.unlink(missing_ok=True)
+
+
+def _latency_from_cable(arrivals: list[tuple[int, int]], hill: SimulatedHill) -> dict[str, float | None]:
+    """From the moment in which the last camera sent its last packet to the message in the subscriber, ms."""
+    sent = [camera.last_packets for camera in hill.statistics().values()]
+    anchor, train, latencies = UtcAnchor.take(), hill.train, []
+    for pulse_utc, arrived_utc in arrivals:
+        # The pulse's time is known to microseconds, the next pulse is a period away.
+        pulse = train.next_index(HostNs(anchor.host(UtcNs(pulse_utc)) - round(0.5e9 / train.rate_hz)))
+        times = [packets[pulse] for packets in sent if pulse in packets]
+        if len(times) == len(sent):
+            latencies.append((anchor.host(UtcNs(arrived_utc)) - max(times)) / 1e6)
+    return median_and_p99(latencies)
 
 
 def _figures(load: Load, report: dict[str, Any], cpu: float, elapsed: float) -> dict[str, Any]:

@@ -32,8 +32,8 @@ def run_gstreamer(load: Load, rig: RigSettings, sink: str, seconds: float, direc
     try:
         time.sleep(_WARM_S)  # pipelines do not tell when they play
         pids = [pipeline.pid for pipeline in pipelines]
-        if dead := [pipeline.args for pipeline in pipelines if pipeline.poll() is not None]:
-            raise CameraError(f"GStreamer does not play: {dead[0]}; try it by hand")
+        if any(pipeline.poll() is not None for pipeline in pipelines):
+            raise CameraError("GStreamer does not play: see its message above, and try aravissrc by hand")
         before, sizes = cpu_seconds(pids), _sizes(files)
         time.sleep(seconds)
         cpu, written = cpu_seconds(pids) - before, _sizes(files) - sizes

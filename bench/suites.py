@@ -32,8 +32,10 @@ def _capture_table(result: dict[str, Any]) -> list[str]:
         case = result[name]
         triplets = f"{case['complete']} of {case['pulses']}" if "pulses" in case else ""
         if "latency_ms" in case:
-            latency = case["latency_ms"]
-            triplets += f"; subscriber got {case['received']}, latency {latency['median']} / {latency['p99']} ms"
+            memory, cable = case["latency_ms"], case["latency_from_cable_ms"]
+            triplets += f"; subscriber got {case['received']}; latency, median and 99 %, from the frame in memory "
+            triplets += f"{memory['median']} and {memory['p99']} ms, "
+            triplets += f"from the last packet sent {cable['median']} and {cable['p99']} ms"
         lines.append(f"{name:22}{case['cpu_s_per_GB']:9.3f}{case['MB_per_s']:8.1f}  {triplets}")
     return lines + [f"{name}: {ratio}" for name, ratio in result["ratios"].items()]
 

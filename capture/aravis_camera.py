@@ -8,6 +8,7 @@ Never believe the ids of a buffer whose status is not SUCCESS: they may be those
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import gi
 
@@ -30,10 +31,13 @@ _TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
 _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
 
 _IDS_16_BIT = 65535
+_SOCKET_BUFFER = 8 << 20  # the kernel grants at most net.core.rmem_max
+_SLOW_BYTES_PER_S = 20e6
+_STALL_FRAMES = 8
 # How many empty buffers stand in Aravis's queue: half a second of frames, but not more than stay in the cache.
 _QUEUE_S = 0.5
-_QUEUE_BYTES = 12 << 20
-_QUEUE_LEAST = 5
+_QUEUE_BYTES = 24 << 20
+_QUEUE_LEAST = 8
 
 
 class AravisCamera:
@@ -47,6 +51,7 @@ class AravisCamera:
     def __init__(self, settings: CameraSettings, network: NetworkSettings, ring: CameraRing, period_ns: int) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
         self._lost = False
+        self._plain_socket = network.packet_socket == "off" or _plain_socket_will_do(settings.frame_bytes, period_ns)
         self._buffers: dict[int, int] = {}
         self._of_slot: list[Aravis.Buffer] = []
         self._in_aravis = 0
@@ -158,7 +163,7 @@ class AravisCamera:
         camera.set_region(region.x, region.y, region.width, region.height)
         camera.set_pixel_format_from_string(settings.pixel_format)
         camera.gv_set_packet_size(network.packet_size)
-        if network.packet_socket == "off":
+        if self._plain_socket:
             camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
         camera.set_trigger(settings.trigger_input)
         edge = {"rising": "RisingEdge", "falling": "FallingEdge"}[settings.trigger_edge]
@@ -185,14 +190,14 @@ class AravisCamera:
         resend = Aravis.GvStreamPacketResend.ALWAYS if network.resend else Aravis.GvStreamPacketResend.NEVER
         # A packet socket hands packets over in blocks of up to 5 ms: asking again any sooner asks for packets
         # that have already come. A good frame waits behind a damaged one for `frame-retention`, so keep that short.
-        packet_timeout_us = 3_000 if network.packet_socket == "off" else 8_000
+        packet_timeout_us = 3_000 if self._plain_socket else 8_000
         for name, value in {
             "packet-resend": resend,
             "packet-timeout": packet_timeout_us,
             "initial-packet-timeout": packet_timeout_us // 3,
             "frame-retention": max(25_000, min(100_000, period_ns * 3 // 4000)),
             "socket-buffer": Aravis.GvStreamSocketBuffer.FIXED,
-            "socket-buffer-size": 8 << 20,
+            "socket-buffer-size": _SOCKET_BUFFER,
         }.items():
             stream.set_property(name, value)
         for slot in range(self._ring.slots):
@@ -221,6 +226,15 @@ class AravisCamera:
                 "use another camera or its newest firmware"
             )
         return frequency
+
+
+def _plain_socket_will_do(frame_bytes: int, period_ns: int) -> bool:
+    """Whether a plain socket is the better choice: a slow camera, and a receive buffer that rides out a stall.
+
+    A packet socket costs far less at high rates, but hands packets over in blocks, up to 5 ms late.
+    """
+    buffer_bytes = int(Path("/proc/sys/net/core/rmem_max").read_text(encoding="ascii"))
+    return frame_bytes * NS_PER_S / period_ns <= _SLOW_BYTES_PER_S and buffer_bytes >= _STALL_FRAMES * frame_bytes
 
 
 def _opening_error(settings: CameraSettings, error: GLib.Error) -> CameraError | CameraNotFoundError:

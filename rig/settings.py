@@ -88,8 +88,8 @@ class NetworkSettings(_Strict):
     )
     packet_socket: Literal["auto", "off"] = Field(
         "auto",
-        description="auto: receive through a packet socket where permitted (CAP_NET_RAW), much cheaper at high rates; "
-        "off: plain sockets, a few ms sooner at low rates",
+        description="auto: receive through a packet socket where permitted (CAP_NET_RAW) and the camera is fast or "
+        "net.core.rmem_max small; off: always through plain sockets",
     )
     resend: bool = Field(True, description="ask the camera again for lost packets")
 

@@ -123,13 +123,23 @@ def _camera_defect(problem: Problem, local: _Local) -> Defect:
 
 
 def _image_defects(problem: Problem, found: Sequence[_Local]) -> list[Defect]:
+    """One entry for all images that nothing is seen in, one for each other."""
+    names = [problem.network.images[local.index].name for local in found]
+    seen = [int(np.sum(problem.image == local.index)) for local in found]
+    sizes = [local.null.shape[1] for local in found]
+    empty = tuple(name for name, count in zip(names, seen, strict=True) if count == 0)
     defects = []
-    for local in found:
-        name, seen = problem.network.images[local.index].name, int(np.sum(problem.image == local.index))
-        defect = local.null.shape[1]
-        what = "has no observations" if seen == 0 else f"its {seen} observations do not determine its pose"
-        message = f"image {name}: {what} ({defect} undetermined); observe more points in it, or drop it"
-        defects.append(Defect(DefectKind.IMAGES, defect, message, images=(name,)))
+    if empty:
+        size = sum(size for size, count in zip(sizes, seen, strict=True) if count == 0)
+        message = f"{_named('image', empty)} without observations ({size} undetermined): observe points, or drop them"
+        defects.append(Defect(DefectKind.IMAGES, size, message, images=empty))
+    for name, count, size in zip(names, seen, sizes, strict=True):
+        if count:
+            message = (
+                f"image {name}: {count} observed points do not determine its pose ({size} undetermined); "
+                "observe more points in it, or drop it"
+            )
+            defects.append(Defect(DefectKind.IMAGES, size, message, images=(name,)))
     return defects
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from photogrammetry.adjustment.acceleration import Acceleration
 from photogrammetry.adjustment.datum import NOTHING_FREE, FreeDatum, find_free_datum, similarity_directions
 from photogrammetry.adjustment.normals import Normals, SingularError, build_normals, factorise
-from photogrammetry.adjustment.problem import Problem
+from photogrammetry.adjustment.problem import Equations, Problem
 from photogrammetry.adjustment.state import Floats, State
 from photogrammetry.diagnosis import NotConvergedError
 
@@ -118,7 +118,15 @@ def _iterate(problem: Problem, progress: _Progress, defect: int) -> FreeDatum | 
     normals = build_normals(problem, equations)
     sigma0 = max(np.sqrt(equations.square_sum / redundancy), _EXACT)
     free = find_free_datum(problem, normals, progress.state, defect) if defect else NOTHING_FREE
-    return free if _advance(problem, normals, free, progress, ARRIVED * sigma0) else None
+    enough = max(ARRIVED * sigma0, _coordinate_noise(problem, equations, progress.state))
+    return free if _advance(problem, normals, free, progress, enough) else None
+
+
+def _coordinate_noise(problem: Problem, equations: Equations, state: State) -> float:
+    """What the last bit of the coordinates does to a step: they may be counted from far away (a national grid)."""
+    largest = max(np.abs(state.xyz).max(initial=0.0), np.abs(state.position).max(initial=0.0))
+    slope = np.abs(equations.by_point).max(initial=0.0)
+    return float(np.finfo(float).eps * largest * slope * np.sqrt(problem.unknowns.count))
 
 
 def _advance(problem: Problem, normals: Normals, free: FreeDatum, progress: _Progress, enough: float) -> bool:

@@ -19,7 +19,9 @@ from rig.ring import CameraRing
 _LATCHES_AT_START: Final = 16
 _LATCH_EVERY_NS: Final = NS_PER_S // 4
 _COUNT_EVERY_NS: Final = NS_PER_S
+_QUIET_NS: Final = NS_PER_S
 _RECEIVE_S: Final = 0.05
+_LAST_LOOK_S: Final = 0.001
 _RETRY_S: Final = 0.5
 
 
@@ -69,18 +71,22 @@ class Grabber:
         for _ in range(_LATCHES_AT_START):
             self._put_latch(camera.latch())
         camera.start()
-        next_latch = next_count = host_now()
+        next_latch = next_count = last_arrival = host_now()
         while not self._stopping():
             requests = self._ring.reconnect_requests()
-            arrival = camera.receive(_RECEIVE_S)
+            arrival = camera.receive(_RECEIVE_S if requests == asked else _LAST_LOOK_S)
             if arrival is not None:
                 self._put_arrival(arrival)
             elif requests != asked:
                 # Asked before we looked once more: the camera is silent, not we were late.
                 raise CameraError("no frame while the other cameras have theirs; connecting again")
             asked = requests
-            # Clock and counters are read just after a frame, when the next one is farthest away.
+            # Clock and counters are read just after a frame, when the next one is farthest away and the camera is sure
+            # to answer: a dead one blocks for seconds. Without pulses they are read all the same, but not at once.
             now = host_now()
+            last_arrival = now if arrival is not None else last_arrival
+            if arrival is None and now < last_arrival + _QUIET_NS:
+                continue
             if now >= next_latch:
                 self._put_latch(camera.latch())
                 next_latch = HostNs(now + _LATCH_EVERY_NS)

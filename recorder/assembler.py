@@ -7,6 +7,7 @@ free again at once. If the disk is behind and no triplet buffer is free, frames 
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,14 +35,21 @@ def least_buffers(period_ns: int) -> int:
     return 2 * (hold_ns(period_ns) // period_ns + 1)
 
 
+class CameraState(StrEnum):
+    """What a camera has just become."""
+
+    CONNECTED = "connected"
+    SILENT = "silent"  #: connected, but three pulses behind the others; its grabber looks after it
+    GONE = "gone"
+
+
 @dataclass(frozen=True, slots=True)
 class CameraChange:
-    """A camera came, went, or fell silent."""
+    """A camera came, fell silent, or went."""
 
     camera: int
-    present: bool
+    state: CameraState
     text: str
-    time: HostNs
 
 
 class _Composition:
@@ -184,14 +192,14 @@ class Assembler:
             case RecordKind.CONNECTED:
                 self.pairer.connected(camera, record.epoch, record.host_time)
                 self.connected[camera] = True
-                self._changes.append(CameraChange(camera, True, record.text, record.host_time))
+                self._changes.append(CameraChange(camera, CameraState.CONNECTED, record.text))
             case RecordKind.DISCONNECTED:
                 self._leave(camera, record.text, record.host_time)
 
     def _leave(self, camera: int, reason: str, time: HostNs) -> None:
         self.pairer.disconnected(camera, time)
         self.connected[camera] = False
-        self._changes.append(CameraChange(camera, False, reason, time))
+        self._changes.append(CameraChange(camera, CameraState.GONE, reason))
 
     def _place(self, camera: int, record: Record, pulse: OpenPulse) -> None:
         """Copy a frame into its triplet, or let it wait until there is a buffer for it."""
@@ -233,9 +241,11 @@ class Assembler:
                 block.fill(0)
 
     def _ask_silent_cameras(self) -> None:
-        """Once per silence, ask the grabber to connect its camera again."""
-        silent = self.pairer.silent()
+        """Once per silence, ask the grabber to look after its camera."""
+        silent = {*self.pairer.silent(), *self.pairer.overdue()}
         for camera, ring in enumerate(self._rings):
             if camera in silent and not self._asked[camera]:
                 ring.request_reconnect()
+                text = "three pulses behind the other cameras; looking after it"
+                self._changes.append(CameraChange(camera, CameraState.SILENT, text))
             self._asked[camera] = camera in silent

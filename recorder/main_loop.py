@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from recorder.assembler import Assembler, CameraChange, Triplet, least_buffers
+from recorder.assembler import Assembler, CameraChange, CameraState, Triplet, least_buffers
 from recorder.events import Event, Level
 from recorder.publisher import Publisher
 from recorder.recording import Recording, RecordingOrder
@@ -25,6 +25,11 @@ from rig.ring import CameraRing
 from rig.settings import RigSettings
 from triggering.pairing import ClosedPulse
 
+_LEVELS: Final = {
+    CameraState.CONNECTED: Level.INFO,
+    CameraState.SILENT: Level.WARNING,
+    CameraState.GONE: Level.ERROR,
+}
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _WARM_PULSES: Final = 3
 
@@ -160,9 +165,9 @@ class RecorderLoop:
             self._report("failed", kind=type(error).__name__, message=str(error))
 
     def _camera_changed(self, change: CameraChange) -> None:
-        self._report("camera", camera=change.camera, present=change.present, text=change.text)
-        level, state = (Level.INFO, "connected") if change.present else (Level.ERROR, "gone")
-        self._happened(Event.now(level, self._rig.cameras[change.camera].name, f"{state}: {change.text}"))
+        self._report("camera", camera=change.camera, state=change.state.value, text=change.text)
+        name = self._rig.cameras[change.camera].name
+        self._happened(Event.now(_LEVELS[change.state], name, f"{change.state}: {change.text}"))
 
     def _happened(self, event: Event) -> None:
         """Publish an event, and write it into the recording if there is one."""

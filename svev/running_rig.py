@@ -16,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
+from recorder.assembler import CameraState
 from rig.clocks import HostNs, host_now
 from rig.control import Message
 from rig.errors import (
@@ -196,9 +197,10 @@ class RunningRig:
         self._tend_processes()
 
     def _note_camera(self, message: Message) -> None:
-        index, name = message["camera"], self._rig.cameras[message["camera"]].name
-        self._present[index], self._reasons[index] = message["present"], message["text"]
-        self._on_event(f"{name} {'connected' if message['present'] else 'gone'}: {message['text']}")
+        index, state, text = message["camera"], message["state"], message["text"]
+        if state != CameraState.SILENT:
+            self._present[index], self._reasons[index] = state == CameraState.CONNECTED, text
+        self._on_event(f"{self._rig.cameras[index].name} {state}: {text}")
 
     def _tend_processes(self) -> None:
         """Start dead grabbers again, each at most once a second; a dead recorder ends everything."""

@@ -65,6 +65,11 @@ class CameraTrack:
         """Typical time from trigger to arrival."""
         return self._matcher.latency_ns
 
+    @property
+    def delivers(self) -> bool:
+        """It has delivered a frame since it was connected."""
+        return self.connected and self._last_time is not None
+
     # -- what the camera says ------------------------------------------------------------------------------------
 
     def connect(self, epoch: int, host: HostNs) -> None:

@@ -51,7 +51,6 @@ class DeviceClock:
         self._slope_uncertainty = _DRIFT_LIMIT
         self._constant = 0.0
         self._trim = 0.0
-        self._frames_spoke = False
 
     @property
     def known(self) -> bool:
@@ -82,14 +81,9 @@ class DeviceClock:
             self._start_anew_if_agreed(latch)
             return
         self._stray = None
-        before = self.to_host(latch.device)
         self._keep(latch)
         self._fit()
-        if self._frames_spoke:
-            # Where the frames had brought the clock counts, not by how much the old line had needed it.
-            self._trim += before - self.to_host(latch.device)
-        self._frames_spoke = False
-        self._trim *= _TRIM_KEPT
+        self._trim *= _TRIM_KEPT  # what the frames said about the old line fades
         self._limit_trim(latch.device)
 
     def correct(self, device: DeviceNs, error_ns: int) -> None:
@@ -99,7 +93,6 @@ class DeviceClock:
             device: this camera's trigger time.
             error_ns: time of the pulse, as the other cameras give it, minus the present `to_host(device)`.
         """
-        self._frames_spoke = True
         self._trim += _TRIM_GAIN * error_ns
         self._limit_trim(device)
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from operator import attrgetter
 from typing import Any, Final
 
-from rig.clocks import ClockLatch, HostNs
+from rig.clocks import NS_PER_S, ClockLatch, HostNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus, Record
 from triggering.camera_track import CameraTrack
@@ -23,6 +23,7 @@ __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 
 _TOLERANCE_PERIODS: Final = 0.3
 _SILENT_PERIODS: Final = 3
+_FIRST_NS: Final = NS_PER_S // 2  # a camera that has just been connected may take so long to its first frame
 _TIME: Final = attrgetter("time")
 _NO_FRAME: Final = {status: Outcome(status) for status in FrameStatus}
 
@@ -131,6 +132,19 @@ class Pairer:
     def silent(self) -> tuple[int, ...]:
         """The connected cameras that have delivered nothing for three periods while others did."""
         return tuple(camera for camera, track in enumerate(self._tracks) if track.silent)
+
+    def overdue(self) -> tuple[int, ...]:
+        """The connected cameras that are three pulses behind the others: look after them.
+
+        Only a suspicion, sooner than `silent`: their frames are waited for all the same, up to the deadline.
+        """
+        overdue = []
+        for camera, track in enumerate(self._tracks):
+            since = track.alive if track.delivers else track.alive + _FIRST_NS
+            behind = sum(pulse.frames[camera] is None and pulse.time > since for pulse in self._open)
+            if track.connected and behind >= _SILENT_PERIODS:
+                overdue.append(camera)
+        return tuple(overdue)
 
     @property
     def counters(self) -> tuple[CameraCounters, ...]:

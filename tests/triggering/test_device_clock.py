@@ -94,6 +94,32 @@ def test_latches_overrule_the_frames() -> None:
     assert abs(clock.to_host(true.device(end)) - end) < 12_000
 
 
+def test_a_better_fit_does_not_move_a_clock_that_the_frames_had_right() -> None:
+    """Before the drift is known, the frames follow it; the latch that tells the drift must not add it once more."""
+    true, clock = TrueClock(ppm=100.0), DeviceClock()
+    true.burst(clock, START, [40_000] * 8)
+    for frame in range(400):
+        host = START + 10 * MS + frame * 5 * MS
+        clock.correct(true.device(host), host - clock.to_host(true.device(host)))
+    host = START + 2010 * MS
+    assert abs(clock.to_host(true.device(host)) - host) < 20_000
+    clock.latch(true.latch(host, 40_000, error=0.0))
+    assert clock.drift_ppm > 80
+    assert abs(clock.to_host(true.device(host)) - host) < 40_000
+
+
+def test_what_the_frames_said_fades() -> None:
+    true, clock = TrueClock(), DeviceClock()
+    clock.latch(true.latch(START, 400_000, error=0.0))
+    for _ in range(100):
+        clock.correct(true.device(START), MS)
+    assert clock.to_host(true.device(START)) - START > 190_000
+    for index in range(60):
+        clock.latch(true.latch(START + index * NS_PER_S // 4, 400_000, error=0.0))
+    end = START + 15 * NS_PER_S
+    assert abs(clock.to_host(true.device(end)) - end) < 5_000
+
+
 def test_a_misread_register_is_ignored() -> None:
     true, clock = TrueClock(), DeviceClock()
     true.burst(clock, START, [100_000] * 4)

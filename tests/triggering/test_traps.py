@@ -13,6 +13,7 @@ from tests.triggering.simulation import MS, US, Hill, Outage, Run, Scenario
 from triggering.pairing import Pairer
 
 PERIOD = NS_PER_S // 30
+HOLD = 3 * PERIOD + 60 * MS
 START = HostNs(1_000 * NS_PER_S)
 
 
@@ -75,6 +76,26 @@ def test_good_frames_held_up_behind_a_damaged_one_stay_with_their_pulses() -> No
     done = run(faults={(20, 0): DAMAGED}, retention_ns=100 * MS, hold_periods=5.0)
     assert statuses(done, 20) == [DAMAGED, OK, OK]
     assert sum(tag.complete for tag in done.closed) == 39
+
+
+@pytest.mark.parametrize("fates", [(LOST, DAMAGED), (DAMAGED, LOST), (MISSED, DAMAGED), (DAMAGED, MISSED)])
+def test_a_damaged_arrival_goes_to_the_pulse_that_it_fits_best(fates: tuple[FrameStatus, FrameStatus]) -> None:
+    done = run(faults={(20, 0): fates[0], (21, 0): fates[1]}, latency_ns=(20 * MS, 24 * MS))
+    assert (statuses(done, 20)[0], statuses(done, 21)[0]) == fates
+
+
+def test_how_late_damaged_frames_come_is_learned() -> None:
+    """Held back for three periods: told from the next pulses' only by experience."""
+    experience = {(pulse, 0): DAMAGED for pulse in range(8, 200, 8)}
+    ambiguous = {(210, 0): DAMAGED, (211, 0): MISSED, (212, 0): MISSED}
+    done = run(
+        pulses=230,
+        faults=experience | ambiguous,
+        latency_ns=(5 * MS, 9 * MS),
+        retention_ns=3 * PERIOD,
+        hold_periods=8.0,
+    )
+    assert [statuses(done, pulse)[0] for pulse in (210, 211, 212)] == [DAMAGED, MISSED, MISSED]
 
 
 def test_a_lost_packet_on_firewire_costs_two_frames() -> None:
@@ -162,9 +183,37 @@ def test_a_silent_camera_is_noticed_at_the_first_deadline() -> None:
             if camera != 1 or pulse < 10:
                 feed.frame(camera, pulse, pulse + 1)
         feed.advance(feed.time_of(pulse) + 5 * MS)
-        deadline = feed.time_of(10) + feed.pairer._hold_ns
+        deadline = feed.time_of(10) + HOLD
         assert feed.pairer.silent() == ((1,) if feed.time_of(pulse) + 5 * MS >= deadline else ())
     assert feed.closed[-1].number == 20, "pulses no longer wait for it"
+
+
+def test_a_camera_three_pulses_behind_the_others_is_overdue_but_still_waited_for() -> None:
+    feed = Feed()
+    for pulse in range(20):
+        for camera in range(3):
+            if camera != 1 or pulse < 10 or pulse > 14:
+                feed.frame(camera, pulse, pulse + 1)
+        feed.advance(feed.time_of(pulse) + 5 * MS)
+        # The tenth pulse, number 9, is the last one that it delivers: with number 12 it is three behind.
+        assert feed.pairer.overdue() == ((1,) if 12 <= pulse <= 14 else ())
+    assert [tag.outcomes[1].status for tag in feed.closed[10:15]] == [LOST] * 5
+
+
+def test_no_camera_is_overdue_while_the_pulses_pause() -> None:
+    feed = Feed()
+    for pulse in [*range(10), *range(100, 110)]:
+        for camera in range(3):
+            feed.frame(camera, pulse, pulse + 1 if pulse < 10 else pulse - 89)
+            assert feed.pairer.overdue() == ()
+        feed.advance(feed.time_of(pulse) + 5 * MS)
+
+
+def test_a_silent_camera_is_noticed_though_the_others_fail_in_between() -> None:
+    done = run(outages=(Outage(2, 0.67, 60.0, None),), faults={(15, 0): MISSED, (15, 1): MISSED})
+    first = next(pulse for pulse, fates in enumerate(done.hill.fates) if fates[2] is MISSED)
+    assert first == 14
+    assert statuses(done, 14) == [OK, OK, ABSENT]
 
 
 def test_a_silent_camera_that_delivers_again_is_back() -> None:
@@ -207,6 +256,13 @@ def test_the_rate_may_be_off() -> None:
         assert done.pairer.health()["period_us"] == pytest.approx(1e6 / 30 * (1 + error), rel=1e-3)
 
 
+def test_between_latches_the_frames_keep_the_clocks_together() -> None:
+    """90 s without a latch: the clocks drift 18 ms apart, the tolerance is 10 ms."""
+    done = run(pulses=2700, drift_ppm=(100.0, 0.0, -100.0), latch_every_s=1e6)
+    assert all(tag.complete for tag in done.closed)
+    assert done.pairer.health()["spread_max_us"] < 1000
+
+
 def test_the_recorder_stalls_and_then_takes_camera_after_camera() -> None:
     done = run(batch_ns=700 * MS, rate_hz=200.0, pulses=600, lost=0.05)
     assert done.unplaced == []
@@ -227,8 +283,8 @@ def test_trigger_counts_tell_overruns() -> None:
 class Feed:
     """Three cameras on one clock, 30 Hz, and records made by hand."""
 
-    def __init__(self, cameras: int = 3, *, latches: bool = True) -> None:
-        self.pairer = Pairer(cameras, PERIOD, hold_ns=3 * PERIOD + 60 * MS)
+    def __init__(self, cameras: int = 3, *, latches: bool = True, hold_ns: int = HOLD) -> None:
+        self.pairer = Pairer(cameras, PERIOD, hold_ns=hold_ns)
         self.cameras = cameras
         self.closed = self.pairer.advance(START)
         for camera in range(cameras):
@@ -290,10 +346,10 @@ def test_a_frame_after_its_pulse_is_decided_is_late() -> None:
     feed = Feed()
     feed.frame(0, 0, 1)
     feed.frame(1, 0, 1)
-    assert feed.pairer.next_deadline() == feed.time_of(0) + 3 * PERIOD + 60 * MS
-    feed.advance(feed.time_of(0) + 3 * PERIOD + 60 * MS)
+    assert feed.pairer.next_deadline() == feed.time_of(0) + HOLD
+    feed.advance(feed.time_of(0) + HOLD)
     assert len(feed.closed) == 1
-    assert not feed.frame(2, 0, 1, after=3 * PERIOD + 61 * MS)
+    assert not feed.frame(2, 0, 1, after=HOLD + MS)
     assert feed.pairer.counters[2].late == 1
 
 
@@ -306,6 +362,42 @@ def test_a_pulse_decided_too_early_is_counted_when_the_ids_contradict() -> None:
     feed.all_cameras(31, [3, 2, 3])
     assert feed.pairer.counters[1].presumed == 1
     assert feed.pairer.counters[1].contradicted == 1
+
+
+def test_a_damaged_arrival_outweighs_a_wrong_presumption() -> None:
+    feed = Feed()
+    feed.all_cameras(0, [1, 1, 1])
+    feed.all_cameras(1, [2, None, 2])
+    feed.advance(feed.time_of(30))
+    feed.pairer.damaged(1, Record(RecordKind.DAMAGED, 1, HostNs(feed.time_of(31) + 5 * MS)))
+    feed.all_cameras(31, [3, None, 3])
+    feed.all_cameras(32, [4, 3, 4])
+    assert [tag.outcomes[1].status for tag in feed.closed] == [OK, LOST, DAMAGED, OK]
+    assert feed.pairer.counters[1].contradicted == 1
+
+
+def test_with_a_short_hold_silence_is_noticed_from_what_was_decided_before() -> None:
+    feed = Feed(hold_ns=PERIOD + 5 * MS)
+    for pulse in range(8):
+        feed.all_cameras(pulse, [pulse + 1, None if pulse >= 4 else pulse + 1, pulse + 1])
+    assert feed.pairer.silent() == (1,)
+    assert [tag.outcomes[1].status for tag in feed.closed] == [OK] * 4 + [LOST] + [ABSENT] * 3
+
+
+def test_frames_that_others_may_still_deliver_prove_no_pulse_in_a_pause() -> None:
+    """One camera lost two frames after a pause; the second one's pulse is not known yet when the first is decided."""
+    feed = Feed()
+    feed.all_cameras(0, [1, 1, 1])
+    feed.frame(0, 12.5, 4)
+    feed.frame(1, 10.5, 2)
+    feed.frame(2, 10.5, 2)
+    feed.advance(feed.time_of(12.6))
+    for camera in (1, 2):
+        feed.frame(camera, 11.5, 3)
+        feed.frame(camera, 12.5, 4)
+    feed.advance(feed.time_of(12.7))
+    assert [tag.outcomes[0].status for tag in feed.closed] == [OK, LOST, LOST, OK]
+    assert feed.pairer.health()["proven_by_ids"] == 0
 
 
 def test_ids_that_begin_anew_without_notice_are_reported() -> None:
@@ -324,6 +416,31 @@ def test_16_bit_ids_that_begin_anew_near_the_wrap_are_not_a_great_loss() -> None
     feed.all_cameras(2, [65002, 1, 65002])
     assert feed.pairer.counters[1].restarts == 1
     assert len(feed.closed) == 3
+
+
+def test_pulses_before_a_camera_first_came_are_absent_however_late_they_are_decided() -> None:
+    feed = Feed()
+    feed.pairer = Pairer(2, PERIOD, hold_ns=10 * PERIOD)
+    for camera, since in ((0, START), (1, feed.time_of(0.5))):
+        feed.pairer.connected(camera, 1, since)
+        feed.latch(camera, since)
+    feed.frame(0, 0, 1)
+    feed.frame(0, 1, 2)
+    feed.frame(1, 1, 1)
+    feed.advance(feed.time_of(1.5))
+    assert [tag.outcomes[1].status for tag in feed.closed] == [ABSENT, OK]
+
+
+def test_a_frame_taken_just_before_the_connection_was_reported_is_waited_for() -> None:
+    feed = Feed()
+    feed.all_cameras(0, [1, 1, 1])
+    feed.pairer.disconnected(0, feed.time_of(0.2))
+    feed.pairer.connected(0, 2, HostNs(feed.time_of(1) + MS))
+    feed.latch(0, feed.time_of(1) + 2 * MS, clock=77)
+    feed.all_cameras(1, [None, 2, 2])
+    assert feed.frame(0, 1, 1, epoch=2, clock=77, after=20 * MS)
+    feed.advance(feed.time_of(1) + 20 * MS)
+    assert feed.closed[1].complete
 
 
 def test_a_device_clock_that_is_set_anew_without_notice() -> None:

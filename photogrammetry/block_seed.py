@@ -12,7 +12,8 @@ from rig.errors import BadInputError
 
 _MIN_COMMON = 5
 _ORIENTED = 16  # pairs whose relative orientation is computed
-_TRIED = 3  # pairs from which a trial block is grown
+_TRIED = 3  # pairs from which a trial block is grown,
+_TRIED_IF_CLEAR = 2  # where the first has a single solution
 _TRIAL_IMAGES = 4
 _ENOUGH_COMMON = 30  # more common points make a pair no better,
 _ENOUGH_PARALLAX = 0.5  # rad, nor does a larger angle between the rays

@@ -24,34 +24,35 @@ _TIMES_X = [_MONOMIALS.index(tuple(sorted((0, *triple[:2])))) for triple in _LOW
 _LEVI_CIVITA = np.zeros((3, 3, 3))
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     _LEVI_CIVITA[_i, _j, _k], _LEVI_CIVITA[_k, _j, _i] = 1.0, -1.0
+_TINY = 1e-12
 _REAL = 1e-6  # imaginary part over modulus below which an eigenvector is real
 
 
 def essential_matrices(u: Array, v: Array) -> Array:
-    """Essential matrices of homologous rays.
+    """Essential matrices of sets of homologous rays.
 
     Args:
-        u: (n, 3) rays of the first image in its camera system, any length near 1; n >= 5.
-        v: (n, 3) the same of the second image.
+        u: (s, n, 3) rays of the first image in its camera system, any length near 1; s sets of n >= 5.
+        v: (s, n, 3) the same of the second image.
 
     Returns:
-        (k, 3, 3), k = 0..10, norm 1. With more than five pairs: of the four matrices that fit best.
+        (k, 3, 3) solutions of all sets, k <= 10 s, norm 1. With n > 5: of the four matrices that fit best.
     """
-    rows = np.einsum("ni,nj->nij", u, v).reshape(-1, 9)
-    space = np.linalg.svd(rows)[2][-4:].reshape(4, 3, 3)
-    e = space.transpose(1, 2, 0)
-    cubic = 2 * np.einsum("iap,jaq,jbr->ibpqr", e, e, e) - np.einsum("jap,jaq,ibr->ibpqr", e, e, e)
-    determinant = np.einsum("ijk,ip,jq,kr->pqr", _LEVI_CIVITA, *e.transpose(1, 0, 2))
-    system = np.vstack((cubic.reshape(9, 64), determinant.reshape(1, 64))) @ _COLLAPSE
-    reduced = -np.linalg.lstsq(system[:, :10], system[:, 10:], rcond=None)[0]
-    times_x = np.array([reduced[i] if i < 10 else np.eye(10)[i - 10] for i in _TIMES_X])
-    vectors = np.linalg.eig(times_x)[1].T
-    last = vectors[:, 9]
-    usable = np.abs(last) > 1e-12
-    unknowns = vectors[usable, 6:9] / last[usable, None]
-    real = np.abs(unknowns.imag).max(axis=1) <= _REAL * np.abs(unknowns).max(axis=1)
-    coefficients = np.column_stack((unknowns[real].real, np.ones(int(real.sum()))))
-    found = np.einsum("kp,pij->kij", coefficients, space)
+    rows = np.einsum("sni,snj->snij", u, v).reshape(len(u), -1, 9)
+    e = np.linalg.svd(rows)[2][:, -4:].reshape(-1, 4, 3, 3).transpose(0, 2, 3, 1)
+    square = np.einsum("siap,sjaq->sijpq", e, e)
+    cubic = 2 * np.einsum("sijpq,sjbr->sibpqr", square, e) - np.einsum("sjjpq,sibr->sibpqr", square, e)
+    minors = np.einsum("ijk,sjq,skr->siqr", _LEVI_CIVITA, e[:, 1], e[:, 2])
+    determinant = np.einsum("sip,siqr->spqr", e[:, 0], minors)
+    system = np.concatenate((cubic.reshape(-1, 9, 64), determinant.reshape(-1, 1, 64)), axis=1) @ _COLLAPSE
+    reduced = -np.linalg.pinv(system[:, :, :10]) @ system[:, :, 10:]
+    times_x = np.concatenate((reduced, np.broadcast_to(np.eye(10), reduced.shape)), axis=1)[:, _TIMES_X]
+    vectors = np.linalg.eig(times_x)[1].transpose(0, 2, 1)
+    last = np.where(np.abs(vectors[..., 9]) > _TINY, vectors[..., 9], np.nan)
+    unknowns = vectors[..., 6:9] / last[..., None]
+    real = np.abs(unknowns.imag).max(axis=2) <= _REAL * np.abs(unknowns).max(axis=2)
+    found = np.einsum("skp,sijp->skij", unknowns.real, e[..., :3]) + e[:, None, :, :, 3]
+    found = found[real]
     return np.asarray(found / np.linalg.norm(found, axis=(1, 2), keepdims=True))
 
 

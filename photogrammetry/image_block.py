@@ -4,7 +4,7 @@ Points are intersected from the images that have a pose, images are resected fro
 turns, until nothing more can be added.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,12 @@ class ImageBlock:
     def known(self) -> NDArray[np.bool_]:
         """(points,) which points have coordinates."""
         return np.asarray(np.isfinite(self.xyz[:, 0]))
+
+    def with_c(self, c: Array) -> "ImageBlock":
+        """A copy with other principal distances (cameras,)."""
+        sightings = self.sightings.with_c(c)
+        cameras = {i: replace(camera, c=sightings.c_of(i)) for i, camera in self.cameras.items()}
+        return ImageBlock(sightings, cameras, self.xyz.copy(), self.held.copy(), set(self.settled))
 
     def grow(self, most_images: int | None = None, polish: bool = True) -> None:
         """Intersect and resect in turns until nothing more can be added.

@@ -25,6 +25,8 @@ _FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points soon only the best of those
 _NEAR = 0.02  # rad: candidates closer than that are refined once
 _MANY = 10
 _STEPS = 30
+_SETTLED = 1e-9  # relative decrease of the square sum,
+_GIVEN_UP = 1.0  # damping without any decrease
 _SAME = 1e-3  # rad: rotations and bases closer than that are one solution
 _POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
 _ROUNDING = 1e-7  # of c: residuals that small are none
@@ -106,10 +108,12 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
 
 def _candidates(u: Array, v: Array) -> Array:
     """Rotations (k, 3, 3) of the closed solutions of sets of five points, and of all points where they are many."""
-    shuffled = np.random.default_rng(len(u))  # the same sets each time
-    sets = [np.arange(len(u))] if len(u) != 6 else []
-    sets += [shuffled.choice(len(u), 5, replace=False) for _ in range(_SETS if len(u) > 5 else 0)]
-    return rotations_of(np.concatenate([essential_matrices(u[chosen], v[chosen]) for chosen in sets]))
+    solutions = [essential_matrices(u[None], v[None])]
+    if len(u) > 5:
+        shuffled = np.random.default_rng(len(u))  # the same sets each time
+        sets = np.array([shuffled.choice(len(u), 5, replace=False) for _ in range(_SETS)])
+        solutions.append(essential_matrices(u[sets], v[sets]))
+    return rotations_of(np.concatenate(solutions))
 
 
 def _distinct_starts(rotations: Array, sums: Array) -> list[int]:
@@ -177,14 +181,14 @@ def _iterate(rotations: Array, bases: Array, u: Array, v: Array, steps: int) -> 
         new_values, new_jacobian = _conditions(turned, moved, u, v)
         new_sums = (new_values**2).sum(axis=1)
         better = new_sums < sums
-        settled = np.abs(step).max() < 1e-10
+        moving = np.where(better, new_sums < (1 - _SETTLED) * sums, damping < _GIVEN_UP)
         rotations = np.where(better[:, None, None], turned, rotations)
         bases = np.where(better[:, None], moved, bases)
         values = np.where(better[:, None], new_values, values)
         jacobian = np.where(better[:, None, None], new_jacobian, jacobian)
         sums = np.where(better, new_sums, sums)
         damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-12, 1e8)
-        if settled:
+        if not moving.any():
             break
     return rotations, bases, sums
 

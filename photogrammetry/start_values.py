@@ -15,12 +15,15 @@ from photogrammetry.ideal_camera import Array, IdealCamera
 from photogrammetry.image_block import ImageBlock
 from photogrammetry.network import Network, Point, Role
 from photogrammetry.placeholders import place_images, place_points
-from photogrammetry.principal_distance_search import improve_principal_distances
+from photogrammetry.principal_distances import from_control, open_cameras
 from photogrammetry.sightings import Sightings, reduce_observations
 from photogrammetry.similarity import fit_similarity
+from photogrammetry.trial_adjustment import adjust_block
 from rig.errors import BadInputError
 
 _FAR = 0.1  # of the block's extent
+_FITS = 3.0  # residuals over their sigmas that leave no doubt about c
+_FACTORS = (1.0, 0.5, 2.0, 0.25)  # on c: the trial adjustment converges best from a c that is too short
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,13 +54,51 @@ def find_start_values(network: Network) -> StartValues:
     Returns:
         The complete network, and in words what had to be made up.
     """
-    block = _given(network, reduce_observations(network))
-    block = _with_c(block, improve_principal_distances(network, block))
+    given = _given(network, reduce_observations(network))
+    c = given.sightings.c.copy()
+    cameras = open_cameras(network, given)
+    for camera in list(cameras):
+        found = from_control(given, camera)
+        if found is not None:
+            c[camera] = found
+            cameras.remove(camera)
+    attempt = _attempt(network, given, c)
+    if cameras and attempt.block.residual() > _FITS:
+        attempt = _with_better_c(network, given, attempt, cameras)
+    block = attempt.block
+    words = [*attempt.words, *place_images(block, network), *place_points(block, network)]
+    return StartValues(_filled(network, block), tuple(words))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Attempt:
+    """A block grown with certain principal distances."""
+
+    block: ImageBlock
+    words: tuple[str, ...]
+
+
+def _attempt(network: Network, given: ImageBlock, c: Array) -> _Attempt:
+    block = given.with_c(c)
     block.grow(polish=False)
     words = _add_models(block, network)
     block.polish()
-    words += [*place_images(block, network), *place_points(block, network)]
-    return StartValues(_filled(network, block), tuple(words))
+    return _Attempt(block, tuple(words))
+
+
+def _with_better_c(network: Network, given: ImageBlock, first: _Attempt, cameras: list[int]) -> _Attempt:
+    """Where only the images can tell c, a trial adjustment finds it; it may need another value to start from."""
+    best, least = first, np.inf
+    for factor in _FACTORS:
+        c = first.block.sightings.c.copy()
+        c[cameras] *= factor
+        attempt = first if factor == 1 else _attempt(network, given, c)
+        trial = adjust_block(network, attempt.block)
+        if trial is not None and trial.ratio < least:
+            best, least = _Attempt(trial.block, attempt.words), trial.ratio
+        if least < _FITS:
+            break
+    return best
 
 
 def _given(network: Network, sightings: Sightings) -> ImageBlock:
@@ -71,13 +112,6 @@ def _given(network: Network, sightings: Sightings) -> ImageBlock:
         if point.role in {Role.CONTROL, Role.FIXED} and point.xyz is not None:
             block.xyz[index], block.held[index] = point.xyz, True
     return block
-
-
-def _with_c(block: ImageBlock, c: Array) -> ImageBlock:
-    cameras = {
-        image: replace(camera, c=float(c[block.sightings.camera[image]])) for image, camera in block.cameras.items()
-    }
-    return replace(block, sightings=block.sightings.with_c(c), cameras=cameras)
 
 
 def _add_models(block: ImageBlock, network: Network) -> list[str]:

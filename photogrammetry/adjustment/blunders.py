@@ -23,9 +23,8 @@ SINGLE_RISK = 0.001
 _SMALL_REDUNDANCY = 30
 _UNCONTROLLED = 1e-6  # eigenvalues of R below this are zero
 _NOISE = 1e-4  # sums of squares below this (in a-priori variances) are rounding
-_ALIKE = 0.9  # correlation of test statistics from which on they may be mistaken for each other
-_SAME = 1.0 - 1e-6  # from here on they are the same
-_CONFIDENT = 1.64  # standard deviations between two test statistics: the wrong one wins in 5 % of cases
+_SAME = 1.0 - 1e-6  # squared correlation of test statistics from which on they are the same
+_NEEDED = 1.96  # test value that a suspect must keep beside another one; with less the other one alone will do
 
 
 class BlunderKind(StrEnum):
@@ -184,18 +183,18 @@ def _blunder(adjustment: Adjustment, families: list[_Hypotheses], family: _Hypot
     rest = adjustment.equations.square_sum - family.drop[place]
     clean = np.sqrt(rest / freedom) if freedom > 0 and rest > 0.0 else 1.0
     rivals: list[tuple[float, Observation]] = []
+    size = np.sqrt(family.drop[place])
     for other in families:
         felt = effect[other.rows]
-        share = np.einsum("ha,hab,hb->h", felt, other.inverse, felt) / family.drop[place]
-        alike = np.sqrt(np.clip(share, 0.0, 1.0))
-        lead = np.sqrt(family.drop[place]) - np.sqrt(other.drop)
-        spread = clean * np.sqrt(2.0 * np.maximum(1.0 - alike, 1e-12))
-        mistaken = (alike > _SAME) | ((alike > _ALIKE) & (lead < _CONFIDENT * spread))
+        alike = np.einsum("ha,hab,hb->h", felt, other.inverse, felt) / size**2
+        # What the suspect still explains once the other one is let go: nothing, if that one is the culprit.
+        shared = np.einsum("ha,hab,hb->h", felt, other.inverse, other.v) / size
+        left = np.abs(size + shared) / np.sqrt(np.maximum(1.0 - alike, 1e-12))
+        mistaken = (alike > _SAME) | (left < _NEEDED * clean)
         if other is family:
             mistaken[place] = False
-        rivals += [
-            (-float(other.drop[i]), Observation(other.kind, int(other.index[i]))) for i in np.flatnonzero(mistaken)
-        ]
+        indices = np.flatnonzero(mistaken)
+        rivals += [(-float(other.drop[i]), Observation(other.kind, int(other.index[i]))) for i in indices]
     rivals.sort(key=lambda rival: (rival[0], rival[1].kind, rival[1].index))
     candidates = (suspect, *(observation for _, observation in rivals)) if rivals else ()
     scale = _sigmas(adjustment, family.rows[place])

@@ -88,6 +88,9 @@ def status_of(outcome: Outcome) -> str:
     words = f"converged after {a.iterations} iterations"
     if a.redundancy == 0:
         words += "; nothing is redundant: sigma0 cannot be estimated, all sigmas are a priori and nothing is checked"
+    behind = a.problem.behind(a.state)
+    if behind:
+        words += f"; {behind} observed points lie behind their cameras: check the start values and the rotations' sense"
     if outcome.components is None:
         words += "; the variance components do not settle"
     return words

@@ -21,7 +21,6 @@ _LATCH_EVERY_NS: Final = NS_PER_S // 4
 _COUNT_EVERY_NS: Final = NS_PER_S
 _QUIET_NS: Final = NS_PER_S
 _RECEIVE_S: Final = 0.05
-_LAST_LOOK_S: Final = 0.001
 _RETRY_S: Final = 0.5
 
 
@@ -32,14 +31,24 @@ class Grabber:
         open_camera: connects and configures the camera from scratch.
         ring: where frames and records go; the only writer.
         doorbell: eventfd that wakes the recorder.
+        period_ns: of the pulses.
         stopping: tells whether the loop shall end; asked at least every 50 ms while the camera answers.
         stop_fd: becomes readable when `stopping` may have changed, so that waiting for a retry ends at once.
     """
 
     def __init__(
-        self, open_camera: OpenCamera, ring: CameraRing, doorbell: int, stopping: Callable[[], bool], stop_fd: int
+        self,
+        open_camera: OpenCamera,
+        ring: CameraRing,
+        doorbell: int,
+        *,
+        period_ns: int,
+        stopping: Callable[[], bool],
+        stop_fd: int,
     ) -> None:
         self._open, self._ring, self._doorbell = open_camera, ring, doorbell
+        # If the camera delivers after all, a frame comes within this time.
+        self._last_look_s = _RECEIVE_S + 1.5 * period_ns / NS_PER_S
         self._stopping, self._stop_fd = stopping, stop_fd
         self._epoch = 0
         self._frames = self._damaged = 0
@@ -74,7 +83,7 @@ class Grabber:
         next_latch = next_count = last_arrival = host_now()
         while not self._stopping():
             requests = self._ring.reconnect_requests()
-            arrival = camera.receive(_RECEIVE_S if requests == asked else _LAST_LOOK_S)
+            arrival = camera.receive(_RECEIVE_S if requests == asked else self._last_look_s)
             if arrival is not None:
                 self._put_arrival(arrival)
             elif requests != asked:

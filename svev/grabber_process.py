@@ -21,7 +21,14 @@ def main() -> None:
     ring = CameraRing(child.config["ring"])
     ring.prefault()
     opener = camera_opener(rig, child.config["camera"], ring, HostNs(child.config["epoch"]))
-    Grabber(opener, ring, child.config["doorbell"], child.stopping, child.control.fileno()).run()
+    Grabber(
+        opener,
+        ring,
+        child.config["doorbell"],
+        period_ns=rig.trigger.period_ns,
+        stopping=child.stopping,
+        stop_fd=child.control.fileno(),
+    ).run()
     os.close(child.config["doorbell"])
 
 

@@ -32,7 +32,10 @@ class Station:
         self.doorbell = os.eventfd(0, os.EFD_NONBLOCK)
         self._stop = threading.Event()
         self._ours, self._theirs = socket.socketpair()
-        grabber = Grabber(lambda: open_camera(ring), ring, self.doorbell, self._stop.is_set, self._theirs.fileno())
+        grabber = Grabber(
+            lambda: open_camera(ring), ring, self.doorbell,
+            period_ns=33_333_333, stopping=self._stop.is_set, stop_fd=self._theirs.fileno(),
+        )  # fmt: skip
         self._thread = threading.Thread(target=grabber.run)
 
     def __enter__(self) -> "Station":

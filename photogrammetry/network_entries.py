@@ -19,7 +19,7 @@ _ORTHONORMAL = 1e-4
 
 
 def _is_rotation(rows: list[list[float]]) -> list[list[float]]:
-    matrix = np.array(rows)
+    matrix = np.clip(np.array(rows), -10.0, 10.0)  # what is larger is no rotation either, and cannot overflow
     if np.abs(matrix @ matrix.T - np.eye(3)).max() > _ORTHONORMAL:
         raise ValueError("its rows are not orthonormal; give a rotation matrix row by row, with more digits")
     if np.linalg.det(matrix) < 0.0:

@@ -41,6 +41,7 @@ from rig.rigfile import validate
 #: `reweight` in the file and in memory.
 REWEIGHT = {False: Reweight.NONE, True: Reweight.HELMERT, "paper": Reweight.PAPER}
 AXES = ("X", "Y", "Z")
+_DIGITS = 30  # of a whole number
 
 
 def read_network(path: Path) -> Network:
@@ -60,14 +61,20 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     try:
         data = json.loads(
-            path.read_text(encoding="utf-8"), object_pairs_hook=_no_key_twice, parse_constant=_no_constant
+            path.read_text(encoding="utf-8"),
+            object_pairs_hook=_no_key_twice,
+            parse_constant=_no_constant,
+            parse_int=_whole_number,
         )
+        json.dumps(data, ensure_ascii=False).encode("utf-8")  # escapes may hide half characters
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; name an existing network file") from None
     except IsADirectoryError:
         raise BadInputError(f"{path}: is a directory; name the file in it") from None
     except UnicodeDecodeError:
         raise BadInputError(f"{path}: is no text file; name a JSON file") from None
+    except UnicodeEncodeError as error:
+        raise BadInputError(f"{path}: half a character ({error.object[error.start]!r}); write it whole") from None
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
     except (json.JSONDecodeError, RecursionError) as error:
@@ -94,6 +101,12 @@ def _no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _no_constant(text: str) -> float:
     raise _RefusedError(f"{text} is no number; write a finite one or null")
+
+
+def _whole_number(text: str) -> int:
+    if len(text) > _DIGITS:
+        raise _RefusedError(f"{text[:_DIGITS]}... has too many digits; write it as a decimal number")
+    return int(text)
 
 
 def network_from_json(data: Mapping[str, Any], source: str) -> Network:

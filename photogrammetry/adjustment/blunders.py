@@ -74,7 +74,8 @@ class _Hypotheses:
         inverse: (h, q, q) pseudo-inverse of R's blocks.
         v: (h, q) whitened residuals.
         drop: (h,) what the square sum falls by.
-        tested: (h,) the squared statistic that decides: the worse coordinate for images, else the drop.
+        signed: (h,) the statistic that decides: the worse coordinate for images, the root of the drop for control.
+        tested: (h,) its square.
         parts: degrees of freedom of that statistic.
     """
 
@@ -84,8 +85,8 @@ class _Hypotheses:
     inverse: Floats
     v: Floats
     drop: Floats
-    tested: Floats
     signed: Floats
+    tested: Floats
     parts: int
 
 
@@ -163,7 +164,7 @@ def _family(
     drop = np.einsum("ha,hab,hb->h", v, inverse, v)
     as_a_whole = signed is None
     sign = np.sqrt(drop) if signed is None else signed
-    return _Hypotheses(kind, index, rows, inverse, v, drop, sign**2, sign, v.shape[1] if as_a_whole else 1)
+    return _Hypotheses(kind, index, rows, inverse, v, drop, sign, sign**2, v.shape[1] if as_a_whole else 1)
 
 
 def _control_blocks(adjustment: Adjustment, rows: Integers) -> Floats:

@@ -76,8 +76,8 @@ def adjust(network: Network, start: State | None = None, *, snoop: bool = False)
     if network.reweight is Reweight.NONE:
         try:
             components, _ = estimate_components(adjustment)
-        except NotConvergedError:
-            components = None
+        except (NotConvergedError, NotSolvableError):
+            components = None  # the adjustment stands; only the weights cannot be estimated
     else:
         estimate = estimate_by_paper if network.reweight is Reweight.PAPER else estimate_components
         components, adjustment = estimate(adjustment)

@@ -183,6 +183,8 @@ def test_malformed_networks_are_refused(change: Change, message: str) -> None:
         ('{"sigma0": -Infinity}', "-Infinity is no number"),
         ('{"points": {"A": 1, "A": 2}}', 'key "A" stands twice'),
         ("[" * 100_000, "not valid JSON"),
+        (f'{{"sigma0": {"9" * 5000}}}', "9999.*too many digits"),
+        ('{"length_unit": "\\ud800"}', "half a character"),
     ],
 )
 def test_files_that_are_no_networks(content: str, message: str, tmp_path: Path) -> None:

@@ -122,7 +122,7 @@ def _ties(block: ImageBlock, network: Network, given: list[int]) -> _Ties | None
     if not rows:
         return None
     vectors, axes, shifted, values, sigmas = (np.array(column, float) for column in zip(*rows, strict=True))
-    largest = max(float(sigmas.max()), _LEAST_SIGMA * float(np.abs(values).max()), np.finfo(float).tiny)
+    largest = max(float(sigmas.max()), _LEAST_SIGMA * float(np.abs(values).max())) or 1.0
     return _Ties(origin, vectors, axes.astype(np.intp), shifted, values, 1 / np.maximum(sigmas, _LEAST_SIGMA * largest))
 
 

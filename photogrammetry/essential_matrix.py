@@ -48,9 +48,9 @@ def essential_matrices(u: Array, v: Array) -> Array:
     reduced = -np.linalg.pinv(system[:, :, :10]) @ system[:, :, 10:]
     times_x = np.concatenate((reduced, np.broadcast_to(np.eye(10), reduced.shape)), axis=1)[:, _TIMES_X]
     vectors = np.linalg.eig(times_x)[1].transpose(0, 2, 1)
-    last = np.where(np.abs(vectors[..., 9]) > _TINY, vectors[..., 9], np.nan)
-    unknowns = vectors[..., 6:9] / last[..., None]
-    real = np.abs(unknowns.imag).max(axis=2) <= _REAL * np.abs(unknowns).max(axis=2)
+    finite = np.abs(vectors[..., 9]) > _TINY
+    unknowns = vectors[..., 6:9] / np.where(finite, vectors[..., 9], 1.0)[..., None]
+    real = finite & (np.abs(unknowns.imag).max(axis=2) <= _REAL * np.abs(unknowns).max(axis=2))
     found = np.einsum("skp,sijp->skij", unknowns.real, e[..., :3]) + e[:, None, :, :, 3]
     found = found[real]
     return np.asarray(found / np.linalg.norm(found, axis=(1, 2), keepdims=True))

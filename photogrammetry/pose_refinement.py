@@ -37,13 +37,13 @@ def refine_pose(camera: IdealCamera, points: Array, xy: Array, steps: int = _MAX
         steps: at most so many.
 
     Returns:
-        The pose at the minimum reached.
+        The pose at the minimum reached; the start values themselves if a point lies behind the camera there.
     """
     best = RefinedPose(camera, _square_sum(camera, points, xy))
     damping = _DAMPING
     nothing = len(points) * (_ROUNDING * camera.c) ** 2
     for _ in range(steps):
-        if best.square_sum < nothing:
+        if best.square_sum < nothing or not np.isfinite(best.square_sum):
             break
         residuals, jacobian = _linearised(best.camera, points, xy)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residuals

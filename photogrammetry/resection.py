@@ -15,6 +15,7 @@ from photogrammetry.similarity import fit_similarity
 from rig.errors import BadInputError
 
 _COLLINEAR = 1e-6  # height of a triangle over its longest side
+_TINY = 1e-12
 _TRIPLES = 5
 _REFINED = 3  # candidates that are refined
 _NEARLY_REAL = 0.2  # imaginary part of a root over its modulus: noise pushes double roots off the real axis
@@ -127,10 +128,10 @@ def _distances(points: Array, rays: Array) -> list[Array]:
         v = float(root.real)
         if v <= 0 or abs(root.imag) > _NEARLY_REAL * abs(root):
             continue
-        first = np.sqrt(b / (1 + v * v - 2 * v * cos_b))
-        divisor = 2 * (cos_c - v * cos_a)
-        if abs(divisor) < 1e-12:
-            continue
+        square, divisor = 1 + v * v - 2 * v * cos_b, 2 * (cos_c - v * cos_a)
+        if square < _TINY or abs(divisor) < _TINY:
+            continue  # two rays coincide
+        first = np.sqrt(b / square)
         u = ((p - 1) * v * v - 2 * p * cos_b * v + 1 + p) / divisor
         if u > 0:
             found.append(first * np.array([1.0, u, v]))

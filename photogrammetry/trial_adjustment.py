@@ -54,9 +54,14 @@ def adjust_block(network: Network, block: ImageBlock) -> Trial | None:
 
 
 def _determined(block: ImageBlock) -> tuple[list[int], NDArray[np.intp]]:
+    """Oriented images, and points with enough rays that lie in front of all images that show them."""
     images = sorted(block.cameras)
     rays = block.sightings.seen()[images].sum(axis=0)
-    return images, np.flatnonzero(block.known & ((rays >= _MIN_RAYS) | (block.held & (rays > 0))))
+    good = block.known & ((rays >= _MIN_RAYS) | (block.held & (rays > 0)))
+    for image, camera in block.cameras.items():
+        shown = block.sightings.points[image]
+        good[shown] &= camera.in_front(block.xyz[shown])
+    return images, np.flatnonzero(good)
 
 
 def _part(network: Network, block: ImageBlock, images: list[int], points: NDArray[np.intp]) -> Network:

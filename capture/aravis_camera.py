@@ -8,10 +8,10 @@ Never believe the ids of a buffer whose status is not SUCCESS: they may be those
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import gi
 
+from capture.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
@@ -31,9 +31,6 @@ _TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
 _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
 
 _IDS_16_BIT = 65535
-_SOCKET_BUFFER = 8 << 20  # the kernel grants at most net.core.rmem_max
-_SLOW_BYTES_PER_S = 20e6
-_STALL_FRAMES = 8
 # How many empty buffers stand in Aravis's queue: half a second of frames, but not more than stay in the cache.
 _QUEUE_S = 0.5
 _QUEUE_BYTES = 24 << 20
@@ -51,7 +48,7 @@ class AravisCamera:
     def __init__(self, settings: CameraSettings, network: NetworkSettings, ring: CameraRing, period_ns: int) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
         self._lost = False
-        self._plain_socket = network.packet_socket == "off" or _plain_socket_will_do(settings.frame_bytes, period_ns)
+        self._plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
         self._buffers: dict[int, int] = {}
         self._of_slot: list[Aravis.Buffer] = []
         self._in_aravis = 0
@@ -197,7 +194,7 @@ class AravisCamera:
             "initial-packet-timeout": packet_timeout_us // 3,
             "frame-retention": max(25_000, min(100_000, period_ns * 3 // 4000)),
             "socket-buffer": Aravis.GvStreamSocketBuffer.FIXED,
-            "socket-buffer-size": _SOCKET_BUFFER,
+            "socket-buffer-size": SOCKET_BUFFER_BYTES,
         }.items():
             stream.set_property(name, value)
         for slot in range(self._ring.slots):
@@ -226,15 +223,6 @@ class AravisCamera:
                 "use another camera or its newest firmware"
             )
         return frequency
-
-
-def _plain_socket_will_do(frame_bytes: int, period_ns: int) -> bool:
-    """Whether a plain socket is the better choice: a slow camera, and a receive buffer that rides out a stall.
-
-    A packet socket costs far less at high rates, but hands packets over in blocks, up to 5 ms late.
-    """
-    buffer_bytes = int(Path("/proc/sys/net/core/rmem_max").read_text(encoding="ascii"))
-    return frame_bytes * NS_PER_S / period_ns <= _SLOW_BYTES_PER_S and buffer_bytes >= _STALL_FRAMES * frame_bytes
 
 
 def _opening_error(settings: CameraSettings, error: GLib.Error) -> CameraError | CameraNotFoundError:

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import zmq
 
+from capture.receive_socket import SOCKET_BUFFER_BYTES, STALL_FRAMES, prefers_plain_socket
 from recorder.zmq_address import bind
 from rig.errors import BadInputError
 from rig.settings import CameraSettings, RigSettings
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 from svev.doctor.interfaces import Interface, interface_to
 
-_MIB = 1 << 20
-_SOCKET_BUFFER = 8 * _MIB  # what the Aravis back end asks for
 _CAP_NET_RAW = 13  # linux/capability.h
 _FULL = 0.9  # a link that is fuller than this has no room for packets that are sent again
 
@@ -25,41 +24,43 @@ def gige_cameras(rig: RigSettings) -> list[CameraSettings]:
 
 
 def look_at_packet_sockets(rig: RigSettings) -> Iterator[Finding]:
-    """Packet sockets receive at a fraction of the processor time; the kernel gives them to the privileged."""
-    wish: str = rig.network.packet_socket
-    if not gige_cameras(rig) or wish == "off":
+    """Packet sockets make fast cameras several times cheaper; the kernel gives them to the privileged."""
+    cameras = gige_cameras(rig)
+    plain = [camera for camera in cameras if _prefers_plain_socket(rig, camera)]
+    if not cameras:
         return
-    if _may_use_packet_sockets():
+    if len(plain) == len(cameras):
+        yield passed(Topic.NETWORK, "frames are received through plain sockets, which suit slow cameras")
+    elif _may_use_packet_sockets():
         yield passed(Topic.NETWORK, "frames are received through packet sockets")
-        return
-    judge = failure if wish == "on" else warning
-    yield judge(
-        Topic.NETWORK,
-        "no right to packet sockets (CAP_NET_RAW): receiving costs several times the processor time",
-        "run svev as root, or by: sudo setpriv --reuid=$USER --regid=$USER --init-groups --inh-caps=+net_raw "
-        '--ambient-caps=+net_raw "$(which svev)" record ...',
-    )
+    else:
+        yield warning(
+            Topic.NETWORK,
+            "no right to packet sockets (CAP_NET_RAW): receiving costs several times the processor time",
+            "run svev as root, or by: sudo setpriv --reuid=$USER --regid=$USER --init-groups --inh-caps=+net_raw "
+            '--ambient-caps=+net_raw "$(which svev)" record ...',
+        )
 
 
 def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
-    """Buffers for plain sockets: too small ones lose packets, above all those of the first frame."""
-    cameras = gige_cameras(rig)
-    if not cameras:
+    """Buffers of plain sockets: too small ones lose packets, above all those of the first frame."""
+    plain = [
+        camera for camera in gige_cameras(rig) if _prefers_plain_socket(rig, camera) or not _may_use_packet_sockets()
+    ]
+    if not plain:
         return
-    used = rig.network.packet_socket == "off" or not _may_use_packet_sockets()
+    largest = max(camera.frame_bytes for camera in plain)
     # The large buffer is asked for when the first packet is already there, so the first frame has to fit into the
     # default one; the kernel counts its own overhead in, about as much again.
-    first = max(_MIB, 2 * max(camera.frame_bytes for camera in cameras))
-    for name, wanted in {"rmem_max": _SOCKET_BUFFER, "rmem_default": first}.items():
+    wanted = {"rmem_max": min(SOCKET_BUFFER_BYTES, STALL_FRAMES * largest), "rmem_default": 2 * largest}
+    for name, least in wanted.items():
         value = int(Path(f"/proc/sys/net/core/{name}").read_text())
         what = f"net.core.{name} is {value}"
-        if value >= wanted:
+        if value >= least:
             yield passed(Topic.NETWORK, what)
-        elif not used:
-            yield passed(Topic.NETWORK, f"{what}, small, but packet sockets do without")
         else:
-            remedy = f"run: sudo sysctl -w net.core.{name}={wanted} (for good: a line in /etc/sysctl.d/90-svev.conf)"
-            yield warning(Topic.NETWORK, f"{what}, {wanted} is wanted: packets may be lost", remedy)
+            remedy = f"run: sudo sysctl -w net.core.{name}={least} (for good: a line in /etc/sysctl.d/90-svev.conf)"
+            yield warning(Topic.NETWORK, f"{what}, {least} is wanted: packets may be lost", remedy)
 
 
 def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
@@ -120,6 +121,10 @@ def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
             yield failure(Topic.NETWORK, f"triplets cannot be published: {error}", remedy)
             return
     yield passed(Topic.NETWORK, f"triplets can be published at {address}")
+
+
+def _prefers_plain_socket(rig: RigSettings, camera: CameraSettings) -> bool:
+    return prefers_plain_socket(rig.network, camera.frame_bytes, rig.trigger.period_ns)
 
 
 def _may_use_packet_sockets() -> bool:

@@ -7,8 +7,11 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from photogrammetry.camera_model import INTERIOR
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
+#: No length, image coordinate or parameter is larger in any unit, no sigma smaller (that of a3 may be 1e-30).
+LARGEST, SMALLEST = 1e12, 1e-60
+
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Sigmas = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Pixels = Annotated[int, Field(strict=True, gt=0)]
@@ -46,7 +49,7 @@ class CameraEntry(Entry):
     a1: Finite = 0.0
     a2: Finite = 0.0
     a3: Finite = 0.0
-    r0: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)] = 0.0
+    r0: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=LARGEST)] = 0.0
     b1: Finite = 0.0
     b2: Finite = 0.0
     c1: Finite = 0.0

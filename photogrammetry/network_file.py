@@ -1,7 +1,6 @@
 """Reads `svev-network/1` files; every error names file, key and remedy."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,8 @@ from photogrammetry.network import (
     Role,
 )
 from photogrammetry.network_entries import (
+    LARGEST,
+    SMALLEST,
     CameraEntry,
     DatumEntry,
     DifferenceEntry,
@@ -240,9 +241,9 @@ def _numbers(row: Any, place: str) -> tuple[list[float], str]:
     if len(numbers) not in (3, 4):
         raise BadInputError(f"{place}: has {len(numbers)} numbers; write x, y, sigma or x, y, sigma_x, sigma_y")
     for number in numbers:
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
-            raise BadInputError(f"{place}: {number!r} is no finite number; correct it")
-    if min(numbers[2:]) <= 0.0:
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not abs(number) <= LARGEST:
+            raise BadInputError(f"{place}: {number!r} is no number in range; correct it")
+    if min(numbers[2:]) < SMALLEST:
         raise BadInputError(f"{place}: sigma {min(numbers[2:])!r} is not positive; correct it")
     if group in RESERVED_GROUPS:
         raise BadInputError(f'{place}: group "{group}" is the name of another kind of observation; choose another')

@@ -1,10 +1,12 @@
 """The adjustment of a network: solved, with covariance, redundancy and tests."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photogrammetry.adjustment.datum import FreeDatum, align, datum_points, inner_operator, s_transform
+from photogrammetry.adjustment.datum import DatumError, FreeDatum, align, datum_points, inner_operator, s_transform
 from photogrammetry.adjustment.normals import SingularError, build_normals, factorise
 from photogrammetry.adjustment.problem import Equations, Problem, build_problem
 from photogrammetry.adjustment.rank import check_rank
@@ -12,8 +14,11 @@ from photogrammetry.adjustment.solver import solve
 from photogrammetry.adjustment.state import Floats, State, state_of
 from photogrammetry.adjustment.statistics import Redundancy, minimal_detectable, redundancy, w_values
 from photogrammetry.adjustment.unknowns import Integers
-from photogrammetry.diagnosis import Defect, DefectKind, NotSolvableError
+from photogrammetry.diagnosis import Defect, DefectKind, NotConvergedError, NotSolvableError
 from photogrammetry.network import Network
+
+#: A reciprocal condition below this at the optimum calls for another rank analysis.
+_DOUBTFUL = 1e-11
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +143,8 @@ def adjust_once(network: Network, start: State | None = None) -> Adjustment:
 
 def adjust_problem(problem: Problem, start: State) -> Adjustment:
     """Adjust a problem whose weights may differ from the network's; otherwise as `adjust_once`."""
-    return _adjusted(problem, start, check_rank(problem, start).defect, start)
+    with _only_sound_numbers():
+        return _adjusted(problem, start, check_rank(problem, start).defect, start)
 
 
 def refine(problem: Problem, adjustment: Adjustment) -> Adjustment:
@@ -147,7 +153,21 @@ def refine(problem: Problem, adjustment: Adjustment) -> Adjustment:
     Raises:
         NotSolvableError, NotConvergedError: as `adjust_once`.
     """
-    return _adjusted(problem, adjustment.state, adjustment.free.defect, adjustment.state)
+    with _only_sound_numbers():
+        return _adjusted(problem, adjustment.state, adjustment.free.defect, adjustment.state)
+
+
+@contextmanager
+def _only_sound_numbers() -> Iterator[None]:
+    """Numbers that overflow, or datum points that fall together on the way, end the adjustment in words."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except np.linalg.LinAlgError:
+        raise NotConvergedError("the numbers leave all bounds; check units and sigmas, or give start values") from None
+    except DatumError as error:
+        message = f"the datum points fall onto a line ({error.missing} conditions short); choose others"
+        raise NotSolvableError((Defect(DefectKind.DATUM, error.missing, message),)) from None
 
 
 def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adjustment:
@@ -174,4 +194,6 @@ def _cofactors(problem: Problem, state: State, equations: Equations, free: FreeD
         check_rank(problem, state)
         message = "at the optimum the network is singular to working precision; estimate fewer camera parameters"
         raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, message),)) from None
+    if factor.condition < _DOUBTFUL:
+        check_rank(problem, state)
     return s_transform(factor.cofactors(), moves, conditions)

@@ -143,8 +143,19 @@ _BAD: dict[str, tuple[Change, str]] = {
         lambda d: d["observations"].append(["i1", "C2", 1, 2, 0]),
         r"observations\.3: sigma 0 is not positive",
     ),
-    "text for x": (lambda d: d["observations"].append(["i1", "C2", "1", 2, 1]), r"observations\.3: '1' is no finite"),
-    "null for x": (lambda d: d["observations"].append(["i1", "C2", None, 2, 1]), r"observations\.3: None is no finite"),
+    "text for x": (
+        lambda d: d["observations"].append(["i1", "C2", "1", 2, 1]),
+        r"observations\.3: '1' is no number in range",
+    ),
+    "null for x": (
+        lambda d: d["observations"].append(["i1", "C2", None, 2, 1]),
+        r"observations\.3: None is no number in range",
+    ),
+    "beyond all bounds": (lambda d: d["points"]["B7"].update(X=[0, 1e300, 0]), r"points\.B7: .*X.*correct it"),
+    "x beyond all bounds": (
+        lambda d: d["observations"].append(["i1", "C2", 1e300, 2, 1]),
+        r"observations\.3: 1e\+300 is",
+    ),
     "reserved group": (
         lambda d: d["observations"].append(["i1", "C2", 1, 2, 1, "control"]),
         r'observations\.3: group "control".*choose another',

@@ -1,4 +1,4 @@
-"""Closed solutions of the relative orientation of five points: essential matrices and the rotations in them.
+"""Closed solutions of the relative orientation of five points: essential matrices and what they hold.
 
 E = [b]x R satisfies u^T E v = 0 for each pair of rays, det E = 0 and 2 E E^T E = tr(E E^T) E. Five pairs leave four
 matrices; the cubic constraints on their combination are ten equations in the twenty monomials of three unknowns. Solved
@@ -56,9 +56,12 @@ def essential_matrices(u: Array, v: Array) -> Array:
     return np.asarray(found / np.linalg.norm(found, axis=(1, 2), keepdims=True))
 
 
-def rotations_of(essential: Array) -> Array:
-    """Both rotations of each essential matrix: (k, 3, 3) to (2 k, 3, 3); they differ by half a turn about the base."""
+def orientations_of(essential: Array) -> tuple[Array, Array]:
+    """Both rotations and the base of each essential matrix: (k, 3, 3) to (2 k, 3, 3) and (2 k, 3).
+
+    The rotations differ by half a turn about the base, whose sign is open.
+    """
     left, _, right = np.linalg.svd(essential)
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     both = np.concatenate((left @ quarter @ right, left @ quarter.T @ right))
-    return np.asarray(both * np.sign(np.linalg.det(both))[:, None, None])
+    return both * np.sign(np.linalg.det(both))[:, None, None], np.concatenate((left[..., 2], left[..., 2]))

@@ -2,19 +2,19 @@
 
 The paper tries probable rotations R_j with linearly derived base components. Here the rotations are not guessed: they
 are the closed solutions of several sets of five points. For each, the base follows linearly from all points, and the
-best are refined by damped Gauss-Newton steps. The distinct minima with the points in front of both cameras are the
-solutions; there may be several for five points, and two for points in a plane.
+best are refined by damped Gauss-Newton steps. Blunders among many points are left out. The distinct minima with the
+points in front of both cameras are the solutions; there may be several for five points, and two for points in a plane.
 
 Condition: b . (u x R v) = 0 with u, v = (x, y, -c), divided by the root of the sum of the squared derivatives by the
 four image coordinates: then its square sum is that of the residuals in the image, to second order of the residuals.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogrammetry.essential_matrix import essential_matrices, rotations_of
+from photogrammetry.essential_matrix import essential_matrices, orientations_of
 from photogrammetry.ideal_camera import Array, IdealCamera
 from photogrammetry.rotation import rotation_from_vector, skew
 from rig.errors import BadInputError
@@ -24,6 +24,8 @@ _STARTS = 12  # candidates that are refined,
 _FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points soon only the best of those with the points in front
 _NEAR = 0.02  # rad: candidates closer than that are refined once
 _MANY = 10
+_GOOD_SHARE = 0.75  # of the points are no blunders,
+_OUTLIER = 6.0  # nor is one with a residual up to so many median ones
 _STEPS = 30
 _SETTLED = 1e-9  # relative decrease of the square sum,
 _GIVEN_UP = 1.0  # damping without any decrease
@@ -40,7 +42,7 @@ class RelativeOrientation:
         rotation: (3, 3), columns are the second camera's axes.
         base: (3,) its projection centre, unit vector.
         residuals: (n,) distances, image unit: root of the smallest square sum of the four coordinates' corrections.
-        square_sum: of the residuals.
+        square_sum: of the residuals, blunders left out.
         in_front: share of the points that lie before both cameras.
         parallax: mean angle (rad) between homologous rays.
         alternatives: other solutions that fit nearly as well, best first (they have no alternatives themselves).
@@ -82,38 +84,61 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     u, v = _vectors(np.asarray(first, float), c_first), _vectors(np.asarray(second, float), c_second)
     if len(u) < 5:
         raise BadInputError(f"a relative orientation has {len(u)} homologous points: give at least five")
-    scale = 0.5 * (c_first + c_second)
-    rotations = _candidates(u / c_first, v / c_second)
+    rounding = len(u) * (_ROUNDING * 0.5 * (c_first + c_second)) ** 2
+    rotations, bases = _candidates(u / c_first, v / c_second)
+    good = _good_points(rotations, bases, u, v)
+    rotations, bases = _minima(rotations, u[good], v[good])
+    good = _good_points(rotations, bases, u, v)
+    rotations, bases, sums = _iterate(rotations, bases, u[good], v[good], _STEPS)
+    solutions = _solutions(rotations, bases, sums, u[good], v[good], rounding)
+    if not solutions or solutions[0].in_front < 0.5:
+        raise BadInputError(
+            "homologous points allow no relative orientation: check point numbers and principal distance"
+        )
+    limit = max(_POSSIBLE * solutions[0].square_sum, rounding)
+    head, *others = (
+        replace(s, residuals=_conditions(s.rotation[None], s.base[None], u, v)[0][0])
+        for s in solutions
+        if s.square_sum <= limit and s.in_front == solutions[0].in_front
+    )
+    return replace(head, alternatives=tuple(others))
+
+
+def _minima(rotations: Array, u: Array, v: Array) -> tuple[Array, Array]:
+    """Minima reached from the best candidates, the base from all points."""
     bases = _linear_bases(rotations, u, v)
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
     best = _distinct_starts(rotations, sums) if len(u) > 5 else list(range(len(rotations)))
-    rotations, bases, sums = rotations[best], bases[best], sums[best]
+    rotations, bases = rotations[best], bases[best]
     if len(u) >= _MANY:
         rotations, bases, sums = _iterate(rotations, bases, u, v, _FIRST_STEPS)
         sums = np.where(_possible(rotations, bases, u, v), sums, np.inf)
         best = [int(i) for i in np.argsort(sums, kind="stable")[:_FIRST_KEPT]]
         rotations, bases = rotations[best], bases[best]
-    rotations, bases, sums = _iterate(rotations, bases, u, v, _STEPS)
-    solutions = _solutions(rotations, bases, sums, u, v, len(u) * (_ROUNDING * scale) ** 2)
-    if not solutions or solutions[0].in_front < 0.5:
-        raise BadInputError(
-            "homologous points allow no relative orientation: check point numbers and principal distance"
-        )
-    limit = max(_POSSIBLE * solutions[0].square_sum, len(u) * (_ROUNDING * scale) ** 2)
-    head, *others = (s for s in solutions if s.square_sum <= limit and s.in_front == solutions[0].in_front)
-    return RelativeOrientation(
-        head.rotation, head.base, head.residuals, head.square_sum, head.in_front, head.parallax, tuple(others)
-    )
+    rotations, bases, _ = _iterate(rotations, bases, u, v, _STEPS)
+    return rotations, bases
 
 
-def _candidates(u: Array, v: Array) -> Array:
-    """Rotations (k, 3, 3) of the closed solutions of sets of five points, and of all points where they are many."""
+def _good_points(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[np.bool_]:
+    """Points that are no blunders by the candidate that fits the most of them best; of few points all are good."""
+    if len(u) < _MANY:
+        return np.ones(len(u), bool)
+    size = np.sort(np.abs(_conditions(rotations, bases, u, v)[0]), axis=1)
+    least = int(np.ceil(_GOOD_SHARE * len(u)))
+    best = int((size[:, :least] ** 2).sum(axis=1).argmin())
+    limit = max(_OUTLIER * float(np.median(size[best])), float(size[best, least - 1]))
+    residuals = _conditions(rotations[best : best + 1], bases[best : best + 1], u, v)[0][0]
+    return np.asarray(np.abs(residuals) <= limit)
+
+
+def _candidates(u: Array, v: Array) -> tuple[Array, Array]:
+    """Rotations (k, 3, 3) and bases (k, 3): closed solutions of sets of five points, and of all together."""
     solutions = [essential_matrices(u[None], v[None])]
     if len(u) > 5:
         shuffled = np.random.default_rng(len(u))  # the same sets each time
         sets = np.array([shuffled.choice(len(u), 5, replace=False) for _ in range(_SETS)])
         solutions.append(essential_matrices(u[sets], v[sets]))
-    return rotations_of(np.concatenate(solutions))
+    return orientations_of(np.concatenate(solutions))
 
 
 def _distinct_starts(rotations: Array, sums: Array) -> list[int]:

@@ -90,6 +90,19 @@ def test_errors_are_those_of_the_noise() -> None:
     assert abs(np.mean(values) - 25) < 5 * np.sqrt(2 * 25 / 30)
 
 
+def test_blunders_are_left_out() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(8):
+        cameras = lab_cameras(rng)[:2]
+        xy = observe(cameras, frame_points(rng, 40), rng)
+        clean = orient_relatively(xy[4:, 0], xy[4:, 1], cameras[0].c, cameras[1].c)
+        xy[:4, 1] = rng.uniform(-200, 200, (4, 2))
+        result = orient_relatively(xy[:, 0], xy[:, 1], cameras[0].c, cameras[1].c)
+        assert _error(result, (clean.rotation, clean.base)) < 0.02
+        assert result.square_sum < 40 * (3 * SIGMA_PX) ** 2
+        assert np.abs(result.residuals[:4]).max() > 10
+
+
 def test_bad_input_is_named() -> None:
     with pytest.raises(BadInputError, match="4 homologous points: give at least five"):
         orient_relatively(np.zeros((4, 2)), np.zeros((4, 2)), 1000.0, 1000.0)

@@ -122,7 +122,7 @@ class Assembler:
         # until it is read, or its unread frames would be taken for missing ones.
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
         self._decided.extend(self.pairer.advance(min(waiting, default=now)))
-        self._ask_silent_cameras()
+        self._ask_silent_cameras(now)
         return list(self._ready())
 
     def _ready(self) -> Iterator[Triplet]:
@@ -240,9 +240,9 @@ class Assembler:
             if outcome.status is not FrameStatus.OK:
                 block.fill(0)
 
-    def _ask_silent_cameras(self) -> None:
+    def _ask_silent_cameras(self, now: HostNs) -> None:
         """Once per silence, ask the grabber to look after its camera."""
-        silent = {*self.pairer.silent(), *self.pairer.overdue()}
+        silent = {*self.pairer.silent(), *self.pairer.overdue(now)}
         for camera, ring in enumerate(self._rings):
             if camera in silent and not self._asked[camera]:
                 ring.request_reconnect()

@@ -23,6 +23,7 @@ __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 
 _TOLERANCE_PERIODS: Final = 0.3
 _SILENT_PERIODS: Final = 3
+_HELD_BACK_NS: Final = NS_PER_S // 20  # good frames wait so long behind a damaged one
 _FIRST_NS: Final = NS_PER_S // 2  # a camera that has just been connected may take so long to its first frame
 _TIME: Final = attrgetter("time")
 _NO_FRAME: Final = {status: Outcome(status) for status in FrameStatus}
@@ -133,16 +134,18 @@ class Pairer:
         """The connected cameras that have delivered nothing for three periods while others did."""
         return tuple(camera for camera, track in enumerate(self._tracks) if track.silent)
 
-    def overdue(self) -> tuple[int, ...]:
-        """The connected cameras that are three pulses behind the others: look after them.
+    def overdue(self, now: HostNs) -> tuple[int, ...]:
+        """The connected cameras that are three pulses behind the others at host time `now`: look after them.
 
-        Only a suspicion, sooner than `silent`: their frames are waited for all the same, up to the deadline.
+        Only a suspicion, sooner than `silent`: their frames are waited for all the same, up to the deadline. Frames
+        that are merely on their way, or held back behind a damaged one, raise none.
         """
         overdue = []
         for camera, track in enumerate(self._tracks):
             since = track.alive if track.delivers else track.alive + _FIRST_NS
-            behind = sum(pulse.frames[camera] is None and pulse.time > since for pulse in self._open)
-            if track.connected and behind >= _SILENT_PERIODS:
+            behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]
+            late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + _HELD_BACK_NS
+            if late and track.connected:
                 overdue.append(camera)
         return tuple(overdue)
 

@@ -221,6 +221,7 @@ class Run:
         closed: the decided pulses.
         unplaced: slots of the whole frames that the pairer refused.
         silent: cameras that were silent at some time.
+        overdue: cameras that were overdue at some time.
         most_open: most pulses undecided at a time.
     """
 
@@ -229,6 +230,7 @@ class Run:
     closed: list[ClosedPulse] = field(default_factory=list)
     unplaced: list[int] = field(default_factory=list)
     silent: set[int] = field(default_factory=set)
+    overdue: set[int] = field(default_factory=set)
     most_open: int = 0
 
     def __post_init__(self) -> None:
@@ -266,6 +268,7 @@ class Run:
     def advance(self, now: HostNs) -> None:
         self.closed += self.pairer.advance(now)
         self.silent |= set(self.pairer.silent())
+        self.overdue |= set(self.pairer.overdue(now))
 
 
 def _load(pulse: OpenPulse, record: Record) -> None:

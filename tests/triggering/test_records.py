@@ -40,9 +40,10 @@ def test_a_camera_three_pulses_behind_the_others_is_overdue_but_still_waited_for
         for camera in range(3):
             if camera != 1 or pulse < 10 or pulse > 14:
                 feed.frame(camera, pulse, pulse + 1)
-        feed.advance(feed.time_of(pulse) + 5 * MS)
+        now = HostNs(feed.time_of(pulse) + 5 * MS)
+        feed.advance(now)
         # The tenth pulse, number 9, is the last one that it delivers: with number 12 it is three behind.
-        assert feed.pairer.overdue() == ((1,) if 12 <= pulse <= 14 else ())
+        assert feed.pairer.overdue(now) == ((1,) if 12 <= pulse <= 14 else ())
     assert [tag.outcomes[1].status for tag in feed.closed[10:15]] == [LOST] * 5
 
 
@@ -51,7 +52,7 @@ def test_no_camera_is_overdue_while_the_pulses_pause() -> None:
     for pulse in [*range(10), *range(100, 110)]:
         for camera in range(3):
             feed.frame(camera, pulse, pulse + 1 if pulse < 10 else pulse - 89)
-            assert feed.pairer.overdue() == ()
+            assert feed.pairer.overdue(feed.time_of(pulse)) == ()
         feed.advance(feed.time_of(pulse) + 5 * MS)
 
 

@@ -208,3 +208,10 @@ def test_between_latches_the_frames_keep_the_clocks_together() -> None:
 def test_the_recorder_stalls_and_then_takes_camera_after_camera() -> None:
     done = run(batch_ns=700 * MS, rate_hz=200.0, pulses=600, lost=0.05)
     assert done.unplaced == []
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 100.0, 200.0])
+def test_frames_that_are_only_on_their_way_make_no_camera_overdue(rate_hz: float) -> None:
+    """At 200 Hz three pulses are 15 ms: less than the transport of one frame."""
+    done = run(rate_hz=rate_hz, pulses=600, damaged=0.01, hold_periods=20.0)
+    assert done.overdue == set()

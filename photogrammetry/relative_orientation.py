@@ -29,6 +29,7 @@ _OUTLIER = 6.0  # nor is one with a residual up to so many median ones
 _STEPS = 30
 _SETTLED = 1e-9  # relative decrease of the square sum,
 _GIVEN_UP = 1.0  # damping without any decrease
+_EPIPOLE = 1e-9
 _SAME = 1e-3  # rad: rotations and bases closer than that are one solution
 _POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
 _ROUNDING = 1e-7  # of c: residuals that small are none
@@ -173,6 +174,7 @@ def _conditions(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[Arr
     in_second = normal @ rotations
     by_second = in_second[..., :2]
     root = np.sqrt(np.einsum("kni,kni->kn", by_first, by_first) + np.einsum("kni,kni->kn", by_second, by_second))
+    root = np.maximum(root, _EPIPOLE * np.linalg.norm(u, axis=1))  # a point in both epipoles says nothing
     jacobian = np.empty((*closure.shape, 5))
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         jacobian[..., i] = v[:, j] * in_second[..., k] - v[:, k] * in_second[..., j]

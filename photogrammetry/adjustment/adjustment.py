@@ -19,6 +19,8 @@ from photogrammetry.network import Network
 
 #: A reciprocal condition below this at the optimum calls for another rank analysis.
 _DOUBTFUL = 1e-11
+#: The redundancy numbers add up to the redundancy; a difference of this size comes from rounding gone wild.
+_LOST = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,9 +181,14 @@ def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adj
         state = align(problem, state, free, points, target.xyz)
     equations = problem.equations(state)
     cofactors = _cofactors(problem, state, equations, free, points)
-    return Adjustment(
-        problem, state, solution.iterations, free, equations, cofactors, redundancy(problem, equations, cofactors)
-    )
+    controlled = redundancy(problem, equations, cofactors)
+    adjusted = Adjustment(problem, state, solution.iterations, free, equations, cofactors, controlled)
+    if not abs(controlled.total - adjusted.redundancy) <= _LOST:
+        raise NotConvergedError(
+            "the solution has lost its digits (the redundancy numbers do not add up); look for coordinates or sigmas "
+            "that are out of all proportion"
+        )
+    return adjusted
 
 
 def _cofactors(problem: Problem, state: State, equations: Equations, free: FreeDatum, points: Integers) -> Floats:

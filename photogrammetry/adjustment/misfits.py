@@ -7,7 +7,7 @@ from photogrammetry.adjustment.problem import build_problem
 from photogrammetry.adjustment.rank import check_rank
 from photogrammetry.adjustment.solver import robust_state
 from photogrammetry.adjustment.state import State
-from photogrammetry.diagnosis import NotConvergedError
+from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Network
 
 #: A misfit is so many times worse than what is typical.
@@ -24,7 +24,7 @@ def find_misfits(network: Network, start: State) -> tuple[list[Blunder], State]:
     problem = build_problem(network)
     try:
         state = robust_state(problem, start, check_rank(problem, start).defect)
-    except NotConvergedError:
+    except (NotConvergedError, NotSolvableError, np.linalg.LinAlgError):
         return [], start
     v = problem.equations(state).v
     sizes = np.linalg.norm(v, axis=1)

@@ -4,14 +4,18 @@
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from photogrammetry.adjustment.adjustment import adjust_once
-from photogrammetry.network import Network, Point, Role
+from photogrammetry.network import Datum, DatumType, Network, Point, Role
+from photogrammetry.network_file import read_network
 from photogrammetry.start_values import complete, find_start_values
 from tests.photogrammetry.networks import Case, hill, laboratory, observations, rods, sheet
+
+_CAMCAL = Path(__file__).parent / "data" / "camcal" / "network.json"
 
 
 def _from_truth(case: Case) -> Network:
@@ -74,6 +78,27 @@ def test_rods_give_the_object_system(factors: tuple[float, ...]) -> None:
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_flat_sheet_by_planar_resection(factor: float) -> None:
     _assert_same_optimum(sheet(np.random.default_rng(15)), (factor,))
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("control", [True, False])
+def test_published_self_calibration_from_nothing(factor: float, control: bool) -> None:
+    """camcal without poses and points, c wrong by a factor of two: the published sigma0; and without control, as free."""
+    network = read_network(_CAMCAL)
+    camera = network.cameras[0]
+    camera = replace(camera, interior=camera.interior * np.array([factor, *[1.0] * 9]))
+    images = tuple(replace(image, position=None, rotation=None) for image in network.images)
+    network = replace(network, cameras=(camera,), images=images)
+    if not control:
+        points = tuple(Point(point.name, Role.TIE) for point in network.points)
+        network = replace(network, points=points, datum=Datum(DatumType.INNER))
+    adjusted = adjust_once(complete(network))
+    assert adjusted.sigma0 is not None
+    if control:
+        assert adjusted.sigma0 == pytest.approx(1.6148, abs=2e-4)
+    else:  # the error-free corners of the sheet were not quite so
+        assert 1.3 < adjusted.sigma0 < 1.6
+    assert adjusted.state.interior[0, 0] == pytest.approx(2336.808, abs=0.4)
 
 
 def test_flat_sheet_without_control_by_relative_orientation() -> None:

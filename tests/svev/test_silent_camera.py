@@ -30,7 +30,7 @@ def test_a_camera_that_falls_silent_is_noticed_and_comes_back(tmp_path: Path, lo
         def on_event(line: str) -> None:
             """Bring the camera back when its loss has been reported."""
             said.append(line)
-            if line.startswith("K2 silent"):
+            if line.startswith("K2 gone"):
                 hill.thaw("K2") if how == "freeze" else hill.restart("K2")
 
         def on_progress(message: Message) -> None:

@@ -6,7 +6,7 @@ Pure functions of the scenario, so that every process and every back end sees th
 import random
 
 from rig.clocks import NS_PER_S, NS_PER_US, DeviceNs, HostNs
-from simrig.scenario import Scenario
+from simrig.world.scenario import Scenario
 
 #: Device clocks count from power-up; an hour before the hill began keeps them positive with any sensible offset.
 _UP_BEFORE_NS = 3600 * NS_PER_S

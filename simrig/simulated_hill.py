@@ -17,8 +17,8 @@ from simrig.gige.camera import OF_THE_PROCESS
 from simrig.gige.config import CameraConfig
 from simrig.gige.counters import CameraStatistics
 from simrig.pulse_train import PulseTrain
-from simrig.scenario import load_scenario
 from simrig.timetable import Timetable
+from simrig.world.scenario import load_scenario
 
 
 class SimulatedHill:

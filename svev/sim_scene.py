@@ -9,9 +9,9 @@ from rig.errors import BadInputError
 from rig.settings import RigSettings
 from simrig.device_clock import DeviceClock
 from simrig.faults import Fault, FaultKind, FaultPlan
+from simrig.images.view import CameraView
 from simrig.pulse_train import PulseTrain
-from simrig.scenario import load_scenario
-from simrig.view import CameraView
+from simrig.world.scenario import load_scenario
 
 _EXPOSURES = {
     FaultKind.MISSED_PULSE: Exposure.MISSED,

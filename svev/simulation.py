@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager, nullcontext
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.settings import CameraSettings, RigSettings
-from simrig.scenario import load_scenario
 from simrig.simulated_hill import SimulatedHill
+from simrig.world.scenario import load_scenario
 
 
 def simulated_hill(

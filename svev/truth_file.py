@@ -5,9 +5,9 @@ from pathlib import Path
 
 from recorder.log_reader import triplets
 from rig.settings import RigSettings
-from simrig import stamp
-from simrig.scenario import load_scenario
-from simrig.truth import truth
+from simrig.images import stamp
+from simrig.world.scenario import load_scenario
+from simrig.world.truth import truth
 
 
 def hill_pulses(log: Path, rig: RigSettings) -> dict[int, set[int]]:

@@ -22,9 +22,9 @@ from simrig.gige.registers import RegisterMap
 from simrig.gige.sensor import Sensor
 from simrig.gige.transmitter import Transmitter
 from simrig.gige.values import XML_ADDRESS, Identity
+from simrig.images.view import CameraView
 from simrig.pulse_train import PulseTrain
-from simrig.scenario import Scenario, load_scenario
-from simrig.view import CameraView
+from simrig.world.scenario import Scenario, load_scenario
 
 #: Faults that befall the process as a whole; `simrig.simulated_hill` carries them out.
 OF_THE_PROCESS = frozenset({FaultKind.RESTART, FaultKind.FROZEN})

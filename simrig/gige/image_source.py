@@ -5,9 +5,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig import stamp
 from simrig.gige.frame_store import FrameStore, Slot
 from simrig.gige.gvsp import FrameFormat
+from simrig.images import stamp
 
 Image = NDArray[np.uint8]
 

@@ -15,8 +15,8 @@ from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.ring import CameraRing
 from rig.settings import RigSettings
-from simrig import stamp
 from simrig.faults import Fault
+from simrig.images import stamp
 from simrig.simulated_hill import SimulatedHill
 from svev.sim_scene import SimScene
 from svev.simulation import simulated_hill

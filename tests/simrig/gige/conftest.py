@@ -12,7 +12,7 @@ from simrig.device_clock import DeviceClock
 from simrig.gige.camera import Camera
 from simrig.gige.config import CameraConfig
 from simrig.pulse_train import PulseTrain
-from simrig.scenario import load_scenario
+from simrig.world.scenario import load_scenario
 from tests.support.loopback import Loopback
 
 TRAINING = CONFIG / "scenarios" / "training.toml"

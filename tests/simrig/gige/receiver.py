@@ -11,7 +11,7 @@ import gi
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig import stamp
+from simrig.images import stamp
 
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis  # noqa: E402

@@ -7,7 +7,7 @@ from rig.rigfile import CONFIG
 from simrig.device_clock import DeviceClock
 from simrig.gige.camera_clock import PTP_SETTLE_NS, CameraClock, PtpMaster
 from simrig.gige.values import PtpStatus
-from simrig.scenario import load_scenario
+from simrig.world.scenario import load_scenario
 
 EPOCH = HostNs(5 * NS_PER_S)
 MASTER = PtpMaster(offset_ns=1_000_000_000_000, error_ns=-120)

@@ -9,11 +9,11 @@ import pytest
 
 from rig.clocks import HostNs
 from rig.rigfile import CONFIG
-from simrig import stamp
 from simrig.gige.gvcp import Command
 from simrig.gige.sensor import PULSE_WIDTH_NS
-from simrig.scenario import load_scenario
-from simrig.view import CameraView
+from simrig.images import stamp
+from simrig.images.view import CameraView
+from simrig.world.scenario import load_scenario
 from tests.simrig.gige.conftest import TRAINING, MakeCamera
 from tests.simrig.gige.raw_client import GvcpClient
 from tests.simrig.gige.receiver import Received, Receiver

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simrig.flight import GRAVITY, STEP_S, Flight, Forces, fly
-from simrig.hill_profile import HillProfile
-from simrig.keyframes import Curve
-from simrig.scenario import Hill
+from simrig.world.flight import GRAVITY, STEP_S, Flight, Forces, fly
+from simrig.world.hill_profile import HillProfile
+from simrig.world.keyframes import Curve
+from simrig.world.scenario import Hill
 
 START = np.array((0.0, 0.0, 0.0))
 SPEEDS = st.tuples(st.floats(5, 40), st.floats(-2, 2), st.floats(-8, 8))
@@ -58,7 +58,7 @@ def test_lift_carries(lift: float) -> None:
 
 def test_halving_the_step_changes_nothing_to_speak_of(monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = flight((26.0, 0.1, -2.6), 0.5, 0.5).position(0.8)
-    monkeypatch.setattr("simrig.flight.STEP_S", STEP_S / 2)
+    monkeypatch.setattr("simrig.world.flight.STEP_S", STEP_S / 2)
     fine = flight((26.0, 0.1, -2.6), 0.5, 0.5).position(0.8)
     assert coarse == pytest.approx(fine, abs=1e-7)
 

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simrig.keyframes import Curve, Keyframe
+from simrig.world.keyframes import Curve, Keyframe
 
 KEYFRAMES = st.lists(
     st.tuples(st.integers(-50, 50), st.floats(-100, 100)), min_size=1, max_size=6, unique_by=lambda frame: frame[0]

@@ -6,8 +6,8 @@ import pytest
 from rig.errors import BadInputError
 from rig.rigfile import CONFIG
 from simrig.faults import FaultKind
-from simrig.projection import look_at
-from simrig.scenario import Scenario, SceneCamera, load_scenario
+from simrig.world.projection import look_at
+from simrig.world.scenario import Scenario, SceneCamera, load_scenario
 
 SMALL = """
 name = "small"

@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simrig.scenario import Scenario
-from simrig.truth import truth
+from simrig.world.scenario import Scenario
+from simrig.world.truth import truth
 
 RATE_HZ = 30.0
 

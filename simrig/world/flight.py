@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.keyframes import Curve
+from simrig.world.keyframes import Curve
 
 GRAVITY = 9.82  #: m/s^2, Trondheim
 STEP_S = 0.01

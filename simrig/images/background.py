@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simrig.blob import Blob
-from simrig.canvas import Canvas
-from simrig.hill_profile import HillProfile
-from simrig.projection import Projection
-from simrig.scenario import BRIGHTEST, Scenario
-from simrig.stroke import stroke
+from simrig.images.blob import Blob
+from simrig.images.canvas import Canvas
+from simrig.images.stroke import stroke
+from simrig.world.hill_profile import HillProfile
+from simrig.world.projection import Projection
+from simrig.world.scenario import BRIGHTEST, Scenario
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from simrig.blob import Blob
-from simrig.canvas import Canvas
-from simrig.snowfall import Snowfall
-from simrig.stroke import stroke
-from tests.simrig.world.measuring import centroid
+from simrig.images.blob import Blob
+from simrig.images.canvas import Canvas
+from simrig.images.snowfall import Snowfall
+from simrig.images.stroke import stroke
+from tests.simrig.images.measuring import centroid
 
 PLACES = st.tuples(st.floats(18, 30), st.floats(18, 30))
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from simrig import stamp
-from simrig.background import PLATE_MARGIN_PX
-from simrig.scenario import Scenario
-from simrig.truth import truth
-from simrig.view import CameraView
-from tests.simrig.world.measuring import centroid, ridge_offset
+from simrig.images import stamp
+from simrig.images.background import PLATE_MARGIN_PX
+from simrig.images.view import CameraView
+from simrig.world.scenario import Scenario
+from simrig.world.truth import truth
+from tests.simrig.images.measuring import centroid, ridge_offset
 
 #: Not a multiple of anything in the scenario, so that markers fall on all parts of a pixel.
 RATE_HZ = 37.3

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simrig.scenario import Hill
+from simrig.world.scenario import Hill
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 import pytest
 
 from rig.rigfile import CONFIG
-from simrig.scenario import Scenario, load_scenario
+from simrig.world.scenario import Scenario, load_scenario
 
 
 @pytest.fixture(scope="session")

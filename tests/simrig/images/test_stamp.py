@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simrig import stamp
+from simrig.images import stamp
 
 
 @given(st.integers(0, 255), st.integers(0, 2**64 - 1))

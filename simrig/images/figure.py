@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.blob import Blob
-from simrig.jumper import Pose
-from simrig.projection import Projection
-from simrig.scenario import BRIGHTEST, Scenario, SceneCamera
-from simrig.stroke import stroke
+from simrig.images.blob import Blob
+from simrig.images.stroke import stroke
+from simrig.world.jumper import Pose
+from simrig.world.projection import Projection
+from simrig.world.scenario import BRIGHTEST, Scenario, SceneCamera
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.float64]  #: x, y in px

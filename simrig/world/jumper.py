@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.flight import Flight, Forces, fly
-from simrig.hill_profile import HillProfile
-from simrig.keyframes import Curve, Keyframe
-from simrig.scenario import Jumper, Scenario, Variation
+from simrig.world.flight import Flight, Forces, fly
+from simrig.world.hill_profile import HillProfile
+from simrig.world.keyframes import Curve, Keyframe
+from simrig.world.scenario import Jumper, Scenario, Variation
 
 Array = NDArray[np.float64]
 

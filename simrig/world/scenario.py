@@ -15,8 +15,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from rig.errors import BadInputError
 from rig.rigfile import read_toml, validate
 from simrig.faults import Fault
-from simrig.keyframes import Keyframe
-from simrig.projection import Projection, look_at
+from simrig.world.keyframes import Keyframe
+from simrig.world.projection import Projection, look_at
 
 REFERENCE_WIDTH = 640  #: px; principal distances in a scenario belong to images of this width
 #: Radiance of the brightest things, grey values at gain 1 above the black level: markers, balls and skis.
@@ -40,7 +40,7 @@ class _Strict(BaseModel):
 
 
 class Hill(_Strict):
-    """Profile of the hill (`simrig.hill_profile`); the defaults are those of a K120 hill."""
+    """Profile of the hill (`simrig.world.hill_profile`); the defaults are those of a K120 hill."""
 
     table_angle_deg: float = Field(11.0, ge=0, le=20, description="slope of the take-off table")
     table_height_m: float = Field(3.0, gt=0, description="from the knoll's foot up to the edge")
@@ -150,7 +150,7 @@ class Scenario(_Strict):
     seed: int = Field(ge=0, le=2**32 - 1)
     jump_every_s: float = Field(4.0, ge=2.5, description="from one jump to the next")
     first_takeoff_s: float = Field(1.0, ge=0, description="scene time at which the first jumper leaves the edge")
-    stamp: bool = Field(True, description="write camera and hill pulse into the image (`simrig.stamp`)")
+    stamp: bool = Field(True, description="write camera and hill pulse into the image (`simrig.images.stamp`)")
     pauses: tuple[tuple[int, int], ...] = Field((), description="hill pulses [from, to) that are not fired")
     hill: Hill = Hill()
     jumper: Jumper = Jumper()

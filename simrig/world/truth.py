@@ -4,7 +4,7 @@ Units: m, s, degrees, m/s, px. Frame: origin at the take-off edge, X horizontal 
 (right-handed). Cameras and pixel coordinates follow the network file (pixel frame, Eq. A1). `height` (Z0 of the paper)
 and `speed` (v) are those of O, the midpoint of P3 and P4; P3 and ski `right` belong together, P4 and `left`. `skis`
 holds a point and a direction (tail to tip) of each line and its parameters by Eq. (C8), Z = alpha X + gamma and
-Y = beta X + delta; `angles` are those of Fig. 6 (`simrig.stick_model`).
+Y = beta X + delta; `angles` are those of Fig. 6 (`simrig.world.stick_model`).
 """
 
 from collections.abc import Iterable
@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.jumper import FLIGHT_X_M, Jump, JumpSeries
-from simrig.projection import Projection
-from simrig.scenario import Scenario
-from simrig.stick_model import angles, ski_line
+from simrig.world.jumper import FLIGHT_X_M, Jump, JumpSeries
+from simrig.world.projection import Projection
+from simrig.world.scenario import Scenario
+from simrig.world.stick_model import angles, ski_line
 
 FORMAT = "svev-truth/1"
 MARKERS = ("P1", "P2", "P3", "P4")

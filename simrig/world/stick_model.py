@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.jumper import Pose
+from simrig.world.jumper import Pose
 
 Array = NDArray[np.float64]
 

@@ -6,12 +6,12 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig import stamp
-from simrig.background import paint
-from simrig.figure import Figure
-from simrig.jumper import JumpSeries
-from simrig.scenario import Scenario
-from simrig.snowfall import Snowfall
+from simrig.images import stamp
+from simrig.images.background import paint
+from simrig.images.figure import Figure
+from simrig.images.snowfall import Snowfall
+from simrig.world.jumper import JumpSeries
+from simrig.world.scenario import Scenario
 
 _NOISES = 6  #: realisations of the noise on the background
 _NOISE_KEY = struct.Struct(">IBQ")

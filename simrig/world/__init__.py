@@ -1,0 +1,1 @@
+"""What there is to see: scenario, hill, flight, jumper, and the truth about them."""

@@ -54,6 +54,7 @@ class Blunder:
         w: test value; of an image point that of its worse coordinate.
         locatable: whether the data can tell that it is this one.
         candidates: those that it may be instead, the suspect first; empty if it is locatable.
+        margin: test value that it keeps beside its strongest rival; 0 if that explains everything.
     """
 
     suspect: Observation
@@ -61,6 +62,7 @@ class Blunder:
     w: float
     locatable: bool
     candidates: tuple[Observation, ...]
+    margin: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,23 +186,25 @@ def _blunder(adjustment: Adjustment, families: list[_Hypotheses], family: _Hypot
     rest = adjustment.equations.square_sum - family.drop[place]
     clean = np.sqrt(rest / freedom) if freedom > 0 and rest > 0.0 else 1.0
     rivals: list[tuple[float, Observation]] = []
+    margin = np.inf
     size = np.sqrt(family.drop[place])
     for other in families:
         felt = effect[other.rows]
         alike = np.einsum("ha,hab,hb->h", felt, other.inverse, felt) / size**2
         # What the suspect still explains once the other one is let go: nothing, if that one is the culprit.
         shared = np.einsum("ha,hab,hb->h", felt, other.inverse, other.v) / size
-        left = np.abs(size + shared) / np.sqrt(np.maximum(1.0 - alike, 1e-12))
-        mistaken = (alike > _SAME) | (left < _NEEDED * clean)
+        left = np.abs(size + shared) / np.sqrt(np.maximum(1.0 - alike, 1e-12)) / clean
+        left[alike > _SAME] = 0.0
         if other is family:
-            mistaken[place] = False
-        indices = np.flatnonzero(mistaken)
+            left[place] = np.inf
+        margin = min(margin, float(left.min()))
+        indices = np.flatnonzero(left < _NEEDED)
         rivals += [(-float(other.drop[i]), Observation(other.kind, int(other.index[i]))) for i in indices]
     rivals.sort(key=lambda rival: (rival[0], rival[1].kind, rival[1].index))
     candidates = (suspect, *(observation for _, observation in rivals)) if rivals else ()
     scale = _sigmas(adjustment, family.rows[place])
     w = float(family.signed[place]) / adjustment.ratio
-    return Blunder(suspect, estimate * scale, w, not rivals, candidates)
+    return Blunder(suspect, estimate * scale, w, not rivals, candidates, margin)
 
 
 def _effect(adjustment: Adjustment, rows: Integers, error: Floats) -> Floats:

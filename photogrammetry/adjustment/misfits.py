@@ -40,6 +40,7 @@ def find_misfits(network: Network, start: State) -> tuple[list[Blunder], State]:
             float(v[i, worse[i]]) / typical,
             locatable=True,
             candidates=(),
+            margin=np.inf,
         )
         for i in found
     ], state

@@ -16,6 +16,8 @@ from rig.errors import BadInputError
 
 #: Snooping stops when this part of all observations has been taken out: something else is wrong then.
 _MOST_REMOVED = 0.1
+#: Test value that a blunder must keep beside any other to be taken out where a larger one cannot be located.
+_CERTAIN = 3.29
 _NAMED = 5  # so many misfits stand in an error message
 
 
@@ -110,8 +112,7 @@ def _snooped(adjustment: Adjustment, blunders: list[Blunder]) -> tuple[Adjustmen
     removed: list[Removed] = []
     most = int(_MOST_REMOVED * adjustment.problem.n_observations)
     while len(removed) < most:
-        # What cannot be located may stand behind everything smaller: no further accusations then.
-        worst = blunders[0] if blunders and blunders[0].locatable else None
+        worst = _most_certain(blunders)
         if worst is None:
             break
         try:
@@ -121,6 +122,16 @@ def _snooped(adjustment: Adjustment, blunders: list[Blunder]) -> tuple[Adjustmen
         removed.append(Removed(worst, adjustment.network))
         adjustment, blunders = adjusted, find_blunders(adjusted)
     return adjustment, blunders, removed
+
+
+def _most_certain(blunders: list[Blunder]) -> Blunder | None:
+    """The worst blunder that can be located, and is no consequence of a larger one that cannot."""
+    needed = 0.0
+    for blunder in blunders:
+        if blunder.locatable and blunder.margin > needed:
+            return blunder
+        needed = _CERTAIN
+    return None
 
 
 def without(network: Network, observation: Observation) -> Network:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from photogrammetry.network import Datum, ImageFrame, Network, Reweight, Role
-from photogrammetry.network_writer import write_network
+from photogrammetry.network_writer import network_to_json, write_network
 from svev.cli import main
 from tests.photogrammetry.synthetic import hill, lab_frame, rods
 
@@ -182,3 +182,29 @@ def test_summary_names_the_suspect(run: Run, capsys: pytest.CaptureFixture[str])
     assert f"{name}: wrong by about" in printed
     assert "redundancy" in printed
     assert max(len(line) for line in printed.splitlines()) < 250
+
+
+def _numbers(value: Any, way: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Ways to all numbers of nested JSON."""
+    if isinstance(value, dict):
+        return [leaf for key, item in value.items() for leaf in _numbers(item, (*way, key))]
+    if isinstance(value, list):
+        return [leaf for i, item in enumerate(value) for leaf in _numbers(item, (*way, i))]
+    return [way] if isinstance(value, (int, float)) and not isinstance(value, bool) else []
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_absurd_numbers_end_in_one_of_four_ways(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    data = network_to_json((hill, rods)[seed % 2](1).network)
+    ways = [way for way in _numbers(data) if way[0] != "observations" or rng.random() < 0.1]
+    for way in rng.permutation(len(ways))[:3]:
+        *before, last = ways[way]
+        place = data
+        for step in before:
+            place = place[step]
+        place[last] = rng.choice([0.0, 1e-30, 1e12, -1e11, -1e6, 1e-10, 10.0 * place[last], -place[last]])
+    (tmp_path / "network.json").write_text(json.dumps(data))
+    code = main(["adjust", str(tmp_path / "network.json"), "-o", str(tmp_path / "result.json")])
+    assert code in {0, 2, 3, 4}
+    assert (tmp_path / "result.json").exists() == (code != 2)

@@ -122,6 +122,20 @@ def test_two_rays_cannot_say_which_of_them_is_wrong() -> None:
     assert sum(blunder.suspect in found.candidates for blunder in find_blunders(adjust_once(network))) == 1
 
 
+def test_snooping_goes_on_beside_what_cannot_be_located() -> None:
+    """Both rays of one point are under suspicion for good; a wrong observation elsewhere goes all the same."""
+    network = hill(3).network
+    o = network.observations
+    left = ~((o.point == 16) & (o.image == 2))
+    parts = {name: getattr(o, name)[left] for name in ("image", "point", "xy", "sigma", "group")}
+    network = replace(network, observations=replace(o, **parts))
+    elsewhere = _row(network, 1, 7)
+    network = _spoilt(_spoilt(network, _row(network, 0, 16), (0.0, 15.0)), elsewhere, (6.0, -4.0))
+    outcome = adjust(network, snoop=True)
+    assert [removed.blunder.suspect for removed in outcome.removed] == [Observation(BlunderKind.IMAGE, elsewhere)]
+    assert [blunder.locatable for blunder in outcome.blunders[:1]] == [False]
+
+
 def test_single_distance_that_gives_the_scale_is_not_controlled() -> None:
     network = lab_frame(5).network
     adjustment = adjust_once(replace(network, distances=(Distance(0, 1, 0.9, 1e-4),)))

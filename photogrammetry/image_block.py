@@ -20,7 +20,7 @@ from rig.errors import BadInputError
 _LEVELS = (8, 6, 4, 3)  # known points that an image must see: the well-determined images come first
 _OUTLIER = 4.0  # residual over the median residual beyond which a point is left out of a resection,
 _GOOD_SHARE, _LEAST_POINTS = 0.8, 6  # as long as so many remain
-_LOOSE = 30.0  # factor on sigma when intersecting with start poses: what they leave open is not taken
+_CAUTION = 30.0  # poses are start values: the rays are less accurate than the image points
 _POLISH_ROUNDS = 2
 
 
@@ -73,8 +73,11 @@ class ImageBlock:
         if polish:
             self.polish()
 
-    def intersect(self, again: bool = False) -> None:
-        """Coordinates of all points with two or more rays; with `again` also of those that have some already."""
+    def intersect(self, again: bool = False, caution: float = _CAUTION) -> None:
+        """Coordinates of all points with two or more rays; with `again` also of those that have some already.
+
+        Points that would not be determined by rays `caution` times less accurate than the image points are left.
+        """
         images = sorted(self.cameras)
         seen = self.sightings.seen()[images] if images else np.zeros((0, self.sightings.n_points), bool)
         wanted = ~self.held & (seen.sum(axis=0) >= 2)
@@ -83,7 +86,7 @@ class ImageBlock:
             return
         xy, there, sigma = self.sightings.table(images, points)
         cameras = [self.cameras[image] for image in images]
-        result = intersect_points(cameras, xy, seen=there, sigma=sigma * _LOOSE)
+        result = intersect_points(cameras, xy, seen=there, sigma=sigma * caution)
         good = np.asarray(result.state == PointState.OK)
         self.xyz[points[good]] = result.X[good]
 

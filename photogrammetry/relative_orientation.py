@@ -10,6 +10,7 @@ four image coordinates: then its square sum is that of the residuals in the imag
 """
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,8 @@ _EPIPOLE = 1e-9
 _SAME = 1e-3  # rad: rotations and bases closer than that are one solution
 _POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
 _ROUNDING = 1e-7  # of c: residuals that small are none
+
+_Minima: TypeAlias = tuple[Array, Array, Array]  # rotations (k, 3, 3), bases (k, 3), square sums (k,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,19 +91,7 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     if len(u) < 5:
         raise BadInputError(f"a relative orientation has {len(u)} homologous points: give at least five")
     rounding = len(u) * (_ROUNDING * 0.5 * (c_first + c_second)) ** 2
-    rotations, bases = _candidates(u / c_first, v / c_second)
-    good = _good_points(rotations, bases, u, v)
-    minima = _minima(rotations, u, v)
-    if not good.all():
-        without = _minima(rotations, u[good], v[good])
-        again = _iterate(*without[:2], u, v, _STEPS)
-        rotations, bases, sums = (np.concatenate(both) for both in zip(minima, again, strict=True))
-        minima = rotations, bases, sums
-        if without[2].min() * _WORTH < minima[2].min():
-            good = _good_points(*without[:2], u, v)
-            minima = _iterate(*without[:2], u[good], v[good], _STEPS)
-        else:
-            good[:] = True
+    good, minima = _robust_minima(*_candidates(u / c_first, v / c_second), u, v)
     solutions = _solutions(*minima, u[good], v[good], rounding)
     if not solutions or solutions[0].in_front < 0.5:
         raise BadInputError(
@@ -115,7 +106,22 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     return replace(head, alternatives=tuple(others))
 
 
-def _minima(rotations: Array, u: Array, v: Array) -> tuple[Array, Array, Array]:
+def _robust_minima(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[NDArray[np.bool_], _Minima]:
+    """Points that are no blunders (n,), and the minima of their square sums."""
+    good = _good_points(rotations, bases, u, v)
+    minima = _minima(rotations, u, v)
+    if good.all():
+        return good, minima
+    without = _minima(rotations, u[good], v[good])
+    again = _iterate(*without[:2], u, v, _STEPS)
+    rotations, bases, sums = (np.concatenate(both) for both in zip(minima, again, strict=True))
+    if without[2].min() * _WORTH > sums.min():
+        return np.ones(len(u), bool), (rotations, bases, sums)
+    good = _good_points(*without[:2], u, v)
+    return good, _iterate(*without[:2], u[good], v[good], _STEPS)
+
+
+def _minima(rotations: Array, u: Array, v: Array) -> _Minima:
     """Minima reached from the best candidates, the base from all points: rotations, bases, square sums."""
     bases = _linear_bases(rotations, u, v)
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
@@ -200,7 +206,7 @@ def _across(bases: Array) -> Array:
     return np.stack((first, np.cross(bases, first)), axis=2)
 
 
-def _iterate(rotations: Array, bases: Array, u: Array, v: Array, steps: int) -> tuple[Array, Array, Array]:
+def _iterate(rotations: Array, bases: Array, u: Array, v: Array, steps: int) -> _Minima:
     """Damped Gauss-Newton from all starts together; a start that gets worse is damped, one that has settled rests."""
     damping = np.full(len(bases), 1e-3)
     values, jacobian = _conditions(rotations, bases, u, v)

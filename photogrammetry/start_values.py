@@ -86,6 +86,7 @@ def _attempt(network: Network, given: ImageBlock, c: Array) -> _Attempt:
     block.grow(polish=False)
     words = _add_models(block, network)
     block.polish()
+    block.intersect(caution=1.0)
     return _Attempt(block, tuple(words))
 
 

@@ -11,7 +11,7 @@ from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.ideal_camera import IdealCamera
 from photogrammetry.image_block import ImageBlock
-from photogrammetry.network import Datum, DatumType, Difference, Distance, Network, Reweight, Role
+from photogrammetry.network import Camera, Datum, DatumType, Difference, Distance, Network, Reweight, Role
 
 _MIN_RAYS = 2
 
@@ -81,15 +81,6 @@ def _part(network: Network, block: ImageBlock, images: list[int], points: NDArra
         group=o.group[rows],
     )
 
-    used = set(block.sightings.camera[images].tolist())
-    cameras = tuple(
-        replace(
-            camera,
-            interior=np.array([block.sightings.c[i], *camera.interior[1:]]),
-            estimate=camera.estimate if i in used else (),
-        )
-        for i, camera in enumerate(network.cameras)
-    )
     oriented = tuple(
         replace(network.images[i], position=block.cameras[i].X0, rotation=block.cameras[i].R) for i in images
     )
@@ -99,7 +90,7 @@ def _part(network: Network, block: ImageBlock, images: list[int], points: NDArra
     )
     return replace(
         network,
-        cameras=cameras,
+        cameras=_cameras(network, block, images),
         images=oriented,
         points=known,
         observations=seen,
@@ -107,6 +98,19 @@ def _part(network: Network, block: ImageBlock, images: list[int], points: NDArra
         differences=tuple(_moved(network.differences, point_at)),
         datum=Datum(network.datum.type),
         reweight=Reweight.NONE,
+    )
+
+
+def _cameras(network: Network, block: ImageBlock, images: list[int]) -> tuple[Camera, ...]:
+    """The cameras with the block's principal distances; those without an image keep all their parameters."""
+    used = set(block.sightings.camera[images].tolist())
+    return tuple(
+        replace(
+            camera,
+            interior=np.array([block.sightings.c[i], *camera.interior[1:]]),
+            estimate=camera.estimate if i in used else (),
+        )
+        for i, camera in enumerate(network.cameras)
     )
 
 

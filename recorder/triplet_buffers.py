@@ -56,7 +56,8 @@ class TripletBuffers:
         with self._lock:
             if not self._free:
                 return None
-            slot = self._free.pop()
+            # The slot that has been free longest: one that has just gone to the disk costs more to write again.
+            slot = self._free.popleft()
             self._holders[slot] = 1
             return slot
 

@@ -140,7 +140,9 @@ class Pairer:
         Only a suspicion, sooner than `silent`: their frames are waited for all the same, up to the deadline. Frames
         that are merely on their way, or held back behind a damaged one, raise none.
         """
-        overdue = []
+        overdue: list[int] = []
+        if len(self._open) < _SILENT_PERIODS:
+            return ()
         for camera, track in enumerate(self._tracks):
             since = track.alive if track.delivers else track.alive + _FIRST_NS
             behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]

@@ -84,7 +84,7 @@ class RecorderLoop:
         if now >= self._next_report:
             self._next_report = HostNs(now + _REPORT_EVERY_NS)
             if self._recording is not None:
-                self._report("progress", **self._recording.ledger.counts())
+                self._control.send({"report": "progress", **self._recording.ledger.counts()}, or_drop=True)
         if now >= self._next_health:
             self._next_health = HostNs(now + NS_PER_S)
             self._tell_health()
@@ -179,7 +179,7 @@ class RecorderLoop:
     def _tell_health(self) -> None:
         health = self._health()
         self._publisher.health(health)
-        self._report("health", **health)
+        self._control.send({"report": "health", **health}, or_drop=True)
         if self._recording is None:
             return
         with self._storage_guarded():

@@ -30,12 +30,19 @@ class ControlChannel:
         """The other side is gone."""
         return self._ended
 
-    def send(self, message: Message) -> bool:
+    def send(self, message: Message, *, or_drop: bool = False) -> bool:
         """Send one message.
 
+        Args:
+            message: what to send.
+            or_drop: do not wait if the other side does not read: a later message says the same anew.
+
         Returns:
-            False if the other side is gone.
+            False if it was dropped or the other side is gone.
         """
+        # The kernel calls a stream socket writable while most of its buffer is free: a message then fits whole.
+        if or_drop and not select.select([], [self._socket], [], 0)[1]:
+            return False
         try:
             self._socket.sendall(json.dumps(message).encode() + b"\n")
         except (BrokenPipeError, ConnectionResetError):

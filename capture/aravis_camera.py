@@ -31,6 +31,7 @@ _TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
 _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
 
 _IDS_16_BIT = 65535
+_RETENTION_US = 50_000  # time for lost packets to be asked for, several times, and to come
 # How many empty buffers stand in Aravis's queue: half a second of frames, but not more than stay in the cache.
 _QUEUE_S = 0.5
 _QUEUE_BYTES = 24 << 20
@@ -63,7 +64,7 @@ class AravisCamera:
             self._device.connect("control-lost", self._on_control_lost)
             self._configure(settings, network)
             self._tick_hz = self._timestamp_frequency()
-            self._stream = self._open_stream(network, period_ns)
+            self._stream = self._open_stream(network)
         except GLib.Error as error:
             self.close()
             raise CameraError(
@@ -180,19 +181,20 @@ class AravisCamera:
                 f"{self._ring.frame_bytes}: correct region and pixel_format of {self._name}"
             )
 
-    def _open_stream(self, network: NetworkSettings, period_ns: int) -> "Aravis.Stream":
+    def _open_stream(self, network: NetworkSettings) -> "Aravis.Stream":
         stream = self._camera.create_stream(None, None)
         if stream is None:
             raise CameraError(f"camera {self._name}: no stream can be opened; check the network interface")
         resend = Aravis.GvStreamPacketResend.ALWAYS if network.resend else Aravis.GvStreamPacketResend.NEVER
         # A packet socket hands packets over in blocks of up to 5 ms: asking again any sooner asks for packets
-        # that have already come. A good frame waits behind a damaged one for `frame-retention`, so keep that short.
+        # that have already come. A good frame waits behind a damaged one for `frame-retention`.
         packet_timeout_us = 3_000 if self._plain_socket else 8_000
         for name, value in {
             "packet-resend": resend,
             "packet-timeout": packet_timeout_us,
             "initial-packet-timeout": packet_timeout_us // 3,
-            "frame-retention": max(25_000, min(100_000, period_ns * 3 // 4000)),
+            "frame-retention": _RETENTION_US,
+            "packet-request-ratio": 1.0,  # a stall may cost most of a frame's packets: ask for all of them
             "socket-buffer": Aravis.GvStreamSocketBuffer.FIXED,
             "socket-buffer-size": SOCKET_BUFFER_BYTES,
         }.items():

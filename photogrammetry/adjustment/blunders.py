@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from photogrammetry.adjustment.adjustment import Adjustment
@@ -102,7 +103,9 @@ def find_blunders(adjustment: Adjustment) -> list[Blunder]:
     found = [
         (family, int(place))
         for family in families
-        for place in np.flatnonzero(_significant(adjustment, family.tested, family.parts, risk))
+        for place in np.flatnonzero(
+            significant(family.tested, family.parts, adjustment.equations.square_sum, adjustment.redundancy, risk)
+        )
     ]
     found.sort(key=lambda item: -float(item[0].tested[item[1]]))
     blunders: list[Blunder] = []
@@ -116,16 +119,23 @@ def find_blunders(adjustment: Adjustment) -> list[Blunder]:
     return blunders
 
 
-def _significant(adjustment: Adjustment, squares: Floats, parts: int, risk: float) -> Floats:
-    """Which squared statistics are too large for chance."""
-    total, freedom = adjustment.equations.square_sum, adjustment.redundancy
-    significant = np.zeros(len(squares), dtype=bool)
+def significant(squares: Floats, parts: int, total: float, freedom: int, risk: float) -> NDArray[np.bool_]:
+    """Which squared statistics are too large for chance.
+
+    Args:
+        squares: (h,) by what the square sum falls where an observation gets an error of its own.
+        parts: degrees of freedom of each.
+        total: square sum of all residuals in units of their a-priori sigmas.
+        freedom: its degrees of freedom.
+        risk: chance that a sound observation is found.
+    """
+    chosen = np.zeros(len(squares), dtype=bool)
     if freedom > parts:
         rest = np.maximum(total - squares, 1e-300) / (freedom - parts)
-        significant = special.fdtrc(parts, freedom - parts, squares / parts / rest) < risk
+        chosen = special.fdtrc(parts, freedom - parts, squares / parts / rest) < risk
     if freedom <= _SMALL_REDUNDANCY and special.chdtrc(freedom, total) < SINGLE_RISK:
-        significant = significant | (special.chdtrc(parts, squares) < risk)
-    return np.asarray(significant & (squares > _NOISE))
+        chosen = chosen | (special.chdtrc(parts, squares) < risk)
+    return np.asarray(chosen & (squares > _NOISE), dtype=bool)
 
 
 def _hypotheses(adjustment: Adjustment) -> list[_Hypotheses]:
@@ -211,7 +221,7 @@ def _effect(adjustment: Adjustment, rows: Integers, error: Floats) -> Floats:
     """R E error: what an error of some observations does to all residuals (flat, whitened), sign reversed."""
     problem, equations = adjustment.problem, adjustment.equations
     n = len(problem.image)
-    columns, slopes = _row(adjustment, rows)
+    columns, slopes = observation_row(adjustment, rows)
     pulled = np.append(adjustment.cofactors[:, columns] @ (slopes.T @ error), 0.0)  # column -1: nothing
     on_global = pulled[problem.global_columns()][problem.image]
     on_point = pulled[problem.unknowns.point][problem.point]
@@ -224,7 +234,7 @@ def _effect(adjustment: Adjustment, rows: Integers, error: Floats) -> Floats:
     return effect
 
 
-def _row(adjustment: Adjustment, rows: Integers) -> tuple[Integers, Floats]:
+def observation_row(adjustment: Adjustment, rows: Integers) -> tuple[Integers, Floats]:
     """Columns (w,) and derivatives (q, w) of some observations (flat rows of one observation)."""
     problem, equations = adjustment.problem, adjustment.equations
     n = len(problem.image)

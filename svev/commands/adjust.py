@@ -2,23 +2,18 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 
-from photogrammetry.adjustment.result_file import failure_to_json, outcome_to_json, write_result
-from photogrammetry.adjustment.run import Outcome
+from photogrammetry.adjustment.result_file import outcome_to_json
 from photogrammetry.adjustment.run import adjust as adjust_network
 from photogrammetry.adjustment.state import state_of
 from photogrammetry.adjustment.summary import summarise
-from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Network, Reweight
 from photogrammetry.network_file import read_network
 from photogrammetry.start_values import complete
-from svev import console
-
-_NOT_SOLVABLE: Final = 3
-_NOT_CONVERGED: Final = 4
+from svev.commands.delivery import deliver
 
 
 def adjust(
@@ -42,33 +37,12 @@ def adjust(
     given = read_network(network)
     if paper:
         given = replace(given, reweight=Reweight.PAPER)
-    code = 0
-    try:
-        outcome = _adjusted(given, snoop=snoop)
-        result, lines = outcome_to_json(outcome), summarise(outcome)
-    except NotSolvableError as error:
-        code, result = _NOT_SOLVABLE, failure_to_json(f"not solvable: {error}", error.defects)
-        lines = ["not solvable", *(f"  {defect.message}" for defect in error.defects)]
-    except NotConvergedError as error:
-        code, result, lines = _NOT_CONVERGED, failure_to_json(f"not converged: {error}"), [f"not converged: {error}"]
-    write_result(result, output)
-    for line in lines:
-        console.say(line, aside=as_json)
-    if as_json:
-        console.print_json(_without_lists(result))
-    else:
-        console.say(f"result in {output}")
-    if code:
-        raise typer.Exit(code)
+    deliver(lambda: _adjusted(given, snoop=snoop), output, as_json=as_json)
 
 
-def _adjusted(network: Network, *, snoop: bool) -> Outcome:
+def _adjusted(network: Network, *, snoop: bool) -> tuple[dict[str, Any], list[str]]:
     poses = all(image.position is not None and image.rotation is not None for image in network.images)
     points = all(point.xyz is not None for point in network.points)
     started = network if poses and points else complete(network)
-    return adjust_network(network, state_of(started), snoop=snoop)
-
-
-def _without_lists(result: dict[str, Any]) -> dict[str, Any]:
-    """What fits on a screen; the rest stands in the file."""
-    return {key: value for key, value in result.items() if key not in ("observations", "points", "images")}
+    outcome = adjust_network(network, state_of(started), snoop=snoop)
+    return outcome_to_json(outcome), summarise(outcome)

@@ -1,0 +1,85 @@
+"""Interior orientations from the result of a calibration, for use as constants (step 2 on the result of step 1)."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from photogrammetry.camera_model import INTERIOR, Distortion
+from photogrammetry.network import Network
+from photogrammetry.network_entries import Finite, Positive
+from photogrammetry.network_file import read_json
+from rig.errors import BadInputError
+from rig.rigfile import validate
+
+
+class CalibratedCamera(BaseModel):
+    """One of `cameras` of a result; sigmas and correlations beside these are of no use here."""
+
+    c: Positive
+    x0: Finite
+    y0: Finite
+    a1: Finite
+    a2: Finite
+    a3: Finite
+    b1: Finite
+    b2: Finite
+    c1: Finite
+    c2: Finite
+    r0: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
+    distortion: Literal["projected", "measured"]
+
+
+class _Result(BaseModel):
+    """What a calibration must have; whatever else it says is not asked."""
+
+    format: Literal["svev-adjustment/1"]
+    converged: bool
+    cameras: dict[str, Any] = {}
+
+
+def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
+    """Read the cameras of a result file (`svev-adjustment/1`).
+
+    Raises:
+        BadInputError: missing, unreadable, no result, or one without numbers.
+    """
+    result = validate(_Result, read_json(path), path)
+    if not result.converged:
+        raise BadInputError(f"{path}: this calibration has no result; calibrate again or name another file")
+    return {name: _camera(body, f"{path}: cameras.{name}") for name, body in result.cameras.items()}
+
+
+def _camera(body: Any, source: str) -> CalibratedCamera:
+    if not isinstance(body, dict):
+        raise BadInputError(f"{source}: is no object; name the result file of a calibration")
+    return validate(CalibratedCamera, body, source)
+
+
+def with_calibration(network: Network, cameras: Mapping[str, CalibratedCamera]) -> Network:
+    """The network with calibrated cameras, which are constant.
+
+    Raises:
+        BadInputError: a camera was not calibrated.
+    """
+    for camera in network.cameras:
+        if camera.name not in cameras:
+            raise BadInputError(
+                f"cameras.{camera.name}: the calibration lacks it (it has {', '.join(cameras) or 'none'}); "
+                "calibrate it too or correct the name"
+            )
+    calibrated = tuple(
+        replace(
+            camera,
+            interior=np.array([getattr(cameras[camera.name], parameter) for parameter in INTERIOR], dtype=float),
+            balance=cameras[camera.name].r0,
+            distortion=Distortion(cameras[camera.name].distortion),
+            estimate=(),
+            sigma={},
+        )
+        for camera in network.cameras
+    )
+    return replace(network, cameras=calibrated)

@@ -1,0 +1,237 @@
+"""Pose estimation on the hill (paper, step 2) with the search for gross errors in three stages.
+
+1. Free adjustment of the images alone: shows gross errors of image coordinates, whatever the survey says.
+2. Similarity transformation of the free block onto the reference points: shows gross errors of the survey.
+3. Adjustment with the reference coordinates as weighted observations (D3b): shows what is left, with the best geometry.
+
+What a stage takes out stays out. The tie points are the static ones (alternative 1) or these and the places of moving
+ones such as the helmet (alternative 2, footnote 3).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from photogrammetry.adjustment.adjustment import Adjustment
+from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation
+from photogrammetry.adjustment.run import Outcome, Removed, adjust
+from photogrammetry.adjustment.state import State, state_of
+from photogrammetry.adjustment.wording import describe, observation_to_json
+from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network import Datum, Network, Role
+from photogrammetry.procedures.reference_fit import ReferenceFit, Suspect, fit_reference
+from photogrammetry.procedures.reference_points import reference_points
+from photogrammetry.procedures.selection import (
+    as_check_points,
+    observation_names,
+    only_points,
+    without_observations,
+    without_survey,
+)
+from photogrammetry.similarity import Similarity
+from photogrammetry.start_values import complete
+from rig.errors import BadInputError
+
+_SURVEYED = (Role.CONTROL, Role.FIXED)
+
+
+class StageName(StrEnum):
+    """The stages, in their order."""
+
+    FREE = "free adjustment"
+    SIMILARITY = "similarity transformation onto the reference points"
+    CONSTRAINED = "constrained adjustment"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a stage found.
+
+    Attributes:
+        message: in words, with the culprit named.
+        removed: whether it was taken out.
+    """
+
+    message: str
+    removed: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """One stage.
+
+    Attributes:
+        name: which.
+        words: how it went.
+        findings: what it found, in that order.
+    """
+
+    name: StageName
+    words: str
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Orientation:
+    """The oriented images.
+
+    Attributes:
+        outcome: the constrained adjustment; `removed` has what all stages took out.
+        stages: the three stages.
+        notes: what else a reader must know.
+    """
+
+    outcome: Outcome
+    stages: tuple[Stage, ...]
+    notes: tuple[str, ...]
+
+
+def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orientation:
+    """Estimate the poses of all images; interior orientations are constant.
+
+    Args:
+        network: images, reference points and tie points. What its cameras estimate is held.
+        alternative: 1: static tie points alone; 2: moving ones too.
+        moving: pattern of the moving points' names (`*` and `?`).
+
+    Raises:
+        BadInputError: the network has no images, a constant pose, or no moving point where alternative 1 leaves
+            them out.
+        NotSolvableError, NotConvergedError: of the constrained adjustment.
+    """
+    network, notes = _prepared(network, alternative, moving)
+    free, removed, stage = _free_stage(network)
+    stages = [stage]
+    cleaned = _cleaned(network, removed)
+    start: State | None = None
+    if free is None:
+        stages.append(Stage(StageName.SIMILARITY, "left out: there is no free block"))
+    else:
+        fit, wrong, stage = _similarity_stage(cleaned, free)
+        stages.append(stage)
+        removed = [*removed, *wrong]
+        cleaned = _cleaned(network, removed)
+        start = None if fit is None else _carried(cleaned, free, fit.transform)
+    outcome = adjust(cleaned, state_of(complete(cleaned)) if start is None else start, snoop=True)
+    stages.append(Stage(StageName.CONSTRAINED, _adjusted_words(outcome), _findings(outcome)))
+    return Orientation(replace(outcome, removed=(*removed, *outcome.removed)), tuple(stages), tuple(notes))
+
+
+def _prepared(network: Network, alternative: int, moving: str) -> tuple[Network, list[str]]:
+    """The network with constant interior orientations and the tie points of the alternative."""
+    notes = []
+    for image in network.images:
+        if not image.estimate:
+            raise BadInputError(
+                f'images.{image.name}: the pose is constant ("estimate": false), but orientation estimates all poses; '
+                "remove that key, or use svev adjust"
+            )
+    held = [camera.name for camera in network.cameras if camera.estimate]
+    if held:
+        notes.append(f"interior orientation held as it is given, although the file estimates it: {', '.join(held)}")
+    cameras = tuple(replace(camera, estimate=(), sigma={}) for camera in network.cameras)
+    network = replace(network, cameras=cameras, datum=Datum())
+    moves = np.array([p.role is Role.TIE and fnmatchcase(p.name, moving) for p in network.points], dtype=bool)
+    if alternative == 1:
+        if not moves.any():
+            raise BadInputError(
+                f'no tie point is called "{moving}", so alternative 1 has none to leave out; name the moving points '
+                "with --moving, or use alternative 2"
+            )
+        network = only_points(network, ~moves)
+        notes.append(f"alternative 1: {int(moves.sum())} moving points left out, static points tie the images alone")
+    else:
+        notes.append(f"alternative 2: {int(moves.sum())} moving points tie the images beside the static ones")
+    return network, notes
+
+
+def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]:
+    """Adjust the images alone; None where they do not determine a block."""
+    alone = without_survey(network)
+    try:
+        outcome = adjust(alone, state_of(complete(alone)), snoop=True)
+    except (BadInputError, NotSolvableError, NotConvergedError) as error:
+        return None, [], Stage(StageName.FREE, f"left out: the images alone do not form a block ({error})")
+    return outcome, list(outcome.removed), Stage(StageName.FREE, _adjusted_words(outcome), _findings(outcome))
+
+
+def _similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | None, list[Removed], Stage]:
+    """Carry the free block onto the survey; None where there are too few reference points."""
+    a = free.adjustment
+    place = {point.name: i for i, point in enumerate(a.network.points)}
+    surveyed = [
+        i for i, p in enumerate(network.points) if p.role in _SURVEYED and p.xyz is not None and p.name in place
+    ]
+    try:
+        fit = fit_reference(*reference_points(a, [network.points[i] for i in surveyed]))
+    except BadInputError as error:
+        return None, [], Stage(StageName.SIMILARITY, f"left out: {error}")
+    wrong = [Removed(_blunder(suspect, surveyed, network, a), network) for suspect in fit.removed]
+    findings = [Finding(describe(gone.network, gone.blunder), removed=True) for gone in wrong]
+    if fit.suspect is not None:
+        findings.append(Finding(describe(network, _blunder(fit.suspect, surveyed, network, a)), removed=False))
+    root = np.sqrt(np.mean(fit.residuals[list(fit.used)] ** 2, axis=0))
+    words = (
+        f"{len(fit.used)} reference points, redundancy {fit.redundancy}, residuals rms X Y Z "
+        + " ".join(f"{value:.3g}" for value in root)
+        + f" {network.length_unit}, sigma0 {fit.ratio:.3g} (a priori 1)"
+    )
+    return fit, wrong, Stage(StageName.SIMILARITY, words, tuple(findings))
+
+
+def _blunder(suspect: Suspect, surveyed: Sequence[int], network: Network, free: Adjustment) -> Blunder:
+    """A wrong reference point as the adjustment would name it."""
+    rows = {names: i for i, names in enumerate(observation_names(network))}
+    names = observation_names(free.network)
+    itself = Observation(BlunderKind.CONTROL, surveyed[suspect.index])
+    others = [Observation(BlunderKind.CONTROL, surveyed[i]) for i in suspect.candidates if i != suspect.index]
+    others += [Observation(BlunderKind.IMAGE, rows[names[i]]) for i in suspect.images]
+    candidates = () if suspect.certain else (itself, *others)
+    margin = np.inf if suspect.certain else 0.0
+    return Blunder(itself, suspect.estimate, suspect.w, suspect.certain, candidates, margin)
+
+
+def _cleaned(network: Network, removed: Sequence[Removed]) -> Network:
+    """The network without what was taken out, which is named: indices differ from stage to stage."""
+    named = [observation_to_json(gone.network, gone.blunder.suspect) for gone in removed]
+    rows = {(n["image"], n["point"]) for n in named if n["kind"] == BlunderKind.IMAGE}
+    points = {n["point"] for n in named if n["kind"] == BlunderKind.CONTROL}
+    return as_check_points(without_observations(network, rows), points)
+
+
+def _carried(network: Network, free: Outcome, transform: Similarity) -> State | None:
+    """Start values from the free block; None where it lacks a tie point."""
+    state, place = free.adjustment.state, {p.name: i for i, p in enumerate(free.adjustment.network.points)}
+    xyz = [transform.apply(state.xyz[place[p.name]]) if p.name in place else p.xyz for p in network.points]
+    if any(known is None for known in xyz):
+        return None
+    return State(
+        np.array([camera.interior for camera in network.cameras], dtype=float),
+        transform.apply(state.position),
+        transform.turn(state.rotation),
+        np.array(
+            [
+                point.xyz if point.role is Role.FIXED else known
+                for point, known in zip(network.points, xyz, strict=True)
+            ],
+            dtype=float,
+        ),
+    )
+
+
+def _adjusted_words(outcome: Outcome) -> str:
+    a = outcome.adjustment
+    sigma0 = "not estimable" if a.sigma0 is None else f"{a.sigma0:.4g}"
+    return (
+        f"{a.problem.n_observations} observations, redundancy {a.redundancy}, "
+        f"sigma0 {sigma0} (a priori {a.network.sigma0:g})"
+    )
+
+
+def _findings(outcome: Outcome) -> tuple[Finding, ...]:
+    gone = [Finding(describe(removed.network, removed.blunder), removed=True) for removed in outcome.removed]
+    network = outcome.adjustment.network
+    return (*gone, *(Finding(describe(network, blunder), removed=False) for blunder in outcome.blunders))

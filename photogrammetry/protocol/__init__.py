@@ -1,0 +1,1 @@
+"""Protocols of adjustments, as text and as one self-contained HTML page."""

@@ -1,0 +1,143 @@
+"""Sections of a protocol that every adjustment has: parameters with sigma, correlations, residuals, findings."""
+
+from itertools import combinations
+
+import numpy as np
+
+from photogrammetry.adjustment.adjustment import Adjustment
+from photogrammetry.adjustment.run import Outcome
+from photogrammetry.adjustment.state import Floats
+from photogrammetry.adjustment.summary import summarise
+from photogrammetry.adjustment.wording import in_file_frame
+from photogrammetry.camera_model import INTERIOR
+from photogrammetry.network import ImageFrame, Role
+from photogrammetry.protocol.document import Section, Table
+
+_STRONG = 0.9  # correlations from here on are named one by one
+_SHOWN = 20  # of them
+_INSIGNIFICANT = 1.96
+_POSE = ("X0", "Y0", "Z0", "angle 1", "angle 2", "angle 3")
+
+
+def adjusted_sections(outcome: Outcome) -> tuple[Section, ...]:
+    """The common sections of an adjusted network."""
+    a = outcome.adjustment
+    sections = [
+        Section("Summary", tuple(summarise(outcome))),
+        Section("Interior orientation", _interior(a)),
+        Section("Poses", _poses(a)),
+        Section("Points", _points(a)),
+        Section("Correlations", _correlations(a)),
+        Section("Residuals", _residuals(a)),
+    ]
+    return tuple(section for section in sections if section.parts)
+
+
+def _interior(a: Adjustment) -> tuple[str | Table, ...]:
+    unknowns, rows = a.problem.unknowns, []
+    for i, camera in enumerate(a.network.cameras):
+        columns = unknowns.camera[i][unknowns.camera[i] >= 0]
+        values = a.state.interior[i][unknowns.selection[unknowns.camera[i] >= 0]]
+        for name, value, sigma in zip(camera.estimate, values, a.sigmas(columns), strict=True):
+            size = abs(value) / sigma if sigma > 0.0 else np.inf
+            doubt = "" if name == "c" else "no" if size < _INSIGNIFICANT else "yes"
+            rows.append((f"{camera.name} {name}", f"{value:.6g}", f"{sigma:.2g}", doubt))
+    if rows:
+        return (Table(("parameter", "value", "sigma", "significant"), tuple(rows)),)
+    given = tuple((camera.name, f"{camera.interior[0]:.6g}") for camera in a.network.cameras)
+    return ("Constant, free of error.", Table(("camera", "c"), given))
+
+
+def _poses(a: Adjustment) -> tuple[str | Table, ...]:
+    sigma = a.sigmas(a.problem.unknowns.pose)
+    rows = []
+    for i, image in enumerate(a.network.images):
+        place = [f"{value:.4f}" for value in a.state.position[i]]
+        spread = [f"{value:.2g}" for value in (*sigma[i, :3], *np.degrees(sigma[i, 3:]) * 60.0)]
+        rows.append((image.name, *place, *spread))
+    unit = a.network.length_unit
+    head = ("image", "X0", "Y0", "Z0", *(f"sigma {name}" for name in _POSE))
+    return (
+        f"Lengths in {unit or 'length units'}, angles about the camera's own axes in minutes.",
+        Table(head, tuple(rows)),
+    )
+
+
+def _points(a: Adjustment) -> tuple[str | Table, ...]:
+    sigma = a.sigmas(a.problem.unknowns.point)
+    count = np.bincount(a.problem.point, minlength=len(a.network.points))
+    rows = [
+        (
+            point.name,
+            point.role.value,
+            str(count[i]),
+            *(f"{value:.4f}" for value in a.state.xyz[i]),
+            *(f"{value:.2g}" for value in sigma[i]),
+        )
+        for i, point in enumerate(a.network.points)
+    ]
+    return (Table(("point", "role", "rays", "X", "Y", "Z", "sigma X", "sigma Y", "sigma Z"), tuple(rows)),)
+
+
+def _correlations(a: Adjustment) -> tuple[str | Table, ...]:
+    """Strong ones among interior orientation and pose of each image."""
+    found = {}
+    for image, columns in enumerate(a.problem.global_columns()):
+        names = _names(a, image)
+        known = columns >= 0
+        matrix = _correlation(a.covariance(columns[known]))
+        chosen = [name for name, there in zip(names, known, strict=True) if there]
+        for (i, one), (j, other) in combinations(enumerate(chosen), 2):
+            if abs(matrix[i, j]) >= _STRONG:
+                found[one, other] = float(matrix[i, j])
+    if not found:
+        return (f"None of interior orientation and poses reaches {_STRONG:g}.",)
+    strongest = sorted(found.items(), key=lambda item: -abs(item[1]))
+    rows = tuple((one, other, f"{value:.3f}") for (one, other), value in strongest[:_SHOWN])
+    words = f"{len(found)} among interior orientation and pose reach {_STRONG:g}"
+    return (f"{words}; the strongest:" if len(found) > _SHOWN else f"{words}:", Table(("one", "other", "r"), rows))
+
+
+def _names(a: Adjustment, image: int) -> list[str]:
+    camera = a.network.cameras[a.network.images[image].camera].name
+    interior = [f"{camera} {INTERIOR[i]}" for i in a.problem.unknowns.selection]
+    return [*interior, *(f"{a.network.images[image].name} {name}" for name in _POSE)]
+
+
+def _correlation(covariance: Floats) -> Floats:
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
+    return np.asarray(covariance / sigma[:, None] / sigma)
+
+
+def _residuals(a: Adjustment) -> tuple[str | Table, ...]:
+    """Image by image, then the reference points."""
+    v = in_file_frame(a.network, a.image_residuals())
+    w = np.nan_to_num(np.abs(a.image_w()))
+    r = a.controlled.image_numbers
+    unit = "px" if a.network.image_frame is ImageFrame.PIXEL else "image units"
+    rows = []
+    for i, image in enumerate(a.network.images):
+        rows_of = slice(a.problem.start[i], a.problem.start[i + 1])
+        if len(v[rows_of]):
+            root = np.sqrt(np.mean(v[rows_of] ** 2, axis=0))
+            worst = f"{w[rows_of].max():.1f}"
+            rows.append(
+                (
+                    image.name,
+                    str(len(v[rows_of])),
+                    f"{root[0]:.3g}",
+                    f"{root[1]:.3g}",
+                    f"{r[rows_of].mean():.2f}",
+                    worst,
+                )
+            )
+    head = ("image", "points", "rms vx", "rms vy", "mean r", "largest |w|")
+    parts: list[str | Table] = [f"Images ({unit}):", Table(head, tuple(rows))]
+    checks = [
+        (point.name, *(f"{value:.3g}" for value in a.state.xyz[i] - point.xyz))
+        for i, point in enumerate(a.network.points)
+        if point.role in (Role.CONTROL, Role.CHECK) and point.xyz is not None
+    ]
+    if checks:
+        parts += ["Surveyed points, adjusted - given:", Table(("point", "vX", "vY", "vZ"), tuple(checks))]
+    return tuple(parts)

@@ -1,0 +1,53 @@
+"""The protocol of a pose estimation, and its result file."""
+
+from dataclasses import replace
+from typing import Any
+
+from photogrammetry.adjustment.result_file import outcome_to_json
+from photogrammetry.adjustment.run import Outcome
+from photogrammetry.adjustment.summary import summarise
+from photogrammetry.procedures.orientation import Orientation, Stage
+from photogrammetry.protocol.adjusted import adjusted_sections
+from photogrammetry.protocol.document import Protocol, Section
+
+
+def orientation_to_json(orientation: Orientation) -> dict[str, Any]:
+    """The constrained adjustment's result with what the three stages found."""
+    stages = [
+        {
+            "stage": stage.name.value,
+            "words": stage.words,
+            "findings": [{"message": finding.message, "removed": finding.removed} for finding in stage.findings],
+        }
+        for stage in orientation.stages
+    ]
+    return outcome_to_json(orientation.outcome) | {"stages": stages, "notes": list(orientation.notes)}
+
+
+def orientation_lines(orientation: Orientation) -> list[str]:
+    """The stages and the constrained adjustment for the screen."""
+    lines = list(orientation.notes)
+    for number, stage in enumerate(orientation.stages, start=1):
+        lines += [f"stage {number}, {stage.name.value}: {stage.words}", *(f"  {line}" for line in _findings(stage))]
+    return [*lines, *summarise(_final(orientation))]
+
+
+def orientation_protocol(orientation: Orientation) -> Protocol:
+    """The protocol."""
+    stages = [
+        Section(f"Stage {number}: {stage.name.value}", (stage.words, *_findings(stage)))
+        for number, stage in enumerate(orientation.stages, start=1)
+    ]
+    sections = (Section("Procedure", orientation.notes), *stages, *adjusted_sections(_final(orientation)))
+    return Protocol("Pose estimation", sections)
+
+
+def _final(orientation: Orientation) -> Outcome:
+    """The constrained adjustment without what the stages have named already."""
+    return replace(orientation.outcome, removed=())
+
+
+def _findings(stage: Stage) -> list[str]:
+    if not stage.findings:
+        return [] if stage.words.startswith("left out") else ["no gross error found"]
+    return [f"{'taken out' if finding.removed else 'suspected'}: {finding.message}" for finding in stage.findings]

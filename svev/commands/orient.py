@@ -1,0 +1,65 @@
+"""`svev orient`: poses of the cameras on the hill."""
+
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from photogrammetry.network import Network, Reweight
+from photogrammetry.network_file import read_network
+from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
+from photogrammetry.procedures.orientation import orient as orient_network
+from photogrammetry.protocol.document import write_protocol
+from photogrammetry.protocol.orientation import orientation_lines, orientation_protocol, orientation_to_json
+from svev.commands.delivery import deliver
+
+
+class Alternative(StrEnum):
+    """Which points tie the images."""
+
+    STATIC = "1"
+    MOVING_TOO = "2"
+
+
+def orient(
+    network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with reference points")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")],
+    calibration: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="result of a calibration; the network's own cameras if left out"),
+    ] = None,
+    alternative: Annotated[
+        Alternative, typer.Option("--alternative", help="1: static tie points alone; 2: moving ones too")
+    ] = Alternative.MOVING_TOO,
+    moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names")] = "H*",
+    paper: Annotated[bool, typer.Option("--paper", help="estimate the weights by D5 as the paper prints it")] = False,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="end with one JSON object: the result without its lists")
+    ] = False,
+) -> None:
+    """Estimate the cameras' poses from reference points, with a search for gross errors in three stages.
+
+    Exit codes: 0 oriented, 2 bad input, 3 not solvable (what is missing stands in the result), 4 not converged.
+
+    Example: svev orient hill.json --calibration cameras.json -o poses.json --report protocol
+    """
+    given = read_network(network)
+    if calibration is not None:
+        given = with_calibration(given, read_calibration(calibration))
+    if paper:
+        given = replace(given, reweight=Reweight.PAPER)
+    deliver(lambda: _oriented(given, int(alternative), moving, report), output, as_json=as_json)
+
+
+def _oriented(network: Network, alternative: int, moving: str, report: Path | None) -> tuple[dict[str, Any], list[str]]:
+    orientation = orient_network(network, alternative, moving)
+    lines = orientation_lines(orientation)
+    if report is not None:
+        text, page = write_protocol(orientation_protocol(orientation), report)
+        lines.append(f"protocol in {text} and {page}")
+    return orientation_to_json(orientation), lines

@@ -13,7 +13,7 @@ import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import adjust, bench, demo, doctor, info, orient, record, replay, schema, verify
+from svev.commands import adjust, bench, calibrate, demo, doctor, info, orient, record, replay, schema, verify
 
 app = typer.Typer(
     name="svev",
@@ -39,6 +39,7 @@ app.command("replay")(replay.replay_command)
 app.command("schema")(schema.schema)
 app.command("verify")(verify.verify_command)
 app.command("adjust")(adjust.adjust)
+app.command("calibrate")(calibrate.calibrate)
 app.command("orient")(orient.orient)
 app.command("bench")(bench.bench)
 

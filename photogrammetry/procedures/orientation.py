@@ -28,6 +28,7 @@ from photogrammetry.procedures.selection import (
     as_check_points,
     observation_names,
     only_points,
+    require_unknown_poses,
     without_observations,
     without_survey,
 )
@@ -123,12 +124,7 @@ def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orient
 def _prepared(network: Network, alternative: int, moving: str) -> tuple[Network, list[str]]:
     """The network with constant interior orientations and the tie points of the alternative."""
     notes = []
-    for image in network.images:
-        if not image.estimate:
-            raise BadInputError(
-                f'images.{image.name}: the pose is constant ("estimate": false), but orientation estimates all poses; '
-                "remove that key, or use svev adjust"
-            )
+    require_unknown_poses(network, "orientation")
     held = [camera.name for camera in network.cameras if camera.estimate]
     if held:
         notes.append(f"interior orientation held as it is given, although the file estimates it: {', '.join(held)}")

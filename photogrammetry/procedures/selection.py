@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.network import Datum, DatumType, Network, Point, Role
+from rig.errors import BadInputError
 
 _RAYS = 2  # that a point needs without a survey
 
@@ -79,3 +80,17 @@ def without_survey(network: Network) -> Network:
         differences=(),
         datum=Datum(DatumType.INNER),
     )
+
+
+def require_unknown_poses(network: Network, procedure: str) -> None:
+    """Refuse constant poses where a procedure estimates all of them.
+
+    Raises:
+        BadInputError: names the image.
+    """
+    for image in network.images:
+        if not image.estimate:
+            raise BadInputError(
+                f'images.{image.name}: the pose is constant ("estimate": false), but {procedure} estimates all poses; '
+                "remove that key, or use svev adjust"
+            )

@@ -1,0 +1,107 @@
+"""Calibration of the cameras (paper, step 1): free adjustment of a 3D frame of unknown targets, self-calibrating.
+
+The paper keeps the free network regular by weighted poses (D.2); here inner constraints do it, which pull at nothing.
+Distances and coordinate differences stay: a scale bar gives the frame its size.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from photogrammetry.adjustment.adjustment import Adjustment
+from photogrammetry.adjustment.run import Outcome, adjust
+from photogrammetry.adjustment.state import state_of
+from photogrammetry.network import Datum, DatumType, Network, Point, Role
+from photogrammetry.procedures.selection import only_points, rays, require_unknown_poses
+from photogrammetry.start_values import complete
+from rig.errors import BadInputError
+
+_RAYS = 2  # that a target needs
+_INSIGNIFICANT = 1.96
+_STRONG = 0.95  # correlation of two interior parameters that can hardly be told apart
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """Calibrated cameras.
+
+    Attributes:
+        outcome: the free adjustment.
+        notes: what was done to the network, and what is doubtful about the parameters.
+    """
+
+    outcome: Outcome
+    notes: tuple[str, ...]
+
+
+def calibrate(network: Network) -> Calibration:
+    """Estimate the interior orientations that the network's cameras ask for, all poses and all targets.
+
+    Gross errors that can be located are taken out, the worst first.
+
+    Args:
+        network: images of a frame. Surveyed coordinates are no more than start values.
+
+    Raises:
+        BadInputError: no camera estimates anything, or a pose is constant.
+        NotSolvableError, NotConvergedError: as the adjustment.
+    """
+    free, notes = _free(network)
+    outcome = adjust(free, state_of(complete(free)), snoop=True)
+    return Calibration(outcome, (*notes, *_doubts(outcome.adjustment)))
+
+
+def _free(network: Network) -> tuple[Network, list[str]]:
+    """The free network, and what had to be changed for it."""
+    if not any(camera.estimate for camera in network.cameras):
+        raise BadInputError(
+            'no camera estimates anything; list its unknown parameters under "estimate", for instance ["c", "x0", "y0"]'
+        )
+    require_unknown_poses(network, "calibration")
+    notes = []
+    unused = [
+        i
+        for i, (point, count) in enumerate(zip(network.points, rays(network), strict=True))
+        if point.role in (Role.CONTROL, Role.FIXED, Role.CHECK) and count < _RAYS
+    ]
+    if unused:
+        names = ", ".join(network.points[i].name for i in unused)
+        notes.append(f"surveyed points that fewer than two images show are left out: {names}")
+        stays = np.ones(len(network.points), dtype=bool)
+        stays[unused] = False
+        network = only_points(network, stays)
+    surveyed = [point.name for point in network.points if point.role is not Role.TIE]
+    if surveyed:
+        notes.append(f"free network: the survey of {len(surveyed)} points is not used ({surveyed[0]} the first)")
+    if any(image.sigma_position is not None or image.sigma_angles is not None for image in network.images):
+        notes.append("free network: the sigmas of given poses are not used")
+    points = network.datum.points if network.datum.type is DatumType.INNER else None
+    free = replace(
+        network,
+        points=tuple(Point(point.name, Role.TIE, point.xyz) for point in network.points),
+        images=tuple(replace(image, sigma_position=None, sigma_angles=None) for image in network.images),
+        datum=Datum(DatumType.INNER, points),
+    )
+    return free, notes
+
+
+def _doubts(a: Adjustment) -> Iterator[str]:
+    """Parameters that the images hardly determine."""
+    for i, camera in enumerate(a.network.cameras):
+        columns = a.problem.unknowns.camera[i]
+        chosen = columns >= 0
+        sigma = a.sigmas(columns[chosen])
+        values = a.state.interior[i][a.problem.unknowns.selection[chosen]]
+        small = np.abs(values) < _INSIGNIFICANT * sigma
+        zero = [name for name, doubtful in zip(camera.estimate, small, strict=True) if doubtful and name != "c"]
+        if zero:
+            yield f"camera {camera.name}: not significantly different from zero: {', '.join(zero)}"
+        correlation = a.covariance(columns[chosen]) / np.maximum(np.outer(sigma, sigma), 1e-300)
+        for (k, one), (j, other) in combinations(enumerate(camera.estimate), 2):
+            if abs(correlation[j, k]) >= _STRONG:
+                yield (
+                    f"camera {camera.name}: {one} and {other} can hardly be told apart "
+                    f"(correlation {correlation[j, k]:.3f}); add images rolled by 90 degrees, or drop one of them"
+                )

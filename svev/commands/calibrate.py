@@ -1,0 +1,42 @@
+"""`svev calibrate`: interior orientations from images of a 3D frame."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from photogrammetry.network import Network
+from photogrammetry.network_file import read_network
+from photogrammetry.procedures.calibration import calibrate as calibrate_network
+from photogrammetry.protocol.calibration import calibration_lines, calibration_protocol, calibration_to_json
+from photogrammetry.protocol.document import write_protocol
+from svev.commands.delivery import deliver
+
+
+def calibrate(
+    network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with images of the frame")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")],
+    report: Annotated[
+        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="end with one JSON object: the result without its lists")
+    ] = False,
+) -> None:
+    """Calibrate cameras: free adjustment of a frame of unknown targets with self-calibration.
+
+    Exit codes: 0 calibrated, 2 bad input, 3 not solvable (what is missing stands in the result), 4 not converged.
+
+    Example: svev calibrate frame.json -o cameras.json --report protocol
+    """
+    given = read_network(network)
+    deliver(lambda: _calibrated(given, report), output, as_json=as_json)
+
+
+def _calibrated(network: Network, report: Path | None) -> tuple[dict[str, Any], list[str]]:
+    calibration = calibrate_network(network)
+    lines = calibration_lines(calibration)
+    if report is not None:
+        text, page = write_protocol(calibration_protocol(calibration), report)
+        lines.append(f"protocol in {text} and {page}")
+    return calibration_to_json(calibration), lines

@@ -13,7 +13,7 @@ import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import adjust, bench, calibrate, demo, doctor, info, orient, record, replay, schema, verify
+from svev.commands import adjust, bench, calibrate, demo, doctor, info, orient, plan, record, replay, schema, verify
 
 app = typer.Typer(
     name="svev",
@@ -41,6 +41,7 @@ app.command("verify")(verify.verify_command)
 app.command("adjust")(adjust.adjust)
 app.command("calibrate")(calibrate.calibrate)
 app.command("orient")(orient.orient)
+app.command("plan")(plan.plan)
 app.command("bench")(bench.bench)
 
 

@@ -1,0 +1,192 @@
+"""A planned network with the observations it will have: every target in every picture that shows it, without error."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogrammetry.camera_model import INTERIOR, Lens, camera_coordinates, image_point
+from photogrammetry.network import (
+    Camera,
+    Datum,
+    DatumType,
+    Difference,
+    Distance,
+    Image,
+    ImageObservations,
+    Network,
+    Point,
+    Role,
+)
+from photogrammetry.planning.description import Description, ImageEntry
+from rig.errors import BadInputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flight:
+    """What step 3 intersects, true values.
+
+    Attributes:
+        points: (t, p, 3) jumper points at t positions.
+        names: of the p points.
+        tie: (t, p) index of the same point in the network of step 2; -1: it is no tie point there.
+        skis: (t, s, k, 3) measured points of s skis.
+        ski_names: of the s skis.
+    """
+
+    points: Floats
+    names: tuple[str, ...]
+    tie: NDArray[np.intp]
+    skis: Floats
+    ski_names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A planned network.
+
+    Attributes:
+        name: for people.
+        network: step 2 (or the laboratory's step 1): true values, error-free observations.
+        sigma: of an image coordinate (px).
+        flight: step 3; None where nobody jumps.
+    """
+
+    name: str
+    network: Network
+    sigma: float
+    flight: Flight | None
+
+
+def plan_from(description: Description) -> Plan:
+    """Work out who sees what.
+
+    Raises:
+        BadInputError: a jumper point or ski that fewer than two images show.
+    """
+    cameras = tuple(_camera(entry.name, entry.c, entry.size, entry.estimate) for entry in description.cameras)
+    images = tuple(
+        Image(f"{entry.name}-{number}", index, np.array(image.X0), _rotation(image))
+        for index, entry in enumerate(description.cameras)
+        for number, image in enumerate(entry.images, 1)
+    )
+    points, distances, differences = _targets(description)
+    flight = _flight(description, len(points))
+    if flight is not None:
+        _check_flight(flight, cameras, images)
+        for position, name in np.argwhere(flight.tie >= 0):
+            points.append(Point(f"{flight.names[name]} at {position + 1}", Role.TIE, flight.points[position, name]))
+    network = Network(
+        cameras,
+        images,
+        tuple(points),
+        _observations(cameras, images, points, description.sigma.image),
+        tuple(distances),
+        tuple(differences),
+        Datum(DatumType(description.datum)),
+        description.length_unit,
+    )
+    return Plan(description.name, network, description.sigma.image, flight)
+
+
+def in_picture(camera: Camera, image: Image, xyz: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Image coordinates (..., 2) of points (..., 3), and whether they lie in front and within the picture (...)."""
+    if image.position is None or image.rotation is None or camera.size is None:
+        raise ValueError("a planned image has a pose and a size")
+    lens = Lens(camera.interior, np.asarray(camera.balance), np.asarray(False))
+    with np.errstate(all="ignore"):
+        xy = image_point(lens, image.rotation, image.position, xyz)
+        front = camera_coordinates(image.rotation, image.position, xyz)[..., 2] < 0.0
+    return xy, front & (np.abs(xy) <= np.array(camera.size) / 2.0).all(axis=-1)
+
+
+def _camera(name: str, c: float, size: list[int], estimate: Sequence[str]) -> Camera:
+    interior = np.zeros(len(INTERIOR))
+    interior[0] = c
+    chosen = tuple(parameter for parameter in INTERIOR if parameter in estimate)
+    return Camera(name, interior, size=(size[0], size[1]), estimate=chosen)
+
+
+def _rotation(image: ImageEntry) -> Floats:
+    """Columns: the camera's axes; upright, then turned about its axis."""
+    back = np.subtract(image.X0, image.look_at)
+    back = back / np.linalg.norm(back)
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    up, roll = np.cross(back, right), np.radians(image.roll_deg)
+    return np.column_stack((np.cos(roll) * right + np.sin(roll) * up, np.cos(roll) * up - np.sin(roll) * right, back))
+
+
+def _targets(description: Description) -> tuple[list[Point], list[Distance], list[Difference]]:
+    """Balls and rods as points, distances and differences."""
+    sigma, index = description.sigma, {name: i for i, name in enumerate(description.target_names())}
+    points = [
+        Point(
+            ball.name,
+            Role(ball.role),
+            np.array(ball.X),
+            np.full(3, sigma.control) if ball.role == "control" and sigma.control is not None else None,
+        )
+        for ball in description.balls
+    ]
+    distances, differences = [], []
+    for rod in description.rods:
+        if sigma.rod_length is None or sigma.rod_verticality is None:  # the description has refused it
+            raise ValueError("rods without sigmas")
+        foot, start = np.array(rod.foot), len(points)
+        points += [
+            Point(f"{rod.name}-1", Role.TIE, foot),
+            Point(f"{rod.name}-2", Role.TIE, foot + np.array((0.0, 0.0, rod.length))),
+        ]
+        distances.append(Distance(start, start + 1, rod.length, sigma.rod_length))
+        across = sigma.rod_verticality * rod.length
+        differences += [Difference(start, start + 1, axis, 0.0, across) for axis in (0, 1)]
+    for entry in description.differences:
+        start, end, axis = index[entry.start], index[entry.end], "XYZ".index(entry.axis)
+        here, there = points[start].xyz, points[end].xyz
+        if here is not None and there is not None:
+            differences.append(Difference(start, end, axis, float(there[axis] - here[axis]), entry.sigma))
+    return points, distances, differences
+
+
+def _flight(description: Description, first_tie: int) -> Flight | None:
+    jumper = description.jumper
+    if jumper is None:
+        return None
+    path, names = np.array(jumper.path), tuple(jumper.points)
+    points = path[:, None] + np.array(list(jumper.points.values()))
+    is_tie = np.tile([name in jumper.tie for name in names], (len(path), 1))
+    tie = np.full(is_tie.shape, -1, dtype=np.intp)
+    tie[is_tie] = first_tie + np.arange(int(is_tie.sum()))
+    along = np.linspace(-0.5, 0.5, jumper.ski_points)
+    skis = np.empty((len(path), len(jumper.skis), jumper.ski_points, 3))
+    for i, ski in enumerate(jumper.skis.values()):
+        direction = np.array(ski.direction) / np.linalg.norm(ski.direction)
+        middle = points[:, names.index(ski.point)]
+        skis[:, i] = middle[:, None] + ski.length * along[:, None] * direction
+    return Flight(points, names, tie, skis, tuple(jumper.skis))
+
+
+def _check_flight(flight: Flight, cameras: tuple[Camera, ...], images: tuple[Image, ...]) -> None:
+    """Every point in at least two images, every ski whole in at least two."""
+    for names, xyz in ((flight.names, flight.points[:, :, None]), (flight.ski_names, flight.skis)):
+        seen = np.sum([in_picture(cameras[image.camera], image, xyz)[1].all(axis=-1) for image in images], axis=0)
+        for position, which in np.argwhere(seen < 2):
+            raise BadInputError(
+                f"{names[which]} at position {position + 1} of the path is in {seen[position, which]} images; "
+                "aim the cameras so that two see it, or shorten the path"
+            )
+
+
+def _observations(
+    cameras: tuple[Camera, ...], images: tuple[Image, ...], points: list[Point], sigma: float
+) -> ImageObservations:
+    xyz = np.array([point.xyz for point in points], dtype=float).reshape(-1, 3)
+    shown = [in_picture(cameras[image.camera], image, xyz) for image in images]
+    where = [(i, p) for i, (_, seen) in enumerate(shown) for p in np.flatnonzero(seen)]
+    xy = np.array([shown[i][0][p] for i, p in where]).reshape(-1, 2)
+    image, point = (np.array([pair[k] for pair in where], dtype=np.intp) for k in (0, 1))
+    return ImageObservations(image, point, xy, np.full(xy.shape, sigma), np.zeros(len(xy), dtype=np.intp))

@@ -1,0 +1,158 @@
+"""Planning: both ways to predict agree, the shipped networks give the documented figures, bad files are refused."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from photogrammetry.adjustment.adjustment import Adjustment
+from photogrammetry.camera_model import Lens, linearise
+from photogrammetry.planning.description import Description, read_description
+from photogrammetry.planning.monte_carlo import simulate
+from photogrammetry.planning.plan import Plan, plan_from
+from photogrammetry.planning.prediction import Sigmas, adjusted_plan, predict
+from photogrammetry.planning.report import worst_disagreement
+from rig.errors import BadInputError
+from rig.rigfile import CONFIG, read_toml, validate
+from svev.cli import main
+
+NETWORKS = CONFIG / "networks"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "planning.md"
+
+
+def _planned(name: str) -> tuple[Plan, Adjustment, Sigmas]:
+    plan = plan_from(read_description(NETWORKS / f"{name}.toml"))
+    adjusted = adjusted_plan(plan)
+    return plan, adjusted, predict(plan, adjusted)
+
+
+@pytest.mark.parametrize(("name", "samples"), [("hill-1", 1500), ("hill-2", 1000), ("rods", 1000), ("laboratory", 150)])
+def test_covariance_and_monte_carlo_agree(name: str, samples: int) -> None:
+    """A simulated sigma scatters by 1 / sqrt(2 samples); no systematic difference beside it."""
+    plan, adjusted, predicted = _planned(name)
+    simulated = simulate(plan, adjusted, samples=samples, seed=4)
+    ours, theirs = predicted.flat(), simulated.flat()
+    ratios = theirs[ours > 0.0] / ours[ours > 0.0]
+    assert np.abs(ratios - 1.0).max() < 4.5 / np.sqrt(2.0 * samples)
+    assert ratios.mean() == pytest.approx(1.0, abs=0.05)
+    if plan.network.cameras[0].estimate == ():
+        assert worst_disagreement(predicted, simulated) < 0.05
+    np.testing.assert_array_equal(theirs == 0.0, ours == 0.0)
+
+
+def test_the_same_seed_gives_the_same_figures() -> None:
+    plan, adjusted, _ = _planned("hill-1")
+    once, again, other = (simulate(plan, adjusted, samples=60, seed=seed).flat() for seed in (1, 1, 2))
+    np.testing.assert_array_equal(once, again)
+    assert np.abs(other - once).max() > 0.0
+
+
+def test_propagation_equals_the_analytic_one() -> None:
+    """Intersected point: dX = -(B^T B)^-1 B^T (e + A dO), A and B being derivatives of the collinearity equations."""
+    plan, adjusted, predicted = _planned("hill-1")
+    assert plan.flight is not None
+    state, unknowns = adjusted.state, adjusted.problem.unknowns
+    position, which = 4, 1
+    target = np.tile(plan.flight.points[position, which], (3, 1))
+    interior = np.array([camera.interior for camera in plan.network.cameras])
+    lens = Lens(interior, np.zeros(3), np.zeros(3, dtype=bool))
+    lines = linearise(lens, state.rotation, state.position, target, np.zeros((3, 2)))
+    by_point = lines.by_point.reshape(6, 3) / plan.sigma
+    by_pose = np.zeros((6, unknowns.n_poses_end))
+    for image in range(3):
+        by_pose[2 * image : 2 * image + 2, unknowns.pose[image]] = lines.by_pose[image] / plan.sigma
+    alone = np.linalg.inv(by_point.T @ by_point)
+    carried = alone @ by_point.T @ by_pose
+    full = alone + carried @ adjusted.cofactors[: unknowns.n_poses_end, : unknowns.n_poses_end] @ carried.T
+    assert predicted.points[position, which] == pytest.approx(np.sqrt(np.diagonal(full)), rel=1e-4)
+
+
+def test_helmets_as_tie_points_help_the_cameras() -> None:
+    _, _, alone = _planned("hill-1")
+    _, _, tied = _planned("hill-2")
+    assert np.all(tied.positions < alone.positions)
+    assert np.all(tied.points <= alone.points)
+
+
+def _rows(title: str) -> list[list[float]]:
+    """Numbers of the table under a heading of the page; what stands in brackets or is text is left out."""
+    part = PAGE.read_text().split(f"## {title}\n", 1)[1].split("\n## ", 1)[0]
+    rows = [line.split("|")[2:-1] for line in part.splitlines() if re.search(r"\d\.\d", line) and line.startswith("|")]
+    return [[float(number) for cell in row for number in re.findall(r"\d+\.\d*", cell)] for row in rows]
+
+
+def test_the_documented_table_1_is_what_the_networks_give() -> None:
+    _, _, laboratory = _planned("laboratory")
+    _, _, hill = _planned("hill-1")
+    ours = np.hstack([laboratory.interior[:, :3], 10.0 * hill.positions])
+    documented = np.array([row[6:12] for row in _rows("Table 1: cameras")])
+    assert documented[:, :3] == pytest.approx(ours[:, :3], abs=0.051)
+    assert documented[:, 3:] == pytest.approx(ours[:, 3:], abs=0.0051)
+
+
+def test_the_documented_table_2_is_what_the_networks_give() -> None:
+    documented = np.array(_rows("Table 2: jumper points, and the verdict of section 6")).reshape(-1, 6)
+    ours = [10.0 * _planned(name)[2].points.mean(axis=1)[[0, 8, 16]] for name in ("hill-1", "hill-2")]
+    assert documented[:6, 3:] == pytest.approx(np.concatenate(ours), abs=0.0051)
+
+
+def test_the_documented_verdict_is_what_the_networks_give() -> None:
+    documented = np.array(_rows("Section 6: rods"))
+    description = read_toml(NETWORKS / "rods.toml")
+    cases: list[dict[str, Any]] = [description]
+    plumb = json.loads(json.dumps(description))
+    plumb["sigma"]["rod_verticality"] = 0.001
+    levelled = json.loads(json.dumps(description))
+    levelled["differences"] += [
+        {"start": start, "end": end, "axis": axis, "sigma": 0.01}
+        for start, end in (("P0", "R1-1"), ("R1-1", "R2-1"))
+        for axis in "XZ"
+    ]
+    cases += [plumb, levelled]
+    for row, case in zip(documented, cases, strict=True):
+        plan = plan_from(validate(Description, case, "rods"))
+        points = predict(plan, adjusted_plan(plan)).points.mean(axis=1)[[0, 8, 16]]
+        assert row == pytest.approx(10.0 * points.ravel(), abs=0.0051)
+
+
+def test_the_command_prints_tables_and_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", str(NETWORKS / "hill-2.toml"), "--samples", "100"]) == 0
+    table = capsys.readouterr().out
+    assert "hill, alternative 2" in table
+    assert re.search(r"^  17  +0\.0", table, re.MULTILINE)
+    assert main(["plan", str(NETWORKS / "hill-1.toml"), "--samples", "100", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["format"] == "svev-plan/1"
+    assert len(result["covariance"]["positions"]) == 17
+    assert result["worst_disagreement"] < 0.3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ('length_unit = "m"', 'length_unit = "m"\ndatums = "inner"', 'unknown key "datums"; did you mean "datum"?'),
+        (", control = 0.012", "", "sigma.control is missing, but there are control balls; add it"),
+        ('name = "B2"', 'name = "B1"', 'two targets are called "B1"; rename one'),
+        ("look_at = [8.1, 0.0, -2.9]", "look_at = [-21.7, -30.9, -2.9]", "looks straight up, straight down or nowhere"),
+        ('tie = ["P1"]', 'tie = ["P9"]', 'tie names "P9"'),
+        ("[2.6, 0.0, ", "[200.6, 0.0, ", "P1 at position 1 of the path is in 0 images; aim the cameras"),
+    ],
+)
+def test_bad_networks_are_refused(tmp_path: Path, old: str, new: str, complaint: str) -> None:
+    text = (NETWORKS / "hill-2.toml").read_text()
+    assert old in text
+    path = tmp_path / "network.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(BadInputError, match=re.escape(complaint)) as caught:
+        plan_from(read_description(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_not_determined_is_said_with_exit_code_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (NETWORKS / "hill-1.toml").read_text().replace('role = "control"', 'role = "tie"')
+    (tmp_path / "network.toml").write_text(text)
+    assert main(["plan", str(tmp_path / "network.toml")]) == 3
+    assert "not solvable" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from photogrammetry.adjustment.wording import in_file_frame
 from photogrammetry.camera_model import INTERIOR
 from photogrammetry.network import ImageFrame, Role
 from photogrammetry.protocol.document import Section, Table
+from photogrammetry.protocol.drawings import network_drawings, residual_drawings
 
 _STRONG = 0.9  # correlations from here on are named one by one
 _SHOWN = 20  # of them
@@ -27,8 +28,9 @@ def adjusted_sections(outcome: Outcome) -> tuple[Section, ...]:
         Section("Interior orientation", _interior(a)),
         Section("Poses", _poses(a)),
         Section("Points", _points(a)),
+        Section("Network", network_drawings(a)),
         Section("Correlations", _correlations(a)),
-        Section("Residuals", _residuals(a)),
+        Section("Residuals", (*_residuals(a), *residual_drawings(a))),
     ]
     return tuple(section for section in sections if section.parts)
 

@@ -28,7 +28,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A drawing: SVG for the page, its caption for the text too."""
+    """A drawing for the page: SVG and a caption."""
 
     caption: str
     svg: str
@@ -67,6 +67,8 @@ def as_text(protocol: Protocol) -> str:
     """The protocol as plain text; drawings stand in the page alone."""
     lines = [protocol.title, "=" * len(protocol.title)]
     for section in protocol.sections:
+        if all(isinstance(part, Drawing) for part in section.parts):
+            continue
         lines += ["", section.title, "-" * len(section.title)]
         for part in section.parts:
             if isinstance(part, str):

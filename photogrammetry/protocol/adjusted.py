@@ -5,10 +5,12 @@ from itertools import combinations
 import numpy as np
 
 from photogrammetry.adjustment.adjustment import Adjustment
+from photogrammetry.adjustment.blunders import BlunderKind, Observation
+from photogrammetry.adjustment.relations import Kind
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.state import Floats
 from photogrammetry.adjustment.summary import summarise
-from photogrammetry.adjustment.wording import in_file_frame
+from photogrammetry.adjustment.wording import in_file_frame, name_of
 from photogrammetry.camera_model import INTERIOR
 from photogrammetry.network import ImageFrame, Role
 from photogrammetry.protocol.document import Section, Table
@@ -142,4 +144,24 @@ def _residuals(a: Adjustment) -> tuple[str | Table, ...]:
     ]
     if checks:
         parts += ["Surveyed points, adjusted - given:", Table(("point", "vX", "vY", "vZ"), tuple(checks))]
+    measured = [
+        *_measured(a, Kind.DISTANCE, BlunderKind.DISTANCE),
+        *_measured(a, Kind.DIFFERENCE, BlunderKind.DIFFERENCE),
+    ]
+    if measured:
+        parts += ["Distances and differences:", Table(("observation", "v", "r", "w"), tuple(measured))]
     return tuple(parts)
+
+
+def _measured(a: Adjustment, kind: Kind, name: BlunderKind) -> list[tuple[str, ...]]:
+    """Residual, redundancy number and test value of distances or differences."""
+    v, r, w = a.relation_residuals(), a.controlled.relation, a.relation_w()
+    return [
+        (
+            name_of(a.network, Observation(name, int(a.problem.relations.item[row]))),
+            f"{v[row]:.3g}",
+            f"{r[row]:.2f}",
+            f"{w[row]:.1f}" if np.isfinite(w[row]) else "",
+        )
+        for row in a.problem.relations.rows(kind)
+    ]

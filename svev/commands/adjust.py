@@ -12,6 +12,8 @@ from photogrammetry.adjustment.state import state_of
 from photogrammetry.adjustment.summary import summarise
 from photogrammetry.network import Network, Reweight
 from photogrammetry.network_file import read_network
+from photogrammetry.protocol.adjusted import adjusted_sections
+from photogrammetry.protocol.document import Protocol, write_protocol
 from photogrammetry.start_values import complete
 from svev.commands.delivery import deliver
 
@@ -24,6 +26,9 @@ def adjust(
         bool,
         typer.Option("--snoop", help="take the worst locatable gross error out, adjust again, until there is none"),
     ] = False,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="end with one JSON object: the result without its lists")
     ] = False,
@@ -37,12 +42,16 @@ def adjust(
     given = read_network(network)
     if paper:
         given = replace(given, reweight=Reweight.PAPER)
-    deliver(lambda: _adjusted(given, snoop=snoop), output, as_json=as_json)
+    deliver(lambda: _adjusted(given, report, snoop=snoop), output, as_json=as_json)
 
 
-def _adjusted(network: Network, *, snoop: bool) -> tuple[dict[str, Any], list[str]]:
+def _adjusted(network: Network, report: Path | None, *, snoop: bool) -> tuple[dict[str, Any], list[str]]:
     poses = all(image.position is not None and image.rotation is not None for image in network.images)
     points = all(point.xyz is not None for point in network.points)
     started = network if poses and points else complete(network)
     outcome = adjust_network(network, state_of(started), snoop=snoop)
-    return outcome_to_json(outcome), summarise(outcome)
+    lines = summarise(outcome)
+    if report is not None:
+        text, page = write_protocol(Protocol("Adjustment", adjusted_sections(outcome)), report)
+        lines.append(f"protocol in {text} and {page}")
+    return outcome_to_json(outcome), lines

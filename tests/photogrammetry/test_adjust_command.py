@@ -171,6 +171,15 @@ def test_paper_and_snoop_and_json(run: Run, capsys: pytest.CaptureFixture[str]) 
     assert "more than 7 control points" in capsys.readouterr().err
 
 
+def test_report(run: Run, tmp_path: Path) -> None:
+    code, _ = run(rods(1).network, "--report", str(tmp_path / "report"))
+    assert code == 0
+    for name in ("protocol.txt", "protocol.html"):
+        text = (tmp_path / "report" / name).read_text()
+        assert "difference Y from P11 to P12" in text
+        assert "K1 c" in text
+
+
 def test_summary_names_the_suspect(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     network = hill(2).network
     xy = network.observations.xy.copy()

@@ -84,6 +84,8 @@ def test_sections_hold_the_numbers() -> None:
     text = as_text(Protocol("Rods", tuple(sections.values())))
     a = outcome.adjustment
     assert f"{a.state.interior[0, 0]:.6g}" in text
+    measured = next(line for line in text.splitlines() if "distance P11 to P12" in line)
+    assert measured.split()[4] == f"{a.relation_residuals()[0]:.3g}"
     table = sections["Points"].parts[0]
     assert isinstance(table, Table)
     assert [row[0] for row in table.rows] == [point.name for point in a.network.points]

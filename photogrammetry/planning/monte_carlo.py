@@ -4,6 +4,8 @@ All samples iterate together. Without camera parameters among the unknowns the n
 network throughout; the gradient is exact at every step, so each sample ends at its own least-squares solution.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,8 @@ from photogrammetry.camera_model import Lens, linearise
 from photogrammetry.diagnosis import NotConvergedError
 from photogrammetry.planning.plan import Flight, Plan
 from photogrammetry.planning.prediction import Sigmas
-from photogrammetry.planning.step_three import Sights, error_free_sights, intersect_flight
+from photogrammetry.planning.step_three import error_free_sights, intersect_flight
+from photogrammetry.planning.step_three_samples import intersect_samples
 from photogrammetry.rotation import rotation_from_vector
 
 Floats = NDArray[np.float64]
@@ -38,45 +41,42 @@ def simulate(plan: Plan, adjusted: Adjustment, *, samples: int, seed: int) -> Si
     Raises:
         NotConvergedError: the errors are so large that step 2 leads nowhere.
     """
-    rng = np.random.default_rng(seed)
-    truth, flight = adjusted.state, plan.flight
-    sights = None if flight is None else error_free_sights(plan, flight)
-    sums = [np.zeros_like(truth.position), np.zeros((len(truth.interior), len(adjusted.problem.unknowns.selection)))]
-    sums += [] if flight is None else [np.zeros_like(flight.points), np.zeros((*flight.skis.shape[:2], 2))]
-    true_angles = None
-    if flight is not None and sights is not None:
-        true_angles = intersect_flight(plan.network, truth, sights, plan.sigma).angles
+    rng, truth, flight = np.random.default_rng(seed), adjusted.state, plan.flight
+    selection = adjusted.problem.unknowns.selection
+    repeated = None if flight is None else _RepeatedFlight(plan, flight, truth)
+    squares: list[tuple[Floats, ...]] = []
     for first in range(0, samples, _CHUNK):
-        count = min(_CHUNK, samples - first)
-        states = _parts(_Samples(adjusted, count, rng).solved())
-        for i in range(count):
-            state = State(*(part[i] for part in states))
-            sums[0] += (state.position - truth.position) ** 2
-            sums[1] += (state.interior - truth.interior)[:, adjusted.problem.unknowns.selection] ** 2
-            if flight is not None and sights is not None and true_angles is not None:
-                points, angles = _step_three(plan, flight, sights, state, rng)
-                sums[2] += (points - flight.points) ** 2
-                sums[3] += (angles - true_angles).reshape(sums[3].shape) ** 2
-    if flight is None:
-        sums += [np.zeros((0, 0, 3)), np.zeros((0, 0, 2))]
-    return Sigmas(*(np.sqrt(part / samples) for part in sums))
+        states = _Samples(adjusted, min(_CHUNK, samples - first), rng).solved()
+        errors = [states.position - truth.position, (states.interior - truth.interior)[:, :, selection]]
+        errors += [] if repeated is None else repeated.errors(states, rng)
+        squares.append(tuple(np.sum(error**2, axis=0) for error in errors))
+    sigmas = [np.sqrt(np.sum(part, axis=0) / samples) for part in zip(*squares, strict=True)]
+    sigmas += [] if repeated is not None else [np.zeros((0, 0, 3)), np.zeros((0, 0, 2))]
+    positions, interior, points, angles = sigmas
+    return Sigmas(positions, interior, points, angles)
 
 
-def _step_three(
-    plan: Plan, flight: Flight, sights: Sights, state: State, rng: np.random.Generator
-) -> tuple[Floats, Floats]:
-    """Jumper points (t, p, 3) and angles of one sample; tie points stay where step 2 left them."""
-    noisy = Sights(
-        sights.points + rng.normal(0.0, plan.sigma, sights.points.shape),
-        sights.points_seen,
-        sights.skis + rng.normal(0.0, plan.sigma, sights.skis.shape),
-        sights.skis_seen,
-    )
-    done = intersect_flight(plan.network, state, noisy, plan.sigma)
-    points = done.points.reshape(flight.points.shape)
-    tied = flight.tie >= 0
-    points[tied] = state.xyz[flight.tie[tied]]
-    return points, done.angles
+class _RepeatedFlight:
+    """Step 3, again and again."""
+
+    def __init__(self, plan: Plan, flight: Flight, truth: State) -> None:
+        self.network, self.flight = plan.network, flight
+        self.sights = error_free_sights(plan, flight)
+        self.truth = intersect_flight(plan.network, truth, self.sights)
+
+    def errors(self, states: State, rng: np.random.Generator) -> list[Floats]:
+        """Errors of points (n, t, p, 3) and angles (n, t, s, 2); tie points stay where step 2 left them."""
+        flight, sights, n = self.flight, self.sights, len(states.xyz)
+        noisy = replace(
+            sights,
+            points=sights.points + rng.normal(0.0, sights.sigma, (n, *sights.points.shape)),
+            skis=sights.skis + rng.normal(0.0, sights.sigma, (n, *sights.skis.shape)),
+        )
+        points, angles = intersect_samples(self.network, states, noisy, self.truth)
+        points = points.reshape(n, *flight.points.shape)
+        tied = flight.tie >= 0
+        points[:, tied] = states.xyz[:, flight.tie[tied]]
+        return [points - flight.points, (angles - self.truth.angles).reshape(n, *flight.skis.shape[:2], 2)]
 
 
 class _Samples:

@@ -57,7 +57,7 @@ def predict(plan: Plan, adjusted: Adjustment) -> Sigmas:
     if flight is None:
         return Sigmas(positions, interior, np.zeros((0, 0, 3)), np.zeros((0, 0, 2)))
     sights = error_free_sights(plan, flight)
-    alone = intersect_flight(plan.network, adjusted.state, sights, plan.sigma)
+    alone = intersect_flight(plan.network, adjusted.state, sights)
     of_points, of_angles = _derivatives(plan, adjusted, sights)
     orientations = adjusted.cofactors[: unknowns.n_poses_end, : unknowns.n_poses_end]
     points = _diagonal(alone.points_covariance) + _carried(of_points, orientations)
@@ -77,8 +77,7 @@ def _derivatives(plan: Plan, adjusted: Adjustment, sights: Sights) -> tuple[Floa
         step = np.zeros(unknowns.count)
         step[column] = _STEP * sigma[column]
         ahead, behind = (
-            intersect_flight(plan.network, unknowns.moved(adjusted.state, sign * step), sights, plan.sigma)
-            for sign in (1.0, -1.0)
+            intersect_flight(plan.network, unknowns.moved(adjusted.state, sign * step), sights) for sign in (1.0, -1.0)
         )
         by_point.append((ahead.points - behind.points) / (2.0 * step[column]))
         by_angle.append((ahead.angles - behind.angles) / (2.0 * step[column]))

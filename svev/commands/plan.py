@@ -1,5 +1,6 @@
 """`svev plan`: how accurate a network will be, before it is built."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -48,4 +49,6 @@ def plan(
     for line in plan_table(planned, predicted, simulated):
         console.say(line)
     largest = 100.0 * worst_disagreement(predicted, simulated)
-    console.say(f"\n{samples} samples; covariance and Monte Carlo differ by at most {largest:.1f} %")
+    known = 100.0 / math.sqrt(2.0 * samples)
+    console.say(f"\ncovariance and Monte Carlo differ by at most {largest:.1f} %")
+    console.say(f"{samples} samples: each simulated sigma is known to {known:.1f} % (one sigma)")

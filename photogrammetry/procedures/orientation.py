@@ -140,7 +140,8 @@ def _prepared(network: Network, alternative: int, moving: str) -> tuple[Network,
         network = only_points(network, ~moves)
         notes.append(f"alternative 1: {int(moves.sum())} moving points left out, static points tie the images alone")
     else:
-        notes.append(f"alternative 2: {int(moves.sum())} moving points tie the images beside the static ones")
+        count = f"{int(moves.sum())} moving points tie" if moves.any() else "no moving point ties"
+        notes.append(f"alternative 2: {count} the images beside the static ones")
     return network, notes
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from photogrammetry.network import Datum, DatumType, Network, Point, Role
+from photogrammetry.network import Datum, DatumType, Network, Point, Reweight, Role
 from rig.errors import BadInputError
 
 _RAYS = 2  # that a point needs without a survey
@@ -79,6 +79,7 @@ def without_survey(network: Network) -> Network:
         distances=(),
         differences=(),
         datum=Datum(DatumType.INNER),
+        reweight=Reweight.NONE,
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from photogrammetry.network import Network, Role
+from photogrammetry.network import Network, Reweight, Role
 from photogrammetry.procedures.orientation import Orientation, StageName, orient
 from photogrammetry.procedures.selection import only_points, rays
 from photogrammetry.rotation import nearest_rotation
@@ -147,6 +147,16 @@ def test_interior_orientation_is_held_and_said() -> None:
     orientation = orient(replace(network, cameras=cameras))
     assert orientation.outcome.adjustment.problem.unknowns.selection.size == 0
     assert "held" in orientation.notes[0]
+
+
+def test_weights_are_estimated_where_the_network_asks_for_it() -> None:
+    """Appendix D.3: the survey is five times worse than its sigmas say."""
+    network = hill(2, helmets=17).network
+    points = tuple(p if p.sigma is None else replace(p, sigma=p.sigma / 5.0) for p in network.points)
+    orientation = orient(replace(network, points=points, reweight=Reweight.HELMERT))
+    components = {part.group: part.factor for part in orientation.outcome.components or ()}
+    assert components["control"] == pytest.approx(5.0, rel=0.5)  # 24 redundant: one sigma is 15 %
+    assert components["image"] == pytest.approx(1.0, rel=0.25)
 
 
 def test_error_free_reference_points() -> None:

@@ -103,6 +103,7 @@ def test_paper_weights(run: Run) -> None:
     code, result = run(hill(2, helmets=17).network, "--paper")
     assert code == 0
     assert result["variance_components"]["control"]["redundancy"] == 8
+    assert not any("left out" in stage["words"] for stage in result["stages"])
 
 
 @pytest.mark.parametrize(

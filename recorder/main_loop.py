@@ -191,8 +191,11 @@ class RecorderLoop:
         recording, reserve = self._recording, self._rig.recorder.reserve_gb
         if recording is None or (free := recording.log.free_bytes()) >= reserve * 1e9:
             return
-        self._happened(Event.now(Level.ERROR, "recorder", f"only {free / 1e9:.1f} GB free: recording stopped"))
-        self._finish()
+        why = f"only {free / 1e9:.1f} GB are free and {reserve:g} GB are kept in reserve: recording stopped; make room"
+        self._happened(Event.now(Level.ERROR, "recorder", why))
+        with self._storage_guarded():
+            recording.close()
+            raise StorageError(f"{recording.path}: {why}; the log is whole up to there")
 
     def _health(self) -> dict[str, Any]:
         """Rates, queues, drops, clocks, temperature, disk: what the last second looked like."""

@@ -1,5 +1,6 @@
 """One recording with a running rig: where the log goes, warm-up, progress, Ctrl-C, the result."""
 
+import shutil
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,6 +37,22 @@ def new_log_path(directory: Path) -> Path:
     return path
 
 
+def check_room(directory: Path, rig: RigSettings, seconds: float) -> None:
+    """Whether a recording fits on the disk, beside what is kept in reserve.
+
+    Raises:
+        BadInputError: it does not.
+    """
+    rows, columns = rig.triplet_shape
+    needed = rows * columns * rig.trigger.rate_hz * seconds / 1e9
+    room = shutil.disk_usage(directory).free / 1e9 - rig.recorder.reserve_gb
+    if needed > room:
+        raise BadInputError(
+            f"{directory}: {seconds:g} s need {needed:.2f} GB, but there is room for {max(0.0, room):.2f} GB beside "
+            f"the reserve of {rig.recorder.reserve_gb:g} GB: make room, record for a shorter time or choose another --out"
+        )
+
+
 def run_recording(
     running: RunningRig, rig: RigSettings, path: Path, seconds: float, *, allow_absent: bool, session: dict[str, str]
 ) -> Message:
@@ -43,7 +60,11 @@ def run_recording(
 
     Returns:
         The result in the form of the command line's contract, with `stopped_early`.
+
+    Raises:
+        SvevError: there is no room for it, a camera is not there, the disk failed, the recorder died.
     """
+    check_room(path.parent, rig, seconds)
     running.wait_until_warm(rig.trigger.settle_s, allow_absent=allow_absent)
     pulses = max(1, round(seconds * rig.trigger.rate_hz))
     with _stop_signals() as stop, console.progress(f"recording {path.name}", pulses) as advance:

@@ -188,3 +188,35 @@ def test_an_unwritable_directory_is_named(tmp_path: Path, loopback: Loopback) ->
     code, _, err = _result(_record(write_rig(tmp_path, "sim", loopback), tmp_path / "file" / "logs", 1))
     assert (code, len(err.strip().splitlines())) == (2, 1)
     assert "cannot be written" in err
+
+
+def test_a_recording_that_does_not_fit_is_refused(tmp_path: Path, loopback: Loopback) -> None:
+    path = write_rig(tmp_path, "sim", loopback)
+    path.write_text(path.read_text().replace("[network]", "[recorder]\nreserve_gb = 1e9\n[network]"))
+    code, _, err = _result(_record(path, tmp_path / "logs", 1))
+    assert code == 2
+    assert "1 s need 0.03 GB, but there is room for 0.00 GB beside the reserve" in err
+
+
+def test_a_full_disk_ends_the_recording_and_what_is_written_is_whole(tmp_path: Path, loopback: Loopback) -> None:
+    """A disk of 40 MB, mounted in a mount namespace of the test's own."""
+    path = write_rig(tmp_path, "sim", loopback)
+    path.write_text(path.read_text().replace("[network]", "[recorder]\nreserve_gb = 0\n[network]"))
+    small = tmp_path / "small"
+    small.mkdir()
+    kept = tmp_path / "kept.mcap"
+    script = (
+        f"mount -t tmpfs -o size=40m none {small} && "
+        f"{sys.executable} -c 'import sys, svev.recording_run as r; r.check_room = lambda *_: None; "
+        f"from svev.cli import main; sys.exit(main())' record --rig {path} --seconds 10 --out {small} --json; "
+        f"code=$?; cp {small}/*.mcap {kept}; exit $code"
+    )
+    command = ["unshare", "--mount", "sh", "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    if "unshare" in done.stderr or "mount:" in done.stderr:
+        pytest.skip("no mount namespace of our own is allowed here: a small disk cannot be made")
+    assert done.returncode == 4, done.stderr
+    assert "the disk is full" in done.stderr.splitlines()[-1]
+    report = verify(kept)
+    assert report.pulses > 20
+    assert report.ledger.complete == report.pulses

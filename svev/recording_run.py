@@ -49,7 +49,7 @@ def check_room(directory: Path, rig: RigSettings, seconds: float) -> None:
     if needed > room:
         raise BadInputError(
             f"{directory}: {seconds:g} s need {needed:.2f} GB, but there is room for {max(0.0, room):.2f} GB beside "
-            f"the reserve of {rig.recorder.reserve_gb:g} GB: make room, record for a shorter time or choose another --out"
+            f"the reserve of {rig.recorder.reserve_gb:g} GB: make room, record less long or choose another --out"
         )
 
 

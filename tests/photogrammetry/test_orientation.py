@@ -132,6 +132,29 @@ def _epipolar(network: Network, point: int) -> np.ndarray:
     return np.asarray((second - first) / np.linalg.norm(second - first))
 
 
+def test_a_reference_point_with_one_ray_is_judged_in_the_last_stage() -> None:
+    """The free block does not have it; afterwards its survey and its image stand against each other."""
+    network = hill(1, helmets=17).network
+    o, point = network.observations, 9
+    left = ~((o.point == point) & (o.image != 1))
+    parts = {name: getattr(o, name)[left] for name in ("image", "point", "xy", "sigma", "group")}
+    orientation = orient(_spoilt(replace(network, observations=replace(o, **parts)), 1, point, (30.0, -30.0)))
+    assert [len(stage.findings) > 0 for stage in orientation.stages] == [False, False, True]
+    message = orientation.stages[2].findings[0].message
+    assert message.startswith("one of these observations is wrong")
+    assert "control point B10" in message
+    assert "point B10 in image hill-2" in message
+
+
+def test_three_reference_points_show_an_error_but_not_whose_it_is() -> None:
+    """Their distances contradict the block; each of them may be the one that is wrong."""
+    network = hill(1, helmets=17).network
+    few = tuple(replace(p, role=Role.TIE, sigma=None) if 3 <= i < 15 else p for i, p in enumerate(network.points))
+    orientation = orient(_shifted(replace(network, points=few), 1, (0.0, 0.0, 1.5)))
+    assert _messages(orientation)[1] == []
+    assert "cannot tell which" in orientation.stages[1].findings[0].message
+
+
 def test_too_few_reference_points_leave_the_second_stage_out() -> None:
     network = hill(1).network
     few = replace(network, points=tuple(replace(p, role=Role.TIE, sigma=None) for p in network.points))

@@ -24,7 +24,7 @@ from photogrammetry.rotation import rotation_from_vector
 
 Floats = NDArray[np.float64]
 
-_CHUNK = 50  # samples at a time: the arrays stay in the cache
+_CHUNK_NUMBERS = 900_000  # of derivatives at a time: they stay in the cache
 _STEPS = 30
 _ENOUGH = 1e-3  # of a sigma; the scatter of 1000 samples is only known to 2e-2
 
@@ -45,8 +45,9 @@ def simulate(plan: Plan, adjusted: Adjustment, *, samples: int, seed: int) -> Si
     selection = adjusted.problem.unknowns.selection
     repeated = None if flight is None else _RepeatedFlight(plan, flight, truth)
     squares: list[tuple[Floats, ...]] = []
-    for first in range(0, samples, _CHUNK):
-        states = _Samples(adjusted, min(_CHUNK, samples - first), rng).solved()
+    chunk = max(1, _CHUNK_NUMBERS // (adjusted.problem.n_observations * adjusted.problem.unknowns.count))
+    for first in range(0, samples, chunk):
+        states = _Samples(adjusted, min(chunk, samples - first), rng).solved()
         errors = [states.position - truth.position, (states.interior - truth.interior)[:, :, selection]]
         errors += [] if repeated is None else repeated.errors(states, rng)
         squares.append(tuple(np.sum(error**2, axis=0) for error in errors))
@@ -104,7 +105,7 @@ class _Samples:
         sigma = np.sqrt(np.diagonal(self.cofactors))
         for _ in range(_STEPS):
             slopes, v = self._equations()
-            gradient = np.einsum("bru,br->bu", slopes, v, optimize=True)
+            gradient = (v[:, None, :] @ slopes)[:, 0]
             if self.own:
                 slopes *= sigma  # units in which the normal matrix is well-conditioned
                 normal = slopes.transpose(0, 2, 1) @ slopes + self.datum

@@ -51,14 +51,12 @@ class ReferencePoint:
     """A reference point in both systems.
 
     Attributes:
-        name: of the point.
         block: (3,) in the free block.
         surveyed: (3,).
         sigma: (3,) of the survey; zero: error-free.
         images: its images.
     """
 
-    name: str
     block: Floats
     surveyed: Floats
     sigma: Floats
@@ -97,10 +95,10 @@ class ReferenceFit:
         transform: block to object system.
         used: indices of the points that it was estimated from.
         residuals: (n, 3) transformed - surveyed, of all points.
-        ratio: estimated / a-priori sigma0; 1 without redundancy.
+        ratio: estimated / a-priori sigma0.
         redundancy: 3 used - 7.
         removed: wrong points that were taken out, in that order.
-        suspect: one that is left because the data cannot tell which it is.
+        suspect: one that is left: the data cannot tell which it is, or too many went before it.
     """
 
     transform: Similarity

@@ -30,7 +30,7 @@ def reference_points(free: Adjustment, surveyed: Sequence[Point]) -> tuple[list[
         sigma = np.zeros(3) if point.sigma is None else point.sigma
         rows = np.flatnonzero(free.problem.point == index)
         images = tuple(_image_point(free, int(row), columns) for row in rows)
-        points.append(ReferencePoint(point.name, free.state.xyz[index], np.asarray(point.xyz), sigma, images))
+        points.append(ReferencePoint(free.state.xyz[index], np.asarray(point.xyz), sigma, images))
     return points, free.covariance(columns)
 
 

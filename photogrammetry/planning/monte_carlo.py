@@ -106,10 +106,12 @@ class _Samples:
         for _ in range(_STEPS):
             slopes, v = self._equations()
             gradient = (v[:, None, :] @ slopes)[:, 0]
+            step: Floats
             if self.own:
                 slopes *= sigma  # units in which the normal matrix is well-conditioned
                 normal = slopes.transpose(0, 2, 1) @ slopes + self.datum
-                step = -np.linalg.solve(normal, sigma[:, None] * gradient[..., None])[..., 0] * sigma
+                scaled = np.linalg.solve(normal, sigma[:, None] * gradient[..., None])[..., 0]
+                step = np.asarray(-scaled * sigma, dtype=float)
             else:
                 step = -gradient @ self.cofactors
             self._move(step)

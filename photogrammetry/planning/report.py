@@ -67,7 +67,7 @@ def _row(ours: Floats, theirs: Floats, form: str) -> str:
 
 def _mean(values: Floats) -> Floats:
     """Over the points or skis of a position; (positions, 2 or 3)."""
-    return values.mean(axis=1) if values.size else values.reshape(len(values), values.shape[-1])
+    return values.mean(axis=1) if values.size else np.zeros((0, values.shape[-1]))
 
 
 def _parameters(plan: Plan) -> list[str]:

@@ -164,6 +164,15 @@ def test_the_command_prints_tables_and_json(capsys: pytest.CaptureFixture[str]) 
     assert result["worst_disagreement"] < 0.3
 
 
+def test_a_jumper_without_skis(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = re.sub(r"^skis\..*\n", "", (NETWORKS / "hill-1.toml").read_text(), flags=re.MULTILINE)
+    (tmp_path / "network.toml").write_text(text)
+    assert main(["plan", str(tmp_path / "network.toml"), "--samples", "100"]) == 0
+    table = capsys.readouterr().out
+    assert "jumper" in table
+    assert "skis" not in table
+
+
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [

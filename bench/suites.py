@@ -12,6 +12,7 @@ from bench.gstreamer import SINKS
 from bench.intersection import run_intersection
 from bench.loads import LOADS
 from bench.parts import run_parts
+from bench.planning import run_planning
 from bench.results import write_results
 
 Suite = Callable[[float, Path], dict[str, Any]]
@@ -47,9 +48,9 @@ def _parts(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
-def _adjustment(seconds: float, directory: Path) -> dict[str, Any]:
-    cases = run_adjustment(seconds)
-    path = write_results("adjustment", cases, directory)
+def _timed(name: str, run: Callable[[float], list[dict[str, Any]]], seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run(seconds)
+    path = write_results(name, cases, directory)
     table = [f"{c['name']:46}{c['value']:9.3f} {c['unit']:3} {c['baseline_is']}: {c['baseline']:.3f}" for c in cases]
     return {"cases": cases, "file": str(path), "table": table}
 
@@ -64,6 +65,7 @@ def _intersection(seconds: float, directory: Path) -> dict[str, Any]:
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
     "parts": _parts,
-    "adjustment": _adjustment,
+    "adjustment": partial(_timed, "adjustment", run_adjustment),
     "intersection": _intersection,
+    "planning": partial(_timed, "planning", run_planning),
 }

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.line_intersection import intersect_lines_in_one_step
-from photogrammetry.point_intersection import intersect_points
+from photogrammetry.intersection.line_intersection import intersect_lines_in_one_step
+from photogrammetry.intersection.point_intersection import intersect_points
 
 _POINTS = 100_000
 _LINES = 200

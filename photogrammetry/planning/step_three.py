@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from photogrammetry.adjustment.state import State
 from photogrammetry.camera_model import Lens, undistort
 from photogrammetry.ideal_camera import IdealCamera
-from photogrammetry.line_intersection import intersect_lines_in_one_step
+from photogrammetry.intersection.line_intersection import intersect_lines_in_one_step
+from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.network import Network
 from photogrammetry.planning.plan import Flight, Plan, in_picture
-from photogrammetry.point_intersection import intersect_points
 
 Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from photogrammetry.adjustment.run import Outcome, adjust
 from photogrammetry.adjustment.state import state_of
 from photogrammetry.network import Datum, DatumType, Network, Point, Role
 from photogrammetry.procedures.selection import only_points, rays, require_unknown_poses
-from photogrammetry.start_values import complete
+from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
 _RAYS = 2  # that a target needs

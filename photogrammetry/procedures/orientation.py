@@ -33,7 +33,7 @@ from photogrammetry.procedures.selection import (
     without_survey,
 )
 from photogrammetry.similarity import Similarity
-from photogrammetry.start_values import complete
+from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)

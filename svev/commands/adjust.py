@@ -14,7 +14,7 @@ from photogrammetry.network import Network, Reweight
 from photogrammetry.network_file import read_network
 from photogrammetry.protocol.adjusted import adjusted_sections
 from photogrammetry.protocol.document import Protocol, write_protocol
-from photogrammetry.start_values import complete
+from photogrammetry.start_values.search import complete
 from svev.commands.delivery import deliver
 
 

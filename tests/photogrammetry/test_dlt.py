@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photogrammetry.dlt import resect_dlt
+from photogrammetry.start_values.dlt import resect_dlt
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import SIGMA_PX, frame_points, lab_cameras, observe
 

@@ -6,9 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_line import ImageLines, fit_image_lines
-from photogrammetry.line_intersection import LineState, SpaceLines, intersect_lines, intersect_lines_in_one_step
-from photogrammetry.line_start import start_lines
+from photogrammetry.intersection.image_line import ImageLines, fit_image_lines
+from photogrammetry.intersection.line_intersection import (
+    LineState,
+    SpaceLines,
+    intersect_lines,
+    intersect_lines_in_one_step,
+)
+from photogrammetry.intersection.line_start import start_lines
 from photogrammetry.rotation import rotation_from_vector
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import SIGMA_PX, Ski, hill_cameras, look_at, ski

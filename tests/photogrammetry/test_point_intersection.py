@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.point_intersection import CHUNK, PointState, intersect_points
+from photogrammetry.intersection.point_intersection import CHUNK, PointState, intersect_points
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import SIGMA_PX, flight_points, hill_cameras, look_at, observe
 

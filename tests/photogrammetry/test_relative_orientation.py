@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photogrammetry import relative_orientation
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.point_intersection import intersect_points
-from photogrammetry.relative_orientation import RelativeOrientation, orient_relatively
+from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.rotation import rotation_from_vector
+from photogrammetry.start_values import relative_orientation
+from photogrammetry.start_values.relative_orientation import RelativeOrientation, orient_relatively
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import SIGMA_PX, flight_points, frame_points, hill_cameras, lab_cameras, observe
 

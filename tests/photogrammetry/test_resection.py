@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.pose_refinement import refine_pose
-from photogrammetry.resection import resect
 from photogrammetry.rotation import rotation_from_vector
+from photogrammetry.start_values.pose_refinement import refine_pose
+from photogrammetry.start_values.resection import resect
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import SIGMA_PX, flight_points, frame_points, hill_cameras, lab_cameras, observe
 

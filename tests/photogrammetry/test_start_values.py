@@ -12,7 +12,7 @@ import pytest
 from photogrammetry.adjustment.adjustment import adjust_once
 from photogrammetry.network import Datum, DatumType, Network, Point, Role
 from photogrammetry.network_file import read_network
-from photogrammetry.start_values import complete, find_start_values
+from photogrammetry.start_values.search import complete, find_start_values
 from tests.photogrammetry.networks import Case, hill, laboratory, observations, rods, sheet
 
 _CAMCAL = Path(__file__).parent / "data" / "camcal" / "network.json"

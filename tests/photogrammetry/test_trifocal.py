@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_line import ImageLines, fit_image_lines
-from photogrammetry.trifocal import check_sides, transfer_lines, trifocal_tensor
+from photogrammetry.intersection.image_line import ImageLines, fit_image_lines
+from photogrammetry.intersection.trifocal import check_sides, transfer_lines, trifocal_tensor
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import SIGMA_PX, Ski, hill_cameras, ski
 

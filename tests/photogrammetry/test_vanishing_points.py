@@ -5,10 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photogrammetry.homography import plane_homography
 from photogrammetry.ideal_camera import Array, IdealCamera
 from photogrammetry.rotation import rotation_from_vector
-from photogrammetry.vanishing_points import line_through, principal_distance, principal_distance_from, vanishing_point
+from photogrammetry.start_values.homography import plane_homography
+from photogrammetry.start_values.vanishing_points import (
+    line_through,
+    principal_distance,
+    principal_distance_from,
+    vanishing_point,
+)
 from rig.errors import BadInputError
 from tests.photogrammetry.scenes import look_at
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.point_intersection import PointState, intersect_points
-from photogrammetry.pose_refinement import refine_pose
-from photogrammetry.resection import Resection, resect
-from photogrammetry.sightings import Sightings
+from photogrammetry.intersection.point_intersection import PointState, intersect_points
 from photogrammetry.similarity import Similarity
+from photogrammetry.start_values.pose_refinement import refine_pose
+from photogrammetry.start_values.resection import Resection, resect
+from photogrammetry.start_values.sightings import Sightings
 from rig.errors import BadInputError
 
 _LEVELS = (8, 6, 4, 3)  # known points that an image must see: the well-determined images come first

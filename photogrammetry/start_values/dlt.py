@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogrammetry.homography import homogeneous, normalising
 from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.start_values.homography import homogeneous, normalising
 from rig.errors import BadInputError
 
 _COPLANAR = 1e-7  # relative singular value: the system has a second solution

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogrammetry.ideal_camera import Array, IdealCamera, unit_rays
-from photogrammetry.pose_refinement import RefinedPose, refine_pose
 from photogrammetry.similarity import fit_similarity
+from photogrammetry.start_values.pose_refinement import RefinedPose, refine_pose
 from rig.errors import BadInputError
 
 _COLLINEAR = 1e-6  # height of a triangle over its longest side

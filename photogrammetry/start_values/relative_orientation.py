@@ -15,9 +15,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogrammetry.essential_matrix import essential_matrices, orientations_of
 from photogrammetry.ideal_camera import Array, IdealCamera
 from photogrammetry.rotation import rotation_from_vector, skew
+from photogrammetry.start_values.essential_matrix import essential_matrices, orientations_of
 from rig.errors import BadInputError
 
 _SETS = 16  # sets of five points

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_line import ImageLines
+from photogrammetry.intersection.image_line import ImageLines
 from rig.errors import BadInputError
 
 _COINCIDENT = 1e-12  # angle (rad) between planes that are one plane to the arithmetic

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_line import ImageLines
+from photogrammetry.intersection.image_line import ImageLines
 from rig.errors import BadInputError
 
 #: Image with interchanged skis in each hypothesis; -1: none. Interchanging in all images, or in two, is only naming.

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_line import ImageLines, fit_image_lines
-from photogrammetry.line_start import LineStart, start_lines
+from photogrammetry.intersection.image_line import ImageLines, fit_image_lines
+from photogrammetry.intersection.line_start import LineStart, start_lines
 
 _MAX_STEPS = 25
 _STEP_SIGMAS = 1e-6  # of a sigma

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.ideal_camera import IdealCamera
-from photogrammetry.image_block import ImageBlock
 from photogrammetry.network import Camera, Datum, DatumType, Difference, Distance, Network, Reweight, Role
+from photogrammetry.start_values.image_block import ImageBlock
 
 _MIN_RAYS = 2
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_block import ImageBlock
 from photogrammetry.network import Network, Role
+from photogrammetry.start_values.image_block import ImageBlock
 
 _NAMED = 5  # so many names in a message; of the others the number
 

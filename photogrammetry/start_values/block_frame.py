@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.ideal_camera import Array
-from photogrammetry.image_block import ImageBlock
 from photogrammetry.network import Network, Role
 from photogrammetry.rotation import rotation_from_vector
 from photogrammetry.similarity import Similarity, fit_similarity
+from photogrammetry.start_values.image_block import ImageBlock
 from rig.errors import BadInputError
 
 _STEPS = 30

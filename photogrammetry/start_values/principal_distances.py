@@ -8,13 +8,13 @@ from contextlib import suppress
 
 import numpy as np
 
-from photogrammetry.dlt import resect_dlt
-from photogrammetry.homography import plane_homography
 from photogrammetry.ideal_camera import Array
-from photogrammetry.image_block import ImageBlock
 from photogrammetry.network import Network
-from photogrammetry.resection import resect
-from photogrammetry.vanishing_points import principal_distance_from
+from photogrammetry.start_values.dlt import resect_dlt
+from photogrammetry.start_values.homography import plane_homography
+from photogrammetry.start_values.image_block import ImageBlock
+from photogrammetry.start_values.resection import resect
+from photogrammetry.start_values.vanishing_points import principal_distance_from
 from rig.errors import BadInputError
 
 _CONTROL_IMAGES = 8

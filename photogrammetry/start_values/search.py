@@ -11,16 +11,16 @@ from itertools import product
 
 import numpy as np
 
-from photogrammetry.block_frame import orient_block
-from photogrammetry.block_seed import seed_block
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.image_block import ImageBlock
 from photogrammetry.network import Network, Point, Role
-from photogrammetry.placeholders import place_images, place_points
-from photogrammetry.principal_distances import from_control, open_cameras
-from photogrammetry.sightings import Sightings, reduce_observations
 from photogrammetry.similarity import fit_similarity
-from photogrammetry.trial_adjustment import adjust_block
+from photogrammetry.start_values.block_frame import orient_block
+from photogrammetry.start_values.block_seed import seed_block
+from photogrammetry.start_values.image_block import ImageBlock
+from photogrammetry.start_values.placeholders import place_images, place_points
+from photogrammetry.start_values.principal_distances import from_control, open_cameras
+from photogrammetry.start_values.sightings import Sightings, reduce_observations
+from photogrammetry.start_values.trial_adjustment import adjust_block
 from rig.errors import BadInputError
 
 _FAR = 0.1  # of the block's extent

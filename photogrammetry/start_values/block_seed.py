@@ -5,9 +5,9 @@ from itertools import combinations
 
 import numpy as np
 
-from photogrammetry.image_block import ImageBlock
-from photogrammetry.relative_orientation import RelativeOrientation, orient_relatively
-from photogrammetry.sightings import Sightings
+from photogrammetry.start_values.image_block import ImageBlock
+from photogrammetry.start_values.relative_orientation import RelativeOrientation, orient_relatively
+from photogrammetry.start_values.sightings import Sightings
 from rig.errors import BadInputError
 
 _MIN_COMMON = 5

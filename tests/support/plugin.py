@@ -7,6 +7,7 @@ import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from tests.support import loopback as loopback_blocks
@@ -19,6 +20,11 @@ _SPARE_EVENTS_TEST = 2
 _SPARE_EVENTS_SESSION = 8
 
 _failed = pytest.StashKey[bool]()
+
+# The same examples at every run: a change is judged by what it changes. For new ones: --hypothesis-profile=explore
+hypothesis.settings.register_profile("repeatable", derandomize=True)
+hypothesis.settings.register_profile("explore", derandomize=False)
+hypothesis.settings.load_profile("repeatable")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

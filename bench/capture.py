@@ -4,6 +4,7 @@ The simulated cameras are the same for all, and are not counted.
 """
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,11 @@ from bench.loads import PRERENDERED, Load
 from bench.processes import cpu_seconds
 from rig.clocks import HostNs, UtcAnchor, UtcNs, host_now
 from simrig.simulated_hill import SimulatedHill
-from svev.process_table import ProcessSpec, ProcessTable
 from svev.recording_run import new_log_path
 from svev.running_rig import RunningRig
 from svev.simulation import simulated_hill
+from svev.subscriber import Subscriber
 from svev.subscriber_process import median_and_p99
-
-_SUBSCRIBER_S = 10.0
 
 
 def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> dict[str, Any]:
@@ -47,27 +46,22 @@ def _record(
     rig = load.rig(directory, publish)
     path = new_log_path(directory)
     pulses = round(seconds * load.rate_hz)
-    subscriber = ProcessTable()
     try:
-        with RunningRig(rig, "", lambda _: None) as running:
+        with RunningRig(rig, "", lambda _: None) as running, ExitStack() as stack:
             running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
             if subscribed_hill is not None:
-                config = {"address": publish, "arrivals": True}
-                subscriber.start(ProcessSpec("subscriber", "svev.subscriber_process", config))
-                _await_report(subscriber, "ready")
+                subscriber = stack.enter_context(Subscriber(publish, arrivals=True))
             before, began = cpu_seconds(running.pids.values()), time.monotonic()
             running.start_recording(path, recording="bench", session={}, pulses=pulses, seconds=seconds)
             report = running.wait_until_finished(lambda _: None, lambda: False)
             cpu, elapsed = cpu_seconds(running.pids.values()) - before, time.monotonic() - began
             figures = _figures(load, report, cpu, elapsed)
             if subscribed_hill is not None:
-                subscriber["subscriber"].control.send({"command": "quit"})
-                counted = _await_report(subscriber, "counted")
+                counted = subscriber.count()
                 figures |= {key: counted[key] for key in ("received", "missing", "latency_ms")}
                 figures["latency_from_cable_ms"] = _latency_from_cable(counted["arrivals"], subscribed_hill)
             return figures
     finally:
-        subscriber.stop()
         path.unlink(missing_ok=True)
 
 
@@ -93,12 +87,3 @@ def _figures(load: Load, report: dict[str, Any], cpu: float, elapsed: float) -> 
         "cpu_s": round(cpu, 2),
         "cpu_s_per_GB": round(cpu / gigabytes, 3),
     }
-
-
-def _await_report(table: ProcessTable, wanted: str) -> dict[str, Any]:
-    deadline = time.monotonic() + _SUBSCRIBER_S
-    while time.monotonic() < deadline:
-        for _, message in table.receive(0.1):
-            if message["report"] == wanted:
-                return message
-    raise TimeoutError(f"the subscriber did not report {wanted} within {_SUBSCRIBER_S} s")

@@ -1,6 +1,5 @@
 """The suites of `svev bench` by name: each measures, writes its JSON, and makes a table for people."""
 
-import socket
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -14,15 +13,13 @@ from bench.loads import LOADS
 from bench.parts import run_parts
 from bench.planning import run_planning
 from bench.results import write_results
+from svev.subscriber import free_address
 
 Suite = Callable[[float, Path], dict[str, Any]]
 
 
 def _capture(name: str, seconds: float, directory: Path) -> dict[str, Any]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        publish = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
-    result = run_capture(LOADS[name], seconds, directory, publish)
+    result = run_capture(LOADS[name], seconds, directory, free_address())
     result["file"] = str(write_results(f"capture-{name}", [result], directory))
     return result | {"table": _capture_table(result)}
 

@@ -1,7 +1,6 @@
 """The main job on the simulated hill: record a few jumps, publish, count, verify, show."""
 
 import socket
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,13 +10,13 @@ from recorder.contact_sheet import write_contact_sheet
 from recorder.verify import verify
 from rig.clocks import host_now
 from rig.control import Message
-from rig.errors import BadInputError, ProcessDiedError
+from rig.errors import BadInputError
 from rig.rigfile import CONFIG, load_rig
 from rig.settings import RigSettings
-from svev.process_table import ProcessSpec, ProcessTable
 from svev.recording_run import new_log_path, run_recording
 from svev.running_rig import RunningRig
 from svev.simulation import simulated_hill
+from svev.subscriber import Subscriber, free_address
 from svev.truth_file import write_truth
 
 Bus = Literal["gige", "firewire", "sim"]
@@ -25,7 +24,6 @@ Bus = Literal["gige", "firewire", "sim"]
 _RIGS: Final = {"gige": "sim-gige.toml", "sim": "sim.toml"}
 _GVCP_PORT: Final = 3956
 _BLOCKS: Final = 64
-_SUBSCRIBER_S: Final = 15.0
 
 
 def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) -> Message:
@@ -44,19 +42,14 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
         hill = stack.enter_context(simulated_hill(rig, epoch))
         say(f"three simulated cameras{' speak GigE Vision' if hill else ''}; pulses at {rig.trigger.rate_hz:g} Hz")
         running = stack.enter_context(RunningRig(rig, rig_file.read_text(encoding="utf-8"), say, epoch))
-        subscriber = ProcessTable()
-        stack.callback(subscriber.stop)
-        subscriber.start(ProcessSpec("subscriber", "svev.subscriber_process", {"address": rig.network.publish}))
-        _await_report(subscriber, "ready")
+        subscriber = stack.enter_context(Subscriber(rig.network.publish))
         session = {"session": "demo", "athlete": "simulated jumper"}
         result = run_recording(running, rig, path, seconds, allow_absent=False, session=session)
-        subscriber["subscriber"].control.send({"command": "quit"})
-        counted = _await_report(subscriber, "counted")
+        counted = subscriber.count()
     say("checking the log")
     report = verify(path)
     sheet, truth = path.with_suffix(".png"), write_truth(path, rig)
     write_contact_sheet(path, sheet)
-    del counted["report"]
     return result | {
         "rate_hz": rig.trigger.rate_hz,
         "subscriber": counted,
@@ -68,10 +61,7 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
 
 def _on_free_addresses(rig: RigSettings) -> RigSettings:
     """The rig with a port of its own for publication and, if they are taken, other loopback addresses."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    network = rig.network.model_copy(update={"publish": f"tcp://127.0.0.1:{port}"})
+    network = rig.network.model_copy(update={"publish": free_address()})
     for block in range(_BLOCKS):
         addresses = [camera.address.replace("127.0.0.", f"127.0.{block}.") for camera in rig.cameras]
         if all(_is_free(address) for address in addresses if address):
@@ -90,14 +80,3 @@ def _is_free(address: str) -> bool:
         except OSError:
             return False
     return True
-
-
-def _await_report(table: ProcessTable, wanted: str) -> Message:
-    deadline = time.monotonic() + _SUBSCRIBER_S
-    while time.monotonic() < deadline:
-        for _, message in table.receive(0.1):
-            if message["report"] == wanted:
-                return message
-        if table.dead():
-            break
-    raise ProcessDiedError("the subscriber process does not answer: start again")

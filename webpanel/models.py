@@ -80,6 +80,7 @@ class CameraStatus(Model):
     reconnects: int = 0
     temperature_c: float | None = None
     clock_offset_us: float | None = Field(None, description="trigger time minus the pulse's, median of late")
+    columns: tuple[int, int] | None = Field(None, description="first and one past the last column in the triplet")
 
 
 class PulseStatus(Model):

@@ -5,9 +5,10 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench test check style wheel lock clean setup system
+.PHONY: help demo run bench test check style wheel install uninstall lock clean setup system
 
 ARGS ?=
+PREFIX ?= /usr/local
 BIN := .venv/bin
 # pip: only its errors are shown (-qq); locked versions with hashes, nothing else.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
@@ -18,7 +19,7 @@ NPM_LOCK := $(wildcard tests/recorder/npm/package-lock.json)
 NPM := $(if $(NPM_LOCK),tests/recorder/npm/node_modules/.setup-npm)
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: setup ## the main job on the simulated hill: three GigE Vision cameras, one jump, a log and a contact sheet
 	@$(BIN)/svev demo $(ARGS)
@@ -42,6 +43,12 @@ style: setup
 
 wheel: setup ## build a wheel and try it in an empty environment outside the checkout
 	@.ci/try-wheel
+
+install: setup ## the program and its systemd service, into PREFIX (as root: /usr/local)
+	@systemd/install "$(PREFIX)"
+
+uninstall: ## remove both from PREFIX; configuration and recordings stay
+	@systemd/uninstall "$(PREFIX)"
 
 lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install -qq uv; }

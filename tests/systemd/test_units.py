@@ -1,0 +1,94 @@
+"""What `make install` puts into a prefix, examined by systemd's own tools."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+_SYSTEMD = Path(__file__).parents[2] / "systemd"
+
+
+def _run(*command: str | Path) -> str:
+    result = subprocess.run(
+        [str(part) for part in command],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout + result.stderr
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """A prefix with the units, and a program for them to start."""
+    prefix = tmp_path / "prefix"
+    _run(_SYSTEMD / "install-units", prefix)
+    program = prefix / "bin" / "svev"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    return prefix
+
+
+def _analyze(*arguments: str | Path) -> str:
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("systemd-analyze is not installed")
+    return _run("systemd-analyze", *arguments)
+
+
+def test_systemd_finds_nothing_wrong_with_the_unit(prefix: Path) -> None:
+    assert _analyze("verify", prefix / "lib/systemd/system/svev.service") == ""
+
+
+def test_the_sandbox_is_tight(prefix: Path) -> None:
+    unit = prefix / "lib/systemd/system/svev.service"
+    # Exposure is given in tenths, from 0 (closed) to 100 (open); ours is 22, a unit without a sandbox has 96.
+    _analyze("security", "--offline=true", "--threshold=25", "--no-pager", unit)
+
+
+def test_users_and_directories_are_understood(prefix: Path, tmp_path: Path) -> None:
+    if shutil.which("systemd-sysusers") is None or shutil.which("systemd-tmpfiles") is None:
+        pytest.skip("systemd is not installed")
+    root = tmp_path / "root"
+    (root / "etc").mkdir(parents=True)
+    _run("systemd-sysusers", f"--root={root}", prefix / "lib/sysusers.d/svev.conf")
+    members = dict(line.split(":", 1) for line in (root / "etc/group").read_text().splitlines())
+    assert members["video"].endswith(":svev")
+    assert members["dialout"].endswith(":svev")
+    described = _run("systemd-tmpfiles", "--cat-config", f"--root={prefix}", prefix / "lib/tmpfiles.d/svev.conf")
+    assert "/var/lib/svev/recordings" in described
+
+
+def test_no_place_is_left_open(prefix: Path) -> None:
+    installed = [path for path in prefix.rglob("*") if path.is_file()]
+    assert len(installed) > 7
+    for path in installed:
+        assert "@PREFIX@" not in path.read_text(), path
+        assert "@CONFIG@" not in path.read_text(), path
+
+
+def test_installing_again_keeps_what_the_owner_has_written(prefix: Path) -> None:
+    (prefix / "etc/svev/rig.toml").write_text("mine")
+    (prefix / "etc/svev/options").write_text("mine too")
+    _run(_SYSTEMD / "install-units", prefix)
+    assert (prefix / "etc/svev/rig.toml").read_text() == "mine"
+    assert (prefix / "etc/svev/options").read_text() == "mine too"
+
+
+def test_uninstalling_removes_all_but_the_configuration(prefix: Path) -> None:
+    said = _run(_SYSTEMD / "uninstall", prefix)
+    left = sorted(str(path.relative_to(prefix)) for path in prefix.rglob("*") if path.is_file())
+    assert left == ["etc/svev/options", "etc/svev/rig.toml"]
+    assert str(prefix / "etc/svev") in said
+
+
+def test_a_relative_prefix_is_refused() -> None:
+    result = subprocess.run(
+        [_SYSTEMD / "install-units", "here"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert result.returncode == 2
+    assert "PREFIX must be an absolute path" in result.stderr

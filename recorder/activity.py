@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recorder.log_items import Chunk
-from recorder.log_reader import LogReader
+from recorder.log_reader import LogReader, tag_of
 from recorder.raw_image import pixels, view_image
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
@@ -42,7 +42,7 @@ def stored_triplets(reader: LogReader) -> list[StoredTriplet]:
     found = []
     for item in reader.items(only=(TAG.name,)):
         if isinstance(item, Chunk) and not item.flaw:
-            tags = {m.sequence: TripletTag.decode(m.data) for m in item.messages if m.data is not None}
+            tags = {m.sequence: tag for m in item.messages if (tag := tag_of(m)) is not None}
             found += [
                 StoredTriplet(tags[m.sequence], m.offset, m.length)
                 for m in item.messages

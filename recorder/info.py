@@ -1,13 +1,13 @@
 """What a log is and holds, in a moment: reads tags and events, no pixels."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from recorder.ledger import Ledger
 from recorder.log_items import Chunk, Damage
-from recorder.log_reader import LogReader
-from rig.tag import TripletTag
+from recorder.log_reader import LogReader, tag_of
+from recorder.session_changes import session_changes
 from rig.topics import RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA, TAG
 
 
@@ -19,8 +19,9 @@ class LogInfo:
         closed: the log was closed properly.
         truncated: it ends in the middle of a record.
         damaged_bytes: bytes that could not be read.
+        torn_bytes: how many of them are an unfinished record at the end, as every recording that was not closed has.
         ledger: what became of every pulse.
-        session, rig: the metadata records, the last of each.
+        session, rig: the metadata records, the last of each; the session as it was changed since.
         rig_toml: the rig file as it was when the log was opened, None if it is not there.
         recording: id of the recording, empty if there is no pulse.
         shape: rows and columns of the triplets, None if there is no pulse.
@@ -34,6 +35,7 @@ class LogInfo:
     closed: bool
     truncated: bool
     damaged_bytes: int
+    torn_bytes: int
     ledger: Ledger
     session: dict[str, str]
     rig: dict[str, str]
@@ -80,25 +82,36 @@ def info(path: Path) -> LogInfo:
     The time it takes depends on the number of pulses, not on the size of the log. Nothing is checked (`verify` does).
 
     Raises:
+        BadInputError: no such file, no MCAP log, or not one of ours; or the session changes beside it are broken.
+    """
+    found = original_info(path)
+    return replace(found, session=found.session | session_changes(path))
+
+
+def original_info(path: Path) -> LogInfo:
+    """As `info`, but with the session as the log itself has it.
+
+    Raises:
         BadInputError: no such file, no MCAP log, or not one of ours.
     """
     ledger, first = Ledger(), None
     messages: dict[str, int] = {}
-    damaged = 0
+    damaged = torn = 0
     with LogReader(path, skim=True) as reader:
         for item in reader.items(only=(TAG.name,)):
             if isinstance(item, Damage):
                 damaged += item.length
+                torn += item.length if item.torn else 0
             elif isinstance(item, Chunk):
                 damaged += item.length if item.flaw else 0
                 for message in item.messages:
                     messages[message.topic] = messages.get(message.topic, 0) + 1
-                    tag = _tag(message.data)
+                    tag = tag_of(message)
                     if tag is not None:
                         first = first or tag
                         ledger.add(tag)
         return LogInfo(
-            path, reader.size, reader.closed, reader.truncated, damaged, ledger,
+            path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger,
             reader.metadata.get(SESSION_METADATA, {}),
             reader.metadata.get(RIG_METADATA, {}),
             _text(reader.attachments.get(RIG_ATTACHMENT)),
@@ -107,14 +120,6 @@ def info(path: Path) -> LogInfo:
             tuple(camera.name for camera in first.cameras) if first else (),
             messages, reader.library,
         )  # fmt: skip
-
-
-def _tag(data: memoryview | None) -> TripletTag | None:
-    """The tag in a message; None for other messages, and for a damaged tag (which `verify` reports)."""
-    try:
-        return None if data is None else TripletTag.decode(data)
-    except (ValueError, KeyError, TypeError):
-        return None
 
 
 def _text(attachment: bytes | None) -> str | None:

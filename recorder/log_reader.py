@@ -29,6 +29,10 @@ from rig.topics import PROFILE, TAG, TRIPLET
 UNREADABLE = (struct.error, ValueError, McapError)
 
 
+class ForeignFileError(BadInputError):
+    """The file is no log of svev and never was."""
+
+
 class LogReader:
     """One log, open for reading.
 
@@ -108,7 +112,7 @@ class LogReader:
         if self.size == 0:
             raise BadInputError(f"{self.path}: is empty; name a log of svev")
         if bytes(self._window.read(0, len(MAGIC))) != MAGIC:
-            raise BadInputError(f"{self.path}: is not an MCAP log; name a log of svev")
+            raise ForeignFileError(f"{self.path}: is not an MCAP log; name a log of svev")
         head = self._window.read(len(MAGIC), RECORD.size)
         opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
         body = bytes(self._window.read(len(MAGIC) + RECORD.size, length)) if length <= 1 << 16 else b""
@@ -119,7 +123,7 @@ class LogReader:
         if opcode != Opcode.HEADER or len(body) < length or header is None:
             raise BadInputError(f"{self.path}: is cut off or damaged before it says what it is; nothing can be read")
         if header.profile != PROFILE:
-            raise BadInputError(
+            raise ForeignFileError(
                 f'{self.path}: is an MCAP log, but not written by svev (profile "{header.profile}"); name a log of svev'
             )
         return str(header.library)
@@ -231,6 +235,16 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
                         tag = TripletTag.decode(message.data)
                         data = images.get(tag.pulse)
                         yield tag, np.zeros(tag.shape, np.uint8) if data is None else pixels(view_image(data))
+
+
+def tag_of(message: Message) -> TripletTag | None:
+    """The tag in a message; None for other messages, and for a damaged tag (which `verify` reports)."""
+    if message.topic != TAG.name or message.data is None:
+        return None
+    try:
+        return TripletTag.decode(message.data)
+    except (ValueError, KeyError, TypeError):
+        return None
 
 
 def stream(body: bytes) -> Any:

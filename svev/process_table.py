@@ -102,10 +102,16 @@ class ProcessTable:
         child = self._children[spec.name] = Child(spec)
         return child
 
-    def receive(self, timeout_s: float) -> list[tuple[str, Message]]:
-        """Messages of all children, waiting at most `timeout_s` seconds for the first."""
+    def receive(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[tuple[str, Message]]:
+        """Messages of all children, waiting at most `timeout_s` seconds for the first.
+
+        Args:
+            timeout_s: s.
+            wake: descriptors that end the waiting too when they become readable; they are not read.
+        """
         alive = [child for child in self._children.values() if not child.control.ended]
-        ready = select.select([child.control for child in alive], [], [], timeout_s)[0]
+        watched: list[ControlChannel | int] = [*(child.control for child in alive), *wake]
+        ready = select.select(watched, [], [], timeout_s)[0]
         return [
             (child.spec.name, message)
             for child in alive

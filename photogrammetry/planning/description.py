@@ -79,25 +79,42 @@ class SkiEntry(Entry):
     length: Positive
 
 
-class JumperEntry(Entry):
-    """The stick model, carried along the flight without turning.
+class StickEntry(Entry):
+    """Which points and skis make the angles of Fig. 6; O lies midway between the points of the two skis."""
 
-    Points are given relative to the path. `tie` names those whose places also act as tie points (alternative 2).
+    helmet: Name
+    hip: Name
+    right: Name
+    left: Name
+
+
+class JumperEntry(Entry):
+    """The jumper, carried along the flight without turning.
+
+    Points are given relative to the path, one place of it per pulse. `tie` names those whose places also act as tie
+    points (alternative 2).
     """
 
     points: Annotated[dict[Name, Triple], Field(min_length=1)]
     skis: dict[Name, SkiEntry] = Field(default={})
     ski_points: Annotated[int, Field(strict=True, ge=2, le=100)] = 4
     tie: list[Name] = Field(default=[])
+    stick: StickEntry | None = None
+    rate_hz: Positive = 30.0
     path: Annotated[list[Triple], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _names_are_known(self) -> "JumperEntry":
-        wanted = [("tie", name) for name in self.tie]
-        wanted += [(f"skis.{name}.point", ski.point) for name, ski in self.skis.items()]
-        for key, name in wanted:
-            if name not in self.points:
-                raise ValueError(f'{key} names "{name}"; the jumper\'s points are {", ".join(self.points)}')
+        points = [("tie", name) for name in self.tie]
+        points += [(f"skis.{name}.point", ski.point) for name, ski in self.skis.items()]
+        skis = []
+        if self.stick is not None:
+            points += [("stick.helmet", self.stick.helmet), ("stick.hip", self.stick.hip)]
+            skis = [("stick.right", self.stick.right), ("stick.left", self.stick.left)]
+        for what, wanted, known in (("points", points, list(self.points)), ("skis", skis, list(self.skis))):
+            for key, name in wanted:
+                if name not in known:
+                    raise ValueError(f'{key} names "{name}"; the jumper\'s {what} are {", ".join(known) or "none"}')
         for name, ski in self.skis.items():
             if abs(ski.direction[0]) < 0.1 * float(np.linalg.norm(ski.direction)):
                 raise ValueError(f"skis.{name}.direction runs across the X axis; turn the system so that X runs along")

@@ -19,10 +19,21 @@ from photogrammetry.network import (
     Point,
     Role,
 )
-from photogrammetry.planning.description import Description, ImageEntry
+from photogrammetry.planning.description import Description, ImageEntry, JumperEntry
 from rig.errors import BadInputError
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Stick:
+    """The stick model of Fig. 6 by indices of the flight's points and skis; pairs are right, left."""
+
+    helmet: int
+    hip: int
+    bindings: tuple[int, int]
+    skis: tuple[int, int]
+    rate_hz: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +46,7 @@ class Flight:
         tie: (t, p) index of the same point in the network of step 2; -1: it is no tie point there.
         skis: (t, s, k, 3) measured points of s skis.
         ski_names: of the s skis.
+        stick: what makes the angles of the body; None: nothing is said of them.
     """
 
     points: Floats
@@ -42,6 +54,7 @@ class Flight:
     tie: NDArray[np.intp]
     skis: Floats
     ski_names: tuple[str, ...]
+    stick: Stick | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,7 +180,18 @@ def _flight(description: Description, first_tie: int) -> Flight | None:
         direction = np.array(ski.direction) / np.linalg.norm(ski.direction)
         middle = points[:, names.index(ski.point)]
         skis[:, i] = middle[:, None] + ski.length * along[:, None] * direction
-    return Flight(points, names, tie, skis, tuple(jumper.skis))
+    return Flight(points, names, tie, skis, tuple(jumper.skis), _stick(jumper))
+
+
+def _stick(jumper: JumperEntry) -> Stick | None:
+    if jumper.stick is None:
+        return None
+    points, skis = list(jumper.points), list(jumper.skis)
+    right, left = (points.index(jumper.skis[name].point) for name in (jumper.stick.right, jumper.stick.left))
+    chosen = skis.index(jumper.stick.right), skis.index(jumper.stick.left)
+    return Stick(
+        points.index(jumper.stick.helmet), points.index(jumper.stick.hip), (right, left), chosen, jumper.rate_hz
+    )
 
 
 def _check_flight(flight: Flight, cameras: tuple[Camera, ...], images: tuple[Image, ...]) -> None:

@@ -1,12 +1,14 @@
 """What a plan says, for people and as JSON."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.camera_model import INTERIOR
-from photogrammetry.planning.plan import Plan
+from photogrammetry.jumper.stick_model import ANGLES
+from photogrammetry.planning.plan import Flight, Plan
 from photogrammetry.planning.prediction import Sigmas
 
 Floats = NDArray[np.float64]
@@ -19,6 +21,8 @@ def worst_disagreement(predicted: Sigmas, simulated: Sigmas) -> float:
         (predicted.interior, simulated.interior),
         (_mean(predicted.points), _mean(simulated.points)),
         (_mean(predicted.angles), _mean(simulated.angles)),
+        (predicted.body, simulated.body),
+        (predicted.speed, simulated.speed),
     ]
     ratios = np.concatenate([(b[a > 0.0] / a[a > 0.0]).ravel() for a, b in pairs])
     return float(np.abs(ratios - 1.0).max(initial=0.0))
@@ -58,7 +62,25 @@ def plan_table(plan: Plan, predicted: Sigmas, simulated: Sigmas) -> list[str]:
         lines += ["", f"skis: mean sigma of slope, heading (degrees) of {', '.join(plan.flight.ski_names)}"]
         pairs = zip(np.degrees(_mean(predicted.angles)), np.degrees(_mean(simulated.angles)), strict=True)
         lines += [f"  {i:<10}" + _row(ours, theirs, "9.3f") for i, (ours, theirs) in enumerate(pairs, 1)]
+    if plan.flight.stick is not None:
+        lines += ["", f"body: sigma of {', '.join(ANGLES)} (degrees)"]
+        bodies = zip(np.degrees(predicted.body[:, :-1]), np.degrees(simulated.body[:, :-1]), strict=True)
+        lines += [f"  {i:<10}" + _row(ours, theirs, "6.2f") for i, (ours, theirs) in enumerate(bodies, 1)]
+        lines += [
+            "",
+            f"O, midway between the bindings: sigma of height ({unit}) and of speed to the next place ({unit}/s)",
+        ]
+        ours, theirs = (
+            np.column_stack((sigmas.body[:, -1], np.append(sigmas.speed, np.nan))) for sigmas in (predicted, simulated)
+        )
+        lines += [f"  {i:<10}" + _row(a[:k], b[:k], "9.4f") for i, k, a, b in _numbered(ours, theirs)]
     return lines
+
+
+def _numbered(ours: Floats, theirs: Floats) -> Iterator[tuple[int, int, Floats, Floats]]:
+    """Number, how many figures are known, and the figures of each position."""
+    for i, (a, b) in enumerate(zip(ours, theirs, strict=True), 1):
+        yield i, int(np.isfinite(a).sum()), a, b
 
 
 def _row(ours: Floats, theirs: Floats, form: str) -> str:
@@ -84,14 +106,23 @@ def _sigmas_to_json(plan: Plan, sigmas: Sigmas) -> dict[str, Any]:
         },
     }
     if flight is not None:
-        out["positions"] = [
-            {
-                "points": {name: s.tolist() for name, s in zip(flight.names, points, strict=True)},
-                "skis": {
-                    name: {"slope_deg": float(np.degrees(s[0])), "heading_deg": float(np.degrees(s[1]))}
-                    for name, s in zip(flight.ski_names, angles, strict=True)
-                },
-            }
-            for points, angles in zip(sigmas.points, sigmas.angles, strict=True)
-        ]
+        out["positions"] = [_position_to_json(flight, sigmas, i) for i in range(len(sigmas.points))]
     return out
+
+
+def _position_to_json(flight: Flight, sigmas: Sigmas, i: int) -> dict[str, Any]:
+    position: dict[str, Any] = {
+        "points": {name: s.tolist() for name, s in zip(flight.names, sigmas.points[i], strict=True)},
+        "skis": {
+            name: {"slope_deg": float(np.degrees(s[0])), "heading_deg": float(np.degrees(s[1]))}
+            for name, s in zip(flight.ski_names, sigmas.angles[i], strict=True)
+        },
+    }
+    if flight.stick is not None:
+        position["body"] = {
+            f"{name}_deg": float(np.degrees(s)) for name, s in zip(ANGLES, sigmas.body[i, :-1], strict=True)
+        }
+        position["height"] = float(sigmas.body[i, -1])
+        if i < len(sigmas.speed):
+            position["speed_to_next"] = float(sigmas.speed[i])
+    return position

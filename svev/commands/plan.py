@@ -8,7 +8,7 @@ import typer
 
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.planning.description import read_description
-from photogrammetry.planning.monte_carlo import simulate
+from photogrammetry.planning.monte_carlo import SAMPLES, simulate
 from photogrammetry.planning.plan import plan_from
 from photogrammetry.planning.prediction import adjusted_plan, predict
 from photogrammetry.planning.report import plan_table, plan_to_json, worst_disagreement
@@ -23,7 +23,7 @@ def plan(
     network: Annotated[Path, typer.Argument(help="planned network (TOML), e.g. config/networks/hill-1.toml")],
     samples: Annotated[
         int, typer.Option(min=100, max=100_000, help="repetitions of the Monte-Carlo simulation")
-    ] = 1000,
+    ] = SAMPLES,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object instead of the tables")] = False,
 ) -> None:
     """Predict the accuracy of cameras, jumper points and skis, by covariance and by Monte Carlo.
@@ -36,7 +36,8 @@ def plan(
     try:
         adjusted = adjusted_plan(planned)
         predicted = predict(planned, adjusted)
-        simulated = simulate(planned, adjusted, samples=samples, seed=_SEED)
+        with console.progress("samples", samples) as done:
+            simulated = simulate(planned, adjusted, samples=samples, seed=_SEED, done=done)
     except NotSolvableError as error:
         console.complain(f"not solvable: {error}")
         raise typer.Exit(_NOT_SOLVABLE) from None

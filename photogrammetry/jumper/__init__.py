@@ -1,0 +1,1 @@
+"""The jumper in numbers."""

@@ -270,6 +270,29 @@ class RigView(Model):
     settings: dict[str, object] = Field(description="the settings with all defaults filled in")
 
 
+class Health(Model):
+    """Whether the service itself works."""
+
+    healthy: bool
+
+
+class Login(Model):
+    """The token, once, for a session cookie."""
+
+    token: str = Field(max_length=1000, examples=["the content of the token file"])
+
+
+class Nothing(Model):
+    """No fields: the call takes none."""
+
+
+class FieldError(Model):
+    """One thing that is wrong with what was sent."""
+
+    where: str = Field(examples=["body.duration_s"])
+    text: str = Field(examples=["Input should be greater than or equal to 0"])
+
+
 class Problem(BaseModel):
     """Problem details (RFC 9457); `code` is stable, `detail` says what to do."""
 
@@ -279,3 +302,4 @@ class Problem(BaseModel):
     detail: str
     instance: str = ""
     code: str
+    errors: tuple[FieldError, ...] = Field((), description="with status 422: what is wrong, one by one")

@@ -8,17 +8,18 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from recorder.catalogue import UnknownRecordingError
 from rig.errors import SvevError
 from rig.frame import FrameStatus
 from webpanel.models import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, Status
 
+__all__ = [
+    "Metric", "Preview", "Quantity", "RigService", "StateForbidsError", "UnknownRecordingError",
+]  # fmt: skip
+
 
 class StateForbidsError(SvevError):
     """The call makes no sense in the present state (HTTP 409); the message says what to do instead."""
-
-
-class UnknownRecordingError(SvevError):
-    """There is no such recording (HTTP 404)."""
 
 
 class Quantity(StrEnum):

@@ -1,0 +1,239 @@
+"""A rig service in memory: the states of the real one, triplets of noise, real logs. No cameras, no processes."""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from recorder.catalogue import Catalogue
+from recorder.log_writer import LogWriter
+from recorder.triplet_buffers import TripletBuffers
+from rig.clocks import UtcNs
+from rig.frame import FrameStatus
+from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
+from webpanel.models import (
+    CameraState,
+    CameraStatus,
+    Counts,
+    DiskStatus,
+    DoctorReport,
+    Event,
+    Finding,
+    Level,
+    PrerollStatus,
+    ProcessStatus,
+    PulseStatus,
+    Recording,
+    RecordingOrder,
+    RecordingState,
+    RigView,
+    SessionChange,
+    SessionFields,
+    State,
+    Statement,
+    Status,
+)  # fmt: skip
+from webpanel.recording_view import to_recording
+from webpanel.rig_service import Metric, Preview, Quantity, StateForbidsError, UnknownRecordingError
+
+SHAPE = (120, 480)
+COLUMNS = ((0, 160), (160, 320), (320, 480))
+CAMERAS = ("K1", "K2", "K3")
+KEPT_EVENTS = 1000
+
+
+class MemoryService:
+    """See `webpanel.rig_service.RigService`.
+
+    Attributes:
+        catalogue: the recordings, real logs in a real folder.
+        state: may be set by tests.
+        well: what `healthy` says.
+        broken: raised by `status`, if set.
+        preview_calls: how often somebody asked for a picture.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.catalogue = Catalogue(folder)
+        self.state = State.IDLE
+        self.well = True
+        self.broken: Exception | None = None
+        self.preview_calls = 0
+        self._since = datetime.now(UTC)
+        self._armed_at = time.monotonic()
+        self._lock = threading.RLock()
+        self._events: list[Event] = []
+        self._numbers = 0
+        self._listeners: set[Callable[[], None]] = set()
+        self._recording: Recording | None = None
+        self._last: str | None = None
+
+    @property
+    def listeners(self) -> int:
+        """How many listen."""
+        return len(self._listeners)
+
+    def status(self) -> Status:
+        if self.broken is not None:
+            raise self.broken
+        with self._lock:
+            armed = self.state in {State.ARMED, State.RECORDING}
+            held_s = min(5.0, time.monotonic() - self._armed_at) if armed else 0.0
+            return Status(
+                state=self.state,
+                since=self._since,
+                statement=Statement(code=f"state_{self.state.value}", text=f"The rig is {self.state.value}"),
+                rig="memory",
+                version="0",
+                cameras=tuple(self._camera(name, block, armed) for name, block in zip(CAMERAS, COLUMNS, strict=True)),
+                pulses=PulseStatus(
+                    arriving=armed, rate_hz=30.0 if armed else None, number=self._pulse() if armed else 0
+                ),
+                preroll=PrerollStatus(seconds=held_s, limit_s=5.0, memory_mb=20.0),
+                disk=DiskStatus(free_gb=100.0, reserve_gb=2.0, seconds_left=3500.0, jumps_left=350, jump_s=10.0),
+                recording=self._recording,
+                last_recording=self._last,
+                processes=(ProcessStatus(name="recorder", pid=1),),
+            )
+
+    def arm(self) -> Status:
+        if self.state is State.IDLE:
+            self._armed_at = time.monotonic()
+            self._become(State.ARMED)
+        return self.status()
+
+    def disarm(self) -> Status:
+        if self.state is State.RECORDING:
+            raise StateForbidsError("a recording is under way: stop it first")
+        if self.state is not State.IDLE:
+            self._become(State.IDLE)
+        return self.status()
+
+    def start_recording(self, order: RecordingOrder) -> Recording:
+        with self._lock:
+            if self.state is State.RECORDING:
+                raise StateForbidsError("a recording is under way: stop it first")
+            if self.state is not State.ARMED:
+                raise StateForbidsError(f"the rig is {self.state.value}: arm it first")
+            now = datetime.now(UTC)
+            session = SessionFields(**order.model_dump(include=set(SessionFields.model_fields)))
+            self._recording = Recording(
+                id=f"{now:%Y%m%d-%H%M%S-%f}", state=RecordingState.RECORDING, started=now, duration_s=0.0, bytes=0,
+                counts=Counts(), session=session,
+                verdict=Statement(level=Level.INFO, code="verdict_recording", text="Recording"),
+            )  # fmt: skip
+            started = self._recording
+            self._become(State.RECORDING)
+        return started if order.duration_s is None else self.stop_recording(started.id)
+
+    def stop_recording(self, recording_id: str) -> Recording:
+        with self._lock:
+            current = self._recording
+            if current is None or current.id != recording_id:
+                return to_recording(self.catalogue.entry(recording_id))
+            self._recording, self._last = None, recording_id
+            write_recording(self.catalogue.directory, recording_id, session=current.session.model_dump())
+            self._become(State.ARMED)
+            return to_recording(self.catalogue.entry(recording_id))
+
+    def change_session(self, recording_id: str, change: SessionChange) -> Recording:
+        fields = change.model_dump(exclude_none=True)
+        with self._lock:
+            if self._recording is not None and self._recording.id == recording_id:
+                session = self._recording.session.model_copy(update=fields)
+                self._recording = self._recording.model_copy(update={"session": session})
+                return self._recording
+        return to_recording(self.catalogue.change_session(recording_id, fields))
+
+    def delete_recording(self, recording_id: str) -> Recording:
+        if self._recording is not None and self._recording.id == recording_id:
+            raise StateForbidsError("the recording is under way: stop it first")
+        return to_recording(self.catalogue.delete(recording_id))
+
+    def restore_recording(self, recording_id: str) -> Recording:
+        if self._recording is not None and self._recording.id == recording_id:
+            raise UnknownRecordingError(f"no recording {recording_id} in the trash: see the list of deleted recordings")
+        return to_recording(self.catalogue.restore(recording_id))
+
+    def preview(self, newer_than: int, timeout_s: float) -> Preview | None:
+        self.preview_calls += 1
+        deadline = time.monotonic() + timeout_s
+        while self.state not in {State.ARMED, State.RECORDING} or self._pulse() == newer_than:
+            if time.monotonic() > deadline:
+                return None
+            time.sleep(0.005)
+        pulse = self._pulse()
+        pixels = np.random.default_rng(pulse).integers(0, 256, SHAPE, dtype=np.uint8)
+        return Preview(pulse, pixels, COLUMNS, ALL_OK)
+
+    def events(self, after: int) -> list[Event]:
+        with self._lock:
+            return [event for event in self._events if event.number > after]
+
+    def listen(self, wake: Callable[[], None]) -> Callable[[], None]:
+        self._listeners.add(wake)
+        return lambda: self._listeners.discard(wake)
+
+    def rig(self) -> RigView:
+        return RigView(name="memory", toml=RIG_TOML.decode(), settings={"name": "memory"})
+
+    def doctor(self) -> DoctorReport:
+        finding = Finding(level="PASS", topic="disk", what="fast enough", remedy="")
+        return DoctorReport(worst="PASS", findings=(finding,))
+
+    def metrics(self) -> list[Metric]:
+        latency = {"0.01": 3.0, "0.1": 9.0, "+Inf": 10.0}
+        return [
+            Metric("svev_frames_total", "Whole frames.", Quantity.COUNTER, "camera", {"K1": 10, 'K"2\n': 11}),
+            Metric("svev_disk_free_bytes", "Free.", Quantity.GAUGE, "", {"": 1e11}),
+            Metric("svev_latency_seconds", "Latency.", Quantity.HISTOGRAM, "", latency, total=0.7),
+        ]
+
+    def healthy(self) -> bool:
+        return self.well
+
+    def say(self, message: str) -> None:
+        """Add an event."""
+        with self._lock:
+            self._numbers += 1
+            event = Event(number=self._numbers, time=datetime.now(UTC), level="info", name="service", message=message)
+            self._events = [*self._events[-KEPT_EVENTS + 1 :], event]
+        for wake in list(self._listeners):
+            wake()
+
+    def _become(self, state: State) -> None:
+        self.state = state
+        self._since = datetime.now(UTC)
+        self.say(f"now {state.value}")
+
+    def _pulse(self) -> int:
+        return int((time.monotonic() - self._armed_at) * 30) + 1
+
+    @staticmethod
+    def _camera(name: str, columns: tuple[int, int], armed: bool) -> CameraStatus:
+        state = CameraState.READY if armed else CameraState.OFF
+        return CameraStatus(
+            name=name, backend="sim", address=name, state=state, columns=columns,
+            statement=Statement(code=f"camera_{state.value}", text=f"Camera {name} is {state.value}"),
+            frames_per_s=30.0 if armed else None,
+        )  # fmt: skip
+
+
+def write_recording(
+    folder: Path,
+    recording_id: str,
+    pulses: Sequence[Sequence[FrameStatus]] = (ALL_OK,) * 10,
+    session: dict[str, str] | None = None,
+) -> Path:
+    """A closed log, whose last pulse is now."""
+    path = folder / f"{recording_id}.mcap"
+    buffers = TripletBuffers(SHAPE, 4)
+    start = time.time_ns() - len(pulses) * PERIOD_NS
+    with LogWriter(path, SHAPE, session=session or {}, rig=RIG, rig_toml=RIG_TOML, buffers=buffers) as log:
+        for pulse, statuses in enumerate(pulses, 1):
+            write_pulse(log, buffers, make_tag(pulse, statuses, SHAPE, UtcNs(start + pulse * PERIOD_NS)))
+    buffers.close()
+    return path

@@ -1,0 +1,56 @@
+"""The panel over a real socket, on a thread of the test."""
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import httpx
+
+from tests.support.waiting import wait_until
+from tests.webpanel.memory_service import MemoryService
+from webpanel.access import Access
+from webpanel.app import create_app
+from webpanel.server import PanelServer, make_server
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A panel that answers at `host:port`."""
+
+    host: str
+    port: int
+    service: MemoryService
+    server: PanelServer
+
+    @property
+    def url(self) -> str:
+        """Its address."""
+        return f"http://{self.host}:{self.port}"
+
+    def client(self, **more: object) -> httpx.Client:
+        """A client of its own; close it."""
+        return httpx.Client(base_url=self.url, timeout=20, **more)  # type: ignore[arg-type]
+
+    def connect(self) -> socket.socket:
+        """A plain connection; close it."""
+        return socket.create_connection((self.host, self.port), timeout=20)
+
+
+@contextmanager
+def serving(service: MemoryService, access: Access) -> Iterator[Panel]:
+    """Serve meanwhile."""
+    server = make_server(create_app(service, service.catalogue, access))
+    listener = socket.create_server((access.host, 0))
+    port = listener.getsockname()[1]
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="panel")
+    thread.start()
+    try:
+        wait_until(lambda: server.started or not thread.is_alive(), "the panel answers", 20)
+        yield Panel(access.host, port, service, server)
+    finally:
+        server.should_exit = True
+        thread.join(20)
+        listener.close()
+    assert not thread.is_alive()

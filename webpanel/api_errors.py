@@ -1,0 +1,61 @@
+"""How the documentation of the API declares refusals and images."""
+
+from http import HTTPStatus
+from typing import Any, Final
+
+from webpanel.problems import MEDIA_TYPE
+
+Responses = dict[int | str, dict[str, Any]]
+
+#: What each status means here, and an example: code and detail.
+_MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
+    400: ("The request cannot be read, or calls the service by an unknown name.", "unknown_host",
+          "the service is not called by this name: use its address, or start it with --allow-host NAME"),
+    401: ("The token is missing or wrong.", "login_required",
+          "this needs the token: log in on the page, or send it as Authorization: Bearer TOKEN"),
+    403: ("The request comes from a page of another site.", "foreign_origin",
+          "the request comes from a page of another site: use the page of this service"),
+    404: ("There is no such recording, or no such pulse in it.", "unknown_recording",
+          "no recording 'jump-7': see the list of recordings"),
+    409: ("The state forbids it; `detail` says what to do instead.", "state_forbids", "the rig is idle: arm it first"),
+    413: ("The body is too large.", "request_entity_too_large",
+          "the request's body is too large; no call needs more than 64 KiB"),
+    415: ("The body is not JSON.", "unsupported_media_type",
+          "the body must be JSON: send Content-Type: application/json"),
+    416: ("The file ends before the range that was asked for.", "range_not_satisfiable",
+          "the file has 1048576 bytes: ask for a range within it"),
+    422: ("A field or parameter is unknown or malformed; `errors` lists them.", "invalid_request",
+          "correct body.bib: String should have at most 200 characters"),
+    429: ("Too many wrong tokens.", "too_many_wrong_tokens",
+          "too many wrong tokens from here: wait 42 s, then try again"),
+    500: ("An error in svev itself.", "internal_error", "an error in svev itself (KeyError): try again"),
+    503: ("It cannot be done now; `detail` says why.", "no_preview",
+          "no triplet has come: arm the rig, and see that pulses arrive"),
+    507: ("The disk is full or refuses.", "storage", "less than 2 GB are free: delete recordings"),
+}  # fmt: skip
+
+
+def refusals(*statuses: int) -> Responses:
+    """The declaration of these problem answers."""
+    return {status: _declare(status) for status in statuses}
+
+
+def jpeg_answer(description: str) -> Responses:
+    """The declaration of an image."""
+    content = {"image/jpeg": {"schema": {"type": "string", "format": "binary"}}}
+    return {200: {"description": description, "content": content}}
+
+
+def _declare(status: int) -> dict[str, Any]:
+    meaning, code, detail = _MEANINGS[status]
+    example = {
+        "type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, "code": code,
+    }  # fmt: skip
+    schema = {"$ref": "#/components/schemas/Problem"}
+    return {"description": meaning, "content": {MEDIA_TYPE: {"schema": schema, "example": example}}}
+
+
+#: What every call may answer.
+COMMON: Final = refusals(400, 401, 403, 422, 429, 500)
+#: What every call that changes something may answer beyond that.
+CHANGING: Final = refusals(409, 413, 415, 503, 507)

@@ -1,0 +1,116 @@
+"""The web application: puts routes, guard and page together."""
+
+import mimetypes
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Final
+
+from fastapi import FastAPI, Response
+from fastapi.responses import JSONResponse, PlainTextResponse
+from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
+
+from recorder.catalogue import Catalogue
+from webpanel.access import Access
+from webpanel.api_errors import COMMON, Responses
+from webpanel.changes import Changes
+from webpanel.documentation import DESCRIPTION, serve_documentation
+from webpanel.guard import BODY_MAX, SECURITY_HEADERS, Door, Guard
+from webpanel.metrics import CountRequests, Metrics
+from webpanel.models import Health
+from webpanel.preview import PreviewFeed
+from webpanel.problems import handle_errors
+from webpanel.rig_service import RigService
+from webpanel.routes_events import events_router
+from webpanel.routes_images import images_router
+from webpanel.routes_login import login_router
+from webpanel.routes_preview import preview_router
+from webpanel.routes_recordings import recordings_router
+from webpanel.routes_rig import rig_router
+from webpanel.streams import Streams
+
+_EVENT_STREAMS_MAX = 32
+_PREVIEW_STREAMS_MAX = 16
+#: The types of the page's files, whatever the computer's own table says.
+_TYPES: Final = {
+    ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".png": "image/png",
+    ".json": "application/json", ".webmanifest": "application/manifest+json", ".woff2": "font/woff2",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class OpenStreams:
+    """The endless answers, by kind; `end` them before the server shuts down."""
+
+    events: Streams = field(default_factory=lambda: Streams(_EVENT_STREAMS_MAX))
+    previews: Streams = field(default_factory=lambda: Streams(_PREVIEW_STREAMS_MAX))
+
+    def end(self) -> None:
+        """Have all of them end."""
+        self.events.end()
+        self.previews.end()
+
+
+def create_app(service: RigService, catalogue: Catalogue, access: Access) -> FastAPI:
+    """The panel of one running service.
+
+    Args:
+        service: what operates the rig.
+        catalogue: its recordings, for reading.
+        access: who may reach the panel.
+
+    Returns:
+        The application; `app.state.streams` are its `OpenStreams`. Serve it with `webpanel.server.make_server`.
+    """
+    changes, streams, metrics = Changes(service), OpenStreams(), Metrics(service)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        async with changes.watching():
+            yield
+
+    app = FastAPI(
+        title="Svev", version=version("svev"), description=DESCRIPTION, docs_url=None, redoc_url=None,
+        redirect_slashes=False, max_body_size=BODY_MAX, lifespan=lifespan, responses=COMMON,
+        generate_unique_id_function=lambda route: route.name,
+    )  # fmt: skip
+    app.state.streams = streams
+    door = Door(access)
+    app.add_middleware(Guard, door=door)
+    app.add_middleware(CountRequests, metrics=metrics)
+    handle_errors(app, SECURITY_HEADERS)
+    app.include_router(rig_router(service))
+    app.include_router(recordings_router(service, catalogue, changes))
+    app.include_router(images_router(service, catalogue))
+    app.include_router(preview_router(PreviewFeed(service), streams.previews))
+    app.include_router(events_router(service, changes, streams.events))
+    app.include_router(login_router(door))
+    _serve_observations(app, service, metrics)
+    serve_documentation(app, access)
+    _serve_page(app)
+    return app
+
+
+def _serve_observations(app: FastAPI, service: RigService, metrics: Metrics) -> None:
+    @app.get("/metrics", tags=["Observing"], response_class=PlainTextResponse)
+    def get_metrics() -> Response:
+        """What has been measured, for Prometheus."""
+        return Response(metrics.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)
+
+    unwell: Responses = {503: {"description": "The service is unwell.", "model": Health}}
+
+    @app.get("/healthz", tags=["Observing"], responses=unwell)
+    def get_health() -> Health:
+        """Whether the service itself works. Needs no token."""
+        if service.healthy():
+            return Health(healthy=True)
+        return JSONResponse(Health(healthy=False).model_dump(), HTTPStatus.SERVICE_UNAVAILABLE)  # type: ignore[return-value]
+
+
+def _serve_page(app: FastAPI) -> None:
+    for suffix, media_type in _TYPES.items():
+        mimetypes.add_type(media_type, suffix)
+    app.frontend("/", directory=str(files("webpanel") / "page"), fallback=None)

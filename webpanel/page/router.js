@@ -1,0 +1,43 @@
+/** Which view is shown: the part of the address after #, e.g. #/recordings/2026-11-21T20-54-50Z. */
+
+import { $ } from "./dom.js";
+import { update } from "./store.js";
+
+const VIEWS = ["live", "recordings", "recording", "log", "doctor", "rig"];
+
+/** @typedef {{ view: string, id: string, trash: boolean }} Place */
+
+/** @returns {Place} */
+export function place() {
+  const [name, id = ""] = location.hash.replace(/^#\//, "").split("/");
+  if (name === "trash") return { view: "recordings", id: "", trash: true };
+  if (name === "recordings" && id) return { view: "recording", id: decodeURIComponent(id), trash: false };
+  return { view: VIEWS.includes(name) ? name : "live", id: "", trash: false };
+}
+
+/** @param {string} path e.g. "recordings" */
+export function go(path) {
+  location.hash = `#/${path}`;
+}
+
+/**
+ * Show the view of the address, now and whenever it changes.
+ *
+ * @param {(place: Place) => void} entered
+ */
+export function startRouter(entered) {
+  const show = () => {
+    const now = place();
+    for (const name of VIEWS) $(name).hidden = name !== now.view;
+    const tab = now.view === "recording" ? "recordings" : now.view;
+    for (const link of document.querySelectorAll(".nav a")) {
+      if (link.getAttribute("href") === `#/${tab}`) link.setAttribute("aria-current", "page");
+      else link.removeAttribute("aria-current");
+    }
+    scrollTo(0, 0);
+    update({ view: now.view });
+    entered(now);
+  };
+  addEventListener("hashchange", () => { show(); $("main").focus({ preventScroll: true }); });
+  show();
+}

@@ -1,4 +1,4 @@
-"""The parent's side of a camera process (`simrig.gige.__main__`)."""
+"""The parent's side of a process of simulated cameras (`simrig.camera_program`)."""
 
 import json
 import os
@@ -10,8 +10,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from rig.errors import BadInputError, ProcessDiedError
-from simrig.gige.config import CameraConfig
 
 START_S = 30.0
 _ANSWER_S = 10.0
@@ -20,19 +21,24 @@ _ROOT = Path(__file__).resolve().parent.parent
 
 
 class CameraProcess:
-    """One camera process, started by the constructor.
+    """One process, started by the constructor.
 
     The kernel kills it, frozen or not, as soon as the *thread* that called the constructor ends: call it in one that
     lives long enough. It sits in a process group of its own, so that Ctrl-C does not reach it.
+
+    Args:
+        module: what to run.
+        config: what to tell it first.
+        what: names it in messages.
     """
 
-    def __init__(self, config: CameraConfig) -> None:
-        self.config = config
+    def __init__(self, module: str, config: BaseModel, what: str) -> None:
+        self._what = what
         self.frozen = self.killed = False
         paths = [str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = {"PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "simrig.gige"],
+            [sys.executable, "-m", module],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **environment},
@@ -53,7 +59,7 @@ class CameraProcess:
         return self._process.poll() is None
 
     def await_ready(self) -> None:
-        """Wait until the camera is on the network.
+        """Wait until its cameras are there.
 
         Raises:
             BadInputError: it cannot be, for a reason that somebody can remove.
@@ -65,8 +71,8 @@ class CameraProcess:
         """Send a command and wait for the answer.
 
         Raises:
-            BadInputError: the camera refuses the command.
-            ProcessDiedError: the camera does not answer.
+            BadInputError: the process refuses the command.
+            ProcessDiedError: it does not answer.
         """
         self._say(json.dumps(command))
         return self._hear(_ANSWER_S)
@@ -126,8 +132,7 @@ class CameraProcess:
                 if not selector.select(max(0.0, deadline - time.monotonic())):
                     self.kill()
                     raise ProcessDiedError(
-                        f"simulated camera {self.config.name} did not answer for {patience_s:.0f} s, so it was ended: "
-                        "restart it"
+                        f"{self._what} did not answer for {patience_s:.0f} s, so it was ended: restart it"
                     )
                 part = os.read(self._process.stdout.fileno(), 1 << 16)
                 if not part:
@@ -141,6 +146,4 @@ class CameraProcess:
 
     def _died(self) -> ProcessDiedError:
         code = self._process.wait(_STOP_S)
-        return ProcessDiedError(
-            f"simulated camera {self.config.name} ended by itself (exit code {code}): see its messages above"
-        )
+        return ProcessDiedError(f"{self._what} ended by itself (exit code {code}): see its messages above")

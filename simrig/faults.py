@@ -13,19 +13,29 @@ from rig.errors import BadInputError
 
 
 class FaultKind(StrEnum):
-    """What goes wrong. The first five befall single frames, the last three the camera for a while."""
+    """What goes wrong. The first six befall single frames, the last four the camera or its bus."""
 
     MISSED_PULSE = "missed_pulse"  #: the camera does not see the pulse: no frame, no frame id, no trigger count
+    OVERRUN = "overrun"  #: the pulse comes too early after the one before: a trigger count, but no frame
     LOST_FRAME = "lost_frame"  #: taken and counted, but none of its packets arrives, nor does a resend
     LOST_PACKETS = "lost_packets"  #: the named packets do not arrive
-    LOST_LEADER = "lost_leader"  #: the packet that opens the frame does not arrive
+    LOST_LEADER = (
+        "lost_leader"  #: the packet that opens the frame does not arrive (FireWire: the first one with pixels)
+    )
     DAMAGED_FRAME = "damaged_frame"  #: arrives, but the camera says that it is not whole
     FROZEN = "frozen"  #: answers nothing and sends nothing for a while, then goes on
-    RESTART = "restart"  #: the camera dies and comes back with default settings
+    RESTART = "restart"  #: the camera dies and comes back with default settings (FireWire: it is unplugged meanwhile)
     SLOW_LINK = "slow_link"  #: the cable carries only so many Mbit/s for a while
+    BUS_RESET = "bus_reset"  #: FireWire: the bus is reset when the camera sees the pulse
 
 
 LASTING = frozenset({FaultKind.FROZEN, FaultKind.RESTART, FaultKind.SLOW_LINK})
+#: Faults that befall the camera as a whole; `simrig.simulated_hill` carries them out.
+OF_THE_CAMERA = frozenset({FaultKind.RESTART, FaultKind.FROZEN})
+#: What can befall a GigE Vision camera.
+ON_GIGE = frozenset(FaultKind) - {FaultKind.BUS_RESET}
+#: What can befall a FireWire camera: its transfer has no pace of its own, and no word about damage.
+ON_FIREWIRE = frozenset(FaultKind) - {FaultKind.SLOW_LINK, FaultKind.DAMAGED_FRAME}
 
 
 class Fault(BaseModel):
@@ -38,7 +48,9 @@ class Fault(BaseModel):
     at_pulse: int | None = Field(None, ge=0, description="hill pulse, counted from 0; none: the next one")
     count: int = Field(1, ge=1, description="so many pulses in a row")
     packets: tuple[int, ...] = Field((), description="lost_packets: packet numbers, 1 = first one with pixels")
-    resend: bool = Field(True, description="lost_packets, lost_leader: whether the camera resends them when asked")
+    resend: bool = Field(
+        True, description="lost_packets, lost_leader: whether the camera resends them when asked (GigE Vision only)"
+    )
     duration_s: float | None = Field(None, gt=0, le=3600, description="frozen, restart, slow_link: how long")
     mbit_s: float | None = Field(None, gt=0, description="slow_link: what is left of the link")
 

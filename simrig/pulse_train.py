@@ -7,9 +7,13 @@ without a wire between them: they only have to share `epoch`, rate and pauses.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from rig.clocks import NS_PER_S, HostNs
 from rig.errors import BadInputError
+
+#: The trigger line falls so much later than it rises at a pulse.
+PULSE_WIDTH_NS: Final = 500_000
 
 
 @dataclass(frozen=True, slots=True)

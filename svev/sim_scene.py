@@ -15,6 +15,7 @@ from simrig.world.scenario import load_scenario
 
 _EXPOSURES = {
     FaultKind.MISSED_PULSE: Exposure.MISSED,
+    FaultKind.OVERRUN: Exposure.MISSED,
     FaultKind.LOST_FRAME: Exposure.LOST,
     FaultKind.LOST_PACKETS: Exposure.DAMAGED,
     FaultKind.LOST_LEADER: Exposure.DAMAGED,
@@ -63,8 +64,8 @@ class SimScene:
             if fault.kind in {FaultKind.FROZEN, FaultKind.RESTART}:
                 self._dark_until = max(self._dark_until, HostNs(time + fault.duration_ns))
         if faults:
-            # Packets that the camera resends arrive after all; a slow link still delivers.
-            harmful = [f for f in faults if f.kind is not FaultKind.SLOW_LINK and not (f.packets and f.resend)]
+            # Packets that the camera resends arrive after all; a slow link still delivers; there is no bus to reset.
+            harmful = [f for f in faults if f.kind in _EXPOSURES and not (f.packets and f.resend)]
             return _EXPOSURES[harmful[0].kind] if harmful else Exposure.OK
         return Exposure.MISSED if time < self._dark_until else Exposure.OK
 

@@ -7,27 +7,25 @@ import time
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from simrig.device_clock import DeviceClock
-from simrig.faults import Fault, FaultKind, FaultPlan
+from simrig.faults import OF_THE_CAMERA, Fault, FaultPlan
 from simrig.gige.camera_clock import CameraClock, PtpMaster
 from simrig.gige.config import CameraConfig
 from simrig.gige.control_server import ControlServer
-from simrig.gige.counters import CameraStatistics, Counters
+from simrig.gige.counters import Counters, GigeStatistics
 from simrig.gige.device import Device, Parts
 from simrig.gige.features import features
 from simrig.gige.genicam import describe
-from simrig.gige.image_source import ImageSource, Painter, TestPattern
 from simrig.gige.link import Link
 from simrig.gige.register_table import all_registers
 from simrig.gige.registers import RegisterMap
 from simrig.gige.sensor import Sensor
 from simrig.gige.transmitter import Transmitter
 from simrig.gige.values import XML_ADDRESS, Identity
+from simrig.image_source import ImageSource, Painter, TestPattern
 from simrig.images.view import CameraView
 from simrig.pulse_train import PulseTrain
 from simrig.world.scenario import Scenario, load_scenario
 
-#: Faults that befall the process as a whole; `simrig.simulated_hill` carries them out.
-OF_THE_PROCESS = frozenset({FaultKind.RESTART, FaultKind.FROZEN})
 _PTP_ERROR_NS = 300
 
 
@@ -42,7 +40,7 @@ class Camera:
         scenario = load_scenario(config.scenario)
         index = scenario.camera_index(config.name)
         self._counters = Counters()
-        self._faults = FaultPlan(f for f in scenario.faults_of(config.name) if f.kind not in OF_THE_PROCESS)
+        self._faults = FaultPlan(f for f in scenario.faults_of(config.name) if f.kind not in OF_THE_CAMERA)
         registers = _registers(config)
         clock = _clock(config, scenario, index)
         painter = _painter(config, scenario, index)
@@ -81,27 +79,27 @@ class Camera:
         Raises:
             BadInputError: its pulses are past, or it is a fault of the process.
         """
-        if fault.kind in OF_THE_PROCESS:
+        if fault.kind in OF_THE_CAMERA:
             raise BadInputError(f"fault {fault.kind} befalls the process: inject it into the SimulatedHill")
         self._faults.inject(fault)
 
-    def statistics(self) -> CameraStatistics:
+    def statistics(self) -> GigeStatistics:
         """What the camera did so far."""
         counters = self._counters
-        return CameraStatistics(
+        return GigeStatistics(
             counters.triggers,
             counters.missed,
             counters.overruns,
             counters.frames,
-            counters.resend_requests,
-            counters.resent_packets,
             self._link.packets,
             self._link.bytes,
             time.process_time(),
             self._sensor.acquiring,
             self._device.control.controller is not None,
-            self._sensor.block_id,
             dict(counters.last_packets.copy()),
+            counters.resend_requests,
+            counters.resent_packets,
+            self._sensor.block_id,
         )
 
 

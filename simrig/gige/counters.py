@@ -4,6 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from rig.clocks import HostNs
+from simrig.statistics import CameraStatistics
 
 _RECENT = 4096  # frames
 
@@ -32,29 +33,13 @@ class Counters:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraStatistics:
-    """A camera's report; the counts are those of `Counters`.
+class GigeStatistics(CameraStatistics):
+    """A GigE Vision camera's report: the counts are those of `Counters`.
 
     Attributes:
-        packets: packets handed to the network, resent ones included.
-        bytes: their bytes on the network layer.
-        cpu_s: CPU time of the camera's process, s.
-        acquiring: whether it exposes at triggers.
-        controlled: whether a program controls it.
         block_id: id of the last frame exposed, 0 if none.
-        last_packets: host time at which the last packet of a frame was handed to the network, by hill pulse.
     """
 
-    triggers: int
-    missed: int
-    overruns: int
-    frames: int
     resend_requests: int
     resent_packets: int
-    packets: int
-    bytes: int
-    cpu_s: float
-    acquiring: bool
-    controlled: bool
     block_id: int
-    last_packets: dict[int, HostNs]

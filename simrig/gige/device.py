@@ -12,7 +12,6 @@ from simrig.gige.counters import Counters
 from simrig.gige.frame_store import FrameStore
 from simrig.gige.gvcp import Action, Status
 from simrig.gige.gvsp import FrameFormat
-from simrig.gige.image_source import Painter
 from simrig.gige.link import Link
 from simrig.gige.register_table import USER_SET
 from simrig.gige.registers import RegisterError, RegisterMap, Value
@@ -31,6 +30,7 @@ from simrig.gige.values import (
     PtpStatus,
     TriggerSource,
 )
+from simrig.image_source import Painter
 
 USER_SET_LOAD_NS = 30_000_000  #: a real camera reads its flash memory meanwhile
 _ACTION_QUEUE = 10
@@ -224,7 +224,7 @@ class Device:
         frame = self._format()
         if self._store is None or self._store.format != frame:
             self._store = FrameStore(frame)
-            parts.painter.prepare(self._store)
+            parts.painter.prepare((slot.image for slot in self._store.slots), frame.rows, frame.columns)
         parts.transmitter.restart(self._store)
         parts.link.connect(*self._destination())
         delay_ticks, tick_hz = self._registers.number("GevSCPD"), self._registers.number("GevTimestampTickFrequency")

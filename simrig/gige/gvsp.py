@@ -51,6 +51,16 @@ class FrameFormat:
     extended: bool
 
     @property
+    def rows(self) -> slice:
+        """Rows of the sensor."""
+        return slice(self.offset_y, self.offset_y + self.height)
+
+    @property
+    def columns(self) -> slice:
+        """Columns of the sensor."""
+        return slice(self.offset_x, self.offset_x + self.width)
+
+    @property
     def payload_bytes(self) -> int:
         """Bytes of the image (Mono8)."""
         return self.width * self.height

@@ -9,20 +9,19 @@ import threading
 from dataclasses import dataclass
 
 from rig.clocks import NS_PER_S, HostNs, host_now
+from simrig import freeze
 from simrig.faults import Fault, FaultKind, FaultPlan
-from simrig.gige import freeze
 from simrig.gige.camera_clock import CameraClock
 from simrig.gige.counters import Counters
 from simrig.gige.frame_store import FrameStore, Shot, Slot
-from simrig.gige.image_source import Painter
 from simrig.gige.link import Link
 from simrig.gige.registers import RegisterMap
 from simrig.gige.transmitter import Transmitter
 from simrig.gige.values import AcquisitionMode, ExposureMode, TriggerSource
-from simrig.pulse_train import PulseTrain
+from simrig.image_source import Painter
+from simrig.pulse_train import PULSE_WIDTH_NS, PulseTrain
 
 LINE_NS = 5_000  #: read-out time of one line of the sensor
-PULSE_WIDTH_NS = 500_000  #: of the hill's trigger pulses; the falling edge comes so much later
 _LATE_NS = 5_000_000  # a trigger that is served later than this raises the question whether we were frozen
 _STOP_S = 5.0
 _IDS_16_BIT = 65535
@@ -194,7 +193,7 @@ class Sensor:
             return
         slot = ahead.slot if ahead is not None and ahead.store is store else store.take()
         if slot is not None:
-            self._painter.paint(store.format, slot, pulse)
+            self._painter.paint(slot.image, store.format.rows, store.format.columns, pulse)
             self._ahead = _Ahead(store, slot, pulse)
 
     def _serve(self, trigger: Trigger) -> None:
@@ -219,7 +218,8 @@ class Sensor:
         self._counters.triggers += 1
         self._counters.frame_triggers += 1
         ahead = self._ahead
-        if trigger.time < self._busy_until or ahead is None or ahead.pulse != trigger.pulse:
+        busy = trigger.time < self._busy_until or any(fault.kind is FaultKind.OVERRUN for fault in faults)
+        if busy or ahead is None or ahead.pulse != trigger.pulse:
             self._counters.overruns += 1
             return
         self._expose(trigger, ahead, faults)

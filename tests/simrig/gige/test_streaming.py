@@ -10,9 +10,9 @@ import pytest
 from rig.clocks import HostNs
 from rig.rigfile import CONFIG
 from simrig.gige.gvcp import Command
-from simrig.gige.sensor import PULSE_WIDTH_NS
 from simrig.images import stamp
 from simrig.images.view import CameraView
+from simrig.pulse_train import PULSE_WIDTH_NS
 from simrig.world.scenario import load_scenario
 from tests.simrig.gige.conftest import TRAINING, MakeCamera
 from tests.simrig.gige.raw_client import GvcpClient

@@ -1,12 +1,12 @@
 """Where a simulated camera's pixels come from."""
 
+from collections.abc import Iterable
+from itertools import cycle
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.gige.frame_store import FrameStore, Slot
-from simrig.gige.gvsp import FrameFormat
 from simrig.images import stamp
 
 Image = NDArray[np.uint8]
@@ -33,7 +33,7 @@ class TestPattern:
 
 
 class Painter:
-    """Puts the sensor's region of interest into frame slots. Exposure time and gain do not change the picture.
+    """Puts the part of the sensor that is read out into frames. Exposure time and gain do not change the picture.
 
     Args:
         source: what the sensor sees.
@@ -42,35 +42,32 @@ class Painter:
         prerendered: so many images are rendered once, and frames only get a new stamp; 0: every frame is rendered.
     """
 
-    def __init__(self, source: ImageSource, sensor: tuple[int, int], camera: int | None, prerendered: int) -> None:
+    def __init__(self, source: ImageSource, sensor: tuple[int, int], camera: int | None, prerendered: int = 0) -> None:
         self._source, self._camera = source, camera
-        self._sensor = sensor
         self._scratch: Image = np.zeros((sensor[1], sensor[0]), np.uint8)
         self._images = [np.empty_like(self._scratch) for _ in range(prerendered)]
         for pulse, image in enumerate(self._images):
             source.render_into(image, pulse)
 
-    def prepare(self, store: FrameStore) -> None:
-        """Fill the slots of a new store with the images rendered once, if there are any."""
-        rows, columns = _region(store.format)
-        for index, slot in enumerate(store.slots if self._images else ()):
-            slot.image[...] = self._images[index % len(self._images)][rows, columns]
+    def prepare(self, frames: Iterable[Image], rows: slice, columns: slice) -> None:
+        """Fill the frames that will be painted with the images rendered once, if there are any."""
+        for frame, image in zip(frames, cycle(self._images), strict=False):
+            frame[...] = image[rows, columns]
 
-    def paint(self, frame: FrameFormat, slot: Slot, pulse: int) -> None:
-        """Put hill pulse `pulse` into a slot."""
+    def paint(self, out: Image, rows: slice, columns: slice, pulse: int) -> None:
+        """Put hill pulse `pulse` into a frame.
+
+        Args:
+            out: the frame, shape (height, width).
+            rows: of the sensor.
+            columns: of the sensor.
+            pulse: which one.
+        """
         if not self._images:
-            if (frame.width, frame.height) == self._sensor:
-                self._source.render_into(slot.image, pulse)
+            if out.shape == self._scratch.shape:
+                self._source.render_into(out, pulse)
             else:
-                rows, columns = _region(frame)
                 self._source.render_into(self._scratch, pulse)
-                slot.image[...] = self._scratch[rows, columns]
+                out[...] = self._scratch[rows, columns]
         if self._camera is not None:
-            stamp.write(slot.image, self._camera, pulse)
-
-
-def _region(frame: FrameFormat) -> tuple[slice, slice]:
-    return (
-        slice(frame.offset_y, frame.offset_y + frame.height),
-        slice(frame.offset_x, frame.offset_x + frame.width),
-    )
+            stamp.write(out, self._camera, pulse)

@@ -1,0 +1,170 @@
+"""The emulated FireWire bus of the hill, as its owner handles it: one process with all its cameras."""
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from rig.clocks import HostNs
+from simrig.camera_process import CameraProcess
+from simrig.faults import ON_FIREWIRE, Fault
+from simrig.firewire import wire
+from simrig.firewire.build import shim
+from simrig.firewire.config import BusConfig
+from simrig.hill_camera import Launch
+from simrig.statistics import CameraStatistics
+
+
+@dataclass(frozen=True, slots=True)
+class BusState:
+    """The bus as a whole.
+
+    Attributes:
+        generation: number of its configuration; every reset makes a new one.
+        bandwidth: units that are free in each cycle.
+        channels: isochronous channels that are taken.
+        nodes: names of the nodes, e.g. fw0 (the computer), fw1.
+    """
+
+    generation: int
+    bandwidth: int
+    channels: tuple[int, ...]
+    nodes: tuple[str, ...]
+
+
+class HillBus:
+    """The bus's process.
+
+    Args:
+        config: what it is told.
+        launch: starts it.
+    """
+
+    def __init__(self, config: BusConfig, launch: Launch) -> None:
+        self._config, self._launch = config, launch
+        self._process: CameraProcess | None = None
+        self._ready = False
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What a process must have in its environment to see the bus.
+
+        Raises:
+            BadInputError: there is no C compiler.
+        """
+        preload = [str(shim()), *filter(None, [os.environ.get("LD_PRELOAD")])]
+        return {"LD_PRELOAD": " ".join(preload), wire.VARIABLE: self._config.socket}
+
+    @property
+    def cameras(self) -> dict[str, "FireWireHillCamera"]:
+        """The cameras on it, by name."""
+        return {name: FireWireHillCamera(self, name) for name in self._config.cameras}
+
+    @property
+    def pid(self) -> int | None:
+        """Its process id, None if it does not run."""
+        return self._process.pid if self._process is not None and self._process.alive else None
+
+    def start(self) -> None:
+        """Begin to start it, once."""
+        if self._process is None:
+            self._process = self._launch("simrig.firewire", self._config, "the emulated FireWire bus")
+
+    def ask(self, command: str, **arguments: Any) -> dict[str, Any]:
+        """Send a command and wait for the answer."""
+        return self._running().ask({"command": command, **arguments})
+
+    def await_ready(self) -> None:
+        """Wait until it is there, once."""
+        if not self._ready:
+            self._running().await_ready()
+            self._ready = True
+
+    def reset(self) -> None:
+        """Reset the bus."""
+        self.ask("reset_bus")
+
+    def state(self) -> BusState:
+        """The bus as a whole."""
+        state = self.ask("state")["state"]
+        return BusState(state["generation"], state["bandwidth"], tuple(state["channels"]), tuple(state["nodes"]))
+
+    def statistics(self, camera: str) -> CameraStatistics:
+        """What one of its cameras did."""
+        data = self.ask("statistics", camera=camera)["statistics"]
+        data["last_packets"] = {int(pulse): HostNs(moment) for pulse, moment in data["last_packets"].items()}
+        return CameraStatistics(**data)
+
+    def begin_stop(self) -> None:
+        """Ask it to end."""
+        if self._process is not None:
+            self._process.begin_stop()
+
+    def stop(self) -> None:
+        """End it."""
+        if self._process is not None:
+            self._process.stop()
+            self._process = None
+
+    def _running(self) -> CameraProcess:
+        assert self._process is not None, "started"  # noqa: S101  (SimulatedHill starts all before it does anything else)
+        return self._process
+
+
+class FireWireHillCamera:
+    """One camera on the bus; see `simrig.hill_camera.HillCamera`. To kill it is to unplug it."""
+
+    kinds = ON_FIREWIRE
+
+    def __init__(self, bus: HillBus, name: str) -> None:
+        self._bus, self._name = bus, name
+        self.killed = self.frozen = False
+
+    @property
+    def pid(self) -> int | None:
+        """Of the bus; None while the camera is unplugged."""
+        return None if self.killed else self._bus.pid
+
+    def start(self) -> None:
+        """See `HillCamera`."""
+        self._bus.start()
+
+    def await_ready(self) -> None:
+        """See `HillCamera`."""
+        self._bus.await_ready()
+
+    def inject(self, fault: Fault) -> None:
+        """See `HillCamera`."""
+        self._bus.ask("inject", fault=fault.model_dump(mode="json"))
+
+    def kill(self) -> None:
+        """Unplug it."""
+        self._bus.ask("unplug", camera=self._name)
+        self.killed, self.frozen = True, False
+
+    def restart(self) -> None:
+        """Unplug it if need be, and plug it in."""
+        self._bus.ask("plug", camera=self._name)
+        self.killed = self.frozen = False
+
+    def freeze(self) -> None:
+        """See `HillCamera`."""
+        self._bus.ask("freeze", camera=self._name)
+        self.frozen = True
+
+    def thaw(self) -> None:
+        """See `HillCamera`."""
+        if self.frozen:
+            self._bus.ask("thaw", camera=self._name)
+            self.frozen = False
+
+    def statistics(self) -> CameraStatistics:
+        """See `HillCamera`."""
+        return self._bus.statistics(self._name)
+
+    def begin_stop(self) -> None:
+        """See `HillCamera`."""
+        self._bus.begin_stop()
+
+    def stop(self) -> None:
+        """See `HillCamera`."""
+        self._bus.stop()

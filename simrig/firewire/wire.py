@@ -1,0 +1,85 @@
+"""The bus's end of the wire to the shim (`shim/bus.h`): one packet per request, one per reply."""
+
+import os
+import socket
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+#: Environment variable that tells the shim the name of the bus's socket.
+VARIABLE: Final = "SVEV_FIREWIRE_BUS"
+_MESSAGE_BYTES: Final = 1 << 15
+_REQUEST: Final = struct.Struct("=IIII")
+_REPLY: Final = struct.Struct("=iII")
+_NO_DESCRIPTOR: Final = -1
+
+
+class Operation(IntEnum):
+    """What the shim asks for."""
+
+    LIST = 1
+    OPEN = 2
+    IOCTL = 3
+    MMAP = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One request.
+
+    Attributes:
+        operation: what is asked for.
+        code: of an ioctl.
+        argument: of an ioctl, as in memory.
+        extra: what the argument points to.
+        descriptor: that came along, -1 if none; the receiver closes it.
+    """
+
+    operation: Operation
+    code: int
+    argument: bytes
+    extra: bytes
+    descriptor: int
+
+
+def receive(connection: socket.socket) -> Request | None:
+    """One request; None at the end of the connection.
+
+    Raises:
+        ValueError: the packet is none of the shim's.
+    """
+    try:
+        data, descriptors, _, _ = socket.recv_fds(connection, _MESSAGE_BYTES, 1)
+    except ConnectionResetError:
+        return None
+    descriptor = descriptors[0] if descriptors else _NO_DESCRIPTOR
+    if not data:
+        return None
+    try:
+        operation, code, argument_bytes, extra_bytes = _REQUEST.unpack_from(data)
+        middle = _REQUEST.size + argument_bytes
+        kind = Operation(operation)
+        whole = len(data) == middle + extra_bytes
+    except (struct.error, ValueError):
+        whole = False
+    if not whole:
+        if descriptor != _NO_DESCRIPTOR:
+            os.close(descriptor)
+        raise ValueError("a packet that the shim does not send")
+    return Request(kind, code, data[_REQUEST.size : middle], data[middle:], descriptor)
+
+
+def reply(connection: socket.socket, result: int, argument: bytes = b"", extra: bytes = b"") -> None:
+    """Answer a request; nothing happens if its sender is gone."""
+    try:
+        connection.send(_REPLY.pack(result, len(argument), len(extra)) + argument + extra)
+    except (BrokenPipeError, ConnectionResetError):
+        return  # the end of the connection is noticed when it is read
+
+
+def owner(connection: socket.socket) -> int:
+    """User id of the process at the other end."""
+    credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("=iII"))
+    user: int = struct.unpack("=iII", credentials)[1]
+    return user

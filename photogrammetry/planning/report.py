@@ -1,6 +1,5 @@
-"""What a plan says, for people and as JSON."""
+"""What a plan says, as JSON, and how far its two predictions differ."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,8 @@ def worst_disagreement(predicted: Sigmas, simulated: Sigmas) -> float:
     pairs = [
         (predicted.positions, simulated.positions),
         (predicted.interior, simulated.interior),
-        (_mean(predicted.points), _mean(simulated.points)),
-        (_mean(predicted.angles), _mean(simulated.angles)),
+        (mean_of_position(predicted.points), mean_of_position(simulated.points)),
+        (mean_of_position(predicted.angles), mean_of_position(simulated.angles)),
         (predicted.body, simulated.body),
         (predicted.speed, simulated.speed),
     ]
@@ -41,63 +40,18 @@ def plan_to_json(plan: Plan, predicted: Sigmas, simulated: Sigmas, samples: int)
     }
 
 
-def plan_table(plan: Plan, predicted: Sigmas, simulated: Sigmas) -> list[str]:
-    """Lines for people: by covariance, and in brackets by Monte Carlo."""
-    unit = plan.network.length_unit
-    lines = [plan.name, "", f"cameras: sigma of X0, Y0, Z0 ({unit}), by covariance (by Monte Carlo)"]
-    for i, image in enumerate(plan.network.images):
-        lines.append(f"  {image.name:<10}" + _row(predicted.positions[i], simulated.positions[i], "9.4f"))
-    parameters = _parameters(plan)
-    if parameters:
-        lines += ["", f"interior orientation: sigma of {', '.join(parameters)} (image unit)"]
-        for i, camera in enumerate(plan.network.cameras):
-            lines.append(f"  {camera.name:<10}" + _row(predicted.interior[i], simulated.interior[i], "9.3g"))
-    if plan.flight is None:
-        return lines
-    names = ", ".join(plan.flight.names)
-    lines += ["", f"jumper: mean sigma of X, Y, Z ({unit}) of {names}, position by position"]
-    for i, (ours, theirs) in enumerate(zip(_mean(predicted.points), _mean(simulated.points), strict=True), 1):
-        lines.append(f"  {i:<10}" + _row(ours, theirs, "9.4f"))
-    if plan.flight.ski_names:
-        lines += ["", f"skis: mean sigma of slope, heading (degrees) of {', '.join(plan.flight.ski_names)}"]
-        pairs = zip(np.degrees(_mean(predicted.angles)), np.degrees(_mean(simulated.angles)), strict=True)
-        lines += [f"  {i:<10}" + _row(ours, theirs, "9.3f") for i, (ours, theirs) in enumerate(pairs, 1)]
-    if plan.flight.stick is not None:
-        lines += ["", f"body: sigma of {', '.join(ANGLES)} (degrees)"]
-        bodies = zip(np.degrees(predicted.body[:, :-1]), np.degrees(simulated.body[:, :-1]), strict=True)
-        lines += [f"  {i:<10}" + _row(ours, theirs, "6.2f") for i, (ours, theirs) in enumerate(bodies, 1)]
-        lines += [
-            "",
-            f"O, midway between the bindings: sigma of height ({unit}) and of speed to the next place ({unit}/s)",
-        ]
-        ours, theirs = (
-            np.column_stack((sigmas.body[:, -1], np.append(sigmas.speed, np.nan))) for sigmas in (predicted, simulated)
-        )
-        lines += [f"  {i:<10}" + _row(a[:k], b[:k], "9.4f") for i, k, a, b in _numbered(ours, theirs)]
-    return lines
-
-
-def _numbered(ours: Floats, theirs: Floats) -> Iterator[tuple[int, int, Floats, Floats]]:
-    """Number, how many figures are known, and the figures of each position."""
-    for i, (a, b) in enumerate(zip(ours, theirs, strict=True), 1):
-        yield i, int(np.isfinite(a).sum()), a, b
-
-
-def _row(ours: Floats, theirs: Floats, form: str) -> str:
-    return "  ".join(f"{a:{form}} ({b:{form}})" for a, b in zip(ours, theirs, strict=True))
-
-
-def _mean(values: Floats) -> Floats:
+def mean_of_position(values: Floats) -> Floats:
     """Over the points or skis of a position; (positions, 2 or 3)."""
     return values.mean(axis=1) if values.size else np.zeros((0, values.shape[-1]))
 
 
-def _parameters(plan: Plan) -> list[str]:
+def parameters_of(plan: Plan) -> list[str]:
+    """Names of the parameters that any camera estimates, in the order of `Sigmas.interior`."""
     return [name for name in INTERIOR if any(name in camera.estimate for camera in plan.network.cameras)]
 
 
 def _sigmas_to_json(plan: Plan, sigmas: Sigmas) -> dict[str, Any]:
-    network, parameters, flight = plan.network, _parameters(plan), plan.flight
+    network, parameters, flight = plan.network, parameters_of(plan), plan.flight
     out: dict[str, Any] = {
         "images": {image.name: s.tolist() for image, s in zip(network.images, sigmas.positions, strict=True)},
         "cameras": {

@@ -14,7 +14,8 @@ from photogrammetry.adjustment.wording import in_file_frame, name_of
 from photogrammetry.camera_model import INTERIOR
 from photogrammetry.network import ImageFrame, Role
 from photogrammetry.protocol.document import Section, Table
-from photogrammetry.protocol.drawings import network_drawings, residual_drawings
+from photogrammetry.protocol.network_drawings import network_drawings
+from photogrammetry.protocol.residual_drawings import residual_drawings
 
 _STRONG = 0.9  # correlations from here on are named one by one
 _SHOWN = 20  # of them
@@ -27,12 +28,12 @@ def adjusted_sections(outcome: Outcome) -> tuple[Section, ...]:
     a = outcome.adjustment
     sections = [
         Section("Summary", tuple(summarise(outcome))),
+        Section("Network", network_drawings(a)),
         Section("Interior orientation", _interior(a)),
         Section("Poses", _poses(a)),
         Section("Points", _points(a)),
-        Section("Network", network_drawings(a)),
         Section("Correlations", _correlations(a)),
-        Section("Residuals", (*_residuals(a), *residual_drawings(a))),
+        Section("Residuals", (*residual_drawings(a), *_residuals(a))),
     ]
     return tuple(section for section in sections if section.parts)
 

@@ -13,7 +13,8 @@ from photogrammetry.adjustment.summary import summarise
 from photogrammetry.network import Network, Reweight
 from photogrammetry.network_file import read_network
 from photogrammetry.protocol.adjusted import adjusted_sections
-from photogrammetry.protocol.document import Protocol, write_protocol
+from photogrammetry.protocol.document import Protocol
+from photogrammetry.protocol.page import write_protocol
 from photogrammetry.start_values.search import complete
 from svev.commands.delivery import deliver
 

@@ -9,7 +9,7 @@ from photogrammetry.network import Network
 from photogrammetry.network_file import read_network
 from photogrammetry.procedures.calibration import calibrate as calibrate_network
 from photogrammetry.protocol.calibration import calibration_lines, calibration_protocol, calibration_to_json
-from photogrammetry.protocol.document import write_protocol
+from photogrammetry.protocol.page import write_protocol
 from svev.commands.delivery import deliver
 
 

@@ -11,8 +11,8 @@ from photogrammetry.network import Network, Reweight
 from photogrammetry.network_file import read_network
 from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
 from photogrammetry.procedures.orientation import orient as orient_network
-from photogrammetry.protocol.document import write_protocol
 from photogrammetry.protocol.orientation import orientation_lines, orientation_protocol, orientation_to_json
+from photogrammetry.protocol.page import write_protocol
 from svev.commands.delivery import deliver
 
 

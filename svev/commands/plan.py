@@ -1,6 +1,5 @@
 """`svev plan`: how accurate a network will be, before it is built."""
 
-import math
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -11,7 +10,10 @@ from photogrammetry.planning.description import read_description
 from photogrammetry.planning.monte_carlo import SAMPLES, simulate
 from photogrammetry.planning.plan import plan_from
 from photogrammetry.planning.prediction import adjusted_plan, predict
-from photogrammetry.planning.report import plan_table, plan_to_json, worst_disagreement
+from photogrammetry.planning.protocol import plan_protocol
+from photogrammetry.planning.report import plan_to_json
+from photogrammetry.protocol.document import as_text
+from photogrammetry.protocol.page import write_protocol
 from svev import console
 
 _NOT_SOLVABLE: Final = 3
@@ -24,13 +26,16 @@ def plan(
     samples: Annotated[
         int, typer.Option(min=100, max=100_000, help="repetitions of the Monte-Carlo simulation")
     ] = SAMPLES,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page with drawings")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object instead of the tables")] = False,
 ) -> None:
-    """Predict the accuracy of cameras, jumper points and skis, by covariance and by Monte Carlo.
+    """Predict the accuracy of cameras, jumper points, skis and body angles, by covariance and by Monte Carlo.
 
     Exit codes: 0 done, 2 bad input, 3 the network does not determine its unknowns, 4 a simulation did not converge.
 
-    Example: svev plan config/networks/hill-2.toml
+    Example: svev plan config/networks/hill-2.toml --report plan
     """
     planned = plan_from(read_description(network))
     try:
@@ -44,12 +49,11 @@ def plan(
     except NotConvergedError as error:
         console.complain(f"not converged: {error}")
         raise typer.Exit(_NOT_CONVERGED) from None
+    protocol = plan_protocol(planned, adjusted, predicted, simulated, samples)
     if as_json:
         console.print_json(plan_to_json(planned, predicted, simulated, samples))
-        return
-    for line in plan_table(planned, predicted, simulated):
-        console.say(line)
-    largest = 100.0 * worst_disagreement(predicted, simulated)
-    known = 100.0 / math.sqrt(2.0 * samples)
-    console.say(f"\ncovariance and Monte Carlo differ by at most {largest:.1f} %")
-    console.say(f"{samples} samples: each simulated sigma is known to {known:.1f} % (one sigma)")
+    else:
+        console.say(as_text(protocol))
+    if report is not None:
+        text, page = write_protocol(protocol, report)
+        console.say(f"protocol in {text} and {page}", aside=as_json)

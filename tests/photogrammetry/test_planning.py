@@ -16,12 +16,15 @@ from photogrammetry.planning.description import Description, read_description
 from photogrammetry.planning.monte_carlo import simulate
 from photogrammetry.planning.plan import Plan, plan_from
 from photogrammetry.planning.prediction import Sigmas, adjusted_plan, predict
+from photogrammetry.planning.protocol import plan_protocol
 from photogrammetry.planning.report import worst_disagreement
 from photogrammetry.planning.step_three import error_free_sights, intersect_flight
 from photogrammetry.planning.step_three_samples import intersect_samples
+from photogrammetry.protocol.document import Drawing
 from rig.errors import BadInputError
 from rig.rigfile import CONFIG, read_toml, validate
 from svev.cli import main
+from tests.photogrammetry.drawn import SVG, bar, chart_scales, parsed, polyline
 
 NETWORKS = CONFIG / "networks"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "planning.md"
@@ -162,6 +165,65 @@ def test_the_command_prints_tables_and_json(capsys: pytest.CaptureFixture[str]) 
     assert result["format"] == "svev-plan/1"
     assert len(result["covariance"]["positions"]) == 17
     assert result["worst_disagreement"] < 0.3
+
+
+@pytest.mark.parametrize("name", ["hill-2", "rods"])
+def test_curves_and_rings_are_the_two_predictions(name: str) -> None:
+    plan, adjusted, predicted = _planned(name)
+    simulated = simulate(plan, adjusted, samples=100, seed=2)
+    protocol = plan_protocol(plan, adjusted, predicted, simulated, 100)
+    drawings = {d.caption.split(";")[0]: d.svg for s in protocol.sections for d in s.parts if isinstance(d, Drawing)}
+    of_body = [(sigmas.body, sigmas.speed[:, None]) for sigmas in (predicted, simulated)]
+    (ours, our_speed), (theirs, their_speed) = of_body
+    expected = {
+        "Mean of P1, P2, P3, P4, sigma of X, Y, Z": (predicted.points.mean(axis=1), simulated.points.mean(axis=1)),
+        "P2, sigma of X, Y, Z": (predicted.points[:, 1], simulated.points[:, 1]),
+        "Sigma of alpha, beta, gamma": (np.degrees(ours[:, :3]), np.degrees(theirs[:, :3])),
+        "Sigma of dphi and phi": (np.degrees(ours[:, 3:5]), np.degrees(theirs[:, 3:5])),
+        "Sigma of the height of O, midway between the bindings": (ours[:, 5:], theirs[:, 5:]),
+        "Sigma of the speed of O to the next position": (our_speed, their_speed),
+    }
+    for caption, (curves, rings) in expected.items():
+        tree = parsed(drawings[caption])
+        x, y = chart_scales(tree)
+        lines = [polyline(element) for element in tree.findall(f"{SVG}polyline")]
+        near = 0.002 * max(curves.max(), rings.max())
+        for column, line in zip(curves.T, lines, strict=True):
+            assert [x(place) for place in line[:, 0]] == pytest.approx(np.arange(1.0, len(column) + 1.0), abs=0.02)
+            assert [y(place) for place in line[:, 1]] == pytest.approx(column, abs=near)
+        drawn = [y(float(ring.attrib["cy"])) for ring in tree.findall(f"{SVG}circle[@fill='none']")]
+        assert drawn == pytest.approx(rings.T.ravel(), abs=near)
+
+
+def test_the_drawing_of_a_plan_has_predicted_ellipses() -> None:
+    plan, adjusted, predicted = _planned("hill-1")
+    protocol = plan_protocol(plan, adjusted, predicted, predicted, 100)
+    network = next(section for section in protocol.sections if section.title == "Network")
+    above = next(d for d in network.parts if isinstance(d, Drawing) and "jumper" in d.caption and "above" in d.caption)
+    tree = parsed(above.svg)
+    said = re.search(r"([\d.]+) times as large", above.caption)
+    assert said is not None
+    radii = [float(e.attrib["rx"]) * bar(tree)[0] / float(said.group(1)) for e in tree.findall(f"{SVG}ellipse")]
+    balls, flight = np.array(radii[:21]), np.array(radii[21:]).reshape(5, 4)
+    variance = np.append(np.diagonal(adjusted.cofactors), 0.0)
+    of_balls = np.sqrt(variance[adjusted.problem.unknowns.point])
+    assert np.all(balls >= 0.98 * of_balls[:, :2].max(axis=1))
+    assert np.all(balls <= 1.02 * np.hypot(of_balls[:, 0], of_balls[:, 1]))
+    shown = predicted.points[::4]
+    assert np.all(flight >= 0.98 * shown[:, :, :2].max(axis=2))
+    assert np.all(flight <= 1.02 * np.hypot(shown[:, :, 0], shown[:, :, 1]))
+
+
+def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "plan"
+    assert main(["plan", str(NETWORKS / "rods.toml"), "--samples", "100", "--report", str(folder), "--json"]) == 0
+    out = capsys.readouterr()
+    assert json.loads(out.out)["covariance"]["positions"][0]["body"]["phi_deg"] > 0.1
+    assert "protocol.html" in out.err
+    page = (folder / "protocol.html").read_text()
+    assert set(re.findall(r"\w+://[^\"' <]+", page)) == {"http://www.w3.org/2000/svg"}
+    assert "Sigma of alpha, beta, gamma" in page
+    assert "speed (m/s)" in (folder / "protocol.txt").read_text()
 
 
 def test_a_jumper_without_skis(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,87 @@
+"""The page of a protocol: one HTML file that needs nothing else; light and dark, on a phone, on paper."""
+
+from html import escape
+from itertools import groupby
+from pathlib import Path
+
+from photogrammetry.protocol.document import Drawing, Protocol, Section, Table, as_text
+
+_LIGHT = (
+    "--paper:#fff;--ink:#1c2227;--soft:#5d6871;--faint:#dde2e6;--fill:#f3f5f7;"
+    "--blue:#1a66b0;--red:#c2321f;--green:#23803c;--amber:#b26a00"
+)
+_DARK = (
+    "--paper:#15191d;--ink:#e6eaed;--soft:#9ba7b1;--faint:#333b43;--fill:#1e242a;"
+    "--blue:#6cb2f5;--red:#ff8070;--green:#63c583;--amber:#e5ab45"
+)
+_STYLE = f"""
+:root{{color-scheme:light dark;{_LIGHT}}}
+@media screen and (prefers-color-scheme:dark){{:root{{{_DARK}}}}}
+*{{box-sizing:border-box}}
+body{{font:16px/1.5 system-ui,sans-serif;background:var(--paper);color:var(--ink);max-width:62rem;margin:auto;\
+padding:1rem;overflow-wrap:break-word}}
+h1{{font-size:1.6rem;line-height:1.2;margin:.5rem 0 1.5rem}}
+h2{{font-size:1.2rem;margin:2.2rem 0 .6rem;padding-bottom:.2rem;border-bottom:2px solid var(--faint)}}
+p{{margin:.4rem 0}}
+.table{{overflow-x:auto;margin:.8rem 0}}
+table{{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}}
+th,td{{padding:.2rem .7rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--faint)}}
+th{{color:var(--soft);font-weight:600}}
+th:first-child,td:first-child{{text-align:left;padding-left:0}}
+.drawings{{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1.2rem;margin:1rem 0}}
+figure{{margin:0;min-width:0;break-inside:avoid}}
+figcaption{{color:var(--soft);font-size:.85rem;line-height:1.35;margin-top:.3rem}}
+svg{{display:block;width:100%;height:auto;background:var(--fill);border-radius:.3rem;fill:currentColor;stroke:none}}
+svg text{{font:10px system-ui,sans-serif;fill:var(--soft)}}
+svg line,svg polyline,svg ellipse,svg circle[fill=none]{{stroke:currentColor}}
+{"".join(f".{name}{{color:var(--{name})}}" for name in ("ink", "soft", "faint", "blue", "red", "green", "amber"))}
+@media print{{body{{font-size:10pt;max-width:none;padding:0}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
+h2{{break-after:avoid}}.drawings{{grid-template-columns:1fr 1fr}}svg{{border:1px solid var(--faint)}}}}
+"""
+
+
+def write_protocol(protocol: Protocol, folder: Path) -> tuple[Path, Path]:
+    """Write `protocol.txt` and `protocol.html` into a folder, which is made if need be.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    text, page = folder / "protocol.txt", folder / "protocol.html"
+    text.write_text(as_text(protocol), encoding="utf-8")
+    page.write_text(as_html(protocol), encoding="utf-8")
+    return text, page
+
+
+def as_html(protocol: Protocol) -> str:
+    """The protocol as one page."""
+    body = [
+        f"<h1>{escape(protocol.title)}</h1>",
+        *(line for section in protocol.sections for line in _section(section)),
+    ]
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(protocol.title)}</title><style>{_STYLE}</style>"
+    )
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(body) + "\n</body></html>\n"
+
+
+def _section(section: Section) -> list[str]:
+    """Drawings that follow each other stand beside each other."""
+    lines = [f"<h2>{escape(section.title)}</h2>"]
+    for drawn, parts in groupby(section.parts, lambda part: isinstance(part, Drawing)):
+        lines += ['<div class="drawings">'] if drawn else []
+        lines += [_part(part) for part in parts]
+        lines += ["</div>"] if drawn else []
+    return lines
+
+
+def _part(part: str | Table | Drawing) -> str:
+    if isinstance(part, str):
+        return f"<p>{escape(part)}</p>"
+    if isinstance(part, Drawing):
+        return f"<figure>{part.svg}<figcaption>{escape(part.caption)}</figcaption></figure>"
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in part.head)
+    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in part.rows)
+    # a wide table scrolls within its box, also by keyboard
+    return f'<div class="table" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'

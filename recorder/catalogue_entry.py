@@ -88,7 +88,8 @@ def read_entry(path: Path) -> Entry:
     missing = sum(last - first + 1 for first, last in ledger.missing)
     return Entry(
         path.stem, path, found.bytes, modified, _state(found), False, ledger.first_time, ledger.duration_s,
-        ledger.pulses, ledger.complete, missing, dict(ledger.causes), _failures(ledger), found.cameras, found.shape, found.session,
+        ledger.pulses, ledger.complete, missing, dict(ledger.causes), _failures(ledger), found.cameras,
+        found.shape, found.session,
     )  # fmt: skip
 
 

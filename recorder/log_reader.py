@@ -26,7 +26,7 @@ from rig.tag import TripletTag
 from rig.topics import PROFILE, TAG, TRIPLET
 
 #: What the `mcap` library raises on bytes that are no such record.
-UNREADABLE = (struct.error, ValueError, McapError)
+UNREADABLE = (struct.error, ValueError, OverflowError, McapError)
 
 
 class ForeignFileError(BadInputError):

@@ -51,6 +51,7 @@ class Publisher:
         """
         self.sent = 0
         self.dropped = 0
+        self._queue = queue
         self._held = 0
         self._lock = threading.Lock()
         self._subscriptions: set[bytes] = set()
@@ -69,6 +70,11 @@ class Publisher:
     def held(self) -> int:
         """Slots that are with ZeroMQ at the moment."""
         return self._held
+
+    @property
+    def busy(self) -> bool:
+        """Whether the slowest subscriber's queue may be half full."""
+        return self._held > self._queue // 2
 
     def wait_for_subscriber(self, timeout_s: float) -> bool:
         """Wait until somebody subscribes to triplets; False if nobody has within `timeout_s`."""

@@ -1,4 +1,4 @@
-"""One recording: from the pulse after the start to the last pulse, into one log."""
+"""One recording: from the first pulse, which may have fired before the command, to the last, into one log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from recorder.events import Event, Level
 from recorder.ledger import Ledger
 from recorder.log_writer import LogSummary, LogWriter
 from recorder.triplet_buffers import TripletBuffers
-from rig.clocks import NS_PER_S, HostNs, UtcAnchor, host_now
+from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
 from rig.settings import RigSettings
 from rig.tag import TripletTag
 from triggering.pairing import ClosedPulse
@@ -27,9 +27,10 @@ class RecordingOrder:
         path: file to create.
         recording: id of the recording.
         session: fields of the session (athlete, bib, gate, wind, notes, operator, session).
-        pulses: stop after so many; None: until told.
-        seconds: stop then even if fewer pulses came; None: until told.
+        pulses: stop after so many, counted from the command; None: until told.
+        seconds: stop so long after the command even if fewer pulses came; None: until told.
         rig_toml: the rig file as it was read, attached to the log.
+        preroll_s: begin so long before the command, as far as pulses are held; None: with the oldest that is held.
     """
 
     path: Path
@@ -38,12 +39,15 @@ class RecordingOrder:
     pulses: int | None
     seconds: float | None
     rig_toml: bytes
+    preroll_s: float | None = 0.0
 
 
 class Recording:
-    """Writes the pulses from now on into one log, numbered from 1.
+    """Writes pulses into one log, numbered from 1.
 
     Attributes:
+        commanded: when it was started.
+        begin: pulses from then on belong to it.
         ledger: what has been recorded so far.
         log: the log.
     """
@@ -51,13 +55,16 @@ class Recording:
     def __init__(self, order: RecordingOrder, rig: RigSettings, assembler: Assembler, buffers: TripletBuffers) -> None:
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
         self._anchor = UtcAnchor.take()
-        self._begin = host_now()
+        self.commanded = host_now()
+        back = order.preroll_s
+        self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
         self._end: HostNs | None = None
-        self._over = False
+        self._ended = False
+        self._since_command = 0
         if order.seconds is not None:
-            # Pulses are counted; the clock only ends a recording whose pulses come too slowly, or no more.
-            grace = round(order.seconds * NS_PER_S * _SLOW) + 2 * rig.trigger.period_ns
-            self._end = HostNs(self._begin + round(order.seconds * NS_PER_S) + grace)
+            # Where pulses are counted, the clock only ends a recording whose pulses come too slowly, or no more.
+            grace = 0 if order.pulses is None else round(order.seconds * NS_PER_S * _SLOW) + 2 * rig.trigger.period_ns
+            self._end = HostNs(self.commanded + round(order.seconds * NS_PER_S) + grace)
         self.ledger = Ledger()
         cameras = ", ".join(camera.name for camera in rig.cameras)
         self.log = LogWriter(
@@ -68,7 +75,6 @@ class Recording:
             rig_toml=order.rig_toml,
             buffers=buffers,
         )
-        self.event(Event.now(Level.INFO, "recorder", f"recording {order.recording} started"))
 
     @property
     def path(self) -> Path:
@@ -76,19 +82,22 @@ class Recording:
         return self._order.path
 
     def finished(self, now: HostNs) -> bool:
-        """All pulses that were ordered are in, or the time is over and every pulse until then is decided."""
-        if self._over or (self._order.pulses is not None and self.ledger.pulses >= self._order.pulses):
-            return True
-        return self._end is not None and now > self._end + self._assembler.hold_ns
+        """Whether no pulse will come any more, all that are decided at `now` having been offered."""
+        return self._ended or self._counted or (self._end is not None and now > self._end + self._assembler.hold_ns)
 
     def stop(self) -> None:
         """Take no pulse that fires later than now."""
         self._end = host_now()
 
-    def takes(self, pulse: ClosedPulse) -> bool:
-        """Whether a pulse belongs to this recording. Pulses come in order, so the first later one ends it."""
-        self._over = self._over or (self._end is not None and pulse.time > self._end)
-        return pulse.time >= self._begin and not self.finished(self._begin)
+    def is_over(self, pulse: ClosedPulse) -> bool:
+        """Whether a pulse comes after the recording's last. Pulses come in order, so the first such one ends it."""
+        self._ended = self._ended or self._counted or (self._end is not None and pulse.time > self._end)
+        return self._ended
+
+    @property
+    def _counted(self) -> bool:
+        """All pulses that were ordered are in."""
+        return self._order.pulses is not None and self._since_command >= self._order.pulses
 
     def tag(self, pulse: ClosedPulse) -> TripletTag:
         """Number the pulse in this recording."""
@@ -98,22 +107,27 @@ class Recording:
             self.ledger.pulses + 1, self._anchor.utc(pulse.time), session, self._order.recording, self._shape, cameras
         )  # fmt: skip
 
-    def write(self, tag: TripletTag, slot: int | None, encoded: bytes) -> None:
-        """Write one pulse; the log holds the buffer until it is on disk."""
+    def write(self, tag: TripletTag, slot: int | None, encoded: bytes, ready: HostNs) -> None:
+        """Write one pulse that was ready then; the log holds the buffer until it is on disk."""
         self.ledger.add(tag)
-        ready = self._anchor.utc(host_now())
+        self._since_command += self._anchor.host(tag.time) >= self.commanded
+        log_time = self._anchor.utc(ready)
         if slot is None:
-            self.log.write_tag_only(tag, pulse_time=tag.time, log_time=ready, encoded=encoded)
+            self.log.write_tag_only(tag, pulse_time=tag.time, log_time=log_time, encoded=encoded)
         else:
-            self.log.write_triplet(slot, tag, pulse_time=tag.time, log_time=ready, encoded=encoded)
+            self.log.write_triplet(slot, tag, pulse_time=tag.time, log_time=log_time, encoded=encoded)
 
     def event(self, event: Event) -> None:
         """Write one event."""
         self.log.write_event(event.level, event.name, event.message, event.time)
 
-    def health(self, health: Mapping[str, Any]) -> None:
-        """Write the health of the last second."""
-        self.log.write_health(health, self._anchor.utc(host_now()))
+    def health(self, health: Mapping[str, Any], time: HostNs) -> None:
+        """Write the health of the second that ended then."""
+        self.log.write_health(health, self._anchor.utc(time))
+
+    def utc(self, time: HostNs) -> UtcNs:
+        """UTC of a host time, as the recording's tags have it."""
+        return self._anchor.utc(time)
 
     def close(self) -> LogSummary:
         """Finish the log.

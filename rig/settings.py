@@ -70,6 +70,14 @@ class RecorderSettings(_Strict):
     directory: Path = Field(Path("recordings"), description="relative to the working directory")
     ring_s: float = Field(2.0, gt=0, le=60, description="each camera's ring in shared memory, seconds of frames")
     triplets_s: float = Field(2.0, gt=0, le=60, description="triplets waiting for the disk, seconds")
+    preroll_s: float = Field(
+        5.0,
+        ge=0,
+        le=600,
+        description="svev serve: seconds held in memory while armed, to record the past",
+    )
+    preroll_limit_mb: float = Field(1024.0, ge=0, description="memory for that at most, 10^6 bytes")
+    jump_s: float = Field(10.0, gt=0, le=3600, description="length of a jump, for how many more fit on the disk")
     reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
 
 

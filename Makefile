@@ -24,8 +24,8 @@ help: ## list the targets
 demo: setup ## the main job on the simulated hill: three GigE Vision cameras, one jump, a log and a contact sheet
 	@$(BIN)/svev demo $(ARGS)
 
-run: setup ## ten seconds of the demo (`svev serve` will stand here once it exists)
-	@$(BIN)/svev demo --seconds 10 $(ARGS)
+run: setup ## the service on the simulated hill, with its panel at http://127.0.0.1:8000/
+	@$(BIN)/svev serve --rig config/rigs/sim-gige.toml $(ARGS)
 
 bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)

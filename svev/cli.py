@@ -13,7 +13,21 @@ import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import adjust, bench, calibrate, demo, doctor, info, orient, plan, record, replay, schema, verify
+from svev.commands import (
+    adjust,
+    bench,
+    calibrate,
+    demo,
+    doctor,
+    info,
+    orient,
+    plan,
+    record,
+    replay,
+    schema,
+    serve,
+    verify,
+)
 
 app = typer.Typer(
     name="svev",
@@ -33,6 +47,7 @@ def _every_command() -> None:
 
 app.command("demo")(demo.demo)
 app.command("record")(record.record)
+app.command("serve")(serve.serve)
 app.command("doctor")(doctor.doctor)
 app.command("info")(info.info_command)
 app.command("replay")(replay.replay_command)

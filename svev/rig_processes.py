@@ -210,8 +210,8 @@ class RigProcesses:
     def _start_grabber(self, index: int) -> None:
         ring = self._rings[index].fd
         config = {
-            "rig": self._rig.model_dump(mode="json", exclude_unset=True), "camera": index, "ring": ring, "doorbell": self._doorbell,
-            "epoch": self._epoch,
+            "rig": self._rig.model_dump(mode="json", exclude_unset=True), "camera": index, "ring": ring,
+            "doorbell": self._doorbell, "epoch": self._epoch,
         }  # fmt: skip
         spec = ProcessSpec(self._names[index], "svev.grabber_process", config, (ring, self._doorbell))
         self._processes.start(spec)

@@ -1,0 +1,67 @@
+"""The live log: numbered events, the last thousand kept, and everybody who listens woken."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Final
+
+from recorder import events
+from rig.clocks import NS_PER_S
+from webpanel.models import Event
+
+_KEPT: Final = 1000
+
+
+class EventHub:
+    """Any thread may tell, read and listen.
+
+    Args:
+        write_line: is given every event, e.g. to log it.
+    """
+
+    def __init__(self, write_line: Callable[[events.Event], None]) -> None:
+        self._write_line = write_line
+        self._lock = threading.Lock()
+        self._events: deque[Event] = deque(maxlen=_KEPT)
+        self._number = 0
+        self._listeners: dict[object, Callable[[], None]] = {}
+
+    def tell(self, event: events.Event) -> None:
+        """Number an event, keep it, log it, wake the listeners."""
+        with self._lock:
+            self._number += 1
+            time = datetime.fromtimestamp(event.time / NS_PER_S, UTC)
+            self._events.append(
+                Event(number=self._number, time=time, level=event.level.value, name=event.name, message=event.message)
+            )
+            self._write_line(event)
+        self.wake()
+
+    def after(self, number: int) -> list[Event]:
+        """The events with higher numbers that are still kept, oldest first."""
+        with self._lock:
+            return [event for event in self._events if event.number > number]
+
+    def listen(self, wake: Callable[[], None]) -> Callable[[], None]:
+        """Have `wake` called at every event and change.
+
+        Returns:
+            A function that ends this.
+        """
+        ticket = object()
+        with self._lock:
+            self._listeners[ticket] = wake
+
+        def end() -> None:
+            with self._lock:
+                self._listeners.pop(ticket, None)
+
+        return end
+
+    def wake(self) -> None:
+        """Call all listeners, outside the lock: they may ask for events at once."""
+        with self._lock:
+            listeners = list(self._listeners.values())
+        for listener in listeners:
+            listener()

@@ -1,0 +1,86 @@
+"""The doctor for the panel: one look at a time, a fresh answer kept for some seconds, nothing disturbed."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from rig.settings import RigSettings
+from svev.doctor.examination import probes, run_probe
+from svev.doctor.finding import Finding, Level, Topic, failure, passed, warning
+from webpanel import models
+from webpanel.models import CameraState, State, Status
+
+_KEPT_S: Final = 10.0
+#: While the rig runs these would disturb it (the disk's speed, the cameras) or find its own sockets in the way.
+_ONLY_IDLE: Final = frozenset({"disk", "publication", "cameras", "discovery"})
+_RANK: Final = tuple(Level)
+
+
+class Examination:
+    """May be asked from any thread.
+
+    Args:
+        rig: the rig.
+        data: where recordings go.
+        status: gives the present picture.
+    """
+
+    def __init__(self, rig: RigSettings, data: Path, status: Callable[[], Status]) -> None:
+        self._rig, self._data, self._status = rig, data, status
+        self._lock = threading.Lock()
+        self._report: models.DoctorReport | None = None
+        self._key: tuple[bool, float] = (False, 0.0)
+
+    def report(self) -> models.DoctorReport:
+        """Look at everything, or give the answer of a moment ago."""
+        with self._lock:
+            status = self._status()
+            idle = status.state is State.IDLE
+            kept_idle, until = self._key
+            if self._report is not None and kept_idle == idle and time.monotonic() < until:
+                return self._report
+            findings = list(self._look(status, idle=idle))
+            worst = max((finding.level for finding in findings), key=_RANK.index)
+            self._report = models.DoctorReport(worst=worst.value, findings=tuple(_shown(each) for each in findings))
+            self._key = (idle, time.monotonic() + _KEPT_S)
+            return self._report
+
+    def _look(self, status: Status, *, idle: bool) -> Iterator[Finding]:
+        for probe in probes(self._rig, self._data):
+            if idle or probe.name not in _ONLY_IDLE:
+                yield from run_probe(probe)
+            elif probe.name == "cameras":
+                yield from _cameras_of(status)
+            elif probe.name == "disk":
+                yield _room_of(status)
+            else:
+                yield passed(probe.topic, f"{probe.name}: in use by the rig, not examined; disarm to have it examined")
+
+
+def _cameras_of(status: Status) -> Iterator[Finding]:
+    """While the rig runs it knows its cameras better than any probe."""
+    for camera in status.cameras:
+        said = camera.statement
+        match camera.state:
+            case CameraState.ABSENT:
+                yield failure(Topic.CAMERAS, said.text, said.advice)
+            case CameraState.SILENT:
+                yield warning(Topic.CAMERAS, said.text, said.advice)
+            case _:
+                yield passed(Topic.CAMERAS, said.text)
+
+
+def _room_of(status: Status) -> Finding:
+    disk = status.disk
+    what = f"{disk.free_gb:g} GB free, room for {disk.jumps_left} jumps of {disk.jump_s:g} s"
+    if disk.jumps_left < 1:
+        return failure(Topic.DISK, what, "delete recordings, or copy them away")
+    return passed(Topic.DISK, f"{what}; disarm to have its speed examined")
+
+
+def _shown(finding: Finding) -> models.Finding:
+    return models.Finding(
+        level=finding.level.value, topic=finding.topic.value, what=finding.what, remedy=finding.remedy
+    )

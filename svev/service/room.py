@@ -1,0 +1,49 @@
+"""Room on the disk, in bytes, seconds and jumps."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rig.errors import StorageError
+from rig.settings import RigSettings
+
+_GB: Final = 1e9
+JUMP_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """How much can still be recorded.
+
+    Attributes:
+        free_bytes: free on the disk.
+        seconds: so long until only the reserve is left.
+        jumps: so many jumps of JUMP_S seconds.
+    """
+
+    free_bytes: int
+    seconds: float
+    jumps: int
+
+
+def room_for(rig: RigSettings, free_bytes: int) -> Room:
+    """What fits into free bytes beside the reserve, all cameras delivering at the rig's rate."""
+    rows, columns = rig.triplet_shape
+    usable = max(0.0, free_bytes - rig.recorder.reserve_gb * _GB)
+    seconds = usable / (rows * columns * rig.trigger.rate_hz)
+    return Room(free_bytes, seconds, int(seconds / JUMP_S))
+
+
+def check_room_for(rig: RigSettings, directory: Path, seconds: float) -> None:
+    """Whether a recording fits.
+
+    Raises:
+        StorageError: it does not.
+    """
+    room = room_for(rig, shutil.disk_usage(directory).free)
+    if room.seconds < seconds:
+        raise StorageError(
+            f"{directory}: there is room for {room.seconds:.0f} s and {seconds:g} s are wanted, beside the reserve of "
+            f"{rig.recorder.reserve_gb:g} GB: delete recordings, or copy them away"
+        )

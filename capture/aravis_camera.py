@@ -7,7 +7,7 @@ few slots go round and stay in the processor's cache.
 Never believe the ids of a buffer whose status is not SUCCESS: they may be those of its previous use.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import gi
 
@@ -137,6 +137,10 @@ class AravisCamera:
         except GLib.Error as error:
             raise CameraError(f"camera {self._name} does not answer: {error.message}") from None
         return counted
+
+    def notices(self) -> Sequence[str]:
+        """None."""
+        return ()
 
     def close(self) -> None:
         """Stop, leave control (else the next opening waits for the heartbeat), and drop all Aravis objects."""

@@ -84,6 +84,8 @@ class Grabber:
         while not self._stopping():
             requests = self._ring.reconnect_requests()
             arrival = camera.receive(_RECEIVE_S if requests == asked else self._last_look_s)
+            for text in camera.notices():
+                self._put(RecordKind.NOTICE, text=text)
             if arrival is not None:
                 self._put_arrival(arrival)
             elif requests != asked:
@@ -106,12 +108,14 @@ class Grabber:
     def _put_arrival(self, arrival: Arrival) -> None:
         if not arrival.whole:
             self._damaged += 1
-            self._put(RecordKind.DAMAGED, host_time=arrival.host_time)
+            time, known = arrival.device_time, int(arrival.device_time != 0)
+            self._queue(Record(RecordKind.DAMAGED, self._epoch, arrival.host_time, device_time=time, value=known))
             return
         self._frames += 1
+        stamped = 0 if arrival.stamped is None else arrival.stamped.to_value()
         record = Record(
             RecordKind.FRAME, self._epoch, arrival.host_time, arrival.slot, arrival.frame_id, arrival.id_modulus,
-            arrival.device_time, arrival.trigger_count,
+            arrival.device_time, arrival.trigger_count, stamped,
         )  # fmt: skip
         self._queue(record)
 
@@ -125,8 +129,8 @@ class Grabber:
             self._put(RecordKind.DISCONNECTED, text=reason)
         self._last_failure = reason
 
-    def _put(self, kind: RecordKind, *, text: str = "", host_time: HostNs | None = None) -> None:
-        self._queue(Record(kind, self._epoch, host_now() if host_time is None else host_time, text=text))
+    def _put(self, kind: RecordKind, *, text: str = "") -> None:
+        self._queue(Record(kind, self._epoch, host_now(), text=text))
 
     def _queue(self, record: Record) -> None:
         if not self._ring.put(record) and record.slot != NO_SLOT:

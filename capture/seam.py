@@ -4,12 +4,12 @@ A back end writes frames into slots of the camera's ring that it takes itself (`
 out one `Arrival` per frame. One conformance suite runs over every back end.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from rig.clocks import ClockLatch, DeviceNs, HostNs
-from rig.frame import NO_SLOT
+from rig.frame import NO_SLOT, StampedPixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,13 +17,14 @@ class Arrival:
     """Something arrived from a camera.
 
     Attributes:
-        whole: a whole frame. If not, ids and device time are meaningless and there are no pixels.
+        whole: a whole frame. If not, ids are meaningless and there are no pixels.
         host_time: when it was handed over.
         slot: slot of the ring that holds the pixels; the caller queues or returns it.
         frame_id: block id or frame counter.
         id_modulus: how many different ids there are, 0 if they never wrap.
-        device_time: device clock at the trigger.
+        device_time: device clock at the trigger; of a damaged frame only about so, 0 if it cannot be told.
         trigger_count: the camera's own count of triggers, -1 if it has none.
+        stamped: pixels that are no picture but the camera's signature.
     """
 
     whole: bool
@@ -33,6 +34,7 @@ class Arrival:
     id_modulus: int = 0
     device_time: DeviceNs = DeviceNs(0)
     trigger_count: int = -1
+    stamped: StampedPixels | None = None
 
 
 class Camera(Protocol):
@@ -72,6 +74,10 @@ class Camera(Protocol):
 
     def counters(self) -> Mapping[str, int]:
         """What the back end has counted, by the names of `rig.ring.COUNTERS`."""
+        ...
+
+    def notices(self) -> Sequence[str]:
+        """What happened since the last call that people should find in the event log, one line each."""
         ...
 
     def close(self) -> None:

@@ -4,7 +4,7 @@ The scene is handed in (`Scene`), because rooms do not import each other: the fr
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Protocol
 
@@ -99,6 +99,10 @@ class SimCamera:
     def counters(self) -> Mapping[str, int]:
         """Frames that found no free slot."""
         return {"underruns": self._underruns}
+
+    def notices(self) -> Sequence[str]:
+        """None."""
+        return ()
 
     def close(self) -> None:
         """Give the slots back."""

@@ -24,17 +24,42 @@ class FrameStatus(StrEnum):
 class RecordKind(IntEnum):
     """Meaning of a record."""
 
-    FRAME = 1  #: a whole frame in `slot`; ids and times valid
-    DAMAGED = 2  #: something arrived that is no whole frame; only `host_time` is to be believed
+    FRAME = 1  #: a whole frame in `slot`; ids and times valid; `value` = `StampedPixels.to_value`, 0 if there are none
+    DAMAGED = 2  #: something arrived that is no whole frame; believe `host_time`, and `device_time` if `value` is 1
     LATCH = 3  #: clock reading: `device_time`, `host_time`, `value` = round trip in ns
     CONNECTED = 4  #: camera (re)configured and streaming; a new epoch begins; `text` says what it is
     DISCONNECTED = 5  #: camera gone, epoch over; `text` says why
+    NOTICE = 6  #: something for the event log; `text` says what
 
 
 NO_SLOT = 0xFFFFFFFF
 TEXT_BYTES = 176
 _LAYOUT = struct.Struct(f"<BBHIIIqqqqQ{TEXT_BYTES}s")
 RECORD_BYTES = _LAYOUT.size
+
+
+@dataclass(frozen=True, slots=True)
+class StampedPixels:
+    """Pixels of a frame that carry the camera's signature instead of the picture.
+
+    Attributes:
+        row: of the frame.
+        column: the first of them.
+        count: how many, to the right.
+    """
+
+    row: int
+    column: int
+    count: int
+
+    def to_value(self) -> int:
+        """As one number, for `Record.value`."""
+        return self.row << 32 | self.column << 16 | self.count
+
+    @classmethod
+    def from_value(cls, value: int) -> "StampedPixels | None":
+        """Read what `to_value` gave; None for 0."""
+        return cls(value >> 32, value >> 16 & 0xFFFF, value & 0xFFFF) if value else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +72,7 @@ class Record:
         slot: slot of the ring that holds the pixels, `NO_SLOT` if none.
         frame_id: the camera's block id (GigE Vision) or frame counter (IIDC).
         id_modulus: how many different ids there are (65535 for 16-bit block ids, which skip 0); 0: never wraps.
-        device_time: device clock at the trigger, ns.
+        device_time: device clock at the trigger, ns; of a damaged frame, if at all, only about so.
         host_time: host clock when the record was made, ns.
         trigger_count: the camera's own count of triggers seen, -1 if it has none.
         value: see `RecordKind`.

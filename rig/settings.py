@@ -3,6 +3,7 @@
 Strict: an unknown or misspelt key is an error, never ignored. `rig.rigfile` reads it and words the errors.
 """
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -26,6 +27,19 @@ class Region(_Strict):
     height: int = Field(480, gt=0, le=16384)
 
 
+class IidcSettings(_Strict):
+    """What only a FireWire camera has."""
+
+    bus: int = Field(0, ge=0, le=15, description="which FireWire bus: cameras on one card share its bandwidth")
+    iso_speed: Literal[100, 200, 400, 800] = Field(400, description="Mbit/s; 800 needs IEEE 1394b throughout")
+    trigger_mode: Literal[0, 1] = Field(0, description="0: the edge triggers, exposure_us long; 1: the level exposes")
+    dma_frames: int = Field(64, ge=64, le=512, description="frames that the kernel holds while the grabber is busy")
+    gain_step_db: float = Field(0.0354, gt=0, le=10, description="gain_db of one step of the gain register (Marlin)")
+    shutter_offset_us: float = Field(
+        30.0, ge=0, le=10_000, description="added to every exposure by the camera (Marlin F-080B: 30, F-080-30fps: 17)"
+    )
+
+
 class CameraSettings(_Strict):
     """One camera. The order of the cameras in the file is their order in the triplet, left to right."""
 
@@ -38,6 +52,7 @@ class CameraSettings(_Strict):
     gain_db: float = Field(0.0, ge=0, le=60)
     trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
     trigger_edge: Literal["rising", "falling"] = "rising"
+    iidc: IidcSettings = IidcSettings()
 
     @property
     def frame_bytes(self) -> int:
@@ -48,6 +63,23 @@ class CameraSettings(_Strict):
     def _address_where_needed(self) -> "CameraSettings":
         if self.backend != "sim" and not self.address:
             raise ValueError(f'backend "{self.backend}" needs an address: add address = "..."')
+        return self
+
+    @model_validator(mode="after")
+    def _firewire_keys_make_sense(self) -> "CameraSettings":
+        if self.backend != "iidc":
+            if "iidc" in self.model_fields_set:
+                raise ValueError(f'iidc = ... is for backend "iidc" only, this one is "{self.backend}": remove it')
+            return self
+        if not re.fullmatch(r"(0x)?[0-9A-Fa-f]{16}", self.address):
+            raise ValueError(
+                f'address "{self.address}" is no GUID: give the 16 hexadecimal digits of the camera\'s label, '
+                "or of svev doctor --bus firewire"
+            )
+        if not re.fullmatch(r"Line[0-3]", self.trigger_input):
+            raise ValueError(
+                f'trigger_input "{self.trigger_input}" is no input of a FireWire camera: use "Line0" to "Line3"'
+            )
         return self
 
 
@@ -123,7 +155,7 @@ class RigSettings(_Strict):
         names = [camera.name for camera in self.cameras]
         if twice := {name for name in names if names.count(name) > 1}:
             raise ValueError(f"camera name {', '.join(sorted(twice))} is used twice: give each camera its own name")
-        addresses = [(c.backend, c.address) for c in self.cameras if c.address]
+        addresses = [(c.backend, c.address.lower().removeprefix("0x")) for c in self.cameras if c.address]
         if doubled := {address for address in addresses if addresses.count(address) > 1}:
             raise ValueError(
                 f"address {', '.join(a for _, a in sorted(doubled))} is used twice: give each camera its own address"

@@ -47,6 +47,9 @@ TAG_SCHEMA: dict[str, Any] = {
                                      "description": "UTC time at which the frame was in the host's memory, ns"},
                     "offset_us": {"type": ["number", "null"],
                                   "description": "trigger time of this frame minus the pulse's, common time line, us"},
+                    "stamped_pixels": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3,
+                                       "description": "pixels that are a signature of the camera, no picture: row and "
+                                                      "first column in the triplet, count; left out if there are none"},
                 },
             },
         },
@@ -62,6 +65,7 @@ class CameraTag:
         columns: first column and one past the last column of the camera's block in the triplet.
         host_time: UTC at which the frame stood in the host's memory.
         offset_us: the frame's trigger time on the common time line minus the pulse's.
+        stamped: row and first column in the triplet, and number, of pixels that are no picture but a signature.
     """
 
     name: str
@@ -72,10 +76,11 @@ class CameraTag:
     device_time: DeviceNs | None = None
     host_time: UtcNs | None = None
     offset_us: float | None = None
+    stamped: tuple[int, int, int] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The contract's form."""
-        return {
+        entry = {
             "name": self.name,
             "columns": list(self.columns),
             "status": self.status.value,
@@ -85,6 +90,7 @@ class CameraTag:
             "host_time_ns": None if self.host_time is None else str(self.host_time),
             "offset_us": None if self.offset_us is None else round(self.offset_us, 3),
         }
+        return entry if self.stamped is None else entry | {"stamped_pixels": list(self.stamped)}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "CameraTag":
@@ -95,6 +101,7 @@ class CameraTag:
         """
         first, end = data["columns"]
         device, host = data["device_time_ns"], data["host_time_ns"]
+        stamped = data.get("stamped_pixels")
         return cls(
             data["name"],
             (int(first), int(end)),
@@ -104,6 +111,7 @@ class CameraTag:
             None if device is None else DeviceNs(int(device)),
             None if host is None else UtcNs(int(host)),
             data["offset_us"],
+            None if stamped is None else (int(stamped[0]), int(stamped[1]), int(stamped[2])),
         )
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
+from capture.iidc.bandwidth import check_bandwidth
+from capture.iidc.library import load as load_libdc1394
 from capture.seam import Camera, OpenCamera
 from rig.clocks import HostNs
 from rig.errors import BadInputError
@@ -25,14 +27,20 @@ def _sim(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> Camer
     return SimCamera(rig.cameras[index], ring, SimScene(rig, index, epoch))
 
 
-_BACKENDS: Final[dict[Backend, _Open]] = {"aravis": _aravis, "sim": _sim}
+def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> Camera:
+    from capture.iidc.iidc_camera import IidcCamera  # noqa: PLC0415
+
+    return IidcCamera(rig.cameras[index], ring, rig.trigger.rate_hz)
+
+
+_BACKENDS: Final[dict[Backend, _Open]] = {"aravis": _aravis, "iidc": _iidc, "sim": _sim}
 
 
 def check_backends(rig: RigSettings) -> None:
     """Whether all cameras of a rig can be driven.
 
     Raises:
-        BadInputError: a back end is not built yet.
+        BadInputError: a back end is not built yet, libdc1394 is missing, or a FireWire bus has no room for its cameras.
     """
     for camera in rig.cameras:
         if camera.backend not in _BACKENDS:
@@ -40,6 +48,9 @@ def check_backends(rig: RigSettings) -> None:
             raise BadInputError(
                 f'camera {camera.name}: backend "{camera.backend}" is not built yet: use {known} in the rig file'
             )
+    if any(camera.backend == "iidc" for camera in rig.cameras):
+        load_libdc1394()
+        check_bandwidth(rig)
 
 
 def camera_opener(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:

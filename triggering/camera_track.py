@@ -9,13 +9,14 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from rig.clocks import ClockLatch, HostNs
+from rig.clocks import ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record
 from triggering.block_ids import id_step
 from triggering.counters import CameraCounters
 from triggering.device_clock import DeviceClock
 from triggering.gaps import DamageMatcher, Gap
 from triggering.pulse_train import PulseTrain
+from triggering.pulses import NO_FRAME, Outcome
 
 #: Damaged arrivals that wait for their pulse; more can only come from a camera that sends nothing else.
 _MOST_DAMAGED: Final = 64
@@ -105,8 +106,15 @@ class CameraTrack:
             self._last = self._last_time = None
             self._broken = True
 
-    def damaged(self, host: HostNs) -> None:
-        """Something arrived that is no whole frame."""
+    def damaged(self, host: HostNs, device: DeviceNs | None = None) -> None:
+        """Something arrived that is no whole frame.
+
+        Args:
+            host: when.
+            device: the camera's clock at its trigger, if it can be told.
+        """
+        if device is not None and self.clock.known:
+            host = self._matcher.arrival_of(self.clock.to_host(device))
         if len(self._damaged) >= _MOST_DAMAGED:
             del self._damaged[0]
             self.counters.unassigned += 1
@@ -144,7 +152,10 @@ class CameraTrack:
             self._gaps.append(self._end_running_gap(self._since, time, taken, anchored=False))
         elif time > last_time:
             taken = self._taken_since(last, last_time, record, time)
-            self._gaps.append(self._end_running_gap(last_time, time, taken, anchored=not self._broken))
+            gap = self._end_running_gap(last_time, time, taken, anchored=not self._broken)
+            gap.overruns = _overruns(last, record, taken + 1) if gap.anchored else 0
+            self.counters.overruns += gap.overruns
+            self._gaps.append(gap)
         else:
             if record.frame_id == last.frame_id:
                 self.counters.duplicate += 1
@@ -163,7 +174,7 @@ class CameraTrack:
         expected = time >= self._since - self._tolerance_ns and time >= self._known_until
         return expected and self.connected and not self.silent
 
-    def settle(self, time: HostNs, rivals: Sequence[HostNs]) -> FrameStatus:
+    def settle(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
         """Decide a pulse for which the camera has delivered no whole frame. Pulses come in the order of time.
 
         Args:
@@ -174,16 +185,16 @@ class CameraTrack:
         if gap is not None:
             return gap.settle(time, rivals, self._matcher)
         if not self.connected or time < self._since:
-            return FrameStatus.ABSENT
+            return NO_FRAME[FrameStatus.ABSENT]
         if self._damaged and self._matcher.match(self._damaged, time, rivals):
             self._settled_damaged += 1
-            return FrameStatus.DAMAGED
+            return NO_FRAME[FrameStatus.DAMAGED]
         self._settled_unseen += 1
         self.unanswered += time > self.alive
         if self._last_time is None or self.silent:
-            return FrameStatus.ABSENT
+            return NO_FRAME[FrameStatus.ABSENT]
         self.counters.presumed += 1
-        return FrameStatus.LOST
+        return NO_FRAME[FrameStatus.LOST]
 
     def gap_after(self, time: HostNs) -> Gap | None:
         """The gap in which `time` lies, None if its end is not known yet. Earlier gaps are done with."""
@@ -246,10 +257,15 @@ class CameraTrack:
             self.counters.restarts += 1
             self._broken = True
             return 0
-        if record.trigger_count >= 0 and last.trigger_count >= 0:
-            self.counters.overruns += max(0, record.trigger_count - last.trigger_count - step)
         return step - 1
 
     def _most_steps(self, span_ns: int) -> float:
         """More frames than this a camera cannot have taken in a time, however odd the rate."""
         return 1.5 * span_ns / self._train.period_ns + 1.5
+
+
+def _overruns(last: Record, record: Record, frames: int) -> int:
+    """Triggers between two whole frames, of which the camera made no frame: it took so many `frames`."""
+    if record.trigger_count < 0 or last.trigger_count < 0:
+        return 0
+    return max(0, record.trigger_count - last.trigger_count - frames)

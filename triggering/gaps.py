@@ -12,6 +12,7 @@ from typing import Final
 from rig.clocks import HostNs
 from rig.frame import FrameStatus
 from triggering.counters import CameraCounters
+from triggering.pulses import NO_FRAME, OVERRUN, Outcome
 
 _EXTRA_GAIN: Final = 0.2
 _LATENCY_GAIN: Final = 0.05
@@ -29,6 +30,7 @@ class Gap:
         damaged: host times of damaged arrivals in between that no pulse accounts for yet.
         broken: the ids do not tell anything here (the camera was not there, silent, or began anew).
         anchored: both ends are frames, so that ids and time together can prove pulses that nobody delivered.
+        overruns: triggers in between that the camera saw but could not follow; those pulses are missed.
     """
 
     start: HostNs
@@ -38,8 +40,9 @@ class Gap:
     damaged: list[HostNs] = field(default_factory=list)
     broken: bool = False
     anchored: bool = True
+    overruns: int = 0
 
-    def settle(self, time: HostNs, rivals: Sequence[HostNs], matcher: "DamageMatcher") -> FrameStatus:
+    def settle(self, time: HostNs, rivals: Sequence[HostNs], matcher: "DamageMatcher") -> Outcome:
         """Decide the pulse at `time`, for which the camera delivered no whole frame.
 
         Args:
@@ -48,20 +51,23 @@ class Gap:
             matcher: tells which damaged arrival belongs to which pulse.
         """
         if time < self.start:
-            return FrameStatus.ABSENT
+            return NO_FRAME[FrameStatus.ABSENT]
         if self.damaged and (self.broken or self.taken > 0) and matcher.match(self.damaged, time, rivals):
             self.taken -= 1
-            return FrameStatus.DAMAGED
+            return NO_FRAME[FrameStatus.DAMAGED]
         if self.broken:
-            return FrameStatus.ABSENT
+            return NO_FRAME[FrameStatus.ABSENT]
         if self.taken > len(self.damaged):
             self.taken -= 1
-            return FrameStatus.LOST
-        return FrameStatus.MISSED
+            return NO_FRAME[FrameStatus.LOST]
+        if self.overruns > 0:
+            self.overruns -= 1
+            return OVERRUN
+        return NO_FRAME[FrameStatus.MISSED]
 
 
 class DamageMatcher:
-    """Matches damaged arrivals, of which only the host time is known, to pulses.
+    """Matches damaged arrivals, of which often only the host time is known, to pulses.
 
     A damaged frame is handed over later than a whole one: when the next one begins or when a timeout is over. How
     much later is learned wherever there was no choice; until then half a period.
@@ -87,6 +93,10 @@ class DamageMatcher:
     def trigger_of(self, arrival: HostNs) -> float:
         """Likely trigger time of a damaged arrival."""
         return arrival - self.latency_ns - self._extra_ns
+
+    def arrival_of(self, trigger: HostNs) -> HostNs:
+        """Where a damaged arrival stands whose trigger time the camera tells."""
+        return HostNs(round(trigger + self.latency_ns + self._extra_ns))
 
     def match(self, damaged: list[HostNs], time: HostNs, rivals: Sequence[HostNs]) -> bool:
         """Take the first damaged arrival out of the list if it belongs to the pulse at `time`.

@@ -26,7 +26,6 @@ _SILENT_PERIODS: Final = 3
 _HELD_BACK_NS: Final = NS_PER_S // 20  # good frames wait so long behind a damaged one
 _FIRST_NS: Final = NS_PER_S // 2  # a camera that has just been connected may take so long to its first frame
 _TIME: Final = attrgetter("time")
-_NO_FRAME: Final = {status: Outcome(status) for status in FrameStatus}
 
 
 class Pairer:
@@ -91,12 +90,12 @@ class Pairer:
         return pulse
 
     def damaged(self, camera: int, record: Record) -> None:
-        """Something arrived that is no whole frame; of the record only `host_time` is used."""
+        """Something arrived that is no whole frame; of the record only its times are used."""
         track = self._tracks[camera]
         if not self._is_current(track, record):
             return
         if track.connected:
-            track.damaged(record.host_time)
+            track.damaged(record.host_time, record.device_time if record.value == 1 else None)
         else:
             track.counters.stale += 1
 
@@ -235,7 +234,7 @@ class Pairer:
         for camera, track in enumerate(self._tracks):
             record, time = pulse.frames[camera], pulse.times[camera]
             if record is None or time is None:
-                outcome = _NO_FRAME[track.settle(pulse.time, self._rivals(camera, track))]
+                outcome = track.settle(pulse.time, self._rivals(camera, track))
             else:
                 track.forget_until(time)
                 offset = time - pulse.time

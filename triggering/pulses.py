@@ -1,6 +1,8 @@
 """A trigger pulse while its frames come in, and what became of it in every camera."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from rig.clocks import HostNs
 from rig.frame import FrameStatus, Record
@@ -51,11 +53,17 @@ class Outcome:
     Attributes:
         record: the frame, None unless `status` is ok.
         offset_ns: the frame's trigger time minus the pulse's, both on the common time line; None likewise.
+        overrun: the pulse is missed because the camera saw it but was still busy with the frame before.
     """
 
     status: FrameStatus
     record: Record | None = None
     offset_ns: int | None = None
+    overrun: bool = False
+
+
+NO_FRAME: Final[Mapping[FrameStatus, Outcome]] = {status: Outcome(status) for status in FrameStatus}
+OVERRUN: Final = Outcome(FrameStatus.MISSED, overrun=True)
 
 
 @dataclass(frozen=True, slots=True)

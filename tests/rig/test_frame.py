@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.clocks import DeviceNs, HostNs
-from rig.frame import NO_SLOT, RECORD_BYTES, TEXT_BYTES, Record, RecordKind
+from rig.frame import NO_SLOT, RECORD_BYTES, TEXT_BYTES, Record, RecordKind, StampedPixels
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 records = st.builds(
@@ -42,3 +42,14 @@ def test_a_long_text_is_cut_between_characters(text: str) -> None:
 def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(ValueError, match="RecordKind"):
         Record.unpack_from(memoryview(bytes(RECORD_BYTES)), 0)
+
+
+@given(st.integers(0, 16383), st.integers(0, 16383), st.integers(1, 16384))
+def test_stamped_pixels_travel_as_one_number(row: int, column: int, count: int) -> None:
+    pixels = StampedPixels(row, column, count)
+    assert StampedPixels.from_value(pixels.to_value()) == pixels
+    assert pixels.to_value() < 2**63
+
+
+def test_no_number_means_no_stamped_pixels() -> None:
+    assert StampedPixels.from_value(0) is None

@@ -91,3 +91,14 @@ def test_the_schema_refuses_an_unknown_status() -> None:
 def test_what_is_no_tag_is_refused(text: bytes) -> None:
     with pytest.raises((ValueError, KeyError, TypeError)):
         TripletTag.decode(text)
+
+
+def test_pixels_of_a_signature_are_marked_only_where_there_are_any() -> None:
+    plain = CameraTag("K1", (0, 640), FrameStatus.OK, 1, 1, DeviceNs(5), UtcNs(6), 0.0)
+    signed = CameraTag("K2", (640, 1280), FrameStatus.OK, 1, 1, DeviceNs(5), UtcNs(6), 0.0, (479, 640, 12))
+    tag = TripletTag(1, UtcNs(5), "", "", (480, 1280), (plain, signed))
+    data = tag.to_json()
+    VALIDATOR.validate(data)
+    assert [camera.get("stamped_pixels") for camera in data["cameras"]] == [None, [479, 640, 12]]
+    assert "stamped_pixels" not in data["cameras"][0]
+    assert TripletTag.decode(tag.encode()) == tag

@@ -71,6 +71,45 @@ def test_trigger_counts_tell_overruns() -> None:
     feed.all_cameras(2, [3, 2, 3], triggers=[3, 3, 3])
     assert [outcome.status for outcome in feed.closed[1].outcomes] == [OK, MISSED, OK]
     assert [counters.overruns for counters in feed.pairer.counters] == [0, 1, 0]
+    assert [outcome.overrun for outcome in feed.closed[1].outcomes] == [False, True, False]
+
+
+def test_a_pulse_that_the_camera_did_not_see_is_no_overrun() -> None:
+    feed = Feed()
+    feed.all_cameras(0, [1, 1, 1], triggers=[1, 1, 1])
+    feed.all_cameras(1, [2, None, 2], triggers=[2, 0, 2])
+    feed.all_cameras(2, [3, 2, 3], triggers=[3, 2, 3])
+    assert feed.closed[1].outcomes[1].status is MISSED
+    assert not feed.closed[1].outcomes[1].overrun
+
+
+def test_of_several_pulses_in_a_row_as_many_are_overruns_as_the_camera_counted() -> None:
+    feed = Feed()
+    feed.all_cameras(0, [1, 1, 1], triggers=[1, 1, 1])
+    for pulse in (1, 2, 3):
+        feed.all_cameras(pulse, [pulse + 1, None, pulse + 1], triggers=[pulse + 1, 0, pulse + 1])
+    feed.all_cameras(4, [5, 3, 5], triggers=[5, 4, 5])
+    between = [pulse.outcomes[1] for pulse in feed.closed[1:4]]
+    assert [outcome.status for outcome in between] == [LOST, MISSED, MISSED]
+    assert [outcome.overrun for outcome in between] == [False, True, False]
+
+
+@pytest.mark.parametrize("late_by", [3 * MS, 40 * MS])
+@pytest.mark.parametrize("damaged_pulse", [1, 2])
+def test_a_damaged_frame_that_tells_its_trigger_time_is_placed_by_it(damaged_pulse: int, late_by: int) -> None:
+    """FireWire hands a torn frame over only when the next one begins or even ends."""
+    feed = Feed()
+    feed.all_cameras(0, [1, 1, 1])
+    for pulse in (1, 2):
+        for camera in (0, 2):
+            feed.frame(camera, pulse, pulse + 1)
+    trigger = feed.time_of(damaged_pulse)
+    arrival = HostNs(feed.time_of(2) + late_by)
+    device = DeviceNs(trigger - START + 100 * US)
+    feed.pairer.damaged(1, Record(RecordKind.DAMAGED, 1, arrival, device_time=device, value=1))
+    feed.all_cameras(3, [4, 4, 4])
+    statuses = [pulse.outcomes[1].status for pulse in feed.closed[1:3]]
+    assert statuses == ([DAMAGED, LOST] if damaged_pulse == 1 else [LOST, DAMAGED])
 
 
 def test_frames_before_the_clock_is_known_are_counted_not_placed() -> None:

@@ -1,0 +1,114 @@
+"""How much of a FireWire bus a camera takes, computed as libdc1394 and the bus do.
+
+Of each cycle of 125 us, 100 us may be isochronous: 4915 units, each the time of four bytes at 1600 Mbit/s. A camera
+sends one packet per cycle, with three quadlets of header and checksums. A rig must be refused before it starts:
+the kernel says only that no channel is to be had (libdc1394's error -7, not -8).
+"""
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import Final
+
+from capture.iidc.cycle_time import CYCLE_NS
+from capture.iidc.structures import VideoMode
+from rig.errors import BadInputError
+from rig.settings import CameraSettings, RigSettings
+
+UNITS_PER_BUS: Final = 4915
+_OVERHEAD_QUADLETS: Final = 3
+_UNITS_PER_QUADLET: Final = {100: 16, 200: 8, 400: 4, 800: 2}
+#: IIDC's frame rates for fixed formats, in libdc1394's order; each fixes the packet size.
+FRAMERATES: Final = (1.875, 3.75, 7.5, 15.0, 30.0, 60.0, 120.0, 240.0)
+#: A pulse generator may be so much faster than a frame rate of the standard.
+_FAST: Final = 1.01
+#: Share of the period in which a Format7 frame is sent, so that the next one never has to wait for it.
+_SHARE: Final = 0.9
+#: Formats that the standard fixes, by width and height: libdc1394's mode, and a frame's cycles at 30 fps.
+FIXED_FORMATS: Final = {
+    (640, 480): (VideoMode.MONO8_640X480, 240),
+    (800, 600): (VideoMode.MONO8_800X600, 240),
+    (1024, 768): (VideoMode.MONO8_1024X768, 256),
+    (1280, 960): (VideoMode.MONO8_1280X960, 240),
+    (1600, 1200): (VideoMode.MONO8_1600X1200, 240),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """What one camera takes.
+
+    Attributes:
+        packet_bytes: payload of one packet.
+        packets: per frame.
+        units: bandwidth units of its bus.
+    """
+
+    packet_bytes: int
+    packets: int
+    units: int
+
+    @property
+    def transport_ns(self) -> int:
+        """From the first packet of a frame to its last."""
+        return self.packets * CYCLE_NS
+
+
+def is_fixed_format(camera: CameraSettings) -> bool:
+    """Whether the region is a whole image of a format that the standard fixes; anything else is Format7."""
+    region = camera.region
+    return region.x == region.y == 0 and (region.width, region.height) in FIXED_FORMATS
+
+
+def framerate_index(rate_hz: float) -> int:
+    """Which of `FRAMERATES`: the slowest that is not slower than the pulses.
+
+    Raises:
+        BadInputError: none is.
+    """
+    for index, framerate in enumerate(FRAMERATES):
+        if rate_hz <= framerate * _FAST:
+            return index
+    raise BadInputError(f"{rate_hz:g} pulses per second are more than FireWire cameras can do: lower trigger.rate_hz")
+
+
+def need(camera: CameraSettings, rate_hz: float, *, unit_bytes: int = 4) -> Need:
+    """What a camera takes of its bus.
+
+    Args:
+        camera: its settings.
+        rate_hz: of the pulses.
+        unit_bytes: packets of Format7 are a multiple of this; the camera tells.
+    """
+    if is_fixed_format(camera):
+        _, cycles_at_30 = FIXED_FORMATS[camera.region.width, camera.region.height]
+        cycles = round(cycles_at_30 * 30 / FRAMERATES[framerate_index(rate_hz)])
+    else:
+        cycles = int(_SHARE * 1e9 / rate_hz / CYCLE_NS)
+    packet = math.ceil(camera.frame_bytes / max(1, cycles) / unit_bytes) * unit_bytes
+    return Need(packet, math.ceil(camera.frame_bytes / packet), units(packet, camera.iidc.iso_speed))
+
+
+def units(packet_bytes: int, iso_speed: int) -> int:
+    """Bandwidth units of one packet per cycle."""
+    return (math.ceil(packet_bytes / 4) + _OVERHEAD_QUADLETS) * _UNITS_PER_QUADLET[iso_speed]
+
+
+def check_bandwidth(rig: RigSettings) -> None:
+    """Whether the FireWire cameras of a rig find room on their buses.
+
+    Raises:
+        BadInputError: they do not.
+    """
+    buses: dict[int, list[CameraSettings]] = defaultdict(list)
+    for camera in rig.cameras:
+        if camera.backend == "iidc":
+            buses[camera.iidc.bus].append(camera)
+    for bus, cameras in buses.items():
+        needs = [need(camera, rig.trigger.rate_hz).units for camera in cameras]
+        if sum(needs) > UNITS_PER_BUS:
+            each = ", ".join(f"{camera.name} {units}" for camera, units in zip(cameras, needs, strict=True))
+            raise BadInputError(
+                f"the cameras on FireWire bus {bus} need {sum(needs)} of its {UNITS_PER_BUS} bandwidth units ({each}): "
+                "take one away, give it a card of its own and say so with iidc.bus, or lower trigger.rate_hz or regions"
+            )

@@ -1,0 +1,213 @@
+"""One open FireWire camera: libdc1394's calls that we use, typed. Knows nothing of rigs, rings or pulses."""
+
+import ctypes
+from ctypes import byref, c_float, c_int, c_uint32, c_uint64
+from types import TracebackType
+from typing import Any, Self
+
+from capture.iidc.bus import Bus, Found, guid_text
+from capture.iidc.library import Dc1394Error
+from capture.iidc.structures import (
+    FEATURE_MODE_MANUAL,
+    FRAMERATE_1_875,
+    TRIGGER_MODE_0,
+    TRIGGER_SOURCE_0,
+    Feature,
+    Framerates,
+    IsoSpeed,
+    OperationMode,
+    Polarity,
+    TriggerSources,
+    VideoMode,
+    VideoModes,
+)
+from rig.errors import CameraError
+
+
+class Device:
+    """A camera that libdc1394 has opened; a context manager. Every call may raise `Dc1394Error`.
+
+    Attributes:
+        pointer: `dc1394camera_t *`.
+    """
+
+    def __init__(self, bus: Bus, found: Found) -> None:
+        self._library = bus.library
+        self.pointer = self._library.get("camera_new_unit", bus.handle, found.guid, found.unit)
+        if not self.pointer:
+            raise CameraError(
+                f"FireWire camera {guid_text(found.guid)} is listed but cannot be opened: plug it out and in"
+            )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of it; its channel and bandwidth are free again. Idempotent."""
+        if self.pointer:
+            self._library.get("camera_free", self.pointer)
+        self.pointer = None
+
+    def call(self, name: str, *arguments: Any) -> None:
+        """`dc1394_<name>` of this camera."""
+        self._library.call(name, self.pointer, *arguments)
+
+    def file_descriptor(self) -> int:
+        """What becomes readable when a frame is complete or the bus was reset; -1 while capture is not set up."""
+        return int(self._library.get("capture_get_fileno", self.pointer))
+
+    @property
+    def name(self) -> str:
+        """Vendor, model and GUID."""
+        camera = self.pointer.contents
+        words = [(text or b"?").decode(errors="replace").strip() for text in (camera.vendor, camera.model)]
+        return f"{' '.join(words)}, GUID {guid_text(camera.guid)}"
+
+    @property
+    def has_advanced_registers(self) -> bool:
+        """Whether the maker has registers of its own."""
+        return bool(self.pointer.contents.advanced_features_csr)
+
+    @property
+    def vendor_id(self) -> int:
+        """IEEE number of the maker."""
+        return int(self.pointer.contents.vendor_id)
+
+    # -- transmission and bus ------------------------------------------------------------------------------------
+
+    def set_transmission(self, *, on: bool) -> None:
+        """Let the camera send frames, or not."""
+        self.call("video_set_transmission", int(on))
+
+    def transmits(self) -> bool:
+        """Whether it sends frames."""
+        return bool(self._int("video_get_transmission"))
+
+    def set_iso_speed(self, mbit_s: int) -> None:
+        """Speed of the frames; more than 400 needs IEEE 1394b."""
+        speed = IsoSpeed[f"S{mbit_s}"]
+        mode = OperationMode.B_1394 if speed > IsoSpeed.S400 else OperationMode.LEGACY
+        self.call("video_set_operation_mode", mode)
+        self.call("video_set_iso_speed", speed)
+
+    def cycle_timer(self) -> int:
+        """The bus's cycle timer, one word."""
+        word, utc_us = c_uint32(), c_uint64()
+        self.call("read_cycle_timer", byref(word), byref(utc_us))
+        return word.value
+
+    def bandwidth_units(self) -> int:
+        """What the frames take of the bus, as the camera is set now."""
+        return self._u32("video_get_bandwidth_usage")
+
+    # -- picture -------------------------------------------------------------------------------------------------
+
+    def modes(self) -> list[int]:
+        """Video modes that the camera has."""
+        modes = VideoModes()
+        self.call("video_get_supported_modes", byref(modes))
+        return [int(mode) for mode in modes.modes[: modes.num]]
+
+    def framerates(self, mode: int) -> list[int]:
+        """Places in `bandwidth.FRAMERATES` that a fixed format can have."""
+        rates = Framerates()
+        self.call("video_get_supported_framerates", mode, byref(rates))
+        return [int(rate) - FRAMERATE_1_875 for rate in rates.framerates[: rates.num]]
+
+    def mode(self) -> int:
+        """The video mode that is set."""
+        return self._int("video_get_mode")
+
+    def set_fixed_format(self, mode: VideoMode, framerate: int) -> None:
+        """A format of the standard, and the place of its rate in `bandwidth.FRAMERATES`."""
+        self.call("video_set_mode", mode)
+        self.call("video_set_framerate", FRAMERATE_1_875 + framerate)
+
+    def pair(self, name: str, *arguments: Any) -> tuple[int, int]:
+        """A function that gives two numbers."""
+        first, second = c_uint32(), c_uint32()
+        self.call(name, *arguments, byref(first), byref(second))
+        return first.value, second.value
+
+    # -- features ------------------------------------------------------------------------------------------------
+
+    def has(self, feature: Feature) -> bool:
+        """Whether the camera has a feature."""
+        return bool(self._int("feature_is_present", feature))
+
+    def set_by_hand(self, feature: Feature) -> None:
+        """No automatism of the camera changes the feature."""
+        self.call("feature_set_mode", feature, FEATURE_MODE_MANUAL)
+
+    def set_raw(self, feature: Feature, value: int) -> None:
+        """Set a feature in the camera's own steps."""
+        self.call("feature_set_value", feature, value)
+
+    def boundaries(self, feature: Feature) -> tuple[int, int]:
+        """Least and greatest value in the camera's own steps."""
+        return self.pair("feature_get_boundaries", feature)
+
+    def has_absolute(self, feature: Feature) -> bool:
+        """Whether the feature can be set in physical units."""
+        return bool(self._int("feature_has_absolute_control", feature))
+
+    def set_absolute(self, feature: Feature, value: float) -> None:
+        """Set a feature in physical units (shutter: s, gain: dB)."""
+        self.call("feature_set_absolute_control", feature, 1)
+        self.call("feature_set_absolute_value", feature, value)
+
+    def absolute_boundaries(self, feature: Feature) -> tuple[float, float]:
+        """Least and greatest value in physical units."""
+        least, greatest = c_float(), c_float()
+        self.call("feature_get_absolute_boundaries", feature, byref(least), byref(greatest))
+        return least.value, greatest.value
+
+    # -- trigger -------------------------------------------------------------------------------------------------
+
+    def trigger_sources(self) -> list[int]:
+        """Numbers of the inputs that can trigger."""
+        sources = TriggerSources()
+        self.call("external_trigger_get_supported_sources", byref(sources))
+        return [int(source) - TRIGGER_SOURCE_0 for source in sources.sources[: sources.num]]
+
+    def set_trigger(self, *, mode: int, source: int, rising: bool) -> None:
+        """Let pulses trigger."""
+        self.call("external_trigger_set_mode", TRIGGER_MODE_0 + mode)
+        self.call("external_trigger_set_source", TRIGGER_SOURCE_0 + source)
+        if self._int("external_trigger_has_polarity"):
+            self.call("external_trigger_set_polarity", Polarity.ACTIVE_HIGH if rising else Polarity.ACTIVE_LOW)
+        elif not rising:
+            raise CameraError(f'{self.name} triggers on rising edges only: set trigger_edge = "rising"')
+        self.call("external_trigger_set_power", 1)
+
+    def is_triggered(self) -> bool:
+        """Whether pulses trigger."""
+        return bool(self._int("external_trigger_get_power"))
+
+    # -- the maker's registers -----------------------------------------------------------------------------------
+
+    def read_advanced(self, offset: int) -> int:
+        """One of the maker's registers."""
+        word = c_uint32()
+        self.call("get_adv_control_registers", offset, byref(word), 1)
+        return word.value
+
+    def write_advanced(self, offset: int, value: int) -> None:
+        """One of the maker's registers."""
+        self.call("set_adv_control_registers", offset, byref(c_uint32(value)), 1)
+
+    def _u32(self, name: str, *arguments: Any) -> int:
+        value = c_uint32()
+        self.call(name, *arguments, byref(value))
+        return value.value
+
+    def _int(self, name: str, *arguments: Any) -> int:
+        value: ctypes.c_int = c_int()
+        self.call(name, *arguments, byref(value))
+        return value.value
+
+
+__all__ = ["Dc1394Error", "Device"]

@@ -1,0 +1,81 @@
+"""The kernel's ring of frames, through libdc1394: set up, wait with a deadline, take, give back."""
+
+import ctypes
+import select
+from typing import Any, Final
+
+from capture.iidc.bandwidth import UNITS_PER_BUS
+from capture.iidc.device import Device
+from capture.iidc.library import Dc1394Error
+from capture.iidc.structures import CAPTURE_FLAGS_DEFAULT, CAPTURE_POLICY_POLL, Code, FramePointer
+from rig.clocks import NS_PER_S, host_now
+from rig.errors import CameraError
+
+_GONE: Final = select.POLLHUP | select.POLLERR | select.POLLNVAL
+
+
+class DmaRing:
+    """Frames of one camera as the FireWire card writes them into memory.
+
+    Args:
+        device: the camera, its format set.
+        frames: so many the ring holds.
+        name: of the camera, for messages.
+
+    Attributes:
+        disturbed: `wait` ended because something else than a frame came: the bus was reset. The caller clears it.
+
+    Raises:
+        CameraError: no channel, no bandwidth, no memory.
+    """
+
+    def __init__(self, device: Device, frames: int, name: str) -> None:
+        self._device, self._name = device, name
+        self.disturbed = False
+        try:
+            device.call("capture_setup", frames, CAPTURE_FLAGS_DEFAULT)
+        except Dc1394Error as error:
+            # The kernel has one answer for both, so libdc1394 says -7 (no channel) where the bandwidth is exhausted.
+            if error.code not in (Code.NO_ISO_CHANNEL, Code.NO_BANDWIDTH):
+                raise
+            raise CameraError(
+                f"camera {name} finds no room on its FireWire bus: it needs {device.bandwidth_units()} of its "
+                f"{UNITS_PER_BUS} bandwidth units and a channel; stop other cameras on the bus, or make regions smaller"
+            ) from None
+        self._poll = select.poll()
+        self._poll.register(device.file_descriptor(), select.POLLIN)
+
+    def wait(self, timeout_s: float) -> Any:
+        """The next frame.
+
+        Args:
+            timeout_s: at most so long.
+
+        Returns:
+            Pointer to a `VideoFrame`, the caller's to `give_back`; None if none came, or if `disturbed`.
+
+        Raises:
+            CameraError: the camera was unplugged.
+        """
+        deadline = host_now() + round(timeout_s * NS_PER_S)
+        while True:
+            remaining_ms = max(0, deadline - host_now()) / 1e6
+            ready = self._poll.poll(remaining_ms)
+            if not ready:
+                return None
+            if ready[0][1] & _GONE:
+                raise CameraError(f"camera {self._name} is gone from the FireWire bus; check its power and cable")
+            frame = FramePointer()
+            self._device.call("capture_dequeue", CAPTURE_POLICY_POLL, ctypes.byref(frame))
+            if frame:
+                return frame
+            self.disturbed = True
+            return None
+
+    def give_back(self, frame: Any) -> None:
+        """Its memory may be written again."""
+        self._device.call("capture_enqueue", frame)
+
+    def close(self) -> None:
+        """Stop. Raises `Dc1394Error` if the card does not."""
+        self._device.call("capture_stop")

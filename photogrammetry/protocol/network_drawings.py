@@ -16,6 +16,7 @@ from photogrammetry.protocol.scales import nice
 from photogrammetry.protocol.svg import Colour
 
 _NAMED = 60  # with more points names cover the drawing
+_SIGHTED = 12  # with more images their fields of view cover the drawing
 _ELLIPSE = 11.0  # drawn units of a typical one
 _LARGEST = 3.0  # times that
 _CLOSER = 0.7  # where the points fill less of the network than this they are drawn once more, closer
@@ -83,7 +84,7 @@ def network_drawings(a: Adjustment, extras: Extras | None = None, *, a_priori: b
     nearby += extras.places
     unit = a.network.length_unit
     far = _extent([*nearby, *cameras]) * _CLOSER > _extent(nearby)
-    sights = _sights(a, np.array([place.xyz for place in nearby]))
+    sights = _sights(a, np.array([place.xyz for place in nearby])) if len(cameras) <= _SIGHTED else []
     whole = [replaced for place in nearby for replaced in (_bare(place) if far else place,)]
     drawings = [
         _projected([*whole, *cameras], [*sights, *extras.tracks], side, unit, "Network") for side in range(len(_SIDES))

@@ -23,11 +23,16 @@ padding:1rem;overflow-wrap:break-word}}
 h1{{font-size:1.6rem;line-height:1.2;margin:.5rem 0 1.5rem}}
 h2{{font-size:1.2rem;margin:2.2rem 0 .6rem;padding-bottom:.2rem;border-bottom:2px solid var(--faint)}}
 p{{margin:.4rem 0}}
-.table{{overflow-x:auto;margin:.8rem 0}}
+.table{{overflow-x:auto;margin:.8rem 0;background:\
+linear-gradient(90deg,var(--paper) 50%,transparent) 0 0/2rem 100% no-repeat local,\
+linear-gradient(-90deg,var(--paper) 50%,transparent) 100% 0/2rem 100% no-repeat local,\
+linear-gradient(90deg,var(--faint),transparent) 0 0/.8rem 100% no-repeat,\
+linear-gradient(-90deg,var(--faint),transparent) 100% 0/.8rem 100% no-repeat}}
 table{{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}}
 th,td{{padding:.2rem .7rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--faint)}}
 th{{color:var(--soft);font-weight:600}}
 th:first-child,td:first-child{{text-align:left;padding-left:0}}
+@media(max-width:40rem){{table{{font-size:.8rem}}th,td{{padding:.2rem .35rem}}}}
 .drawings{{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1.2rem;margin:1rem 0}}
 figure{{margin:0;min-width:0;break-inside:avoid}}
 figcaption{{color:var(--soft);font-size:.85rem;line-height:1.35;margin-top:.3rem}}
@@ -35,7 +40,8 @@ svg{{display:block;width:100%;height:auto;background:var(--fill);border-radius:.
 svg text{{font:10px system-ui,sans-serif;fill:var(--soft)}}
 svg line,svg polyline,svg ellipse,svg circle[fill=none]{{stroke:currentColor}}
 {"".join(f".{name}{{color:var(--{name})}}" for name in ("ink", "soft", "faint", "blue", "red", "green", "amber"))}
-@media print{{body{{font-size:10pt;max-width:none;padding:0}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
+@media print{{:root{{font-size:10pt}}body{{font-size:10pt;max-width:none;padding:0}}table{{font-size:.75rem}}\
+th,td{{padding:.1rem .4rem}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
 h2{{break-after:avoid}}.drawings{{grid-template-columns:1fr 1fr}}svg{{border:1px solid var(--faint)}}}}
 """
 
@@ -83,5 +89,5 @@ def _part(part: str | Table | Drawing) -> str:
         return f"<figure>{part.svg}<figcaption>{escape(part.caption)}</figcaption></figure>"
     head = "".join(f"<th>{escape(cell)}</th>" for cell in part.head)
     rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in part.rows)
-    # a wide table scrolls within its box, also by keyboard
+    # a wide table scrolls within its box, also by keyboard; a shade at its edge says that there is more
     return f'<div class="table" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'

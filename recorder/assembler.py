@@ -12,9 +12,10 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from recorder.stranded_slots import StrandedSlots
 from recorder.triplet_buffers import TripletBuffers
-from rig.clocks import NS_PER_US, ClockLatch, HostNs, UtcAnchor
-from rig.frame import FrameStatus, Record, RecordKind
+from rig.clocks import NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
+from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
 from rig.ring import CameraRing
 from rig.settings import RigSettings
 from rig.tag import CameraTag
@@ -35,12 +36,23 @@ def least_buffers(period_ns: int) -> int:
     return 2 * (hold_ns(period_ns) // period_ns + 1)
 
 
+_OVERRUN = (
+    "overrun: a pulse came while it was busy with the frame before, and is missed; shorten its exposure or lower "
+    "trigger.rate_hz"
+)
+
+
+#: Records of a camera that is connected.
+_STREAMING = (RecordKind.FRAME, RecordKind.DAMAGED, RecordKind.LATCH)
+
+
 class CameraState(StrEnum):
     """What a camera has just become."""
 
     CONNECTED = "connected"
     SILENT = "silent"  #: connected, but three pulses behind the others; its grabber looks after it
     GONE = "gone"
+    NOTICE = "notice"  #: nothing has become of it, but people should know
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +116,8 @@ class Assembler:
         self._decided: deque[ClosedPulse] = deque()
         self._changes: list[CameraChange] = []
         self._asked = [False] * len(rings)
+        self._heard = [False] * len(rings)
+        self._stranded = StrandedSlots(rings, host_now())
         period = rig.trigger.period_ns
         self.hold_ns = hold_ns(period)
         self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns)
@@ -123,6 +137,7 @@ class Assembler:
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
         self._decided.extend(self.pairer.advance(min(waiting, default=now)))
         self._ask_silent_cameras(now)
+        self._stranded.free(now)
         return list(self._ready())
 
     def _ready(self) -> Iterator[Triplet]:
@@ -135,7 +150,14 @@ class Assembler:
             slot = part.slot if isinstance(part, _Composition) else None
             if slot is not None:
                 self._blacken(pulse, slot)
+            self._tell_overruns(pulse)
             yield Triplet(pulse, slot)
+
+    def _tell_overruns(self, pulse: ClosedPulse) -> None:
+        """A pulse missed because the camera was busy has another remedy than one that it did not see."""
+        for camera, outcome in enumerate(pulse.outcomes):
+            if outcome.overrun:
+                self._changes.append(CameraChange(camera, CameraState.NOTICE, _OVERRUN))
 
     @property
     def backlog(self) -> bool:
@@ -164,20 +186,37 @@ class Assembler:
             triggers = None if record.trigger_count < 0 else record.trigger_count
             offset = None if outcome.offset_ns is None else outcome.offset_ns / NS_PER_US
             host = anchor.utc(record.host_time)
+            pixels = StampedPixels.from_value(record.value)
+            stamped = None if pixels is None else (pixels.row, columns[0] + pixels.column, pixels.count)
             yield CameraTag(
-                name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset
+                name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset, stamped
             )  # fmt: skip
 
     def _read(self, camera: int) -> None:
         """Take in what one camera has queued, up to a frame that has to wait for a buffer."""
         ring = self._rings[camera]
         while not self._is_waiting(camera) and (record := ring.get()) is not None:
+            if not self._heard[camera]:
+                self._hear_first(camera, record)
             if record.kind is not RecordKind.FRAME:
                 self._note(camera, record)
-            elif (pulse := self.pairer.frame(camera, record)) is None:
+                continue
+            self._stranded.named(camera, record.slot)
+            if (pulse := self.pairer.frame(camera, record)) is None:
                 ring.release(record.slot)
             else:
                 self._place(camera, record, pulse)
+
+    def _hear_first(self, camera: int, record: Record) -> None:
+        """A camera not heard of from its connection on was there before this recorder, which took another's place."""
+        self._heard[camera] = record.kind in (*_STREAMING, RecordKind.CONNECTED, RecordKind.DISCONNECTED)
+        if record.kind in _STREAMING:
+            self._join(camera, record, "streaming since before the recorder was started")
+
+    def _join(self, camera: int, record: Record, text: str) -> None:
+        self.pairer.connected(camera, record.epoch, record.host_time)
+        self.connected[camera] = True
+        self._changes.append(CameraChange(camera, CameraState.CONNECTED, text))
 
     def _is_waiting(self, camera: int) -> bool:
         return any(camera == waiting for part in self._waiting for waiting, _ in part.pending)
@@ -190,11 +229,11 @@ class Assembler:
             case RecordKind.LATCH:
                 self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
             case RecordKind.CONNECTED:
-                self.pairer.connected(camera, record.epoch, record.host_time)
-                self.connected[camera] = True
-                self._changes.append(CameraChange(camera, CameraState.CONNECTED, record.text))
+                self._join(camera, record, record.text)
             case RecordKind.DISCONNECTED:
                 self._leave(camera, record.text, record.host_time)
+            case RecordKind.NOTICE:
+                self._changes.append(CameraChange(camera, CameraState.NOTICE, record.text))
 
     def _leave(self, camera: int, reason: str, time: HostNs) -> None:
         self.pairer.disconnected(camera, time)

@@ -32,6 +32,7 @@ _LEVELS: Final = {
     CameraState.CONNECTED: Level.INFO,
     CameraState.SILENT: Level.WARNING,
     CameraState.GONE: Level.ERROR,
+    CameraState.NOTICE: Level.WARNING,
 }
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000

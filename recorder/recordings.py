@@ -19,6 +19,7 @@ from recorder.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import BadInputError, StorageError
 from rig.settings import RigSettings
+from rig.tag import TripletTag
 from triggering.pairing import ClosedPulse
 
 _SLICE_NS: Final = NS_PER_S // 200
@@ -111,7 +112,7 @@ class Recordings:
     def take(self, triplet: Triplet) -> None:
         """Take over a decided pulse, the latest so far."""
         ready = host_now()
-        if self._recording is None:
+        if self._recording is None or self._ending:
             self._note_latency(triplet.pulse, ready)
         self._preroll.add(triplet, ready)
 
@@ -199,11 +200,20 @@ class Recordings:
             recording.write(tag, slot, encoded, held.ready)
         if pulse.time >= recording.commanded:
             self._note_latency(pulse, host_now())
+        self._tell_overruns(tag, pulse)
 
     def _note_latency(self, pulse: ClosedPulse, now: HostNs) -> None:
         arrivals = [outcome.record.host_time for outcome in pulse.outcomes if outcome.record is not None]
         if arrivals:
             self._latency.add(now - max(arrivals))
+
+    def _tell_overruns(self, tag: TripletTag, pulse: ClosedPulse) -> None:
+        """A pulse missed because the camera was busy has another remedy than one that it did not see."""
+        why = "overrun: the camera saw it but was still busy with the frame before"
+        for camera, outcome in zip(tag.cameras, pulse.outcomes, strict=True):
+            if outcome.overrun:
+                text = f"pulse {tag.pulse}: {why}; shorten its exposure or lower trigger.rate_hz"
+                self.happened(Event.now(Level.WARNING, camera.name, text))
 
     def _finish(self) -> None:
         recording, self._recording, self._over_since = self._recording, None, None

@@ -171,6 +171,16 @@ class CameraRing:
         """The recorder is done with a slot."""
         self._map[_OWNERS + slot] = _FREE[0]
 
+    def queued_slots(self) -> set[int]:
+        """The slots that the grabber has handed over and the recorder has not freed."""
+        return {slot for slot in range(self.slots) if self._map[_OWNERS + slot] == _QUEUED[0]}
+
+    def unread_slots(self) -> set[int]:
+        """The slots that are named by records which nobody has read."""
+        read, written = self._words[_READ], self._words[_WRITTEN]
+        places = (number % self._capacity * RECORD_BYTES for number in range(read, written))
+        return {Record.unpack_from(self._queue, place).slot for place in places}
+
     def request_reconnect(self) -> None:
         """Ask the grabber to tear the camera down and set it up from scratch."""
         self._words[_RECONNECT] += 1

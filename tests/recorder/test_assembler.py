@@ -1,69 +1,26 @@
 """The assembler with real rings and real buffers: right columns, black blocks, back-pressure without loss."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack
 
 import numpy as np
 import pytest
 
-from recorder.assembler import Assembler, Triplet
+from recorder.assembler import Assembler, CameraState, Triplet
 from recorder.triplet_buffers import TripletBuffers
-from rig.clocks import DeviceNs, HostNs, UtcAnchor
-from rig.frame import FrameStatus, Record, RecordKind
-from rig.ring import CameraRing
-from rig.settings import CameraSettings, Region, RigSettings, TriggerSettings
+from rig.clocks import HostNs, UtcAnchor, host_now
+from rig.frame import FrameStatus
+from tests.recorder.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, ring_rig
 
-PERIOD = 33_333_333
-SIZES = [(40, 30), (64, 30), (16, 30)]
-START = 1_000_000_000
-
-
-def _rig() -> RigSettings:
-    cameras = tuple(
-        CameraSettings(name=f"K{i + 1}", backend="aravis", address=f"127.0.0.{i + 1}", region=Region(width=w, height=h))
-        for i, (w, h) in enumerate(SIZES)
-    )
-    return RigSettings(name="test", cameras=cameras, trigger=TriggerSettings(rate_hz=30))
-
-
-class Cameras:
-    """Three grabbers' ends of their rings; every device clock is the host's."""
-
-    def __init__(self, rings: list[CameraRing]) -> None:
-        self.rings = rings
-        self.ids = [0] * len(rings)
-        for ring in rings:
-            ring.put(Record(RecordKind.CONNECTED, 1, HostNs(START - 1)))
-            for i in range(16):
-                time = HostNs(START - 16 + i)
-                ring.put(Record(RecordKind.LATCH, 1, time, device_time=DeviceNs(time), value=10_000))
-
-    def expose(self, pulse: int, *cameras: int, lose: bool = False) -> None:
-        """Put one frame of each camera; its pixels are 10 * pulse + camera."""
-        for camera in cameras:
-            self.ids[camera] += 1
-            slot = None if lose else self.rings[camera].take_slot()
-            if slot is None:
-                continue
-            self.rings[camera].frame(slot)[:] = 10 * pulse + camera
-            time = START + pulse * PERIOD
-            record = Record(
-                RecordKind.FRAME, 1, HostNs(time + 5_000_000), slot, self.ids[camera], 0, DeviceNs(time + camera)
-            )
-            self.rings[camera].put(record)
+Parts = tuple[Assembler, RingCameras, TripletBuffers]
 
 
 @pytest.fixture
-def parts() -> Iterator[tuple[Assembler, Cameras, TripletBuffers]]:
-    rig = _rig()
-    with ExitStack() as stack:
-        rings = []
-        for camera in rig.cameras:
-            rings.append(CameraRing.create(camera.name, camera.frame_bytes, 16))
-            stack.callback(rings[-1].close)
+def parts() -> Iterator[Parts]:
+    rig = ring_rig()
+    with camera_rings(rig) as rings:
         buffers = TripletBuffers(rig.triplet_shape, 4)
-        stack.callback(buffers.close)
-        yield Assembler(rig, rings, buffers), Cameras(rings), buffers
+        yield Assembler(rig, rings, buffers), RingCameras(rings), buffers
+        buffers.close()
 
 
 def _now(pulse: float) -> HostNs:
@@ -81,7 +38,7 @@ def _blocks(buffers: TripletBuffers, triplet: Triplet) -> list[set[int]]:
     return values
 
 
-def test_frames_stand_side_by_side_in_the_rigs_order(parts: tuple[Assembler, Cameras, TripletBuffers]) -> None:
+def test_frames_stand_side_by_side_in_the_rigs_order(parts: Parts) -> None:
     assembler, cameras, buffers = parts
     cameras.expose(1, 2, 0, 1)
     (triplet,) = assembler.pump(_now(1.3))
@@ -95,7 +52,7 @@ def test_frames_stand_side_by_side_in_the_rigs_order(parts: tuple[Assembler, Cam
 
 
 def test_a_missing_frame_is_black_even_where_an_older_one_stood(
-    parts: tuple[Assembler, Cameras, TripletBuffers],
+    parts: Parts,
 ) -> None:
     assembler, cameras, buffers = parts
     for pulse in range(1, 5):
@@ -111,7 +68,7 @@ def test_a_missing_frame_is_black_even_where_an_older_one_stood(
 
 
 def test_without_a_free_buffer_frames_wait_in_the_rings_and_none_is_lost(
-    parts: tuple[Assembler, Cameras, TripletBuffers],
+    parts: Parts,
 ) -> None:
     assembler, cameras, buffers = parts
     for pulse in range(1, 11):
@@ -126,3 +83,51 @@ def test_without_a_free_buffer_frames_wait_in_the_rings_and_none_is_lost(
     assert seen == [[{10 * n}, {10 * n + 1}, {10 * n + 2}] for n in range(1, 11)]
     assert not assembler.backlog
     assert buffers.free_count == buffers.count
+
+
+def test_a_recorder_that_takes_anothers_place_goes_on_with_its_cameras() -> None:
+    rig = ring_rig()
+    with camera_rings(rig) as rings:
+        cameras, first = RingCameras(rings, host_now()), TripletBuffers(rig.triplet_shape, 1)
+        dead = Assembler(rig, rings, first)
+        for pulse in (1, 2, 3):
+            cameras.expose(pulse, 0, 1, 2)
+        dead.pump(cameras.time(3.3))  # pulse 1 has the only buffer; it dies with pulse 2 in hand, 3 unread
+        first.close()
+        in_hand = [ring.queued_slots() - ring.unread_slots() for ring in rings]
+        assert [len(slots) for slots in in_hand] == [1, 1, 1]
+
+        buffers = TripletBuffers(rig.triplet_shape, 4)
+        anew = Assembler(rig, rings, buffers)
+        anew.pump(cameras.time(3.4))
+        assert [change.state for change in anew.changes()] == [CameraState.CONNECTED] * 3
+        assert anew.connected == [True] * 3
+        cameras.latch()
+        cameras.expose(4, 0, 1, 2)
+        (triplet,) = anew.pump(cameras.time(4.3))
+        assert _blocks(buffers, triplet) == [{40}, {41}, {42}]
+        assert [ring.queued_slots() for ring in rings] == in_hand, "a grabber could still be about to queue them"
+        anew.pump(HostNs(host_now() + 2_000_000_000))
+        assert [ring.queued_slots() for ring in rings] == [set()] * 3
+        buffers.close()
+
+
+def test_a_slot_whose_record_was_just_being_queued_is_not_taken_for_stranded() -> None:
+    rig = ring_rig()
+    with camera_rings(rig) as rings:
+        slot = rings[0].take_slot()
+        assert slot is not None
+        rings[0]._map[1024 + slot] = 2  # queued; its record follows only after the new recorder has looked
+        buffers = TripletBuffers(rig.triplet_shape, 4)
+        assembler, cameras = Assembler(rig, rings, buffers), RingCameras(rings, host_now())
+        assembler.pump(cameras.time(0))
+        rings[0]._map[1024 + slot] = 0
+        cameras.expose(1, 0, 1, 2)
+        later = HostNs(host_now() + 2_000_000_000)
+        taken = [buffers.acquire() for _ in range(4)]  # nothing is copied now: the frames stay in their slots
+        assembler.pump(later)
+        assert [len(ring.queued_slots()) for ring in rings] == [1, 1, 1]
+        for held in taken:
+            assert held is not None
+            buffers.release(held)
+        buffers.close()

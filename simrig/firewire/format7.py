@@ -4,7 +4,7 @@ from enum import IntEnum
 from typing import Final
 
 from simrig.firewire.bits import bit
-from simrig.firewire.geometry import PACKET_UNIT, SENSOR, UNIT, Readout, recommended_packet_bytes
+from simrig.firewire.geometry import PACKET_UNIT, POSITION_UNIT, SENSOR, SIZE_UNIT, Readout, recommended_packet_bytes
 
 CSR: Final = 0xF08000  #: where its registers are, from the begin of the initial register space
 SIZE: Final = 0x100
@@ -64,8 +64,8 @@ class Format7:
         readout = self.readout
         registers = {
             Register.MAX_IMAGE_SIZE: SENSOR[0] << 16 | SENSOR[1],
-            Register.UNIT_SIZE: UNIT[0] << 16 | UNIT[1],
-            Register.UNIT_POSITION: UNIT[0] << 16 | UNIT[1],
+            Register.UNIT_SIZE: SIZE_UNIT[0] << 16 | SIZE_UNIT[1],
+            Register.UNIT_POSITION: POSITION_UNIT[0] << 16 | POSITION_UNIT[1],
             Register.IMAGE_POSITION: self._left << 16 | self._top,
             Register.IMAGE_SIZE: self._width << 16 | self._height,
             Register.COLOR_CODING_ID: 0,  # Mono8
@@ -97,12 +97,13 @@ class Format7:
         return recommended_packet_bytes(self._width, self._height, self.max_packet_bytes)
 
     def _region_fits(self) -> bool:
+        places, sizes = (self._left, self._top), (self._width, self._height)
         return all(
-            size > 0 and begin + size <= whole and begin % unit == 0 and size % unit == 0
-            for begin, size, whole, unit in (
-                (self._left, self._width, SENSOR[0], UNIT[0]),
-                (self._top, self._height, SENSOR[1], UNIT[1]),
-            )
+            sizes[axis] > 0
+            and places[axis] + sizes[axis] <= SENSOR[axis]
+            and places[axis] % POSITION_UNIT[axis] == 0
+            and sizes[axis] % SIZE_UNIT[axis] == 0
+            for axis in (0, 1)
         )
 
     def _packet_fits(self, packet_bytes: int) -> bool:

@@ -5,7 +5,8 @@ from typing import Final
 
 SENSOR: Final = (1032, 778)  #: width and height, px
 VGA: Final = (640, 480)
-UNIT: Final = (4, 2)  #: steps of size and position in Format_7
+SIZE_UNIT: Final = (4, 2)  #: steps of width and height in Format_7
+POSITION_UNIT: Final = (4, 1)  #: of the first column and row
 PACKET_UNIT: Final = 4  #: bytes
 RATES_HZ: Final = {1: 3.75, 2: 7.5, 3: 15.0, 4: 30.0}  #: frame rates of Format_0 by the code in CUR_V_FRM_RATE
 #: Largest isochronous packet by speed code (IEEE 1394-1995, 6.2.2.3): S100, S200, S400.

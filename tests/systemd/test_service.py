@@ -1,0 +1,90 @@
+"""The service under the real systemd: start, sandbox, watchdog, stop. Skipped where systemd cannot be booted."""
+
+import json
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.waiting import wait_until
+from tests.systemd.booted import CHECKOUT, Booted, booted
+
+_ASK = """
+import json, sys, urllib.request
+method, path, body = sys.argv[1:]
+request = urllib.request.Request("http://127.0.0.1:8000" + path, body.encode() or None, method=method)
+request.add_header("Content-Type", "application/json")
+sys.stdout.write(urllib.request.urlopen(request, timeout=20).read().decode())
+"""
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """What `make install PREFIX=/opt/prefix` makes, but the program is that of the checkout; the rig is simulated."""
+    prefix = tmp_path / "prefix"
+    subprocess.run([CHECKOUT / "systemd" / "install-units", prefix], check=True, timeout=30)
+    for path in prefix.rglob("*"):
+        if path.is_file():
+            path.write_text(path.read_text().replace(str(prefix), "/opt/prefix"))
+    rig = (CHECKOUT / "config" / "rigs" / "sim.toml").read_text()
+    (prefix / "etc/svev/rig.toml").write_text(rig.replace('"../', '"/opt/svev/config/'))
+    program = prefix / "bin" / "svev"
+    program.parent.mkdir()
+    program.write_text('#!/bin/sh\nexport PYTHONPATH=/opt/svev\nexec /opt/svev/.venv/bin/python -m svev "$@"\n')
+    program.chmod(0o755)
+    return prefix
+
+
+@pytest.fixture
+def systemd(prefix: Path) -> Iterator[Booted]:
+    """Runs, and the service is ready."""
+    with booted(prefix) as system:
+        wait_until(lambda: system.show("ActiveState") == "active", "the service is ready", 30)
+        yield system
+
+
+def _ask(system: Booted, method: str, path: str, body: str = "") -> dict[str, object]:
+    answer = json.loads(system.run("python3", "-c", _ASK, method, path, body))
+    assert isinstance(answer, dict)
+    return answer
+
+
+def _await_state(system: Booted, state: str) -> None:
+    wait_until(lambda: _ask(system, "GET", "/api/status")["state"] == state, f"the state is {state}", 30)
+
+
+def test_stopping_the_unit_finishes_the_recording(systemd: Booted) -> None:
+    assert "svev" in systemd.run("ps", "-o", "user=", "-p", systemd.show("MainPID"))
+    _ask(systemd, "POST", "/api/arm")
+    _await_state(systemd, "armed")
+    recording = _ask(systemd, "POST", "/api/recordings", '{"athlete": "Ola", "bib": "17"}')
+    _await_state(systemd, "recording")
+    assert "recording" in systemd.show("StatusText").lower()
+
+    systemd.systemctl("stop", "svev.service")
+
+    assert systemd.show("Result") == "success"
+    assert systemd.show("ExecMainStatus") == "0"
+    log = f"/var/lib/svev/recordings/{recording['id']}.mcap"
+    systemd.run("/opt/prefix/bin/svev", "verify", log)
+
+
+def test_a_service_that_hangs_is_started_again(systemd: Booted) -> None:
+    first = systemd.show("MainPID")
+
+    systemd.run("kill", "-STOP", first)
+
+    wait_until(lambda: systemd.show("NRestarts") == "1", "the watchdog has fired", 60)
+    wait_until(lambda: systemd.show("ActiveState") == "active", "the service is ready again", 30)
+    assert systemd.show("MainPID") != first
+    assert _ask(systemd, "GET", "/api/status")["state"] == "idle"
+
+
+def test_a_wrong_rig_file_is_not_tried_again(prefix: Path) -> None:
+    (prefix / "etc/svev/rig.toml").write_text("name = 3\n")
+    with booted(prefix) as system:
+        wait_until(lambda: system.show("ActiveState") == "failed", "the service has given up", 30)
+        assert system.show("ExecMainStatus") == "2"
+        assert system.show("NRestarts") == "0"
+        assert "rig.toml" in system.log()

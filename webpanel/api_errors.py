@@ -19,7 +19,7 @@ _MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
           "no recording 'jump-7': see the list of recordings"),
     409: ("The state forbids it; `detail` says what to do instead.", "state_forbids", "the rig is idle: arm it first"),
     413: ("The body is too large.", "request_entity_too_large",
-          "the request's body is too large; no call needs more than 64 KiB"),
+          "the request's body is too large: no call needs more than 64 KiB"),
     415: ("The body is not JSON.", "unsupported_media_type",
           "the body must be JSON: send Content-Type: application/json"),
     416: ("The file ends before the range that was asked for.", "range_not_satisfiable",

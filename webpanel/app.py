@@ -18,7 +18,7 @@ from webpanel.access import Access
 from webpanel.api_errors import COMMON, Responses
 from webpanel.changes import Changes
 from webpanel.documentation import DESCRIPTION, serve_documentation
-from webpanel.guard import BODY_MAX, SECURITY_HEADERS, Door, Guard
+from webpanel.guard import SECURITY_HEADERS, Door, Guard
 from webpanel.metrics import CountRequests, Metrics
 from webpanel.models import Health
 from webpanel.preview import PreviewFeed
@@ -74,7 +74,7 @@ def create_app(service: RigService, catalogue: Catalogue, access: Access) -> Fas
 
     app = FastAPI(
         title="Svev", version=version("svev"), description=DESCRIPTION, docs_url=None, redoc_url=None,
-        redirect_slashes=False, max_body_size=BODY_MAX, lifespan=lifespan, responses=COMMON,
+        redirect_slashes=False, lifespan=lifespan, responses=COMMON,
         generate_unique_id_function=lambda route: route.name,
     )  # fmt: skip
     app.state.streams = streams

@@ -55,7 +55,7 @@ class Changes:
                 number = self.number
                 status = await run_in_threadpool(self._service.status)
                 self._note_recordings(status)
-                self._status = (number, now, status.model_dump_json().encode())
+                self._status = (number, now, status.model_dump_json(ensure_ascii=True).encode())
             return self._status[2]
 
     def _tell(self, what: Callable[[], None]) -> None:

@@ -6,6 +6,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -15,6 +16,9 @@ from webpanel.problems import ProblemError, problem
 
 COOKIE: Final = "svev_session"
 BODY_MAX: Final = 64 * 1024
+HEAD_MAX: Final = 16 * 1024
+_HEADER_COST: Final = 32  # what a header takes beside its text (RFC 9113, 6.5.2)
+_TOO_LARGE: Final = f"the request's body is too large: no call needs more than {BODY_MAX // 1024} KiB"
 _PAGE_POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "font-src 'self'; manifest-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
@@ -103,10 +107,11 @@ class Guard:
         except ProblemError as error:
             await problem(error.status, error.code, error.detail, error.headers)(scope, receive, send_guarded)
         else:
-            await self._app(scope, receive, send_guarded)
+            await self._app(scope, _bounded(receive), send_guarded)
 
     def _check(self, request: HTTPConnection) -> None:
         """Raises ProblemError if the request is not to be answered."""
+        _check_size(request.scope)
         headers, path, reading = request.headers, request.url.path, request.scope["method"] in _READING
         check_host(request, self._door.access)
         if not reading or (path.startswith("/api/") and headers.get("sec-fetch-mode") != "navigate"):
@@ -134,6 +139,14 @@ def client_of(request: HTTPConnection) -> str:
     return request.client.host if request.client else ""
 
 
+def _check_size(scope: Scope) -> None:
+    size = len(scope["raw_path"]) + len(scope["query_string"])
+    size += sum(len(name) + len(value) + _HEADER_COST for name, value in scope["headers"])
+    if size > HEAD_MAX:
+        text = f"address and headers of the request are too large: {HEAD_MAX // 1024} KiB are enough for every call"
+        raise ProblemError(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "request_head_too_large", text)
+
+
 def _check_origin(headers: Headers) -> None:
     """Browsers say from which page a request comes; programs do not."""
     origins = headers.getlist("origin")
@@ -153,16 +166,29 @@ def _authority(origin: str) -> str:
 
 def _check_body(headers: Headers, *, reading: bool) -> None:
     length = headers.get("content-length", "0")
-    has_body = length != "0" or "transfer-encoding" in headers
     if length.isdecimal() and int(length[:20]) > BODY_MAX:
-        text = f"the request's body is too large; no call needs more than {BODY_MAX // 1024} KiB"
-        raise ProblemError(
-            HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "request_entity_too_large", text, {"Connection": "close"}
-        )
+        raise ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "request_entity_too_large", _TOO_LARGE)
+    has_body = length != "0" or "transfer-encoding" in headers
     media_type = headers.get("content-type", "").partition(";")[0].strip().lower()
     if has_body and not reading and media_type != "application/json":
         text = "the body must be JSON: send Content-Type: application/json"
         raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
+
+
+def _bounded(receive: Receive) -> Receive:
+    """The same, for a body that does not say how long it is."""
+    received = 0
+
+    async def receive_bounded() -> Message:
+        nonlocal received
+        message = await receive()
+        received += len(message.get("body", b""))
+        if received > BODY_MAX:
+            # The one kind of error that the framework hands on while it reads a body.
+            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _TOO_LARGE)
+        return message
+
+    return receive_bounded
 
 
 def _unauthorized(code: str, text: str) -> ProblemError:

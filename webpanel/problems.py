@@ -27,7 +27,6 @@ _STATUSES: tuple[tuple[type[SvevError], HTTPStatus], ...] = (
 _ADVICE = {
     HTTPStatus.NOT_FOUND: "there is nothing at this address; see /docs",
     HTTPStatus.METHOD_NOT_ALLOWED: "this address does not take this method; see the Allow header",
-    HTTPStatus.REQUEST_ENTITY_TOO_LARGE: "the request's body is too large; no call needs more than 64 KiB",
 }
 
 

@@ -49,7 +49,9 @@ def events_router(service: RigService, changes: Changes, streams: Streams) -> AP
             yield ServerSentEvent(event="status", raw_data=status.decode())
             for event in await run_in_threadpool(service.events, after):
                 after = event.number
-                yield ServerSentEvent(event="log", id=f"{run}-{after}", raw_data=event.model_dump_json())
+                yield ServerSentEvent(
+                    event="log", id=f"{run}-{after}", raw_data=event.model_dump_json(ensure_ascii=True)
+                )
             if seen_recordings not in {None, changes.recordings}:
                 yield ServerSentEvent(event="recordings", raw_data="{}")
             seen_recordings = changes.recordings

@@ -7,6 +7,7 @@ import anyio
 import anyio.to_thread
 import numpy as np
 from fastapi import APIRouter, Path, Query, Response
+from fastapi.responses import FileResponse
 from numpy.typing import NDArray
 
 from recorder.catalogue import Catalogue, UnknownRecordingError
@@ -89,7 +90,7 @@ def images_router(service: RigService, catalogue: Catalogue) -> APIRouter:
 
     @router.get(
         "/recordings/{recording_id}/file",
-        response_class=RecordingFile,
+        response_class=FileResponse,
         responses=_LOG | refusals(404, 409, 416),
     )
     def download_recording(recording_id: RecordingId) -> RecordingFile:

@@ -6,8 +6,8 @@ import uvicorn
 from fastapi import FastAPI
 
 from webpanel.connection import GuardedConnection
+from webpanel.guard import HEAD_MAX
 
-_HEADERS_MAX_BYTES = 16 * 1024
 _GRACE_S = 3
 
 
@@ -38,7 +38,7 @@ def make_server(app: FastAPI) -> PanelServer:
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        h11_max_incomplete_event_size=_HEADERS_MAX_BYTES,
+        h11_max_incomplete_event_size=HEAD_MAX,
         timeout_graceful_shutdown=_GRACE_S,
     )
     return PanelServer(config, app)

@@ -1,0 +1,107 @@
+"""The description of the API is complete, and its page shows nothing from elsewhere."""
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.support.loopback import Loopback
+from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.serving import serving
+from webpanel.access import Access
+
+#: The calls of the contract, and those that the page needs beyond it.
+CALLS = {
+    "GET /api/status", "POST /api/arm", "POST /api/disarm", "GET /api/rig", "GET /api/doctor", "GET /api/events",
+    "GET /api/preview.jpg", "GET /api/preview.mjpg", "GET /api/recordings", "POST /api/recordings",
+    "GET /api/recordings/{recording_id}", "PATCH /api/recordings/{recording_id}",
+    "DELETE /api/recordings/{recording_id}", "POST /api/recordings/{recording_id}/stop",
+    "POST /api/recordings/{recording_id}/restore", "GET /api/recordings/{recording_id}/file",
+    "GET /api/recordings/{recording_id}/pulses", "GET /api/recordings/{recording_id}/pulses/{pulse}.jpg",
+    "GET /api/recordings/{recording_id}/thumbnail.jpg", "POST /api/login", "POST /api/logout", "GET /metrics",
+    "GET /healthz",
+}  # fmt: skip
+
+
+@pytest.fixture
+def schema(client: httpx.Client) -> dict[str, Any]:
+    """The description."""
+    found: dict[str, Any] = client.get("/openapi.json").json()
+    return found
+
+
+def operations(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Method and path, description."""
+    for path, methods in schema["paths"].items():
+        for method, operation in methods.items():
+            yield f"{method.upper()} {path}", operation
+
+
+def test_every_call_is_there(schema: dict[str, Any]) -> None:
+    assert {name for name, _ in operations(schema)} == CALLS
+
+
+def test_every_call_is_explained(schema: dict[str, Any]) -> None:
+    names = [operation["operationId"] for _, operation in operations(schema)]
+    assert len(set(names)) == len(names)
+    for name, operation in operations(schema):
+        assert re.fullmatch(r"[a-z_]+", operation["operationId"]), name
+        assert operation["description"], name
+        assert operation["tags"], name
+        for parameter in operation.get("parameters", ()):
+            assert parameter.get("description") or parameter["schema"].get("description"), (name, parameter)
+
+
+def test_every_refusal_is_declared_as_a_problem(schema: dict[str, Any]) -> None:
+    for name, operation in operations(schema):
+        if not name.partition(" ")[2].startswith("/api/"):
+            continue
+        statuses = set(operation["responses"])
+        assert {"400", "401", "403", "422", "429", "500"} <= statuses, name
+        if not name.startswith("GET") and "login" not in name and "logout" not in name:
+            assert {"409", "413", "415"} <= statuses, name
+        if "{recording_id}" in name:
+            assert "404" in statuses, name
+        for status, response in operation["responses"].items():
+            if status >= "400":
+                declared = response["content"]["application/problem+json"]
+                assert declared["schema"] == {"$ref": "#/components/schemas/Problem"}
+                assert declared["example"]["status"] == int(status)
+                assert list(response["content"]) == ["application/problem+json"], (name, status)
+
+
+def test_every_reference_leads_somewhere(schema: dict[str, Any]) -> None:
+    for name in re.findall(r'"#/components/schemas/(\w+)"', json.dumps(schema)):
+        assert name in schema["components"]["schemas"]
+    assert "HTTPValidationError" not in schema["components"]["schemas"]
+
+
+def test_bodies_have_examples(schema: dict[str, Any]) -> None:
+    fields = schema["components"]["schemas"]["RecordingOrder"]["properties"]
+    assert all(field.get("examples") for field in fields.values())
+    assert schema["components"]["schemas"]["RecordingOrder"]["additionalProperties"] is False
+
+
+def test_the_token_is_described_where_one_is_needed(service: MemoryService, loopback: Loopback) -> None:
+    token = "a-token-for-the-tests-only"  # noqa: S105
+    access = Access.for_address(loopback.host, environment={"SVEV_TOKEN": token})
+    with serving(service, access) as panel, panel.client(headers={"Authorization": f"Bearer {token}"}) as client:
+        schema = client.get("/openapi.json").json()
+    assert schema["security"] == [{"token": []}]
+    assert schema["paths"]["/api/login"]["post"]["security"] == []
+
+
+def test_the_page_of_the_description_needs_nothing_from_elsewhere(client: httpx.Client) -> None:
+    page = client.get("/docs")
+    assert page.headers["content-type"].startswith("text/html")
+    wanted = re.findall(r'(?:src|href)="([^"]+)"', page.text)
+    assert len(wanted) == 3
+    for address in wanted:
+        assert address.startswith("/docs/")
+        answer = client.get(address)
+        assert answer.status_code == 200
+        assert answer.headers["content-type"].split(";")[0] in {"text/css", "text/javascript"}
+    assert "https:" not in page.text + page.headers["content-security-policy"]

@@ -118,9 +118,10 @@ def serving(
     environment: Mapping[str, str] | None = None,
     prefix: tuple[str, ...] = (),
     data: Path | None = None,
+    port: int | None = None,
 ) -> Iterator[Serving]:
-    """A service on a port of this test's own; ended by SIGTERM, which must give exit code 0."""
-    port = loopback.free_port()
+    """A service on a port of this test's own (or the one given); ended by SIGTERM, which must give exit code 0."""
+    port = loopback.free_port() if port is None else port
     log, data = folder / "service.log", folder / "data" if data is None else data
     arguments = ["--rig", str(rig), "--host", loopback.host, "--port", str(port), "--data", str(data), *more]
     with log.open("w") as file:

@@ -15,13 +15,18 @@ from rig.rigfile import CONFIG, load_rig
 from rig.settings import RigSettings
 from svev.recording_run import new_log_path, run_recording
 from svev.running_rig import RunningRig
-from svev.simulation import simulated_hill
+from svev.simulation import environment, simulated_hill
 from svev.subscriber import Subscriber, free_address
 from svev.truth_file import write_truth
 
 Bus = Literal["gige", "firewire", "sim"]
 
-_RIGS: Final = {"gige": "sim-gige.toml", "sim": "sim.toml"}
+_RIGS: Final[dict[Bus, str]] = {"gige": "sim-gige.toml", "firewire": "sim-firewire.toml", "sim": "sim.toml"}
+_CAMERAS: Final[dict[Bus, str]] = {
+    "gige": "three simulated cameras speak GigE Vision",
+    "firewire": "three simulated cameras on an emulated FireWire bus",
+    "sim": "three simulated cameras",
+}
 _GVCP_PORT: Final = 3956
 _BLOCKS: Final = 64
 
@@ -32,16 +37,16 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
     Returns:
         The recording's result, what the subscriber counted, the verdict, and the files made.
     """
-    if bus == "firewire":
-        raise BadInputError("the emulated FireWire bus is not built yet: use --bus gige or --bus sim")
     rig_file = CONFIG / "rigs" / _RIGS[bus]
     rig = _on_free_addresses(load_rig(rig_file))
     path = new_log_path(out)
     epoch = host_now()
     with ExitStack() as stack:
         hill = stack.enter_context(simulated_hill(rig, epoch))
-        say(f"three simulated cameras{' speak GigE Vision' if hill else ''}; pulses at {rig.trigger.rate_hz:g} Hz")
-        running = stack.enter_context(RunningRig(rig, rig_file.read_text(encoding="utf-8"), say, epoch))
+        say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
+        running = stack.enter_context(
+            RunningRig(rig, rig_file.read_text(encoding="utf-8"), say, epoch, environment(hill))
+        )
         subscriber = stack.enter_context(Subscriber(rig.network.publish))
         session = {"session": "demo", "athlete": "simulated jumper"}
         result = run_recording(running, rig, path, seconds, allow_absent=False, session=session)
@@ -63,12 +68,11 @@ def _on_free_addresses(rig: RigSettings) -> RigSettings:
     """The rig with a port of its own for publication and, if they are taken, other loopback addresses."""
     network = rig.network.model_copy(update={"publish": free_address()})
     for block in range(_BLOCKS):
-        addresses = [camera.address.replace("127.0.0.", f"127.0.{block}.") for camera in rig.cameras]
-        if all(_is_free(address) for address in addresses if address):
-            cameras = tuple(
-                camera.model_copy(update={"address": address})
-                for camera, address in zip(rig.cameras, addresses, strict=True)
-            )
+        cameras = tuple(
+            camera.model_copy(update={"address": camera.address.replace("127.0.0.", f"127.0.{block}.")})
+            for camera in rig.cameras
+        )
+        if all(_is_free(camera.address) for camera in cameras if camera.backend == "aravis"):
             return rig.model_copy(update={"cameras": cameras, "network": network})
     raise BadInputError(f"{_BLOCKS} blocks of loopback addresses are all in use: stop the other simulated cameras")
 

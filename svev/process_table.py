@@ -4,12 +4,14 @@ A child inherits exactly the descriptors that its row names, and a control chann
 parent is gone. Nothing is forked, nothing is named in the file system, so nothing is left behind.
 """
 
+import os
 import select
 import signal
 import socket
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -27,12 +29,14 @@ class ProcessSpec:
         module: run as `python -m MODULE NAME CONTROL_FD`.
         config: first message that the child receives.
         inherit: descriptors that the child inherits under the same numbers.
+        environment: variables that the child has beside ours.
     """
 
     name: str
     module: str
     config: Message
     inherit: tuple[int, ...] = field(default=())
+    environment: Mapping[str, str] = field(default_factory=dict)
 
 
 class Child:
@@ -51,6 +55,7 @@ class Child:
                 [sys.executable, "-P", "-m", spec.module, spec.name, str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 pass_fds=(*spec.inherit, theirs.fileno()),
+                env={**os.environ, **spec.environment},
             )
         self.control = ControlChannel(ours)
         self.control.send(spec.config)

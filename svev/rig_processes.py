@@ -64,6 +64,7 @@ class RigProcesses:
         epoch: host time of the simulated hill's pulse 0; now if left out.
         recorder: more configuration for the recorder.
         inherit: descriptors that the recorder inherits for it.
+        environment: what grabbers of FireWire cameras need in theirs, for simulated ones.
 
     Attributes:
         cameras: what was last heard of each.
@@ -83,10 +84,12 @@ class RigProcesses:
         epoch: HostNs | None = None,
         recorder: Mapping[str, Any] | None = None,
         inherit: tuple[int, ...] = (),
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         check_backends(rig)
         self._rig, self._on_event = rig, on_event
         self._more, self._inherit = dict(recorder or {}), inherit
+        self._environment = dict(environment or {})
         self._processes = ProcessTable()
         self._exit = ExitStack()
         self._rings: list[CameraRing] = []
@@ -213,5 +216,7 @@ class RigProcesses:
             "rig": self._rig.model_dump(mode="json", exclude_unset=True), "camera": index, "ring": ring,
             "doorbell": self._doorbell, "epoch": self._epoch,
         }  # fmt: skip
-        spec = ProcessSpec(self._names[index], "svev.grabber_process", config, (ring, self._doorbell))
+        # Only libdc1394 has to see the emulated bus.
+        more = self._environment if self._rig.cameras[index].backend == "iidc" else {}
+        spec = ProcessSpec(self._names[index], "svev.grabber_process", config, (ring, self._doorbell), more)
         self._processes.start(spec)

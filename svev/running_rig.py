@@ -40,19 +40,25 @@ class RunningRig:
         rig_toml: the rig file's text, attached to every log.
         on_event: is told, in one line, of cameras that come and go and of processes that are started again.
         epoch: host time of the simulated hill's pulse 0; now if left out.
+        environment: what grabbers of FireWire cameras need in theirs, for simulated ones.
 
     Raises:
         BadInputError: a camera's back end is not built yet.
     """
 
     def __init__(
-        self, rig: RigSettings, rig_toml: str, on_event: Callable[[str], None], epoch: HostNs | None = None
+        self,
+        rig: RigSettings,
+        rig_toml: str,
+        on_event: Callable[[str], None],
+        epoch: HostNs | None = None,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         def tell(event: Event) -> None:
             on_event(f"{event.name} {event.message}")
 
         self._rig, self._rig_toml = rig, rig_toml
-        self._processes = RigProcesses(rig, tell, epoch=epoch)
+        self._processes = RigProcesses(rig, tell, epoch=epoch, environment=environment)
         self._path: Path | None = None
 
     def __enter__(self) -> Self:

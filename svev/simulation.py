@@ -1,11 +1,12 @@
 """Starts the simulated hill's cameras where the rig file asks for them."""
 
 import ipaddress
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 
 from rig.clocks import HostNs
 from rig.errors import BadInputError
-from rig.settings import CameraSettings, RigSettings
+from rig.settings import CameraSettings, Region, RigSettings
 from simrig.simulated_hill import SimulatedHill
 from simrig.world.scenario import load_scenario
 
@@ -13,37 +14,48 @@ from simrig.world.scenario import load_scenario
 def simulated_hill(
     rig: RigSettings, epoch: HostNs, *, prerendered: int = 0, link_mbit_s: float = 1000.0
 ) -> AbstractContextManager[SimulatedHill | None]:
-    """The simulated GigE Vision cameras of a rig with a `[simulation]` table; nothing for any other rig.
+    """The simulated cameras of a rig with a `[simulation]` table, GigE Vision and FireWire; nothing for any other rig.
 
     Args:
         rig: the rig.
         epoch: host time of hill pulse 0.
-        prerendered: for load tests: draw so many images once and only stamp them anew.
-        link_mbit_s: pace of each camera's packets; 0: as fast as possible.
+        prerendered: for load tests: GigE Vision cameras draw so many images once and only stamp them anew.
+        link_mbit_s: pace of each GigE Vision camera's packets; 0: as fast as possible.
 
     Raises:
-        BadInputError: the scenario is broken or lacks a camera; an address is not on loopback, or in use.
+        BadInputError: the scenario is broken or lacks a camera; an address is not on loopback, or in use, or no GUID.
     """
     if rig.simulation is None:
         return nullcontext()
     scenario = load_scenario(rig.simulation.scenario)
     for camera in rig.cameras:
         scenario.camera_index(camera.name)
-    cameras = [camera for camera in rig.cameras if camera.backend == "aravis"]
-    if not cameras:
+    gige = [camera for camera in rig.cameras if camera.backend == "aravis"]
+    firewire = [camera for camera in rig.cameras if camera.backend == "iidc"]
+    if not gige and not firewire:
         return nullcontext()
-    for camera in cameras:
+    for camera in gige:
         _check_loopback(camera)
-    region = cameras[0].region
+    region = gige[0].region if gige else Region()
     return SimulatedHill(
         rig.simulation.scenario,
-        {camera.name: camera.address for camera in cameras},
+        {camera.name: camera.address for camera in gige},
         rig.trigger.rate_hz,
+        firewire={camera.name: camera.address for camera in firewire},
         epoch=epoch,
         size=(region.width, region.height),
         prerendered=prerendered,
         link_mbit_s=link_mbit_s,
     )
+
+
+def environment(hill: SimulatedHill | None) -> Mapping[str, str]:
+    """What grabber processes need in their environment to see the hill's FireWire cameras.
+
+    Raises:
+        BadInputError: there are some, but no C compiler for what makes them visible.
+    """
+    return {} if hill is None else hill.environment
 
 
 def _check_loopback(camera: CameraSettings) -> None:

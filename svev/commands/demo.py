@@ -18,10 +18,12 @@ def demo(
 ) -> None:
     """Record a few jumps on the simulated hill and show what was made. No camera needed.
 
-    Three simulated cameras speak real GigE Vision over loopback to Aravis, a pulse train triggers them, the frames
-    are paired by pulse, logged and published; a subscriber counts what it gets.
+    Three simulated cameras speak real GigE Vision over loopback to Aravis, or, with --bus firewire, are driven by the
+    unmodified libdc1394 on an emulated FireWire bus. A pulse train triggers them, the frames are paired by pulse,
+    logged and published; a subscriber counts what it gets.
 
     Example: svev demo --seconds 5
+    Example: svev demo --bus firewire
     """
     result = run_demo(bus, seconds, out, lambda line: console.say(line, aside=True))
     if as_json:

@@ -12,7 +12,7 @@ from rig.settings import RigSettings
 from svev import console
 from svev.recording_run import new_log_path, run_recording
 from svev.running_rig import RunningRig
-from svev.simulation import simulated_hill
+from svev.simulation import environment, simulated_hill
 
 
 def record(
@@ -52,7 +52,7 @@ def record_once(
     """
     path = new_log_path(out)
     epoch = host_now()
-    with simulated_hill(rig, epoch), RunningRig(rig, rig_toml, _aside, epoch) as running:
+    with simulated_hill(rig, epoch) as hill, RunningRig(rig, rig_toml, _aside, epoch, environment(hill)) as running:
         return run_recording(running, rig, path, seconds, allow_absent=allow_absent, session=session)
 
 

@@ -13,7 +13,7 @@ from rig.clocks import HostNs, host_now
 from rig.errors import SvevError
 from rig.settings import RigSettings
 from svev.rig_processes import RigProcesses
-from svev.simulation import simulated_hill
+from svev.simulation import environment, simulated_hill
 
 
 class RigSession:
@@ -43,6 +43,7 @@ class RigSession:
         self._recorder, self._inherit = recorder, inherit
         self._hill: ExitStack | None = None
         self._epoch: HostNs | None = None
+        self._environment: Mapping[str, str] = {}
         self._job: Future[RigProcesses | None] | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rig session")
         self.processes: RigProcesses | None = None
@@ -96,11 +97,12 @@ class RigSession:
         with ExitStack() as stack:
             if self._hill is None:
                 epoch = host_now()
-                stack.enter_context(simulated_hill(self._rig, epoch))
+                self._environment = environment(stack.enter_context(simulated_hill(self._rig, epoch)))
                 self._epoch = epoch
             processes = RigProcesses(
-                self._rig, self._on_event, epoch=self._epoch, recorder=self._recorder, inherit=self._inherit
-            )
+                self._rig, self._on_event, epoch=self._epoch, recorder=self._recorder, inherit=self._inherit,
+                environment=self._environment,
+            )  # fmt: skip
             processes.__enter__()
             self._hill = self._hill or stack.pop_all()
             return processes

@@ -15,7 +15,7 @@ _MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
           "this needs the token: log in on the page, or send it as Authorization: Bearer TOKEN"),
     403: ("The request comes from a page of another site.", "foreign_origin",
           "the request comes from a page of another site: use the page of this service"),
-    404: ("There is no such recording, or no such pulse in it.", "unknown_recording",
+    404: ("There is no such thing: recording, pulse, picture.", "unknown_recording",
           "no recording 'jump-7': see the list of recordings"),
     409: ("The state forbids it; `detail` says what to do instead.", "state_forbids", "the rig is idle: arm it first"),
     413: ("The body is too large.", "request_entity_too_large",
@@ -29,8 +29,8 @@ _MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
     429: ("Too many wrong tokens.", "too_many_wrong_tokens",
           "too many wrong tokens from here: wait 42 s, then try again"),
     500: ("An error in svev itself.", "internal_error", "an error in svev itself (KeyError): try again"),
-    503: ("It cannot be done now; `detail` says why.", "no_preview",
-          "no triplet has come: arm the rig, and see that pulses arrive"),
+    503: ("It cannot be done now; `detail` says why.", "too_many_viewers",
+          "32 viewers are connected, which is the most: close some, or try again later"),
     507: ("The disk is full or refuses.", "storage", "less than 2 GB are free: delete recordings"),
 }  # fmt: skip
 

@@ -4,29 +4,27 @@ import mimetypes
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from http import HTTPStatus
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Final
 
-from fastapi import FastAPI, Response
-from fastapi.responses import JSONResponse, PlainTextResponse
-from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
 
 from recorder.catalogue import Catalogue
 from webpanel.access import Access
-from webpanel.api_errors import COMMON, Responses
+from webpanel.api_errors import COMMON
 from webpanel.changes import Changes
 from webpanel.documentation import DESCRIPTION, serve_documentation
-from webpanel.guard import SECURITY_HEADERS, Door, Guard
+from webpanel.guard import Door, Guard
 from webpanel.metrics import CountRequests, Metrics
-from webpanel.models import Health
 from webpanel.preview import PreviewFeed
 from webpanel.problems import handle_errors
 from webpanel.rig_service import RigService
 from webpanel.routes_events import events_router
 from webpanel.routes_images import images_router
 from webpanel.routes_login import login_router
+from webpanel.routes_observing import observing_router
 from webpanel.routes_preview import preview_router
 from webpanel.routes_recordings import recordings_router
 from webpanel.routes_rig import rig_router
@@ -81,33 +79,21 @@ def create_app(service: RigService, catalogue: Catalogue, access: Access) -> Fas
     door = Door(access)
     app.add_middleware(Guard, door=door)
     app.add_middleware(CountRequests, metrics=metrics)
-    handle_errors(app, SECURITY_HEADERS)
-    app.include_router(rig_router(service))
-    app.include_router(recordings_router(service, catalogue, changes))
-    app.include_router(images_router(service, catalogue))
-    app.include_router(preview_router(PreviewFeed(service), streams.previews))
-    app.include_router(events_router(service, changes, streams.events))
-    app.include_router(login_router(door))
-    _serve_observations(app, service, metrics)
+    routers = (
+        rig_router(service),
+        recordings_router(service, catalogue, changes),
+        images_router(service, catalogue),
+        preview_router(PreviewFeed(service), streams.previews),
+        events_router(service, changes, streams.events),
+        login_router(door),
+        observing_router(service, metrics),
+    )
+    for router in routers:
+        app.include_router(router)
+    handle_errors(app, [route for router in routers for route in router.routes if isinstance(route, APIRoute)])
     serve_documentation(app, access)
     _serve_page(app)
     return app
-
-
-def _serve_observations(app: FastAPI, service: RigService, metrics: Metrics) -> None:
-    @app.get("/metrics", tags=["Observing"], response_class=PlainTextResponse)
-    def get_metrics() -> Response:
-        """What has been measured, for Prometheus."""
-        return Response(metrics.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)
-
-    unwell: Responses = {503: {"description": "The service is unwell.", "model": Health}}
-
-    @app.get("/healthz", tags=["Observing"], responses=unwell)
-    def get_health() -> Health:
-        """Whether the service itself works. Needs no token."""
-        if service.healthy():
-            return Health(healthy=True)
-        return JSONResponse(Health(healthy=False).model_dump(), HTTPStatus.SERVICE_UNAVAILABLE)  # type: ignore[return-value]
 
 
 def _serve_page(app: FastAPI) -> None:

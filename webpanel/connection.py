@@ -7,8 +7,8 @@ from typing import Any, Final
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from webpanel.guard import SECURITY_HEADERS
 from webpanel.problems import MEDIA_TYPE
+from webpanel.security_headers import SECURITY_HEADERS
 
 #: A request, headers and body, must be there so soon after its first byte (or the connection).
 REQUEST_S: Final = 10.0

@@ -13,26 +13,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from webpanel.access import Access
 from webpanel.logins import Brake, Sessions
 from webpanel.problems import ProblemError, problem
+from webpanel.security_headers import SECURITY_HEADERS
 
 COOKIE: Final = "svev_session"
 BODY_MAX: Final = 64 * 1024
 HEAD_MAX: Final = 16 * 1024
 _HEADER_COST: Final = 32  # what a header takes beside its text (RFC 9113, 6.5.2)
 _TOO_LARGE: Final = f"the request's body is too large: no call needs more than {BODY_MAX // 1024} KiB"
-_PAGE_POLICY: Final = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
-    "font-src 'self'; manifest-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
-)
-#: Headers of every answer that does not set them itself.
-SECURITY_HEADERS: Final = {
-    "content-security-policy": _PAGE_POLICY,
-    "x-content-type-options": "nosniff",
-    "x-frame-options": "DENY",
-    "referrer-policy": "no-referrer",
-    "cross-origin-opener-policy": "same-origin",
-    "cross-origin-resource-policy": "same-origin",
-    "permissions-policy": "camera=(), microphone=(), geolocation=()",
-}
 _READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Behind these stands something to protect; the page itself may be seen by everybody, it has to ask for the token.
 _PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")

@@ -1,18 +1,20 @@
 """Every refusal and failure as problem details (RFC 9457), also what the web framework refuses by itself."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
 from recorder.catalogue import UnknownRecordingError
 from rig.errors import BadInputError, StorageError, SvevError
 from webpanel.models import FieldError, Problem
 from webpanel.rig_service import StateForbidsError
+from webpanel.security_headers import SECURITY_HEADERS
 
 MEDIA_TYPE = "application/problem+json"
 #: The statuses of our own errors; the first class that fits.
@@ -55,14 +57,16 @@ def problem(
     )
 
 
-def handle_errors(app: FastAPI, error_headers: Mapping[str, str]) -> None:
+def handle_errors(app: FastAPI, routes: Iterable[APIRoute]) -> None:
     """Have all errors of an application answered as problems.
 
     Args:
         app: the application.
-        error_headers: headers of an answer to an unforeseen error, which passes no middleware.
+        routes: all that there are, so that who uses a wrong method is told all right ones.
     """
-    closing = {**error_headers, "Connection": "close"}  # the server closes it when an error reaches it
+    table = list(routes)
+    # The answer to an unforeseen error passes no middleware, and the server closes the connection behind it.
+    closing = {**SECURITY_HEADERS, "Connection": "close"}
 
     @app.exception_handler(ProblemError)
     async def _panel(_: Request, error: ProblemError) -> JSONResponse:
@@ -74,11 +78,15 @@ def handle_errors(app: FastAPI, error_headers: Mapping[str, str]) -> None:
         return problem(status, code_of(error), str(error))
 
     @app.exception_handler(HTTPException)
-    async def _framework(_: Request, error: HTTPException) -> JSONResponse:
+    async def _framework(request: Request, error: HTTPException) -> JSONResponse:
         status = HTTPStatus(error.status_code)
         if status is HTTPStatus.BAD_REQUEST:  # text that no JSON parser can do anything with
             return problem(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid_request", "the body is no JSON: correct it")
-        return problem(status, status.name.lower(), _ADVICE.get(status, error.detail), error.headers)
+        headers = dict(error.headers or {})
+        if status is HTTPStatus.METHOD_NOT_ALLOWED:
+            methods = [route.methods or set() for route in table if route.path_regex.match(request.url.path)]
+            headers["Allow"] = ", ".join(sorted(set[str]().union(*methods))) or headers.get("Allow", "GET, HEAD")
+        return problem(status, status.name.lower(), _ADVICE.get(status, error.detail), headers)
 
     @app.exception_handler(RequestValidationError)
     async def _fields(_: Request, error: RequestValidationError) -> JSONResponse:

@@ -26,13 +26,13 @@ def preview_router(feed: PreviewFeed, streams: Streams) -> APIRouter:
         async with streams.place():
             yield
 
-    @router.get("/preview.jpg", response_class=Response, responses=jpeg_answer("The triplet.") | refusals(503))
+    @router.get("/preview.jpg", response_class=Response, responses=jpeg_answer("The triplet.") | refusals(404))
     async def get_preview() -> Response:
         """The newest triplet, the cameras side by side. The headers say which pulse it is."""
         picture = await feed.other_than(None)
         if picture is None:
             text = "no triplet has come: arm the rig, and see that pulses arrive"
-            raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "no_preview", text, {"Retry-After": "2"})
+            raise ProblemError(HTTPStatus.NOT_FOUND, "no_preview", text)
         return Response(picture.jpeg, media_type="image/jpeg", headers=_facts(picture))
 
     @router.get(

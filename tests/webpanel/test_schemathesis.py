@@ -1,0 +1,35 @@
+"""Schemathesis makes up requests from the description of the API, right ones and wrong ones, and judges the answers."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from rig.frame import FrameStatus
+from tests.recorder.logs import ALL_OK
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import Panel
+
+K2_LOST = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
+#: These answers have no end; they are tested on their own.
+ENDLESS = ("/api/events", "/api/preview.mjpg")
+
+
+def schemathesis(url: str, folder: Path, *options: str) -> str:
+    """Run it against a server; what it says, which ends in what it has found."""
+    excluded = [f"--exclude-path={path}" for path in ENDLESS]
+    command = [
+        str(Path(sys.executable).with_name("st")), "run", f"{url}/openapi.json", "--phases=examples,coverage,fuzzing",
+        "--seed=1", "--request-timeout=20", "--continue-on-failure", "--generation-database=none", *excluded, *options,
+    ]  # fmt: skip
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=170, check=False)
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr
+    return done.stdout
+
+
+def test_the_api_is_as_it_is_described(panel: Panel, service: MemoryService, tmp_path: Path) -> None:
+    for number in range(3):
+        write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
+    service.arm()
+    said = schemathesis(panel.url, tmp_path, "--max-examples=10")
+    assert "21 selected / 23 total" in said
+    assert service.healthy()

@@ -17,6 +17,7 @@ from svev.commands import (
     adjust,
     bench,
     calibrate,
+    ctl,
     demo,
     doctor,
     info,
@@ -48,6 +49,7 @@ def _every_command() -> None:
 app.command("demo")(demo.demo)
 app.command("record")(record.record)
 app.command("serve")(serve.serve)
+app.add_typer(ctl.app, name="ctl")
 app.command("doctor")(doctor.doctor)
 app.command("info")(info.info_command)
 app.command("replay")(replay.replay_command)

@@ -24,7 +24,8 @@ from svev.backends import check_backends
 from svev.process_table import Child, ProcessSpec, ProcessTable
 
 _LEAST_SLOTS: Final = 16
-_LEVELS: Final = {
+#: What changes a camera's presence, and how much it matters; anything else is only told.
+_PRESENCE: Final = {
     CameraState.CONNECTED: Level.INFO,
     CameraState.SILENT: Level.WARNING,
     CameraState.GONE: Level.ERROR,
@@ -70,6 +71,7 @@ class RigProcesses:
         cameras: what was last heard of each.
         warm: whether whole triplets have come.
         ready: whether the recorder has reported for work.
+        recorder_died: whether it is dead now; nothing is known of cameras then.
         health: the recorder's last report of that name.
 
     Raises:
@@ -99,7 +101,7 @@ class RigProcesses:
         self._back_offs = {name: BackOff() for name in self._names}
         self._again: dict[Child, float] = {}
         self.cameras = [CameraPresence()] * len(rig.cameras)
-        self.warm = self.ready = False
+        self.warm = self.ready = self.recorder_died = False
         self.health: Message = {}
 
     def __enter__(self) -> Self:
@@ -153,7 +155,7 @@ class RigProcesses:
             wake: descriptors that end the waiting when they become readable.
 
         Raises:
-            ProcessDiedError: the recorder died, and everything that it reported before has been passed on.
+            ProcessDiedError: the recorder died, and everything that it reported before has been passed on; said once.
         """
         reports = [message for _, message in self._processes.receive(timeout_s, wake)]
         for message in reports:
@@ -169,16 +171,24 @@ class RigProcesses:
         self._tend()
         return reports
 
+    def restart_recorder(self) -> None:
+        """Start a recorder in place of the dead one; cameras that kept on streaming are there again at once."""
+        self.recorder_died = False
+        self._start_recorder()
+
     def _note_camera(self, index: int, state: CameraState, text: str) -> None:
-        self.cameras[index] = CameraPresence(state, text)
-        self._on_event(Event.now(_LEVELS[state], self._names[index], f"{state}: {text}"))
+        if state in _PRESENCE:
+            self.cameras[index] = CameraPresence(state, text)
+        self._on_event(Event.now(_PRESENCE.get(state, Level.WARNING), self._names[index], f"{state}: {text}"))
 
     def _tend(self) -> None:
         """Start dead grabbers again, after a while that grows; a dead recorder ends everything."""
         for child in self._processes.dead():
             if child.spec.name != RECORDER:
                 self._tend_grabber(child)
-            elif child.control.ended:
+            elif child.control.ended and not self.recorder_died:
+                self.recorder_died, self.ready, self.warm, self.health = True, False, False, {}
+                self.cameras = [CameraPresence()] * len(self._names)
                 raise ProcessDiedError(
                     f"the recorder process ended ({child.ending()}); start again, and if it recurs run: svev doctor"
                 )

@@ -2,12 +2,14 @@
 
 import os
 import queue
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import TypeVar
+from contextlib import suppress
+from typing import Any, TypeVar
 
-from rig.errors import ProcessDiedError, SvevError
+from rig.errors import ProcessDiedError
 
 T = TypeVar("T")
 
@@ -21,7 +23,9 @@ class Commands:
 
     def __init__(self) -> None:
         self.bell = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-        self._queue: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[Callable[[Future[Any]], None], Future[Any]]] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._over = False
 
     def ask(self, command: Callable[["Future[T]"], None], deadline_s: float) -> T:
         """Have the owner carry out a command, and wait for the answer.
@@ -35,8 +39,11 @@ class Commands:
             SvevError: whatever the command says.
         """
         future: Future[T] = Future()
-        self._queue.put(lambda: _carry_out(command, future))
-        self.ring()
+        with self._lock:
+            if self._over:
+                raise _ending()
+            self._queue.put((command, future))
+            self.ring()
         try:
             return future.result(deadline_s)
         except FutureTimeoutError:
@@ -50,23 +57,28 @@ class Commands:
 
     def carry_out(self) -> None:
         """Carry out what has been asked; the owner calls this."""
-        try:
+        with suppress(BlockingIOError):  # nobody has rung
             os.eventfd_read(self.bell)
-        except BlockingIOError:
-            return
-        while True:
-            try:
-                self._queue.get_nowait()()
-            except queue.Empty:
-                return
+        with suppress(queue.Empty):
+            while True:
+                command, future = self._queue.get_nowait()
+                try:
+                    command(future)
+                except Exception as error:  # noqa: BLE001 - whatever it is, it is the answer; the owner goes on
+                    future.set_exception(error)
+
+    def end(self) -> None:
+        """Refuse whatever is asked from now on, and what has not been carried out."""
+        with self._lock:
+            self._over = True
+        with suppress(queue.Empty):
+            while True:
+                self._queue.get_nowait()[1].set_exception(_ending())
 
     def close(self) -> None:
-        """Give the bell back; nobody may ask any more."""
+        """Give the bell back, after the end."""
         os.close(self.bell)
 
 
-def _carry_out(command: Callable[["Future[T]"], None], future: "Future[T]") -> None:
-    try:
-        command(future)
-    except SvevError as error:
-        future.set_exception(error)
+def _ending() -> ProcessDiedError:
+    return ProcessDiedError("the service is ending: wait until it runs again")

@@ -78,8 +78,8 @@ def serve(settings: ServiceSettings) -> None:
 def _supervisor(
     rig: RigSettings, rig_toml: str, data: Path, hub: EventHub, slot: PreviewSlot, preroll_s: float | None
 ) -> Supervisor:
-    preroll = 0.0 if preroll_s is None else preroll_s
-    config = {"preroll_s": preroll, "preview": slot.fd}
+    preroll = rig.recorder.preroll_s if preroll_s is None else preroll_s
+    config = {"preroll_s": preroll, "preview": slot.fd, "directory": str(data)}
     return Supervisor(rig, rig_toml, data, hub, preroll_s=preroll, recorder=config, inherit=(slot.fd,))
 
 
@@ -104,7 +104,10 @@ def _run(
         if supervisor.answering:
             notify.feed_watchdog()
 
-    supervisor.on_turn = on_turn
+    def on_end() -> None:
+        server.should_exit = True
+
+    supervisor.on_turn, supervisor.on_end = on_turn, on_end
     with _signals(server, supervisor, notify):
         supervisor.start()
         try:
@@ -116,6 +119,8 @@ def _run(
     if not ended:
         raise ProcessDiedError(f"the rig did not stop within {_STOP_S:g} s: its processes end by themselves")
     supervisor.close()
+    if supervisor.failure is not None:
+        raise supervisor.failure
 
 
 @contextmanager

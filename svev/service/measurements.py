@@ -61,6 +61,11 @@ def _of_recorder(status: Status, health: Message) -> Iterator[Metric]:
         dropped = {"": float(health["unpublished"])}
         yield Metric("svev_unpublished", "Triplets dropped before a slow subscriber.", Quantity.COUNTER, "", dropped)
     yield Metric("svev_pulses", "Pulses since arming.", Quantity.COUNTER, "", {"": float(status.pulses.number)})
+    if "latency" in health:
+        latency = health["latency"]
+        text = "From the last frame in memory to the publication."
+        buckets = {bound: float(count) for bound, count in latency["buckets_s"].items()}
+        yield Metric("svev_latency_seconds", text, Quantity.HISTOGRAM, "", buckets, float(latency["sum_s"]))
     if status.recording is not None:
         counts = status.recording.counts
         triplets = {"complete": float(counts.complete), "partial": float(counts.partial)}

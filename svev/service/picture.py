@@ -9,7 +9,7 @@ from rig.control import Message
 from rig.settings import RigSettings
 from svev.rig_processes import CameraPresence
 from svev.service.pulse_rate import PulseRate
-from svev.service.room import JUMP_S, Room
+from svev.service.room import Room
 from svev.service.state_machine import Phase
 from svev.service.statements import about_camera, about_state, camera_state, process_restarted
 from webpanel.models import (
@@ -90,7 +90,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
             reserve_gb=reserve,
             seconds_left=round(room.seconds),
             jumps_left=room.jumps,
-            jump_s=JUMP_S,
+            jump_s=rig.recorder.jump_s,
         ),
         recording=facts.recording,
         last_recording=facts.last_recording,
@@ -105,7 +105,6 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
     found = []
     for camera, presence, report, columns in zip(rig.cameras, heard, reported, rig.columns(), strict=True):
         state = camera_state(armed, presence)
-        millidegrees = report.get("temperature_mdeg", 0)
         found.append(
             CameraStatus(
                 name=camera.name,
@@ -119,7 +118,7 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
                 damaged=report.get("damaged", 0),
                 resent_packets=report.get("resent_packets", 0),
                 reconnects=report.get("reconnects", 0),
-                temperature_c=millidegrees / 1000 if millidegrees else None,
+                temperature_c=report.get("temperature_c"),
                 clock_offset_us=report.get("clock_offset_us"),
             )
         )

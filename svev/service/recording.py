@@ -1,5 +1,6 @@
 """The recording in progress, as the supervisor sees it."""
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from datetime import UTC, datetime
 from pathlib import Path
@@ -55,21 +56,24 @@ class RecordingInProgress:
         """Whether the recorder has not yet said that the log is open."""
         return self._opened is not None
 
-    def open(self, report: Message) -> None:
-        """The recorder has opened the log."""
-        if (first := report.get("first_pulse_ns")) is not None:
-            self._started = datetime.fromtimestamp(int(first) / NS_PER_S, UTC)
+    def open(self, report: Message) -> Callable[[], None]:
+        """The recorder has opened the log.
+
+        Returns:
+            Tells whoever waits for it.
+        """
+        self._note_first(report)
         opened, self._opened = self._opened, None
-        if opened is not None:
-            opened.set_result(self.view())
+        return lambda: opened.set_result(self.view()) if opened is not None else None
 
     def refuse(self, error: Exception) -> None:
-        """The log could not be opened."""
+        """The log could not be opened: tell whoever waits for it."""
         if self._opened is not None:
             self._opened.set_exception(error)
 
     def progress(self, report: Message) -> None:
         """Counts so far."""
+        self._note_first(report)
         counts = {name: report[name] for name in ("pulses", "complete", "partial")}
         self._counts = Counts(**counts, causes=Causes(**report["causes"]))
 
@@ -80,6 +84,10 @@ class RecordingInProgress:
     def change_session(self, change: SessionChange) -> None:
         """Take over changed session fields."""
         self.session = self.session.model_copy(update=change.model_dump(exclude_none=True))
+
+    def _note_first(self, report: Message) -> None:
+        if self._started is None and (first := report.get("first_pulse_ns")) is not None:
+            self._started = datetime.fromtimestamp(int(first) / NS_PER_S, UTC)
 
     def end(self) -> None:
         """It is over: tell whoever waits."""

@@ -1,19 +1,21 @@
 """Starts and ends recordings; hears what the recorder reports of them. Runs in the supervisor's thread."""
 
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from pathlib import Path
 
 from recorder.catalogue import UnknownRecordingError
 from recorder.events import Event, Level
 from rig.control import Message
-from rig.errors import SvevError
+from rig.errors import ProcessDiedError, SvevError
 from rig.settings import RigSettings
 from svev.recording_run import new_log_path
-from svev.rig_processes import RigProcesses
 from svev.running_rig import reported_error
 from svev.service.recording import RecordingInProgress
-from svev.service.room import JUMP_S, check_room_for
+from svev.service.rig_session import RigSession
+from svev.service.room import check_room_for
 from svev.service.state_machine import StateMachine
 from svev.service.statements import FORBIDDEN, recording_ended
 from webpanel.models import Recording, RecordingOrder, SessionChange, State, Statement
@@ -28,24 +30,40 @@ class RecordingControl:
         rig_toml: the rig file's text, attached to every log.
         data: where logs go.
         machine: moved between armed and recording.
+        session: has the recorder.
         tell: is told what happens.
 
     Attributes:
         current: the recording in progress or being opened.
         last: id of the recording that ended last.
         notice: how the last one failed, until another is started.
+        armed_at: when the rig was armed, on the monotonic clock, s.
     """
 
     def __init__(
-        self, rig: RigSettings, rig_toml: str, data: Path, machine: StateMachine, tell: Callable[[Event], None]
+        self,
+        rig: RigSettings,
+        rig_toml: str,
+        data: Path,
+        machine: StateMachine,
+        session: RigSession,
+        tell: Callable[[Event], None],
     ) -> None:
         self._rig, self._rig_toml, self._data = rig, rig_toml, data
-        self._machine, self._tell = machine, tell
+        self._machine, self._session, self._tell = machine, session, tell
         self.current: RecordingInProgress | None = None
         self.last: str | None = None
         self.notice: Statement | None = None
+        self.armed_at = time.monotonic()
+        self._answers: list[Callable[[], None]] = []
 
-    def start(self, processes: RigProcesses | None, order: RecordingOrder, opened: "Future[Recording]") -> None:
+    def answer(self) -> None:
+        """Tell those who wait; after the new state can be seen, so that who asks next finds what he was told."""
+        answers, self._answers = self._answers, []
+        for answer in answers:
+            answer()
+
+    def start(self, order: RecordingOrder, opened: "Future[Recording]") -> None:
         """Have the recorder open a log.
 
         Raises:
@@ -53,25 +71,30 @@ class RecordingControl:
             StorageError: no room.
             BadInputError: the folder cannot be written.
         """
-        state = self._machine.state
+        state, processes = self._machine.state, self._session.processes
         if processes is None or state is not State.ARMED or self.current is not None:
             raise StateForbidsError(FORBIDDEN["start", State.RECORDING if state is State.ARMED else state])
-        check_room_for(self._rig, self._data, JUMP_S if order.duration_s is None else order.duration_s)
+        length_s = self._rig.recorder.jump_s if order.duration_s is None else order.duration_s
+        check_room_for(self._rig, self._data, length_s)
         path = new_log_path(self._data)
         self.current, self.notice = RecordingInProgress(path, order, opened), None
         processes.tell(
             {
                 "command": "start", "path": str(path), "recording": path.stem, "pulses": None,
                 "session": {name: text for name, text in self.current.session.model_dump().items() if text},
-                "seconds": order.duration_s, "preroll_s": order.preroll_s, "rig_toml": self._rig_toml,
+                "seconds": order.duration_s, "preroll_s": self._reach_s(order), "rig_toml": self._rig_toml,
             }
         )  # fmt: skip
 
-    def stop(self, processes: RigProcesses | None, recording: str | None, ended: "Future[str]") -> None:
+    def _reach_s(self, order: RecordingOrder) -> float:
+        """How far to begin in the past: before the rig was armed, cameras were missing."""
+        armed_s = time.monotonic() - self.armed_at
+        return armed_s if order.preroll_s is None else min(order.preroll_s, armed_s)
+
+    def stop(self, recording: str | None, ended: "Future[str]") -> None:
         """Have the recorder close the log; the future gets the id when that is done.
 
         Args:
-            processes: of the rig.
             recording: which; None: whichever there is.
             ended: is answered when it is over.
 
@@ -82,9 +105,9 @@ class RecordingControl:
         if current is None or recording not in {None, current.id}:
             raise UnknownRecordingError(f"recording {recording} is not in progress: see the list of recordings")
         current.waiting.append(ended)
-        if processes is not None and not current.stopping:
+        if self._session.processes is not None and not current.stopping:
             current.stopping = True
-            processes.tell({"command": "stop"})
+            self._session.processes.tell({"command": "stop"})
 
     def change_session(self, recording: str, change: SessionChange) -> Recording | None:
         """Change the session of the recording in progress.
@@ -104,13 +127,14 @@ class RecordingControl:
             return
         match message["report"]:
             case "started":
-                current.open(message)
+                self._answers.append(current.open(message))
                 self._machine.move(State.RECORDING)
                 self._say(Level.INFO, f"recording {current.id} started")
             case "progress":
                 current.progress(message)
             case "health" if not current.opening:
-                current.grown(current.path.stat().st_size)
+                with suppress(FileNotFoundError):  # somebody has moved it away
+                    current.grown(current.path.stat().st_size)
             case "finished":
                 current.progress(message)
                 counts = f"{message['pulses']} pulses, {message['complete']} complete, {message['partial']} partial"
@@ -132,12 +156,22 @@ class RecordingControl:
         self._say(Level.ERROR, self.notice.text)
         self._over(then)
 
+    def abandon(self) -> None:
+        """The service ends before the recorder's last word: nobody need wait for it any more."""
+        self.answer()
+        current, self.current = self.current, None
+        if current is not None:
+            error = ProcessDiedError("the service ends: look at the list of recordings when it runs again")
+            current.refuse(error)
+            for future in current.waiting:
+                future.set_exception(error)
+
     def _over(self, then: State) -> None:
         current, self.current = self.current, None
         if current is not None:
             self.last = current.id
             self._machine.move(then)
-            current.end()
+            self._answers.append(current.end)
 
     def _say(self, level: Level, text: str) -> None:
         self._tell(Event.now(level, "service", text))

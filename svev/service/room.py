@@ -9,7 +9,6 @@ from rig.errors import StorageError
 from rig.settings import RigSettings
 
 _GB: Final = 1e9
-JUMP_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +18,7 @@ class Room:
     Attributes:
         free_bytes: free on the disk.
         seconds: so long until only the reserve is left.
-        jumps: so many jumps of JUMP_S seconds.
+        jumps: so many jumps of `recorder.jump_s`.
     """
 
     free_bytes: int
@@ -32,7 +31,15 @@ def room_for(rig: RigSettings, free_bytes: int) -> Room:
     rows, columns = rig.triplet_shape
     usable = max(0.0, free_bytes - rig.recorder.reserve_gb * _GB)
     seconds = usable / (rows * columns * rig.trigger.rate_hz)
-    return Room(free_bytes, seconds, int(seconds / JUMP_S))
+    return Room(free_bytes, seconds, int(seconds / rig.recorder.jump_s))
+
+
+def free_bytes(directory: Path) -> int:
+    """Free on the disk of a directory; nothing while it is not there (an unplugged disk, say)."""
+    try:
+        return shutil.disk_usage(directory).free
+    except OSError:
+        return 0
 
 
 def check_room_for(rig: RigSettings, directory: Path, seconds: float) -> None:
@@ -41,7 +48,7 @@ def check_room_for(rig: RigSettings, directory: Path, seconds: float) -> None:
     Raises:
         StorageError: it does not.
     """
-    room = room_for(rig, shutil.disk_usage(directory).free)
+    room = room_for(rig, free_bytes(directory))
     if room.seconds < seconds:
         raise StorageError(
             f"{directory}: there is room for {room.seconds:.0f} s and {seconds:g} s are wanted, beside the reserve of "

@@ -79,7 +79,7 @@ class Service:
         supervisor = self._supervisor
 
         def start(opened: "Future[Recording]") -> None:
-            supervisor.recordings.start(supervisor.processes, order, opened)
+            supervisor.recordings.start(order, opened)
 
         return supervisor.commands.ask(start, _OPEN_S)
 
@@ -88,7 +88,7 @@ class Service:
         supervisor = self._supervisor
 
         def stop(ended: "Future[str]") -> None:
-            supervisor.recordings.stop(supervisor.processes, recording_id, ended)
+            supervisor.recordings.stop(recording_id, ended)
 
         with suppress(UnknownRecordingError):  # not in progress: it is over, or the catalogue does not know it either
             supervisor.commands.ask(stop, _CLOSE_S)

@@ -10,6 +10,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.records import Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
+from recorder.health_schema import HEALTH_SCHEMA
 from recorder.mcap_layout import (
     EVENTS_CHANNEL,
     FIRST_CALIBRATION_CHANNEL,
@@ -19,13 +20,6 @@ from recorder.mcap_layout import (
 )
 from rig.tag import TAG_SCHEMA
 from rig.topics import EVENTS, HEALTH, TAG, TRIPLET, Topic
-
-HEALTH_SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "title": HEALTH.schema,
-    "description": "State of the recording, about once a second: rates, queues, drops, clocks, disk.",
-    "type": "object",
-}
 
 CALIBRATION_TOPIC = "/calibration/"
 

@@ -72,15 +72,16 @@ def framerate_index(rate_hz: float) -> int:
     raise BadInputError(f"{rate_hz:g} pulses per second are more than FireWire cameras can do: lower trigger.rate_hz")
 
 
-def need(camera: CameraSettings, rate_hz: float, *, unit_bytes: int = 4) -> Need:
+def need(camera: CameraSettings, rate_hz: float, *, fixed: bool | None = None, unit_bytes: int = 4) -> Need:
     """What a camera takes of its bus.
 
     Args:
         camera: its settings.
         rate_hz: of the pulses.
+        fixed: whether it sends a fixed format; None: if its region is one.
         unit_bytes: packets of Format7 are a multiple of this; the camera tells.
     """
-    if is_fixed_format(camera):
+    if is_fixed_format(camera) if fixed is None else fixed:
         _, cycles_at_30 = FIXED_FORMATS[camera.region.width, camera.region.height]
         cycles = round(cycles_at_30 * 30 / FRAMERATES[framerate_index(rate_hz)])
     else:

@@ -2,15 +2,18 @@
 
 import ctypes
 import select
+from os import close
 from typing import Any, Final
 
 from capture.iidc.bandwidth import UNITS_PER_BUS
 from capture.iidc.device import Device
 from capture.iidc.library import Dc1394Error
-from capture.iidc.structures import CAPTURE_FLAGS_DEFAULT, CAPTURE_POLICY_POLL, Code, FramePointer
+from capture.iidc.structures import CAPTURE_FLAGS_DEFAULT, CAPTURE_POLICY_POLL, Code, FramePointer, VideoFrame
 from rig.clocks import NS_PER_S, host_now
 from rig.errors import CameraError
 
+_libc: Final = ctypes.CDLL(None)
+_libc.munmap.argtypes = (ctypes.c_void_p, ctypes.c_size_t)
 _GONE: Final = select.POLLHUP | select.POLLERR | select.POLLNVAL
 
 
@@ -42,8 +45,10 @@ class DmaRing:
                 f"camera {name} finds no room on its FireWire bus: it needs {device.bandwidth_units()} of its "
                 f"{UNITS_PER_BUS} bandwidth units and a channel; stop other cameras on the bus, or make regions smaller"
             ) from None
+        self._frames, self._memory, self._bytes = frames, 0, 0
+        self._descriptor = device.file_descriptor()
         self._poll = select.poll()
-        self._poll.register(device.file_descriptor(), select.POLLIN)
+        self._poll.register(self._descriptor, select.POLLIN)
 
     def wait(self, timeout_s: float) -> Any:
         """The next frame.
@@ -68,6 +73,7 @@ class DmaRing:
             frame = FramePointer()
             self._device.call("capture_dequeue", CAPTURE_POLICY_POLL, ctypes.byref(frame))
             if frame:
+                self._note_memory(frame.contents)
                 return frame
             self.disturbed = True
             return None
@@ -77,5 +83,21 @@ class DmaRing:
         self._device.call("capture_enqueue", frame)
 
     def close(self) -> None:
-        """Stop. Raises `Dc1394Error` if the card does not."""
-        self._device.call("capture_stop")
+        """Stop, and free the ring even if the camera is gone.
+
+        Raises:
+            Dc1394Error: the card does not stop.
+        """
+        try:
+            self._device.call("capture_stop")
+        except Dc1394Error:
+            # libdc1394 2.2.6 gives up at its first step, and would leave descriptor and memory behind for good.
+            close(self._descriptor)
+            if self._memory:
+                _libc.munmap(self._memory, self._bytes)
+            raise
+
+    def _note_memory(self, frame: VideoFrame) -> None:
+        """Where the ring lies: its frames stand one behind the other."""
+        self._memory = frame.image - frame.id * frame.total_bytes
+        self._bytes = frame.total_bytes * self._frames

@@ -2,7 +2,6 @@
 
 import ctypes
 import logging
-from collections import deque
 from ctypes import POINTER, c_char_p, c_float, c_int, c_int32, c_uint32, c_uint64, c_void_p
 from functools import cache
 from typing import Any, Final
@@ -82,8 +81,8 @@ _OTHERS: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "error_get_string": (c_char_p, (c_int,)),
 }
 
-#: What libdc1394 said last: its error codes alone rarely tell the reason.
-_last_words: Final[deque[str]] = deque(maxlen=1)
+#: What libdc1394 said first during the present call: its error codes alone rarely tell the reason.
+_first_words: Final[list[str]] = []
 
 
 class Dc1394Error(CameraError):
@@ -123,11 +122,11 @@ class Library:
         Raises:
             Dc1394Error: the code is not success.
         """
-        _last_words.clear()
+        _first_words.clear()
         code = self._functions[name](*arguments)
         if code != Code.SUCCESS:
             said = self._functions["error_get_string"](code) or b"unknown error"
-            words = f"; {_last_words[0]}" if _last_words else ""
+            words = f"; {_first_words[0]}" if _first_words else ""
             raise Dc1394Error(name, code, f"dc1394_{name}: {said.decode(errors='replace')} ({code}{words})")
 
     def get(self, name: str, *arguments: Any) -> Any:
@@ -138,8 +137,8 @@ class Library:
 def _to_our_log(kind: int, message: bytes, _user: object) -> None:
     """What libdc1394 says, in our log."""
     text = message.decode(errors="replace").strip()
-    if kind != Log.DEBUG:
-        _last_words.append(text)
+    if kind != Log.DEBUG and not _first_words:
+        _first_words.append(text)
     _LOGGER.log(_LEVELS[Log(kind)], "%s", text)
 
 

@@ -38,21 +38,19 @@ def set_video_format(device: Device, camera: CameraSettings, rate_hz: float) -> 
         BadInputError: no format is that fast.
     """
     device.set_iso_speed(camera.iidc.iso_speed)
-    if is_fixed_format(camera):
-        return _fixed(device, camera, rate_hz)
+    if is_fixed_format(camera) and (fixed := _fixed(device, camera, rate_hz)) is not None:
+        return fixed
     return _format7(device, camera, rate_hz)
 
 
-def _fixed(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat:
+def _fixed(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat | None:
+    """A format of the standard; None if this camera does not have it at this rate."""
     region, rate = camera.region, framerate_index(rate_hz)
     mode, _ = FIXED_FORMATS[region.width, region.height]
     if mode not in device.modes() or rate not in device.framerates(mode):
-        raise CameraError(
-            f"camera {camera.name} has no format of {region.width} x {region.height} Mono8 at {rate_hz:g} Hz: choose "
-            "another region (one that is no standard format is cut out of the sensor), or lower trigger.rate_hz"
-        )
+        return None
     device.set_fixed_format(mode, rate)
-    return VideoFormat(mode, f"{region.width} x {region.height}", need(camera, rate_hz))
+    return VideoFormat(mode, f"{region.width} x {region.height}", need(camera, rate_hz, fixed=True))
 
 
 def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat:
@@ -60,14 +58,15 @@ def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFor
     mode, region = VideoMode.FORMAT7_0, camera.region
     if mode not in device.modes():
         raise CameraError(
-            f"camera {camera.name} has standard formats only: set its region to x = 0, y = 0 and 640 x 480"
+            f"camera {camera.name} has no format of {region.width} x {region.height} at {rate_hz:g} Hz: set its region "
+            "to x = 0, y = 0 and 640 x 480, or lower trigger.rate_hz"
         )
     _check_region(device, camera)
     # Set once so that the camera tells its packet sizes for this region, then with the packet size.
     device.call("video_set_mode", mode)
-    _set_region(device, camera, need(camera, rate_hz).packet_bytes)
+    _set_region(device, camera, need(camera, rate_hz, fixed=False).packet_bytes)
     unit, largest = device.pair("format7_get_packet_parameters", mode)
-    wanted = need(camera, rate_hz, unit_bytes=max(4, unit))
+    wanted = need(camera, rate_hz, fixed=False, unit_bytes=max(4, unit))
     if wanted.packet_bytes > largest:
         raise CameraError(
             f"camera {camera.name} would need packets of {wanted.packet_bytes} bytes, {largest} is the most at "

@@ -27,7 +27,7 @@ def write_rig(
 
     Args:
         directory: where.
-        backend: "sim" or "aravis".
+        backend: "sim", "aravis" or "iidc".
         loopback: addresses of the simulated cameras and of the publication.
         faults: faults of the scenario, as in its TOML.
         scenario: more TOML for the top of the scenario.
@@ -43,12 +43,18 @@ def write_rig(
         f'publish = "{loopback.endpoint()}"',
         *(f"{k} = {json.dumps(v)}" for k, v in network.items()),
     ]
-    for name, address in zip(names, loopback.cameras(len(names)), strict=True):
+    addresses = {"sim": [""] * len(names), "aravis": loopback.cameras(len(names)), "iidc": guids(len(names))}[backend]
+    for name, address in zip(names, addresses, strict=True):
         lines += ["[[cameras]]", f'name = "{name}"', f'backend = "{backend}"']
-        lines += [f'address = "{address}"'] if backend == "aravis" else []
+        lines += [f'address = "{address}"'] if address else []
     path = directory / "rig.toml"
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def guids(count: int) -> list[str]:
+    """GUIDs of emulated FireWire cameras. Every bus is a world of its own, so they may be the same in all tests."""
+    return [f"000a4701011b{number:04x}" for number in range(1, count + 1)]
 
 
 def make_rig(directory: Path, backend: str, loopback: Loopback, **options: Any) -> RigSettings:

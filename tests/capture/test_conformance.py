@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from capture.aravis_camera import AravisCamera
+from capture.iidc.iidc_camera import IidcCamera
 from capture.seam import Arrival, Camera
 from capture.sim_camera import SimCamera
 from rig.clocks import host_now
@@ -20,10 +21,11 @@ from simrig.images import stamp
 from simrig.simulated_hill import SimulatedHill
 from svev.sim_scene import SimScene
 from svev.simulation import simulated_hill
+from tests.capture.iidc.emulated import visible
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 
-BACKENDS = ["sim", "aravis"]
+BACKENDS = ["sim", "aravis", "iidc"]
 PERIOD_NS = 33_333_333
 
 
@@ -42,6 +44,8 @@ class Bench:
         settings = self.rig.cameras[0]
         if settings.backend == "aravis":
             return AravisCamera(settings, self.rig.network, self.ring, self.rig.trigger.period_ns)
+        if settings.backend == "iidc":
+            return IidcCamera(settings, self.ring, self.rig.trigger.rate_hz)
         self._scene = self._scene or SimScene(self.rig, 0, self.epoch)
         return SimCamera(settings, self.ring, self._scene)
 
@@ -72,6 +76,8 @@ def bench(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) ->
             made = Bench(make_rig(tmp_path, request.param, loopback, names=["K2"], **options), slots)
             stack.callback(made.ring.close)
             made.hill = stack.enter_context(simulated_hill(made.rig, made.epoch))
+            if request.param == "iidc" and made.hill is not None:
+                stack.enter_context(visible(made.hill))
             return made
 
         yield open_bench
@@ -142,15 +148,22 @@ def test_without_pulses_receive_comes_back_empty(bench: OpenBench) -> None:
         assert host_now() - before < 1_000_000_000
 
 
+#: Fault, its fields, how far the ids go on across it.
+FAULTS: list[tuple[str, dict[str, Any], int]] = [
+    ("missed_pulse", {}, 1),
+    ("lost_frame", {}, 2),
+    ("damaged_frame", {}, 2),
+    ("lost_leader", {"resend": False}, 2),
+    ("lost_packets", {"packets": [3, 4], "resend": False}, 2),
+]
+#: A FireWire camera has no word about damage. What a lost packet does there: `tests/capture/iidc`.
+FAULTS_ON_FIREWIRE = [fault for fault in FAULTS if fault[0] not in {"damaged_frame", "lost_packets"}]
+
+
 @pytest.mark.parametrize(
-    ("kind", "fields", "id_step"),
-    [
-        ("missed_pulse", {}, 1),
-        ("lost_frame", {}, 2),
-        ("damaged_frame", {}, 2),
-        ("lost_leader", {"resend": False}, 2),
-        ("lost_packets", {"packets": [3, 4], "resend": False}, 2),
-    ],
+    ("bench", "kind", "fields", "id_step"),
+    [(backend, *fault) for backend in BACKENDS for fault in (FAULTS_ON_FIREWIRE if backend == "iidc" else FAULTS)],
+    indirect=["bench"],
 )
 def test_a_fault_costs_one_frame_and_the_ids_tell_why(
     bench: OpenBench, kind: str, fields: dict[str, Any], id_step: int
@@ -171,6 +184,7 @@ def test_a_fault_costs_one_frame_and_the_ids_tell_why(
     assert abs(np.diff(times)[gap] - 2 * PERIOD_NS) < 200_000
 
 
+@pytest.mark.parametrize("bench", ["sim", "aravis"], indirect=True)  # FireWire sends nothing again
 def test_packets_that_are_sent_again_cost_nothing(bench: OpenBench) -> None:
     made = bench()
     with _warm(made) as camera:

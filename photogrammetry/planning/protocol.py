@@ -20,7 +20,7 @@ from photogrammetry.protocol.svg import Colour
 
 Floats = NDArray[np.float64]
 
-_COLOURS = (Colour.BLUE, Colour.GREEN, Colour.RED, Colour.AMBER)
+_COLOURS = (Colour.BLUE, Colour.AMBER, Colour.INK)  # told apart by everybody
 _BOTH = "curves by covariance, rings by Monte Carlo"
 
 

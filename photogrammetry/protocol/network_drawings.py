@@ -23,6 +23,7 @@ _CLOSER = 0.7  # where the points fill less of the network than this they are dr
 _SIDES = ((0, 1), (0, 2))
 _SEEN_FROM = ("from above", "from the side")
 _AXES = "XYZ"
+_WHOLE = "Network (cameras green, surveyed points blue)"
 
 
 class Shape(Enum):
@@ -87,7 +88,7 @@ def network_drawings(a: Adjustment, extras: Extras | None = None, *, a_priori: b
     sights = _sights(a, np.array([place.xyz for place in nearby])) if len(cameras) <= _SIGHTED else []
     whole = [replaced for place in nearby for replaced in (_bare(place) if far else place,)]
     drawings = [
-        _projected([*whole, *cameras], [*sights, *extras.tracks], side, unit, "Network") for side in range(len(_SIDES))
+        _projected([*whole, *cameras], [*sights, *extras.tracks], side, unit, _WHOLE) for side in range(len(_SIDES))
     ]
     if far:
         words = f"Points{extras.words}"

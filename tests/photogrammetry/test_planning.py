@@ -136,6 +136,14 @@ def test_the_documented_table_2_is_what_the_networks_give() -> None:
     assert documented[:6, 3:] == pytest.approx(np.concatenate(ours), abs=0.0051)
 
 
+def test_the_documented_angles_are_what_the_networks_give() -> None:
+    documented = np.array(_rows("What is predicted"))
+    for row, name in zip(documented, ("hill-2", "rods"), strict=True):
+        _, _, predicted = _planned(name)
+        ours = [*np.degrees(predicted.body[8, :5]), 10.0 * predicted.body[8, 5], predicted.speed[8]]
+        assert row == pytest.approx(ours, abs=0.0051)
+
+
 def test_the_documented_verdict_is_what_the_networks_give() -> None:
     documented = np.array(_rows("Section 6: rods"))
     description = read_toml(NETWORKS / "rods.toml")
@@ -145,8 +153,8 @@ def test_the_documented_verdict_is_what_the_networks_give() -> None:
     levelled = json.loads(json.dumps(description))
     levelled["differences"] += [
         {"start": start, "end": end, "axis": axis, "sigma": 0.01}
-        for start, end in (("P0", "R1-1"), ("R1-1", "R2-1"))
-        for axis in "XZ"
+        for start, end, axes in (("P0", "R1-1", "XYZ"), ("R1-1", "R2-1", "XZ"))
+        for axis in axes
     ]
     cases += [plumb, levelled]
     for row, case in zip(documented, cases, strict=True):

@@ -6,30 +6,42 @@ from typing import Any
 
 import pytest
 
+from rig.clocks import host_now
 from rig.errors import BadInputError
 from simrig.faults import Fault, FaultKind
 from simrig.simulated_hill import SimulatedHill
 from tests.simrig.firewire.conftest import GUIDS, Program, RefusedError, StartHill, StartProgram
 from tests.support.waiting import wait_until
 
-IOCTL_FAILURE = -9
+AROUND = 3
 
 
-def shot(start_hill: StartHill, start_program: StartProgram, ring: int = 16) -> tuple[SimulatedHill, Program, int]:
-    """A hill, a program that receives, and a pulse that is soon to come."""
+def receiving(start_hill: StartHill, start_program: StartProgram, ring: int = 64) -> tuple[SimulatedHill, Program]:
+    """A hill, and a program that has received from K1."""
     hill = start_hill()
     program = start_program(hill, "K1")
     program("start", ring)
-    (first,) = program("frames", 1)
-    return hill, program, first["pulse"] + 12
+    assert len(program("frames", 1)) == 1
+    return hill, program
 
 
-def without(frames: list[dict[str, Any]], pulse: int, neighbours: int = 3) -> list[int]:
-    """Which pulses around `pulse` are missing; the whole neighbourhood must have been received."""
+def befall(
+    hill: SimulatedHill, program: Program, around: int = AROUND, **fault: Any
+) -> tuple[int, list[dict[str, Any]]]:
+    """Let a fault befall K1 soon.
+
+    Returns:
+        Its pulse, and the frames received until some pulses later.
+    """
+    pulse = hill.train.next_index(host_now()) + 30
+    hill.inject(Fault(camera="K1", at_pulse=pulse, **fault))
+    return pulse, program("frames_until", pulse + around)
+
+
+def missing(frames: list[dict[str, Any]], pulse: int, around: int = AROUND) -> list[int]:
+    """Which of the pulses about `pulse` have no frame."""
     pulses = [frame["pulse"] for frame in frames]
-    assert min(filter(None, pulses)) <= pulse - neighbours
-    assert max(filter(None, pulses)) >= pulse + neighbours
-    return [one for one in range(pulse - neighbours, pulse + neighbours + 1) if one not in pulses]
+    return [one for one in range(pulse - AROUND, pulse + around + 1) if one not in pulses]
 
 
 @pytest.mark.parametrize(
@@ -45,10 +57,8 @@ def test_a_frame_that_vanishes(
     start_hill: StartHill, start_program: StartProgram, kind: FaultKind, triggers: int, frames: int
 ) -> None:
     """The counters tell the causes apart: not triggered; triggered, not read out; read out, not transferred."""
-    hill, program, pulse = shot(start_hill, start_program)
-    hill.inject(Fault(kind=kind, camera="K1", at_pulse=pulse))
-    seen = program("frames", 24)
-    assert without(seen, pulse) == [pulse]
+    pulse, seen = befall(*receiving(start_hill, start_program), kind=kind)
+    assert missing(seen, pulse) == [pulse]
     before, after = (next(frame for frame in seen if frame["pulse"] == pulse + step) for step in (-1, 1))
     assert after["trigger_count"] - before["trigger_count"] == 1 + triggers
     assert after["frame_count"] - before["frame_count"] == 1 + frames
@@ -59,9 +69,8 @@ def test_a_lost_packet_tears_two_frames(
     start_hill: StartHill, start_program: StartProgram, packets: tuple[int, ...]
 ) -> None:
     """The frame comes a period late, with the begin of the next one as its end; the next one does not come at all."""
-    hill, program, pulse = shot(start_hill, start_program)
-    hill.inject(Fault(kind=FaultKind.LOST_PACKETS, camera="K1", at_pulse=pulse, packets=packets))
-    seen = program("frames", 24)
+    hill, program = receiving(start_hill, start_program)
+    pulse, seen = befall(hill, program, kind=FaultKind.LOST_PACKETS, packets=packets)
     (torn,) = [index for index, frame in enumerate(seen) if frame["pulse"] is None]
     assert seen[torn - 1]["pulse"] == pulse - 1
     assert seen[torn + 1]["pulse"] == pulse + 2
@@ -73,7 +82,7 @@ def test_a_lost_packet_tears_two_frames(
 
 def test_a_stalled_consumer_loses_frames_and_comes_back(start_hill: StartHill, start_program: StartProgram) -> None:
     """Eight buffers hold eight frames; the rest vanishes without a word, and then whole frames follow."""
-    _, program, _ = shot(start_hill, start_program, ring=8)
+    _, program = receiving(start_hill, start_program, ring=8)
     program("sleep", 0.9)
     seen = program("frames", 30)
     pulses = [frame["pulse"] for frame in seen]
@@ -86,17 +95,17 @@ def test_a_stalled_consumer_loses_frames_and_comes_back(start_hill: StartHill, s
 
 
 def test_a_ring_of_64_outlasts_a_second(start_hill: StartHill, start_program: StartProgram) -> None:
-    _, program, _ = shot(start_hill, start_program, ring=64)
+    _, program = receiving(start_hill, start_program)
     program("sleep", 1.0)
     pulses = [frame["pulse"] for frame in program("frames", 45)]
     assert pulses == list(range(pulses[0], pulses[0] + 45))
 
 
 def test_a_bus_reset_loses_nothing(start_hill: StartHill, start_program: StartProgram) -> None:
-    hill, program, pulse = shot(start_hill, start_program)
+    hill, program = receiving(start_hill, start_program)
     generation = hill.bus_state().generation
-    hill.inject(Fault(kind=FaultKind.BUS_RESET, camera="K1", at_pulse=pulse))
-    assert without(program("frames", 24), pulse) == []
+    pulse, seen = befall(hill, program, kind=FaultKind.BUS_RESET)
+    assert missing(seen, pulse) == []
     hill.reset_bus()
     assert hill.bus_state().generation == generation + 2
     assert program("advanced", 0x624) > 20, "registers answer by the new generation"
@@ -144,14 +153,13 @@ def test_unplugging_that_the_scenario_plans(start_hill: StartHill, start_program
 
 
 def test_a_frozen_camera_misses_pulses(start_hill: StartHill, start_program: StartProgram) -> None:
-    hill, program, pulse = shot(start_hill, start_program)
-    hill.inject(Fault(kind=FaultKind.FROZEN, camera="K1", at_pulse=pulse, duration_s=0.3))
-    seen = program("frames", 25)
-    missing = without(seen, pulse + 4, neighbours=6)
-    assert len(missing) >= 7
-    before, after = (next(f for f in seen if f["pulse"] == p) for p in (min(missing) - 1, max(missing) + 1))
+    hill, program = receiving(start_hill, start_program)
+    _, seen = befall(hill, program, 40, kind=FaultKind.FROZEN, duration_s=0.5)
+    before, after = max(pairwise(seen), key=lambda pair: pair[1]["pulse"] - pair[0]["pulse"])
+    gone = after["pulse"] - before["pulse"] - 1
+    assert gone >= 8
     assert after["trigger_count"] - before["trigger_count"] <= 3, "not even counted"
-    assert hill.statistics()["K1"].missed >= 7
+    assert hill.statistics()["K1"].missed >= gone - 2
 
 
 @pytest.mark.parametrize("fault", [{"kind": "damaged_frame"}, {"kind": "slow_link", "duration_s": 1.0, "mbit_s": 1.0}])
@@ -161,8 +169,9 @@ def test_faults_that_firewire_does_not_have(start_hill: StartHill, fault: dict[s
 
 
 def test_faults_of_the_past_and_of_strangers(start_hill: StartHill, start_program: StartProgram) -> None:
-    hill, _, pulse = shot(start_hill, start_program)
+    hill, program = receiving(start_hill, start_program)
+    pulse = program("frames", 1)[0]["pulse"]
     with pytest.raises(BadInputError, match="is past"):
-        hill.inject(Fault(kind=FaultKind.LOST_FRAME, camera="K1", at_pulse=pulse - 12))
+        hill.inject(Fault(kind=FaultKind.LOST_FRAME, camera="K1", at_pulse=pulse))
     with pytest.raises(BadInputError, match='no camera "K9"'):
         hill.inject(Fault(kind=FaultKind.LOST_FRAME, camera="K9"))

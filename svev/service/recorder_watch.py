@@ -8,7 +8,7 @@ from svev.rig_processes import RigProcesses
 from svev.service.pulse_rate import PulseRate
 
 #: A recorder that has not reported for so long is stuck. Closing a log on a slow disk may take a while.
-STUCK_S: Final = 30.0
+STUCK_S: Final = 20.0
 #: Not to be called healthy any more.
 _LATE_S: Final = 10.0
 

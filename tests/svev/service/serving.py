@@ -29,8 +29,8 @@ class Serving:
         log: what it writes to standard error.
     """
 
-    def __init__(self, process: "subprocess.Popen[str]", url: str, data: Path, log: Path) -> None:
-        self._process, self.url, self.data, self.log = process, url, data, log
+    def __init__(self, process: "subprocess.Popen[str]", url: str, data: Path, log: Path, token: str) -> None:
+        self._process, self.url, self.data, self.log, self._token = process, url, data, log, token
 
     @property
     def pid(self) -> int:
@@ -45,6 +45,7 @@ class Serving:
         """
         data = None if body is None else json.dumps(body).encode()
         headers = {} if body is None else {"Content-Type": "application/json"}
+        headers |= {"Authorization": f"Bearer {self._token}"} if self._token else {}
         request = urllib.request.Request(  # noqa: S310 - our own service
             self.url + path, data, headers, method=method
         )
@@ -118,6 +119,7 @@ def serving(
     environment: Mapping[str, str] | None = None,
     prefix: tuple[str, ...] = (),
     data: Path | None = None,
+    token: str = "",
     port: int | None = None,
 ) -> Iterator[Serving]:
     """A service on a port of this test's own (or the one given); ended by SIGTERM, which must give exit code 0."""
@@ -132,7 +134,7 @@ def serving(
             text=True,
             env={**os.environ, **(environment or {})},
         )
-    service = Serving(process, f"http://{loopback.host}:{port}", data, log)
+    service = Serving(process, f"http://{loopback.host}:{port}", data, log, token)
     try:
         wait_until(lambda: _answers(service), "the API answers", PATIENCE_S)
         yield service

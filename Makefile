@@ -15,8 +15,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 VENV := .venv/.setup-venv
 LOCKED := .venv/.setup-locked
 SVEV := .venv/.setup-svev
-NPM_LOCK := $(wildcard tests/recorder/npm/package-lock.json)
-NPM := $(if $(NPM_LOCK),tests/recorder/npm/node_modules/.setup-npm)
+NPM := $(patsubst %/package-lock.json,%/node_modules/.setup-npm,$(wildcard tests/*/npm/package-lock.json))
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -57,7 +56,7 @@ lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 
 clean: ## remove everything that make made; recordings stay
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
-	rm -rf tests/recorder/npm/node_modules
+	rm -rf tests/*/npm/node_modules
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Set-up. A stamp is made when its step is done, so an interrupted step starts over.
@@ -80,9 +79,7 @@ $(SVEV): pyproject.toml $(LOCKED) | system
 	@$(PIP) install -qq --no-deps --no-build-isolation -e .
 	@touch $@
 
-ifneq ($(NPM),)
-$(NPM): $(NPM_LOCK) | system
-	@echo "installing the npm packages of the tests"
-	@npm ci --prefix $(dir $(NPM_LOCK)) --no-audit --no-fund --loglevel=error
+%/node_modules/.setup-npm: %/package-lock.json | system
+	@echo "installing the npm packages of $(dir $<)"
+	@npm ci --prefix $(dir $<) --no-audit --no-fund --loglevel=error
 	@touch $@
-endif

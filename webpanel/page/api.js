@@ -39,12 +39,12 @@ export function onTokenNeeded(action) {
  * @throws {Problem}
  */
 export async function call(method, path, body, deadlineMs = DEADLINE_MS) {
-  const headers = body === undefined ? {} : { "Content-Type": "application/json" };
-  const content = body === undefined ? undefined : JSON.stringify(body);
+  /** @type {RequestInit} */
+  const content = body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
   let answer;
   try {
     answer = await fetch(`./api/${path}`, {
-      method, headers, body: content, cache: "no-store", signal: AbortSignal.timeout(deadlineMs),
+      method, ...content, cache: "no-store", signal: AbortSignal.timeout(deadlineMs),
     });
     if (answer.ok) return answer.status === 204 ? null : await answer.json();
   } catch (error) {

@@ -71,8 +71,8 @@ function drawBlocks({ cameras, state, pulses }) {
   viewer.layOut(blocks, ratio ? columns / ratio : USUAL_ROWS);
   cameras.forEach((camera, index) => {
     const fine = camera.state === "ready";
-    const { text, advice } = say(camera.statement);
-    viewer.cover(index, camera.statement.level, fine ? "" : t(`camera.${camera.state}`), camera.state === "off" ? "" : advice || text);
+    const { text, advice } = camera.state === "off" ? { text: "", advice: "" } : say(camera.statement);
+    viewer.cover(index, camera.statement.level, fine ? "" : t(`camera.${camera.state}`), text, advice);
   });
   viewer.image.alt = t("preview.alt", { cameras: cameras.map((camera) => camera.name).join(", ") });
   const live = state === "armed" || state === "recording";

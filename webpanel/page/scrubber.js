@@ -163,7 +163,7 @@ function drawPlace() {
   viewer.image.alt = t("scrub.alt", { pulse });
   statuses.forEach((status, index) => {
     const fine = status === "ok";
-    viewer.cover(index, "warning", fine ? "" : t(`status.${status}`), fine ? "" : t(`status.${status}.means`));
+    viewer.cover(index, "warning", fine ? "" : t(`status.${status}`), fine ? "" : t(`status.${status}.means`), "");
   });
 }
 

@@ -23,6 +23,7 @@ function draw() {
   }
   setText($("state-word"), t(`state.${state}`));
   setText($("state-text"), inWords());
+  $("state-text").dataset.level = status?.statement.level ?? "";
   drawTime();
 }
 

@@ -11,7 +11,7 @@
  * @property {(blocks: Block[], rows: number) => void} layOut
  * @property {(index: number|null) => void} select one camera, or all
  * @property {() => number|null} selected
- * @property {(index: number, level: string, title: string, text: string) => void} cover say in a camera's block why it is black
+ * @property {(index: number, level: string, title: string, text: string, advice: string) => void} cover say in a camera's block why it is black
  */
 
 import { make, setText } from "./dom.js";
@@ -45,8 +45,7 @@ export function makeViewer(root, chosen) {
       label.hidden = one !== null && one !== index;
       label.style.left = one === null ? `${(100 * block.columns[0]) / all}%` : "0";
       label.style.width = one === null ? `${(100 * (block.columns[1] - block.columns[0])) / all}%` : "100%";
-      const words = t(one === null ? "viewer.enlarge" : "viewer.all", { camera: block.name });
-      label.setAttribute("aria-label", words);
+      setText(label.querySelector(".unseen"), t(one === null ? "viewer.enlarge" : "viewer.all"));
       label.setAttribute("aria-pressed", String(one === index));
     });
   }
@@ -59,7 +58,7 @@ export function makeViewer(root, chosen) {
         one = null;
         labels.replaceChildren(...newBlocks.map((block, index) => make(
           "button", { type: "button", class: "block", onclick: () => chosen(one === null ? index : null) },
-          make("span", { class: "name" }, block.name), make("span", { class: "cover", hidden: true }),
+          make("span", { class: "name" }, block.name), make("span", { class: "unseen" }), make("span", { class: "cover", hidden: true }),
         )));
       }
       [blocks, rows] = [newBlocks, newRows];
@@ -70,13 +69,12 @@ export function makeViewer(root, chosen) {
       draw();
     },
     selected: () => one,
-    cover(index, level, title, text) {
+    cover(index, level, title, text, advice) {
       const cover = labels.children[index].querySelector(".cover");
       cover.hidden = !title;
       cover.dataset.level = level;
-      if (!cover.children.length) cover.append(make("strong"), make("span"));
-      setText(cover.children[0], title);
-      setText(cover.children[1], text);
+      if (!cover.children.length) cover.append(make("strong"), make("span"), make("em"));
+      [title, text, advice].forEach((words, line) => setText(cover.children[line], words));
     },
   };
 }

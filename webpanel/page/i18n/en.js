@@ -54,8 +54,8 @@ export const en = {
   "preview.no_pulses": "No trigger pulses: the picture stands still.",
   "preview.tap": "Tap a camera to see it large.",
   "preview.tap_back": "Tap again to see all cameras.",
-  "viewer.enlarge": "{camera}: show large",
-  "viewer.all": "{camera} is shown large: show all cameras",
+  "viewer.enlarge": "show large",
+  "viewer.all": "is shown large; show all cameras",
 
   "session.title": "Next jump",
   "session.this": "This jump",

@@ -54,8 +54,8 @@ export const nb = {
   "preview.no_pulses": "Ingen pulser: bildet står stille.",
   "preview.tap": "Trykk på et kamera for å se det stort.",
   "preview.tap_back": "Trykk igjen for å se alle kameraene.",
-  "viewer.enlarge": "{camera}: vis stort",
-  "viewer.all": "{camera} vises stort: vis alle kameraene",
+  "viewer.enlarge": "vis stort",
+  "viewer.all": "vises stort; vis alle kameraene",
 
   "session.title": "Neste hopp",
   "session.this": "Dette hoppet",

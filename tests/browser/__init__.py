@@ -1,0 +1,1 @@
+"""The panel's page in a real browser, and its sources."""

@@ -1,0 +1,62 @@
+"""Debian's Chromium without a window, and pages in it that must not complain."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
+
+from tests.webpanel.conftest import client, panel, service
+
+__all__ = ["browser", "client", "open_page", "panel", "service"]
+
+#: The machine may be busy: what is waited for takes a second or two on a quiet one.
+PATIENCE_MS = 40_000
+#: What the browser itself says of answers that the page handles: refusals, and a service that is gone on purpose.
+_HANDLED = ("Failed to load resource", "net::ERR_")
+
+Open = Callable[..., Page]
+
+
+@pytest.fixture
+def browser() -> Iterator[Browser]:
+    """A browser of this test's own."""
+    path = shutil.which("chromium")
+    if path is None:
+        pytest.skip("chromium is not installed (Debian package chromium): the page cannot be tried")
+    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=arguments, timeout=PATIENCE_MS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def open_page(browser: Browser) -> Iterator[Open]:
+    """Opens pages: `open_page(url, width=360, height=780, locale="nb-NO", color_scheme="dark")`.
+
+    A page that raises an error, or writes one to the console, fails the test.
+    """
+    contexts: list[BrowserContext] = []
+    complaints: list[str] = []
+
+    def hear(message: ConsoleMessage) -> None:
+        if message.type in {"error", "warning"} and not any(handled in message.text for handled in _HANDLED):
+            complaints.append(message.text)
+
+    def open_one(url: str, *, width: int = 1280, height: int = 800, locale: str = "en-GB", **more: Any) -> Page:
+        context = browser.new_context(viewport={"width": width, "height": height}, locale=locale, **more)
+        contexts.append(context)
+        context.set_default_timeout(PATIENCE_MS)
+        page = context.new_page()
+        page.on("console", hear)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(url)
+        return page
+
+    yield open_one
+    for context in contexts:
+        context.close()
+    assert not complaints

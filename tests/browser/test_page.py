@@ -1,0 +1,251 @@
+"""The page itself, over a rig in memory: languages, sizes, looks, accessibility, refusals, login."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from rig.frame import FrameStatus
+from tests.browser.conftest import Open
+from tests.recorder.logs import ALL_OK
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import Panel, serving
+from webpanel.access import Access
+from webpanel.models import State
+
+AXE = Path(__file__).with_name("npm") / "node_modules" / "axe-core" / "axe.min.js"
+TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
+#: The views, and what is there when a view has what it shows.
+READY = {
+    "live": "#cameras li",
+    "recordings": "#recordings-list li",
+    "trash": "#recordings-empty",
+    "recordings/jump-2": "#frame-strip li",
+    "log": "#log-list li, #log-empty",
+    "doctor": "#doctor-run",
+    "rig": "#rig-facts div",
+}
+SMALLEST_TOUCH_PX = 44
+#: What a finger has to hit, and fails to have room for it.
+TOO_SMALL = """least =>
+    [...document.querySelectorAll("button, select, textarea, input:not([type=checkbox]), nav a, .button")]
+    .filter(e => e.checkVisibility() && !e.matches(".block"))
+    .filter(e => Math.min(e.getBoundingClientRect().height, e.getBoundingClientRect().width) < least)
+    .map(e => e.outerHTML)"""
+HIDE = (
+    "Object.defineProperty(document, 'hidden', { value: true }); document.dispatchEvent(new Event('visibilitychange'))"
+)
+
+
+@pytest.fixture
+def jumps(service: MemoryService) -> None:
+    """Two recordings, one with a lost frame."""
+    folder = service.catalogue.directory
+    write_recording(folder, "jump-1", (ALL_OK,) * 30, {"athlete": "Anna Berg", "bib": "17"})
+    lost = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
+    write_recording(folder, "jump-2", (lost, *(ALL_OK,) * 29), {"athlete": "Ola <b>Nordmann</b>", "bib": "4"})
+
+
+def enter(page: Page, panel: Panel, view: str) -> None:
+    """Go to a view, and wait until it has what it shows."""
+    page.goto(f"{panel.url}/#/{view}")
+    expect(page.locator(f":is({READY[view]}):visible").first).to_be_attached()
+    if view == "doctor":
+        page.locator("#doctor-run").click()
+        expect(page.locator(".finding")).to_have_count(1)
+
+
+def test_an_unready_rig_offers_to_arm_and_nothing_else(panel: Panel, open_page: Open) -> None:
+    page = open_page(panel.url)
+    expect(page.locator("#state-word")).to_have_text("Idle")
+    expect(page.locator("#next-step")).to_have_text("Arm")
+    expect(page.locator("#save-last")).to_be_hidden()
+    expect(page.locator("#disarm")).to_be_hidden()
+    expect(page.locator("#preview")).to_have_class(re.compile("dark"))
+    page.locator("#next-step").click()
+    expect(page.locator("#state-word")).to_have_text("Armed")
+    expect(page.locator("#next-step")).to_have_text("Record")
+
+
+@pytest.mark.parametrize(
+    ("state", "word", "button"),
+    [
+        (State.ARMING, "Arming", "Arming …"),
+        (State.DISARMING, "Closing", "Closing …"),
+        (State.FAULT, "Fault", "Arm again"),
+    ],
+)
+def test_every_state_has_its_word_and_its_button(
+    panel: Panel, service: MemoryService, open_page: Open, state: State, word: str, button: str
+) -> None:
+    service._become(state)
+    page = open_page(panel.url)
+    expect(page.locator("#state-word")).to_have_text(word)
+    expect(page.locator("#state")).to_have_attribute("data-state", state.value)
+    expect(page.locator("#next-step")).to_have_text(button)
+    wanted = expect(page.locator("#next-step"))
+    wanted.to_be_enabled() if state is State.FAULT else wanted.to_be_disabled()
+
+
+def test_a_refusal_is_shown_with_what_to_do(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    page = open_page(panel.url)
+    service.arm()
+    expect(page.locator("#next-step")).to_have_text("Record")
+    page.route("**/api/events", lambda route: route.abort())
+    service.state = State.IDLE  # nobody is told: as if another operator had been quicker
+    page.locator("#next-step").click()
+    expect(page.get_by_role("alert").filter(has_text="arm it first")).to_be_visible()
+    expect(page.locator("#next-step")).not_to_have_attribute("aria-busy", "true")
+
+
+def test_names_of_athletes_are_text_and_nothing_else(panel: Panel, jumps: None, open_page: Open) -> None:
+    page = open_page(panel.url)
+    enter(page, panel, "recordings")
+    expect(page.locator("#recordings-list")).to_contain_text("Ola <b>Nordmann</b>")
+    page.get_by_role("searchbox").fill("anna")
+    expect(page.locator("#recordings-list li")).to_have_count(1)
+
+
+def test_session_fields_carry_over_and_the_next_jumper_clears_who(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page(panel.url)
+    page.get_by_role("textbox", name="Bib").fill("7")
+    page.get_by_role("textbox", name="Wind").fill("1 m/s")
+    page.reload()
+    expect(page.get_by_role("textbox", name="Bib")).to_have_value("7")
+    page.locator("#next-step").click()
+    expect(page.locator("#session-title")).to_have_text("This jump")
+    page.get_by_role("textbox", name="Notes").fill("long")
+    page.keyboard.press("Tab")
+    wait_until(
+        lambda: (recording := service.status().recording) is not None and recording.session.notes == "long", "the notes"
+    )
+    page.get_by_role("button", name="Next jumper").click()
+    expect(page.get_by_role("textbox", name="Bib")).to_be_focused()
+    expect(page.get_by_role("textbox", name="Bib")).to_have_value("")
+    page.keyboard.type("8")
+    page.keyboard.press("Tab")
+    page.locator("#next-step").click()
+    expect(page.locator("#state-word")).to_have_text("Armed")
+    expect(page.get_by_role("textbox", name="Wind")).to_have_value("1 m/s")
+    (saved,) = service.catalogue.entries()
+    assert (saved.session["bib"], saved.session["wind"], saved.session["notes"]) == ("7", "1 m/s", "long")
+
+
+def test_the_preview_runs_only_while_it_is_looked_at(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    service.arm()
+    page = open_page(panel.url)
+    image = page.locator("#preview img")
+    expect(image).to_have_attribute("src", "./api/preview.mjpg")
+    expect(image).not_to_have_js_property("naturalWidth", 0)
+    previews = panel.server.config.app.state.streams.previews  # type: ignore[union-attr]
+    assert previews.open == 1
+    page.get_by_role("button", name="K2 show large").click()
+    expect(page.locator("#preview")).to_have_class(re.compile("single"))
+    page.goto(f"{panel.url}/#/log")
+    expect(image).not_to_have_attribute("src", re.compile("preview"))
+    wait_until(lambda: previews.open == 0, "the stream is closed", 20)
+    page.goto(f"{panel.url}/#/live")
+    expect(image).to_have_attribute("src", "./api/preview.mjpg")
+    page.evaluate(HIDE)
+    expect(image).not_to_have_attribute("src", re.compile("preview"))
+
+
+def test_norwegian_from_the_browser_and_by_choice(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open
+) -> None:
+    page = open_page(panel.url, locale="nb-NO")
+    expect(page.locator("#state-word")).to_have_text("Av")
+    expect(page.locator("#state-text")).to_contain_text("Kameraene er av.")
+    expect(page.locator("html")).to_have_attribute("lang", "nb")
+    enter(page, panel, "recordings/jump-2")
+    expect(page.locator("#recording-verdict")).to_have_text("1 av 30 pulser mangler et bilde")
+    expect(page.locator("#frame-fate")).to_contain_text("K2 tapt")
+    page.keyboard.press("?")
+    page.get_by_label("Språk").select_option("en")
+    expect(page.get_by_role("heading", name="Settings and keys")).to_be_visible()
+    page.get_by_role("button", name="Close").click()
+    expect(page.locator("#frame-fate")).to_contain_text("K2 lost")
+    expect(page.locator("#recording-verdict")).to_contain_text("1 of 30 pulses lack a frame")
+    page.reload()
+    expect(page.locator("html")).to_have_attribute("lang", "en")
+
+
+@pytest.mark.parametrize("locale", ["en-GB", "nb-NO"])
+def test_a_narrow_phone_scrolls_down_only_and_takes_gloves(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open, locale: str
+) -> None:
+    service.arm()
+    page = open_page(panel.url, width=360, height=780, locale=locale, has_touch=True, is_mobile=True)
+    for view in READY:
+        enter(page, panel, view)
+        assert page.evaluate("document.documentElement.scrollWidth") == 360, view
+        assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX), view
+
+
+def _grave(page: Page) -> list[str]:
+    found: dict[str, Any] = page.evaluate("axe.run({ resultTypes: ['violations'] })")
+    return [
+        f"{violation['id']}: {violation['help']}: {json.dumps([node['html'][:150] for node in violation['nodes'][:3]])}"
+        for violation in found["violations"]
+        if violation["impact"] in {"serious", "critical"}
+    ]
+
+
+@pytest.mark.parametrize("look", ["light", "dark", "outdoor"])
+@pytest.mark.parametrize("width", [360, 1280])
+def test_axe_finds_nothing_grave(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open, look: str, width: int
+) -> None:
+    if not AXE.exists():
+        pytest.fail(f"the npm packages are not installed: run `npm ci` in {AXE.parents[2]}, or `make test`")
+    page = open_page(
+        panel.url, width=width, color_scheme="light" if look == "outdoor" else look, reduced_motion="reduce"
+    )
+    page.evaluate("look => localStorage.setItem('svev.look', JSON.stringify(look))", look)
+    page.reload()
+    page.evaluate(AXE.read_text())
+    for view in READY:
+        enter(page, panel, view)
+        assert not _grave(page), view
+    page.goto(f"{panel.url}/#/live")
+    for state in (State.ARMING, State.ARMED, State.RECORDING, State.DISARMING, State.FAULT):
+        service._become(state)
+        expect(page.locator("#state")).to_have_attribute("data-state", state.value)
+        assert not _grave(page), state
+    page.locator("#open-settings").click()
+    assert not _grave(page), "settings"
+
+
+@pytest.fixture
+def guarded(service: MemoryService, loopback: Loopback) -> Iterator[Panel]:
+    """A panel that wants its token."""
+    with serving(service, Access.for_address(loopback.host, environment={"SVEV_TOKEN": TOKEN})) as running:
+        yield running
+
+
+def test_the_token_is_asked_for_once(guarded: Panel, open_page: Open) -> None:
+    page = open_page(guarded.url)
+    dialog = page.get_by_role("dialog", name="Log in")
+    expect(dialog).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(dialog).to_be_visible()
+    dialog.get_by_label("Token").fill("wrong")
+    dialog.get_by_role("button").click()
+    expect(dialog.get_by_role("alert")).to_contain_text("the token is wrong")
+    dialog.get_by_label("Token").fill(TOKEN)
+    dialog.get_by_role("button").click()
+    expect(page.locator("#state-word")).to_have_text("Idle")
+    expect(dialog).to_be_hidden()
+    page.reload()
+    expect(page.locator("#state-word")).to_have_text("Idle")
+    assert TOKEN not in page.url
+    assert TOKEN not in page.evaluate("JSON.stringify({ ...localStorage }) + document.cookie")

@@ -1,0 +1,120 @@
+"""The page's sources: types, words in both languages, shapes as the API has them, nothing from outside."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from webpanel import models
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "webpanel" / "page"
+NPM = Path(__file__).with_name("npm")
+MODULES = sorted(PAGE.rglob("*.js"))
+EVERYTHING = sorted(path for path in PAGE.rglob("*") if path.is_file())
+WORDS = re.compile(r'^  "([\w.]+)": "(.*)",$', re.MULTILINE)
+#: Keys that are put together in the code, by their beginnings.
+COMPOSED = ("state.", "actions.wait_", "camera.", "status.", "field.", "doctor.")
+
+
+def _words(language: str) -> dict[str, str]:
+    return dict(WORDS.findall((PAGE / "i18n" / f"{language}.js").read_text()))
+
+
+def _placeholders(text: str) -> set[str]:
+    return set(re.findall(r"\{(\w+)\}", text))
+
+
+def _sources() -> str:
+    own_words = {PAGE / "i18n" / "en.js", PAGE / "i18n" / "nb.js"}
+    return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
+
+
+def test_the_types_of_the_modules_fit_together() -> None:
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed: the types of the page cannot be checked")
+    compiler = NPM / "node_modules" / "typescript" / "lib" / "tsc.js"
+    if not compiler.exists():
+        pytest.fail(f"the npm packages are not installed: run `npm ci` in {NPM}, or `make test`")
+    command = [node, str(compiler), "-p", str(NPM / "tsconfig.json")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_both_languages_have_the_same_keys_and_fill_in_the_same() -> None:
+    english, norwegian = _words("en"), _words("nb")
+    assert list(english) == list(norwegian)
+    assert len(english) > 150
+    for key, text in english.items():
+        assert _placeholders(text) == _placeholders(norwegian[key]), key
+
+
+def test_every_key_that_is_used_has_words_and_the_other_way_round() -> None:
+    english, sources = _words("en"), _sources()
+    used = set(re.findall(r'data-t(?:-label|-placeholder)?="([^"]+)"', sources))
+    used |= {literal for literal in re.findall(r'"([a-z]+(?:\.[\w]+)*)"', sources) if literal in english}
+    called = set(re.findall(r'\bt\("([^"]+)"', sources))
+    assert used | called <= set(english)
+    assert {key for key in english if not key.startswith(COMPOSED)} <= used | called
+
+
+def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> None:
+    norwegian = (PAGE / "i18n" / "nb-statements.js").read_text()
+    translated = dict(re.findall(r"^  (\w+): \[(.*)\],$", norwegian, re.MULTILINE))
+    stated = set()
+    for path in [*(ROOT / "svev" / "service").rglob("*.py"), *(ROOT / "webpanel").rglob("*.py")]:
+        text = path.read_text()
+        stated |= set(re.findall(r'\bcode="(\w+)"', text))
+        stated |= set(re.findall(r'_working\("(\w+)"', text))
+        stated |= {f"{code}_partly" for code in re.findall(r'_working\("(\w+)"', text)}
+    verdicts = (ROOT / "webpanel" / "recording_view.py").read_text()
+    stated |= {f"verdict_{word}" for word in re.findall(r'Level\.\w+, "(\w+)", ', verdicts)}
+    assert len(stated) > 20
+    assert stated <= set(translated)
+
+
+def _types() -> dict[str, list[str]]:
+    """Properties by name of the typedef."""
+    types: dict[str, list[str]] = {}
+    name = ""
+    for line in (PAGE / "types.js").read_text().splitlines():
+        if found := re.search(r"@typedef \{object\} (\w+)", line):
+            name = found[1]
+            types[name] = []
+        elif found := re.search(r"@property \{.*\} (\w+)", line):
+            types[name].append(found[1])
+    return types
+
+
+@pytest.mark.parametrize("name", sorted(_types()))
+def test_the_shapes_are_those_of_the_api(name: str) -> None:
+    model: type[BaseModel] = getattr(models, name)
+    assert _types()[name] == list(model.model_fields)
+
+
+@pytest.mark.parametrize("path", EVERYTHING, ids=lambda path: path.name)
+def test_nothing_comes_from_outside_and_nothing_is_inline(path: Path) -> None:
+    text = path.read_text()
+    assert not re.sub(r"http://www\.w3\.org/2000/svg", "", text).count("://")
+    assert not re.search(r"url\(|@import", text) or path.suffix == ".js"
+    if path.suffix == ".html":
+        assert not re.search(r'\sstyle="|\son\w+="|<style|javascript:', text)
+        assert all("src=" in tag for tag in re.findall(r"<script[^>]*>", text))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)
+def test_modules_are_short(path: Path) -> None:
+    limit = 400 if path.parent.name == "i18n" else 250
+    assert len(path.read_text().splitlines()) <= limit
+
+
+def test_icons_that_are_shown_exist() -> None:
+    drawn = set(re.findall(r'<symbol id="([\w-]+)"', (PAGE / "icons.svg").read_text()))
+    shown = set(re.findall(r"icons\.svg#([\w-]+)", (PAGE / "index.html").read_text()))
+    shown |= set(re.findall(r'\bicon(?:\(|: )"([\w-]+)"', _sources()))
+    shown |= {state.value for state in models.State} - {"disarming"} | {level.value for level in models.Level}
+    assert shown <= drawn

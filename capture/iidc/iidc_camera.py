@@ -17,7 +17,7 @@ from capture.iidc.device import Device
 from capture.iidc.dma import DmaRing
 from capture.iidc.exposure import READOUT_NS, longest_delay_ns, set_exposure, set_gain, set_trigger
 from capture.iidc.library import Dc1394Error
-from capture.iidc.signature import SIGNATURE_BYTES, SignatureReader
+from capture.iidc.signature import SIGNATURE_BYTES, ByteOrder, SignatureReader
 from capture.iidc.video_format import set_video_format
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now
@@ -86,6 +86,16 @@ class IidcCamera:
         signed = "signs its frames" if self._signatures is not None else "no signature, times from packets"
         need = self._format.need
         return f"{self._device.name}, {self._format.name}, {need.units} bandwidth units, {signed}"
+
+    @property
+    def byte_order(self) -> ByteOrder | None:
+        """Order of the bytes in the signature; None if the camera does not sign or no frame has told yet."""
+        return None if self._signatures is None else self._signatures.order
+
+    @property
+    def transport_ns(self) -> int:
+        """From the first packet of a frame to its last."""
+        return self._format.need.transport_ns
 
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from capture.iidc.bandwidth import FIXED_FORMATS, Need, framerate_index, is_fixed_format, need
-from capture.iidc.cycle_time import CYCLE_NS
 from capture.iidc.device import Device
 from capture.iidc.structures import COLOR_CODING_MONO8, VideoMode
 from rig.errors import CameraError
@@ -23,11 +22,6 @@ class VideoFormat:
     mode: VideoMode
     name: str
     need: Need
-
-    @property
-    def transport_ns(self) -> int:
-        """From the first packet of a frame to its last."""
-        return self.need.packets * CYCLE_NS
 
 
 def set_video_format(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat:

@@ -3,13 +3,13 @@
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 import typer
 
 from rig.rigfile import CONFIG, load_rig
 from svev import console
-from svev.doctor.examination import probes, run_probe
+from svev.doctor.examination import firewire_probes, probes, run_probe
 from svev.doctor.finding import Finding, Level
 
 _STYLES: Final = {Level.PASS: "green", Level.WARN: "yellow", Level.FAIL: "bold red"}
@@ -18,22 +18,29 @@ _SOMETHING_FAILS: Final = 3
 
 def doctor(
     rig: Annotated[
-        Path,
+        Path | None,
         typer.Option(help="rig file to examine the machine for; the simulated hill if left out", show_default=False),
-    ] = CONFIG / "rigs" / "sim-gige.toml",
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="recording directory; the rig file's if left out")] = None,
+    bus: Annotated[
+        Literal["firewire"] | None,
+        typer.Option(help="examine this bus alone, and try each of its cameras: set up, 2 s of frames, a bus reset"),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Examine machine, network, disk and cameras before a recording: PASS, WARN or FAIL, and what to do.
 
-    Writes up to 256 MB to the recording directory and removes them again. Touches no camera's settings.
+    Writes up to 256 MB to the recording directory and removes them again. Touches no camera's settings, except
+    with --bus: do not use that while recording.
 
     Exit codes: 0 nothing fails, 2 bad input, 3 at least one FAIL.
 
     Example: svev doctor --rig config/rigs/hill-gige.toml
+
+    Example: svev doctor --bus firewire --rig config/rigs/hill-iidc.toml
     """
-    settings = load_rig(rig)
-    todo = probes(settings, out or settings.recorder.directory)
+    settings = load_rig(rig or CONFIG / "rigs" / ("hill-iidc.toml" if bus else "sim-gige.toml"))
+    todo = firewire_probes(settings) if bus else probes(settings, out or settings.recorder.directory)
     findings: list[Finding] = []
     with console.progress("examining", len(todo)) as advance:
         for done, probe in enumerate(todo, start=1):

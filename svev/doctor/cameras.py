@@ -22,8 +22,10 @@ def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
                 yield _look_at_simulated(camera)
             case "aravis":
                 yield _look_at_gige(camera)
+            case "iidc":
+                pass  # all at once: `svev.doctor.firewire`
             case other:
-                remedy = 'use backend "aravis" or "sim"'
+                remedy = 'use backend "aravis", "iidc" or "sim"'
                 yield failure(Topic.CAMERAS, f'{camera.name}: backend "{other}" is not built yet', remedy)
 
 

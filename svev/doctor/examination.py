@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.settings import RigSettings
-from svev.doctor import cameras, disk, machine, memory, network, software
+from svev.doctor import cameras, disk, firewire, machine, memory, network, software
 from svev.doctor.finding import Finding, Topic, failure
 
 
@@ -42,9 +42,19 @@ def probes(rig: RigSettings, directory: Path) -> list[Probe]:
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),
         Probe("publication", Topic.NETWORK, lambda: network.look_at_publication(rig)),
         Probe("cameras", Topic.CAMERAS, lambda: cameras.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
+        Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("discovery", Topic.CAMERAS, lambda: cameras.look_for_cameras(rig), limit_s=10.0),
         Probe("clock", Topic.TIME, machine.look_at_clock),
         Probe("processor", Topic.PROCESSOR, machine.look_at_processor),
+    ]
+
+
+def firewire_probes(rig: RigSettings) -> list[Probe]:
+    """The FireWire cameras of a rig alone, and tried."""
+    limit_s = firewire.trial_limit_s(rig) + 15
+    return [
+        Probe("camera libraries", Topic.SOFTWARE, lambda: software.look_at_camera_libraries(rig), limit_s=10.0),
+        Probe("FireWire", Topic.CAMERAS, lambda: firewire.try_firewire(rig), limit_s=limit_s),
     ]
 
 

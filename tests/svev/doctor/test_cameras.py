@@ -95,7 +95,9 @@ def test_cameras_inside_the_program_are_said_to_be_so() -> None:
 
 
 def test_a_back_end_that_does_not_exist_yet_fails() -> None:
-    findings = list(cameras.look_at_cameras(load_rig(CONFIG / "rigs" / "hill-iidc.toml")))
+    rig = load_rig(CONFIG / "rigs" / "hill-gige.toml")
+    replayed = tuple(camera.model_copy(update={"backend": "replay"}) for camera in rig.cameras)
+    findings = list(cameras.look_at_cameras(rig.model_copy(update={"cameras": replayed})))
     assert [finding.level for finding in findings] == [Level.FAIL] * 3
 
 

@@ -1,0 +1,91 @@
+"""What can be seen of FireWire cameras without changing anything in them."""
+
+from collections.abc import Iterator
+
+from capture.iidc.avt import AvtRegisters
+from capture.iidc.bandwidth import UNITS_PER_BUS, check_bandwidth, need
+from capture.iidc.bus import Bus, guid_text, why_no_camera
+from capture.iidc.device import Device
+from capture.iidc.exposure import READOUT_NS
+from rig.clocks import NS_PER_US
+from rig.errors import BadInputError, CameraError
+from rig.settings import CameraSettings, RigSettings
+from svev.doctor.finding import Finding, Topic, failure, passed, warning
+
+
+def told(message: str) -> Finding:
+    """What an error of ours says: the thing, a colon, what to do."""
+    what, _, remedy = message.removeprefix("camera ").partition(": ")
+    return failure(Topic.CAMERAS, what, remedy or "see docs/firewire.md")
+
+
+def look_at_cameras(rig: RigSettings) -> Iterator[tuple[Finding, CameraSettings | None]]:
+    """Findings, each with the camera that it finds ready to be tried, if it does."""
+    cameras = [camera for camera in rig.cameras if camera.backend == "iidc"]
+    yield _look_at_bandwidth(rig, cameras), None
+    for camera in cameras:
+        yield _look_at_exposure(camera, rig), None
+    try:
+        with Bus() as bus:
+            there = {found.guid for found in bus.cameras()}
+            if not there:
+                yield told(why_no_camera()), None
+                return
+            known = {int(camera.address, 16) for camera in cameras}
+            if others := ", ".join(guid_text(guid) for guid in sorted(there - known)):
+                yield passed(Topic.CAMERAS, f"also on FireWire, but not in the rig file: {others}"), None
+            for camera in cameras:
+                yield from _look_at_camera(bus, camera)
+    except (BadInputError, CameraError) as error:
+        yield told(str(error)), None
+
+
+def _look_at_camera(bus: Bus, camera: CameraSettings) -> Iterator[tuple[Finding, CameraSettings | None]]:
+    try:
+        with Device(bus, bus.find(int(camera.address, 16))) as device:
+            if device.transmits():
+                what = f"{camera.name} ({device.name}) sends frames already"
+                remedy = (
+                    "end the program that uses it (another svev?); after a crash the next recording switches it off"
+                )
+                yield warning(Topic.CAMERAS, what, remedy), None
+                return
+            yield passed(Topic.CAMERAS, f"{camera.name} is {device.name}"), camera
+            yield _look_at_signature(camera, AvtRegisters(device)), None
+    except (BadInputError, CameraError) as error:
+        yield told(f"{camera.name}, {error}"), None
+
+
+def _look_at_signature(camera: CameraSettings, avt: AvtRegisters) -> Finding:
+    if avt.signs:
+        return passed(Topic.CAMERAS, f"{camera.name} can sign its frames (secure image signature)")
+    return warning(
+        Topic.CAMERAS,
+        f"{camera.name} cannot sign its frames: torn frames pass as pictures, lost ones count as missed",
+        "use an AVT camera with firmware 3.03 or newer where every frame counts",
+    )
+
+
+def _look_at_bandwidth(rig: RigSettings, cameras: list[CameraSettings]) -> Finding:
+    try:
+        check_bandwidth(rig)
+    except BadInputError as error:
+        return told(str(error))
+    needs = [need(camera, rig.trigger.rate_hz) for camera in cameras]
+    each = ", ".join(f"{camera.name} {taken.units}" for camera, taken in zip(cameras, needs, strict=True))
+    total = sum(taken.units for taken in needs)
+    return passed(Topic.CAMERAS, f"FireWire bandwidth: {total} of {UNITS_PER_BUS} units ({each})")
+
+
+def _look_at_exposure(camera: CameraSettings, rig: RigSettings) -> Finding:
+    """A camera that is still sending its last frame may be too busy for the next pulse."""
+    period_ms = rig.trigger.period_ns / 1e6
+    exposure_ns = camera.exposure_us * NS_PER_US
+    busy_ms = (exposure_ns + READOUT_NS + need(camera, rig.trigger.rate_hz).transport_ns) / 1e6
+    what = f"{camera.name}: exposure, readout and transfer take {busy_ms:.1f} of {period_ms:.1f} ms"
+    remedy = "shorten exposure_us, make the region smaller, or lower trigger.rate_hz"
+    if exposure_ns + READOUT_NS >= rig.trigger.period_ns:
+        return failure(Topic.CAMERAS, f"{what}: every other pulse will find it exposing", remedy)
+    if busy_ms > period_ms:
+        return warning(Topic.CAMERAS, f"{what}: pulses may find it busy (overrun)", remedy)
+    return passed(Topic.CAMERAS, what)

@@ -6,7 +6,7 @@ from photogrammetry.adjustment.state import Floats
 from photogrammetry.protocol.scales import ticks
 from photogrammetry.protocol.svg import FONT, WIDTH, Colour, Svg
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 38.0, 12.0, 34.0, 32.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 38.0, 15.0, 34.0, 32.0
 _HEIGHT = 230.0
 
 

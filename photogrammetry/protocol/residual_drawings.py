@@ -1,4 +1,4 @@
-"""Drawings of what is left over: residuals in each image, their distribution, their run outwards, redundancy."""
+"""Drawings of what is left over: distribution, redundancy, run outwards, and the vectors."""
 
 from itertools import pairwise
 
@@ -7,19 +7,16 @@ from scipy.stats import norm
 
 from photogrammetry.adjustment.adjustment import Adjustment
 from photogrammetry.adjustment.state import Floats
-from photogrammetry.network import ImageFrame
-from photogrammetry.protocol.canvas import Canvas
 from photogrammetry.protocol.chart import Chart
 from photogrammetry.protocol.document import Drawing
-from photogrammetry.protocol.scales import nice, rounded_up
+from photogrammetry.protocol.residual_vectors import LARGE, image_unit, patterns_of_cameras, vectors_of_images
+from photogrammetry.protocol.scales import rounded_up
 from photogrammetry.protocol.svg import Colour
 
-_IMAGES = 24  # with more of them one drawing for each camera says more than one for each image
-_VECTOR = 12.0  # drawn units of a typical residual
-_LARGE = 3.29  # |w| that one sound observation in 1000 exceeds
 _BINS = np.linspace(-5.0, 5.0, 21)
 _STARS = 40  # of the longest row of the text
 _BANDS = 10
+_DOTS = 3000  # more are a cloud, and slow to draw
 _NAMES = 12  # images that fit as names under a chart
 
 
@@ -29,7 +26,7 @@ def residual_drawings(a: Adjustment) -> tuple[Drawing, ...]:
         return ()
     drawings = [histogram(a), redundancy_drawing(a)]
     drawings += [radial for camera in range(len(a.network.cameras)) for radial in _radial(a, camera)]
-    return (*drawings, *_vectors(a))
+    return (*drawings, *patterns_of_cameras(a), *vectors_of_images(a))
 
 
 def histogram(a: Adjustment) -> Drawing:
@@ -43,9 +40,9 @@ def histogram(a: Adjustment) -> Drawing:
     chart.curve(x, len(w) * (_BINS[1] - _BINS[0]) * norm.pdf(x), Colour.RED)
     chart.legend(Colour.BLUE, f"{len(w)} observations")
     chart.legend(Colour.RED, "standard normal")
-    outside, there = int(np.sum(np.abs(w) > _LARGE)), 2.0 * norm.sf(_LARGE) * len(w)
+    outside, there = int(np.sum(np.abs(w) > LARGE)), 2.0 * norm.sf(LARGE) * len(w)
     caption = (
-        f"Normalized residuals w: {outside} of {len(w)} beyond {_LARGE}, {there:.1f} expected. "
+        f"Normalized residuals w: {outside} of {len(w)} beyond {LARGE}, {there:.1f} expected. "
         "What is beyond 5 stands in the last bar."
     )
     return Drawing(caption, chart.svg.rendered(caption), (*_text_histogram(w), caption))
@@ -102,9 +99,12 @@ def _radial(a: Adjustment, camera: int) -> list[Drawing]:
     radius = np.linalg.norm(reduced, axis=1)
     outwards = np.sum(a.image_residuals()[rows] * reduced, axis=1) / np.maximum(radius, 1e-12 * radius.max())
     largest = rounded_up(1.05 * float(np.abs(outwards).max()) or 1.0)
-    chart = Chart((0.0, rounded_up(float(radius.max()))), (-largest, largest), f"radius ({_unit(a)})", _unit(a))
+    chart = Chart(
+        (0.0, rounded_up(float(radius.max()))), (-largest, largest), f"radius ({image_unit(a)})", image_unit(a)
+    )
     chart.rule(0.0, Colour.SOFT)
-    chart.dots(radius, outwards, Colour.BLUE, 1.1)
+    every = -(-len(radius) // _DOTS)
+    chart.dots(radius[::every], outwards[::every], Colour.BLUE, 1.1)
     bands = np.array_split(np.argsort(radius), _BANDS)
     at = np.array([radius[band].mean() for band in bands])
     mean = np.array([outwards[band].mean() for band in bands])
@@ -112,58 +112,10 @@ def _radial(a: Adjustment, camera: int) -> list[Drawing]:
     for x, y, e in zip(at, mean, error, strict=True):
         chart.spread(x, y - e, y + e, Colour.RED)
     chart.curve(at, mean, Colour.RED)
-    chart.legend(Colour.BLUE, "radial residual")
+    chart.legend(Colour.BLUE, "radial residual" if every == 1 else f"radial residual, every {every}th")
     chart.legend(Colour.RED, "mean of each tenth, ± its sigma")
     caption = (
         f"Camera {entry.name}: residuals (adjusted - observed) outwards from the principal point, against the radius. "
-        f"A mean that leaves zero is distortion left over; the largest is {np.abs(mean).max():.2g} {_unit(a)}."
+        f"A mean that leaves zero is distortion left over; the largest is {np.abs(mean).max():.2g} {image_unit(a)}."
     )
     return [Drawing(caption, chart.svg.rendered(caption))]
-
-
-def _vectors(a: Adjustment) -> list[Drawing]:
-    """Residuals as vectors over each image, or over each camera's images together where those are many."""
-    by_image = len(a.network.images) <= _IMAGES
-    names = (
-        [f"Image {i.name}" for i in a.network.images] if by_image else [f"Camera {c.name}" for c in a.network.cameras]
-    )
-    belongs = a.problem.image if by_image else a.problem.camera
-    cameras = [i.camera for i in a.network.images] if by_image else list(range(len(a.network.cameras)))
-    drawings, residuals = [], a.image_residuals()
-    large = np.nan_to_num(np.abs(a.image_w())).max(axis=1) > _LARGE
-    typical = float(np.median(np.linalg.norm(residuals, axis=1)))
-    for i, (name, camera) in enumerate(zip(names, cameras, strict=True)):
-        rows = belongs == i
-        if not rows.any():
-            continue
-        canvas = Canvas(_frame(a.network.cameras[camera].size, a.problem.xy[rows]), margin=16.0)
-        magnified = nice(1.4 * _VECTOR * canvas.unit / typical) if typical > 0.0 else 1.0
-        _outline(canvas, a.network.cameras[camera].size)
-        for place, vector, wrong in zip(a.problem.xy[rows], residuals[rows], large[rows], strict=True):
-            colour = Colour.RED if wrong else Colour.BLUE
-            canvas.line(place, place + magnified * vector, colour, width=1.2)
-            canvas.svg.dot(*canvas.at(place), Colour.INK, 1.1)
-        root = float(np.sqrt(np.mean(residuals[rows] ** 2)))
-        canvas.scale_bar(_unit(a), magnified)
-        beyond = f", {int(large[rows].sum())} beyond |w| = {_LARGE} (red)" if large[rows].any() else ""
-        caption = f"{name}: {int(rows.sum())} residuals{beyond}, the bar is their scale; rms {root:.3g} {_unit(a)}."
-        drawings.append(Drawing(caption, canvas.svg.rendered(caption)))
-    return drawings
-
-
-def _unit(a: Adjustment) -> str:
-    return "px" if a.network.image_frame is ImageFrame.PIXEL else "image units"
-
-
-def _frame(size: tuple[int, int] | None, places: Floats) -> Floats:
-    """What the drawing must show: the whole image where its size is known."""
-    if size is None:
-        return places
-    half = np.array(size, dtype=float) / 2.0
-    return np.vstack([places, -half, half])
-
-
-def _outline(canvas: Canvas, size: tuple[int, int] | None) -> None:
-    if size is not None:
-        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]) * np.array(size) / 2.0
-        canvas.svg.path([canvas.at(corner) for corner in corners], Colour.FAINT, width=1.0)

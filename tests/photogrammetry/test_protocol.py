@@ -17,6 +17,7 @@ from photogrammetry.protocol.document import Drawing, Protocol, Section, Table, 
 from photogrammetry.protocol.network_drawings import network_drawings
 from photogrammetry.protocol.page import as_html, write_protocol
 from photogrammetry.protocol.residual_drawings import histogram, redundancy_drawing, residual_drawings
+from photogrammetry.protocol.residual_vectors import cell_means
 from photogrammetry.protocol.scales import nice, rounded_up, ticks
 from photogrammetry.protocol.svg import Colour
 from tests.photogrammetry.drawn import SVG, bar, chart_scales, parsed, polyline
@@ -197,7 +198,7 @@ def test_every_residual_is_drawn_to_the_scale_of_the_bar(adjusted: dict[str, Adj
         assert vectors == pytest.approx(a.image_residuals()[rows], abs=0.15 * pixels)
 
 
-def test_many_images_are_drawn_by_camera() -> None:
+def test_of_many_images_the_means_are_drawn() -> None:
     made = lab_frame(1, points=12).network
     images = tuple(replace(image, name=f"{image.name}-{k}") for k in range(3) for image in made.images)
     o = made.observations
@@ -205,9 +206,25 @@ def test_many_images_are_drawn_by_camera() -> None:
     image = np.concatenate([o.image + 9 * k for k in range(3)])
     many = ImageObservations(image, three["point"], three["xy"], three["sigma"], three["group"])
     a = adjust(replace(made, images=images, observations=many)).adjustment
-    captions = [d.caption for d in residual_drawings(a)]
-    assert sum(caption.startswith("Camera K") and "bar" in caption for caption in captions) == 3
-    assert not any(caption.startswith("Image ") for caption in captions)
+    drawings = residual_drawings(a)
+    assert not any(d.caption.startswith("Image ") for d in drawings)
+    patterns = [d for d in drawings if "mean residual" in d.caption]
+    assert len(patterns) == 3
+    tree = parsed(patterns[0].svg)
+    pixels, _ = bar(tree)
+    rows = a.problem.camera == 0
+    places, means = cell_means(a.problem.xy[rows], a.image_residuals()[rows])
+    lines = [e for e in tree.findall(f"{SVG}line") if e.attrib["stroke-width"] == "1.2"]
+    ends = np.array([[float(e.attrib[k]) for k in ("x1", "y1", "x2", "y2")] for e in lines])
+    assert (ends[:, 2:] - ends[:, :2]) * (1.0, -1.0) * pixels == pytest.approx(means, abs=0.15 * pixels)
+    assert len(places) < rows.sum()
+
+
+def test_means_of_cells() -> None:
+    places = np.array([[0.0, 0.0], [2.0, 1.0], [120.0, 60.0], [115.0, 61.0], [60.0, 0.0]])
+    at, means = cell_means(places, np.array([[1.0, 0.0], [3.0, 2.0], [5.0, 5.0], [7.0, 5.0], [9.0, 9.0]]), 1)
+    assert at == pytest.approx(np.array([[1.0, 0.5], [60.0, 0.0], [117.5, 60.5]]))
+    assert means == pytest.approx(np.array([[2.0, 1.0], [9.0, 9.0], [6.0, 5.0]]))
 
 
 def test_sections_hold_the_numbers() -> None:

@@ -145,7 +145,7 @@ def adjust_once(network: Network, start: State | None = None) -> Adjustment:
 
 def adjust_problem(problem: Problem, start: State) -> Adjustment:
     """Adjust a problem whose weights may differ from the network's; otherwise as `adjust_once`."""
-    with _only_sound_numbers():
+    with only_sound_numbers():
         return _adjusted(problem, start, check_rank(problem, start).defect, start)
 
 
@@ -155,12 +155,12 @@ def refine(problem: Problem, adjustment: Adjustment) -> Adjustment:
     Raises:
         NotSolvableError, NotConvergedError: as `adjust_once`.
     """
-    with _only_sound_numbers():
+    with only_sound_numbers():
         return _adjusted(problem, adjustment.state, adjustment.free.defect, adjustment.state)
 
 
 @contextmanager
-def _only_sound_numbers() -> Iterator[None]:
+def only_sound_numbers() -> Iterator[None]:
     """Numbers that overflow, or datum points that fall together on the way, end the adjustment in words."""
     try:
         with np.errstate(all="ignore"):
@@ -180,7 +180,7 @@ def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adj
     if free.defect:
         state = align(problem, state, free, points, target.xyz)
     equations = problem.equations(state)
-    cofactors = _cofactors(problem, state, equations, free, points)
+    cofactors = cofactors_at(problem, state, equations, free, points)
     controlled = redundancy(problem, equations, cofactors)
     adjusted = Adjustment(problem, state, solution.iterations, free, equations, cofactors, controlled)
     if not abs(controlled.total - adjusted.redundancy) <= _LOST:
@@ -191,7 +191,7 @@ def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adj
     return adjusted
 
 
-def _cofactors(problem: Problem, state: State, equations: Equations, free: FreeDatum, points: Integers) -> Floats:
+def cofactors_at(problem: Problem, state: State, equations: Equations, free: FreeDatum, points: Integers) -> Floats:
     """Q of all unknowns in the datum."""
     normals = build_normals(problem, equations)
     moves, conditions = inner_operator(problem, state, free, points)

@@ -1,37 +1,18 @@
 """The whole of an adjustment as a network file asks for it: weights, gross errors, variance components."""
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
-from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation, find_blunders
-from photogrammetry.adjustment.misfits import find_misfits
+from photogrammetry.adjustment.blunders import Blunder
+from photogrammetry.adjustment.removal import Removed
+from photogrammetry.adjustment.snooping import explained
+from photogrammetry.adjustment.snooping import snoop as snooped
 from photogrammetry.adjustment.state import State, state_of
+from photogrammetry.adjustment.suspicion import FAMILY_RISK, find_blunders
 from photogrammetry.adjustment.variance_components import Component, estimate_by_paper, estimate_components
-from photogrammetry.adjustment.wording import name_of
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
-from photogrammetry.network import Network, Reweight, Role
+from photogrammetry.network import Network, Reweight
 from rig.errors import BadInputError
-
-#: Snooping stops when this part of all observations has been taken out: something else is wrong then.
-_MOST_REMOVED = 0.1
-#: Test value that a blunder must keep beside any other to be taken out where a larger one cannot be located.
-_CERTAIN = 3.29
-_NAMED = 5  # so many misfits stand in an error message
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Removed:
-    """An observation that snooping took out, by names (indices change when an observation goes).
-
-    Attributes:
-        blunder: what was found.
-        network: the network whose indices it speaks of.
-    """
-
-    blunder: Blunder
-    network: Network
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,13 +32,16 @@ class Outcome:
     removed: tuple[Removed, ...] = ()
 
 
-def adjust(network: Network, start: State | None = None, *, snoop: bool = False) -> Outcome:
+def adjust(
+    network: Network, start: State | None = None, *, snoop: bool = False, family_risk: float = FAMILY_RISK
+) -> Outcome:
     """Adjust a network as it asks for.
 
     Args:
         network: the network; its values are the observed ones where they have a sigma.
         start: start values of everything; the network's own if left out.
         snoop: take the worst locatable gross error out and adjust again, until there is none.
+        family_risk: chance that anything at all is suspected in sound data.
 
     Returns:
         The adjusted network with tests and variance components.
@@ -67,13 +51,16 @@ def adjust(network: Network, start: State | None = None, *, snoop: bool = False)
         NotConvergedError: no optimum was reached, or weights that were asked for do not settle.
         BadInputError: a start value is missing, or too few control points for the paper's D5.
     """
-    adjustment, removed = _first(network, state_of(network) if start is None else start, snoop=snoop)
+    start = state_of(network) if start is None else start
+    removed: tuple[Removed, ...] = ()
+    if snoop:
+        cleaned = snooped(network, start, family_risk)
+        adjustment, blunders, removed = cleaned.adjustment, cleaned.left, cleaned.removed
+    else:
+        adjustment = _adjusted(network, start, family_risk)
+        blunders = tuple(find_blunders(adjustment, family_risk))
     if not adjustment.problem.n_observations:
         raise BadInputError("the network has no observations: nothing to adjust; add some")
-    blunders = find_blunders(adjustment)
-    if snoop:
-        adjustment, blunders, further = _snooped(adjustment, blunders)
-        removed += further
     components: tuple[Component, ...] | None
     if network.reweight is Reweight.NONE:
         try:
@@ -83,70 +70,13 @@ def adjust(network: Network, start: State | None = None, *, snoop: bool = False)
     else:
         estimate = estimate_by_paper if network.reweight is Reweight.PAPER else estimate_components
         components, adjustment = estimate(adjustment)
-        blunders = find_blunders(adjustment)
-    return Outcome(adjustment, tuple(blunders), components, tuple(removed))
+        blunders = tuple(find_blunders(adjustment, family_risk))
+    return Outcome(adjustment, blunders, components, removed)
 
 
-def _first(network: Network, start: State, *, snoop: bool) -> tuple[Adjustment, list[Removed]]:
-    """Adjust; where that does not converge, say which observations are to blame, or take them out if that is wanted."""
+def _adjusted(network: Network, start: State, family_risk: float) -> Adjustment:
+    """Adjust; where that does not converge, say which observations are to blame."""
     try:
-        return adjust_once(network, start), []
+        return adjust_once(network, start)
     except NotConvergedError as error:
-        misfits, state = find_misfits(network, start)
-        if not misfits:
-            raise
-        if not snoop:
-            names = "; ".join(name_of(network, misfit.suspect) for misfit in misfits[:_NAMED])
-            raise NotConvergedError(
-                f"no optimum, because something is grossly wrong: {names}; measure again, or let --snoop take it out"
-            ) from error
-    removed = []
-    for misfit in sorted(misfits, key=lambda misfit: -misfit.suspect.index):  # from behind: indices in front stay
-        removed.append(Removed(misfit, network))
-        network = without(network, misfit.suspect)
-    return adjust_once(network, state), removed
-
-
-def _snooped(adjustment: Adjustment, blunders: list[Blunder]) -> tuple[Adjustment, list[Blunder], list[Removed]]:
-    """Data snooping: one at a time, because the others may be its consequences."""
-    removed: list[Removed] = []
-    most = int(_MOST_REMOVED * adjustment.problem.n_observations)
-    while len(removed) < most:
-        worst = _most_certain(blunders)
-        if worst is None:
-            break
-        try:
-            adjusted = adjust_once(without(adjustment.network, worst.suspect), adjustment.state)
-        except (NotSolvableError, NotConvergedError):
-            break
-        removed.append(Removed(worst, adjustment.network))
-        adjustment, blunders = adjusted, find_blunders(adjusted)
-    return adjustment, blunders, removed
-
-
-def _most_certain(blunders: list[Blunder]) -> Blunder | None:
-    """The worst blunder that can be located, and is no consequence of a larger one that cannot."""
-    needed = 0.0
-    for blunder in blunders:
-        if blunder.locatable and blunder.margin > needed:
-            return blunder
-        needed = _CERTAIN
-    return None
-
-
-def without(network: Network, observation: Observation) -> Network:
-    """The network without one observation; a control point becomes a check point."""
-    i = observation.index
-    match observation.kind:
-        case BlunderKind.IMAGE:
-            o = network.observations
-            left = np.arange(len(o.image)) != i
-            parts = {name: getattr(o, name)[left] for name in ("image", "point", "xy", "sigma", "group")}
-            return replace(network, observations=replace(o, **parts))
-        case BlunderKind.CONTROL:
-            point = replace(network.points[i], role=Role.CHECK, sigma=None)
-            return replace(network, points=(*network.points[:i], point, *network.points[i + 1 :]))
-        case BlunderKind.DISTANCE:
-            return replace(network, distances=network.distances[:i] + network.distances[i + 1 :])
-        case _:
-            return replace(network, differences=network.differences[:i] + network.differences[i + 1 :])
+        raise explained(error, network, start, family_risk) from error

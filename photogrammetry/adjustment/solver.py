@@ -1,6 +1,6 @@
 """Damped Gauss-Newton: shorter steps, then Levenberg's damping, help on the way and are gone at the optimum."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,8 +25,6 @@ _MOST_DAMPING = 1e8
 _MORE, _LESS = 10.0, 0.1
 #: A change of the square sum below this part of it cannot be measured any more.
 _ROUNDING = 1e-12
-_ROBUST_STEPS = 40
-_DOUBTFUL = 2.0  # typical residuals: from here on an observation counts less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,31 +75,15 @@ def solve(problem: Problem, start: State, defect: int) -> Solution:
     )
 
 
-def robust_state(problem: Problem, start: State, defect: int) -> State:
-    """Values that a few gross errors do not draw away: residuals count by their size, not by its square.
-
-    Observations that fit badly get larger standard deviations (Huber), anew after every step. No optimum of anything
-    that is reported; it shows what does not fit.
-
-    Args:
-        problem: the network made ready.
-        start: start values.
-        defect: number of free similarity transformations.
+def one_step(problem: Problem, start: State, defect: int) -> tuple[State, bool]:
+    """One accepted step from `start`, and whether it was the last one.
 
     Raises:
         NotConvergedError: it leads nowhere.
     """
-    state = start
-    for _ in range(_ROBUST_STEPS):
-        v = problem.equations(state).v
-        typical = max(float(np.median(np.abs(v))) / 0.6745, 1.0)
-        doubt = np.sqrt(np.maximum(np.linalg.norm(v, axis=1, keepdims=True) / (_DOUBTFUL * typical), 1.0))
-        softened = replace(problem, sigma=problem.sigma * typical * doubt)
-        progress = _begin(softened, state)
-        if _iterate(softened, progress, defect) is not None:
-            return progress.state
-        state = progress.state
-    return state
+    progress = _begin(problem, start)
+    arrived = _iterate(problem, progress, defect) is not None
+    return progress.state, arrived
 
 
 def _begin(problem: Problem, start: State) -> _Progress:

@@ -76,6 +76,9 @@ def blunder_to_json(network: Network, blunder: Blunder) -> dict[str, Any]:
 
 def describe(network: Network, blunder: Blunder) -> str:
     """A gross error in words."""
+    if len(blunder.candidates) == 1:
+        name = name_of(network, blunder.suspect)
+        return f"{name} is suspected (w = {abs(blunder.w):.1f}), but there is no result without it; measure it again"
     if not blunder.locatable:
         names = "; ".join(name_of(network, candidate) for candidate in blunder.candidates)
         return (

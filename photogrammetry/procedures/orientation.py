@@ -17,8 +17,10 @@ import numpy as np
 
 from photogrammetry.adjustment.adjustment import Adjustment
 from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation
-from photogrammetry.adjustment.run import Outcome, Removed, adjust
+from photogrammetry.adjustment.removal import Removed
+from photogrammetry.adjustment.run import Outcome, adjust
 from photogrammetry.adjustment.state import State, state_of
+from photogrammetry.adjustment.suspicion import FAMILY_RISK
 from photogrammetry.adjustment.wording import describe, observation_to_json
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Datum, Network, Role
@@ -37,6 +39,8 @@ from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)
+#: Chance that a stage suspects anything in sound data: of all three together it is that of one adjustment.
+_STAGE_RISK = FAMILY_RISK / 3
 
 
 class StageName(StrEnum):
@@ -111,12 +115,14 @@ def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orient
     if free is None:
         stages.append(Stage(StageName.SIMILARITY, "left out: there is no free block"))
     else:
-        fit, wrong, stage = _similarity_stage(cleaned, free)
+        fit, wrong, stage = _similarity_stage(cleaned, _without_suspects(free))
         stages.append(stage)
         removed = [*removed, *wrong]
         cleaned = _cleaned(network, removed)
         start = None if fit is None else _carried(cleaned, free, fit.transform)
-    outcome = adjust(cleaned, state_of(complete(cleaned)) if start is None else start, snoop=True)
+    outcome = adjust(
+        cleaned, state_of(complete(cleaned)) if start is None else start, snoop=True, family_risk=_STAGE_RISK
+    )
     stages.append(Stage(StageName.CONSTRAINED, _adjusted_words(outcome), _findings(outcome)))
     return Orientation(replace(outcome, removed=(*removed, *outcome.removed)), tuple(stages), tuple(notes))
 
@@ -149,7 +155,7 @@ def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]
     """Adjust the images alone; None where they do not determine a block."""
     alone = without_survey(network)
     try:
-        outcome = adjust(alone, state_of(complete(alone)), snoop=True)
+        outcome = adjust(alone, state_of(complete(alone)), snoop=True, family_risk=_STAGE_RISK)
     except (BadInputError, NotSolvableError, NotConvergedError) as error:
         return None, [], Stage(StageName.FREE, f"left out: the images alone do not form a block ({error})")
     return outcome, list(outcome.removed), Stage(StageName.FREE, _adjusted_words(outcome), _findings(outcome))
@@ -163,7 +169,7 @@ def _similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | N
         i for i, p in enumerate(network.points) if p.role in _SURVEYED and p.xyz is not None and p.name in place
     ]
     try:
-        fit = fit_reference(*reference_points(a, [network.points[i] for i in surveyed]))
+        fit = fit_reference(*reference_points(a, [network.points[i] for i in surveyed]), _STAGE_RISK)
     except BadInputError as error:
         return None, [], Stage(StageName.SIMILARITY, f"left out: {error}")
     wrong = [Removed(_blunder(suspect, surveyed, network, a), network) for suspect in fit.removed]
@@ -179,6 +185,20 @@ def _similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | N
     return fit, wrong, Stage(StageName.SIMILARITY, words, tuple(findings))
 
 
+def _without_suspects(free: Outcome) -> Outcome:
+    """The free block without what it could not decide about: that must not bend it. As it was, if it needs them."""
+    if not free.blunders:
+        return free
+    network = free.adjustment.network
+    suspects = {candidate for blunder in free.blunders for candidate in (blunder.suspect, *blunder.candidates)}
+    named = [observation_to_json(network, suspect) for suspect in suspects]
+    less = without_survey(without_observations(network, {(names["image"], names["point"]) for names in named}))
+    try:
+        return adjust(less, state_of(complete(less)), family_risk=_STAGE_RISK)
+    except (BadInputError, NotSolvableError, NotConvergedError):
+        return free
+
+
 def _blunder(suspect: Suspect, surveyed: Sequence[int], network: Network, free: Adjustment) -> Blunder:
     """A wrong reference point as the adjustment would name it."""
     rows = {names: i for i, names in enumerate(observation_names(network))}
@@ -187,8 +207,7 @@ def _blunder(suspect: Suspect, surveyed: Sequence[int], network: Network, free: 
     others = [Observation(BlunderKind.CONTROL, surveyed[i]) for i in suspect.candidates if i != suspect.index]
     others += [Observation(BlunderKind.IMAGE, rows[names[i]]) for i in suspect.images]
     candidates = () if suspect.certain else (itself, *others)
-    margin = np.inf if suspect.certain else 0.0
-    return Blunder(itself, suspect.estimate, suspect.w, suspect.certain, candidates, margin)
+    return Blunder(itself, suspect.estimate, suspect.w, suspect.certain, candidates)
 
 
 def _cleaned(network: Network, removed: Sequence[Removed]) -> Network:

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from scipy import special
 
-from photogrammetry.adjustment.blunders import FAMILY_RISK, SINGLE_RISK, significant
 from photogrammetry.adjustment.state import Floats
+from photogrammetry.adjustment.suspicion import FAMILY_RISK, SINGLE_RISK, significant
 from photogrammetry.rotation import rotation_from_vector, skew
 from photogrammetry.similarity import Similarity, fit_similarity
 from rig.errors import BadInputError
@@ -25,8 +25,8 @@ _RANK: Final = 1e-9
 #: Of the square sum a large error explains, so much may be left because its effect is not linear.
 _LINEAR: Final = 0.005
 _FEWEST: Final = 3  # points of a similarity transformation
-#: A rival explains a misclosure if no more than this is left of the suspect beside it (5 %, three coordinates).
-_EXPLAINED: Final = float(special.chdtri(3, 0.05))
+#: A rival explains a misclosure if no more than this is left of the suspect beside it (three coordinates).
+_EXPLAINED: Final = float(special.chdtri(3, SINGLE_RISK))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,12 +110,15 @@ class ReferenceFit:
     suspect: Suspect | None = None
 
 
-def fit_reference(points: Sequence[ReferencePoint], covariance: Floats) -> ReferenceFit:
+def fit_reference(
+    points: Sequence[ReferencePoint], covariance: Floats, family_risk: float = FAMILY_RISK
+) -> ReferenceFit:
     """Carry a free block onto its reference points and take wrong ones out, the worst first.
 
     Args:
         points: n reference points.
         covariance: (3 n, 3 n) of their coordinates in the block.
+        family_risk: chance that anything at all is suspected in sound data.
 
     Raises:
         BadInputError: fewer than three points, all on a line, or numbers beyond all bounds.
@@ -124,18 +127,18 @@ def fit_reference(points: Sequence[ReferencePoint], covariance: Floats) -> Refer
         raise BadInputError(f"{len(points)} reference points that two images show: give at least three")
     try:
         with np.errstate(all="ignore"):
-            return _fitted(points, covariance)
+            return _fitted(points, covariance, family_risk)
     except np.linalg.LinAlgError:
         raise BadInputError("the numbers leave all bounds; check units and sigmas") from None
 
 
-def _fitted(points: Sequence[ReferencePoint], covariance: Floats) -> ReferenceFit:
+def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: float) -> ReferenceFit:
     used = list(range(len(points)))
     removed: list[Suspect] = []
     most = len(points) // 3  # with more something else is wrong
     while True:
         estimate = _Estimate.of(points, covariance, used)
-        suspect = estimate.suspect()
+        suspect = estimate.suspect(family_risk)
         if suspect is None or not suspect.certain or len(removed) == most or len(used) <= _FEWEST:
             break
         remaining = [i for i in used if i != suspect.index]
@@ -207,11 +210,11 @@ class _Estimate:
     def ratio(self) -> float:
         return float(np.sqrt(self.square_sum / self.redundancy))
 
-    def suspect(self) -> Suspect | None:
+    def suspect(self, family_risk: float) -> Suspect | None:
         """The worst point that is too bad for chance, with what else it may be."""
         count = len(self.used)
         drops = np.array([self._drop(self._wrong(i)) for i in range(count)])
-        risk = min(SINGLE_RISK, FAMILY_RISK / count)
+        risk = min(SINGLE_RISK, family_risk / count)
         if not significant(drops, 3, self.square_sum, self.redundancy, risk).any():
             return None
         worst = int(np.argmax(drops))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogrammetry.adjustment.adjustment import Adjustment
-from photogrammetry.adjustment.blunders import observation_row
+from photogrammetry.adjustment.hypotheses import observation_row
 from photogrammetry.adjustment.state import Floats
 from photogrammetry.adjustment.unknowns import Integers
 from photogrammetry.network import Point

@@ -5,7 +5,7 @@ fitted together by the seven parameters, from several starting rotations. What t
 vertical, the whole datum of a free network) keeps a harmless value, and the adjustment says what is missing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 
 import numpy as np
@@ -19,6 +19,8 @@ from photogrammetry.start_values.image_block import ImageBlock
 from rig.errors import BadInputError
 
 _STEPS = 30
+_ROBUST_ROUNDS = 8
+_WRONG = 6.0  # residual over the typical one from which on something is grossly wrong
 _LENGTH = -1  # in place of an axis
 _SAME_FIT = 1.05  # ratio of square sums up to which two fits are equally good,
 _SMALL_FIT = 1e-6  # and square sum below which all are
@@ -141,10 +143,29 @@ def _ties(block: ImageBlock, network: Network, given: list[int]) -> _Ties | None
 def _by_ties(block: ImageBlock, network: Network, ties: _Ties) -> Similarity:
     fits = [_fitted(ties, rotation) for rotation in _cube_rotations()]
     least = min(square_sum for _, square_sum in fits)
+    residuals, _ = ties.linearised(min(fits, key=lambda fit: fit[1])[0])
+    if np.abs(residuals).max() > _WRONG * _typical(residuals):
+        fits = [_robustly_fitted(ties, rotation) for rotation in _cube_rotations()]
+        least = min(square_sum for _, square_sum in fits)
     good = [fit for fit, square_sum in fits if square_sum <= _SAME_FIT * least + _SMALL_FIT]
     shifts = [fit.translation - fit.scale * fit.rotation @ ties.origin for fit in good]
     moved = [Similarity(fit.scale, fit.rotation, shift) for fit, shift in zip(good, shifts, strict=True)]
     return min(moved, key=lambda transform: _oddness(block, network, transform))
+
+
+def _typical(residuals: Array) -> float:
+    return max(float(np.median(np.abs(residuals))) / 0.6745, 1.0)
+
+
+def _robustly_fitted(ties: _Ties, rotation: Array) -> tuple[Similarity, float]:
+    """The fit in which what fits badly has little weight (Cauchy): a wrong image point spoils the ties of its point."""
+    transform = Similarity(_first_scale(ties), rotation, np.zeros(3))
+    for _ in range(_ROBUST_ROUNDS):
+        residuals, _ = ties.linearised(transform)
+        doubt = np.hypot(1.0, residuals / (2.0 * _typical(residuals)))
+        transform, _ = _improved(replace(ties, weights=ties.weights / doubt), transform)
+    residuals, _ = ties.linearised(transform)
+    return transform, float(np.log1p(residuals**2).sum())
 
 
 def _cube_rotations() -> list[Array]:
@@ -158,8 +179,12 @@ def _cube_rotations() -> list[Array]:
 
 
 def _fitted(ties: _Ties, rotation: Array) -> tuple[Similarity, float]:
-    """Damped Gauss-Newton from one rotation; parameters that nothing determines do not move."""
-    transform = Similarity(_first_scale(ties), rotation, np.zeros(3))
+    """The least-squares fit from one rotation."""
+    return _improved(ties, Similarity(_first_scale(ties), rotation, np.zeros(3)))
+
+
+def _improved(ties: _Ties, transform: Similarity) -> tuple[Similarity, float]:
+    """Damped Gauss-Newton; parameters that nothing determines do not move."""
     residuals, jacobian = ties.linearised(transform)
     damping = 1e-3
     for _ in range(_STEPS):

@@ -22,6 +22,7 @@ _OUTLIER = 4.0  # residual over the median residual beyond which a point is left
 _GOOD_SHARE, _LEAST_POINTS = 0.8, 6  # as long as so many remain
 _CAUTION = 30.0  # poses are start values: the rays are less accurate than the image points
 _POLISH_ROUNDS = 2
+_USUAL, _USUAL_SQUARE = 0.8, 3.219  # quantile of squared residuals, and its value for two standard normal numbers
 
 
 @dataclass(slots=True, eq=False)
@@ -106,13 +107,22 @@ class ImageBlock:
 
     def residual(self) -> float:
         """Root mean square of the residuals of all rays to known points over their sigmas, blunders cut at 100."""
-        squares = []
+        every = self._squares()
+        return float(np.sqrt(np.minimum(every, 1e4).mean())) if len(every) else np.inf
+
+    def typical_residual(self) -> float:
+        """The same by the residual that four fifths of the rays do not exceed: a few blunders do not change it."""
+        every = self._squares()
+        return float(np.sqrt(2.0 * np.quantile(every, _USUAL) / _USUAL_SQUARE)) if len(every) else np.inf
+
+    def _squares(self) -> Array:
+        """Squared residuals of all rays to known points over their variances."""
+        squares = [np.zeros(0)]
         for image, camera in self.cameras.items():
             known = self.known[self.sightings.points[image]]
             v = camera.project(self.xyz[self.sightings.points[image][known]]) - self.sightings.xy[image][known]
             squares.append(((v / self.sightings.sigma[image][known, None]) ** 2).sum(axis=1))
-        every = np.concatenate(squares) if squares else np.zeros(0)
-        return float(np.sqrt(np.minimum(np.nan_to_num(every, nan=1e4), 1e4).mean())) if len(every) else np.inf
+        return np.nan_to_num(np.concatenate(squares), nan=1e4)
 
     def transform(self, similarity: Similarity) -> None:
         """Carry the block into another system."""

@@ -66,7 +66,7 @@ def find_start_values(network: Network) -> StartValues:
             c[camera] = found
             cameras.remove(camera)
     attempt = _attempt(network, given, c)
-    if cameras and attempt.block.residual() > _FITS:
+    if cameras and attempt.block.typical_residual() > _FITS:
         attempt = _with_better_c(network, given, attempt, cameras)
     block = attempt.block
     words = [*attempt.words, *place_images(block, network), *place_points(block, network)]

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from photogrammetry.adjustment.adjustment import adjust_once, refine
-from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation, find_blunders
+from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation
 from photogrammetry.adjustment.problem import build_problem
 from photogrammetry.adjustment.run import adjust
 from photogrammetry.adjustment.state import with_state
+from photogrammetry.adjustment.suspicion import find_blunders
 from photogrammetry.adjustment.wording import blunder_to_json, describe
 from photogrammetry.diagnosis import NotConvergedError
 from photogrammetry.network import Difference, Distance, Network, Role
@@ -195,7 +196,7 @@ def test_what_keeps_an_adjustment_from_converging_is_named() -> None:
     network, row = _with_a_wild_observation()
     o = network.observations
     name = f"point {network.points[o.point[row]].name} in image {network.images[o.image[row]].name}"
-    with pytest.raises(NotConvergedError, match=f"grossly wrong: {name}; measure again"):
+    with pytest.raises(NotConvergedError, match=f"grossly wrong: {name}: wrong by about .*measure it again"):
         adjust(network)
 
 
@@ -203,7 +204,7 @@ def test_snooping_takes_out_what_keeps_it_from_converging() -> None:
     network, row = _with_a_wild_observation()
     outcome = adjust(network, snoop=True)
     assert outcome.removed[0].blunder.suspect == Observation(BlunderKind.IMAGE, row)
-    # a robust solution is no optimum, but its idea of the error is near: 3 % of it
-    assert np.abs(outcome.removed[0].blunder.estimate - (-200.0, 220.0)).max() < 10.0
+    # a trial adjustment without it sizes the error; one sigma of that is about 1 px in this weak network
+    assert np.abs(outcome.removed[0].blunder.estimate - (-200.0, 220.0)).max() < 4.0
     assert outcome.blunders == ()
     assert outcome.adjustment.ratio == pytest.approx(1.0, abs=0.2)

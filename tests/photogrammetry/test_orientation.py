@@ -76,13 +76,29 @@ def test_moving_points_make_the_poses_more_accurate() -> None:
     assert len(moving.network.points) == 38
 
 
-@pytest.mark.parametrize("error", [(3.0, 8.0), (-5.0, 60.0), (120.0, -150.0)])
+@pytest.mark.parametrize("error", [(3.0, 8.0), (-5.0, 60.0), (-60.0, 200.0)])
 def test_image_point_is_found_in_the_free_adjustment(error: tuple[float, float]) -> None:
     network = _spoilt(_without_start(hill(2, helmets=17).network), 1, 7, error)
     free, fit, constrained = _messages(orient(network))
     assert len(free) == 1
     assert "point B8 in image hill-2" in free[0]
     assert (fit, constrained) == ([], [])
+
+
+def test_an_image_point_that_the_images_alone_cannot_tell_from_another_is_found_with_the_survey() -> None:
+    """Nearly along the epipolar line of another image, 190 px: a wrong point there would explain it as well.
+
+    The block of the second stage does without both, so that no survey is accused for it.
+    """
+    network = _spoilt(_without_start(hill(2, helmets=17).network), 1, 7, (120.0, -150.0))
+    orientation = orient(network)
+    message = orientation.stages[0].findings[0].message
+    assert message.startswith("one of these observations is wrong")
+    assert "point B8 in image hill-2" in message
+    free, fit, constrained = _messages(orientation)
+    assert (free, fit) == ([], [])
+    assert len(constrained) == 1
+    assert "point B8 in image hill-2: wrong by about (1" in constrained[0]
 
 
 @pytest.mark.parametrize("error", [(0.1, -0.1, 0.1), (0.0, 0.0, 1.0), (30.0, -200.0, 10.0)])

@@ -1,0 +1,189 @@
+"""Data snooping: what is wrong and can be located is taken out, the worst first, one at a time.
+
+The linear tests name a suspect and its rivals. Trial adjustments decide: one without each of them. The suspect is the
+one without which vTPv is least; it is taken out if without any of the others it is still too bad for chance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
+from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation
+from photogrammetry.adjustment.problem import build_problem
+from photogrammetry.adjustment.removal import Removed, index_without, without
+from photogrammetry.adjustment.robust import linearised_at, robust_state
+from photogrammetry.adjustment.state import Floats, State
+from photogrammetry.adjustment.suspicion import SINGLE_RISK, find_blunders, still_found
+from photogrammetry.adjustment.wording import describe
+from photogrammetry.camera_model import residuals
+from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network import Network
+
+Trial = Adjustment | NotSolvableError | NotConvergedError
+
+#: Snooping stops when this part of all observations has been taken out: something else is wrong then.
+_MOST_REMOVED = 0.1
+#: An estimated sigma0 so many times the a-priori one may come from errors that bend the optimum.
+_BENT = 2.0
+_NAMED = 3  # so many suspects stand in an error message
+_MOST_TRIALS = 12  # with more candidates the data cannot tell anyway
+#: What vTPv falls by, by chance, for 1, 2 and 3 coordinates: makes observations of different kinds comparable.
+_BY_CHANCE = special.chdtri(np.array([1.0, 2.0, 3.0]), SINGLE_RISK)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snooped:
+    """A network without its gross errors.
+
+    Attributes:
+        adjustment: without them.
+        left: suspected, but it cannot be told which of several it is.
+        removed: what was taken out, in that order.
+    """
+
+    adjustment: Adjustment
+    left: tuple[Blunder, ...]
+    removed: tuple[Removed, ...]
+
+
+def snoop(network: Network, start: State, family_risk: float) -> Snooped:
+    """Take gross errors out until none is left that can be located.
+
+    Args:
+        network: with all observations.
+        start: start values.
+        family_risk: chance that anything at all is suspected in sound data.
+
+    Raises:
+        NotSolvableError: a rank defect.
+        NotConvergedError: no optimum, and it cannot be told what keeps it from one.
+    """
+    removed: list[Removed] = []
+    most = int(_MOST_REMOVED * build_problem(network).n_observations)
+    current = _adjusted(network, start)
+    while True:
+        view = point_of_view(network, start, current)
+        left, located = _judged_all(view, family_risk)
+        if located is None or len(removed) >= most:
+            break
+        blunder, current = located
+        removed.append(Removed(blunder, network))
+        network, start = current.network, current.state
+    if isinstance(current, NotConvergedError):
+        raise _named(current, network, left)
+    return Snooped(current, tuple(left), tuple(removed))
+
+
+def point_of_view(network: Network, start: State, current: Adjustment | NotConvergedError) -> Adjustment:
+    """Where the tests are linearised: at the optimum, or where the sound observations agree if that is far off.
+
+    Raises:
+        NotConvergedError: there is no optimum, and no robust solution either.
+    """
+    if isinstance(current, Adjustment) and current.ratio <= _BENT:
+        return current
+    try:
+        return linearised_at(network, robust_state(network, start))
+    except (NotSolvableError, NotConvergedError):
+        if isinstance(current, Adjustment):
+            return current
+        raise current from None
+
+
+def explained(error: NotConvergedError, network: Network, start: State, family_risk: float) -> NotConvergedError:
+    """The error with what keeps the network from an optimum, as far as that can be told."""
+    left, located = _judged_all(point_of_view(network, start, error), family_risk)
+    return _named(error, network, left if located is None else [located[0]])
+
+
+def _named(error: NotConvergedError, network: Network, suspects: Sequence[Blunder]) -> NotConvergedError:
+    if not suspects:
+        return error
+    words = "; ".join(describe(network, suspect) for suspect in suspects[:_NAMED])
+    return NotConvergedError(f"no optimum, because something is grossly wrong: {words}")
+
+
+def _adjusted(network: Network, start: State) -> Adjustment | NotConvergedError:
+    try:
+        return adjust_once(network, start)
+    except NotConvergedError as error:
+        return error
+
+
+def _judged_all(view: Adjustment, family_risk: float) -> tuple[list[Blunder], tuple[Blunder, Adjustment] | None]:
+    """What cannot be located, up to the first that can; that one with the adjustment without it."""
+    trials: dict[Observation, Trial] = {}
+    left: list[Blunder] = []
+    for blunder in find_blunders(view, family_risk):
+        if any(blunder.suspect in other.candidates for other in left):
+            continue
+        judged = _judged(view, blunder, trials)
+        trial = trials.get(judged.suspect)
+        if judged.locatable and isinstance(trial, Adjustment):
+            return left, (judged, trial)
+        left.append(judged)
+    return left, None
+
+
+def _judged(view: Adjustment, blunder: Blunder, trials: dict[Observation, Trial]) -> Blunder:
+    """The suspicion after trial adjustments without each candidate; these are added to `trials`."""
+    candidates = blunder.candidates or (blunder.suspect,)
+    if len(candidates) > _MOST_TRIALS:
+        return blunder
+    for candidate in candidates:
+        if candidate not in trials:
+            trials[candidate] = _trial(view, candidate)
+    possible = {c: trial for c in candidates if isinstance(trial := trials[c], Adjustment)}
+    if not possible:
+        return replace(blunder, locatable=False, candidates=candidates)
+    variance = min(trial.ratio for trial in possible.values()) ** 2
+    best = min(possible, key=lambda candidate: _left_over(view, possible[candidate], variance))
+    rivals = [c for c in candidates if c != best and not _found_without(trials[c], c, best)]
+    estimate = _error(view.network, best, possible[best].state)
+    return Blunder(best, estimate, blunder.w, not rivals, (best, *rivals) if rivals else ())
+
+
+def _trial(view: Adjustment, gone: Observation) -> Trial:
+    """The adjustment without one observation, or why there is none."""
+    try:
+        return adjust_once(without(view.network, gone), view.state)
+    except (NotSolvableError, NotConvergedError) as error:
+        return error
+
+
+def _left_over(adjustment: Adjustment, trial: Adjustment, variance: float) -> float:
+    """What is left of vTPv, made comparable between observations of one, two and three coordinates."""
+    parts = adjustment.problem.n_observations - trial.problem.n_observations
+    return trial.equations.square_sum + float(_BY_CHANCE[parts - 1]) * variance
+
+
+def _found_without(trial: Trial, gone: Observation, suspect: Observation) -> bool:
+    """Whether the suspect is still found once `gone` is out."""
+    if isinstance(trial, Adjustment):
+        return still_found(trial, index_without(suspect, gone))
+    # Without an optimum something grossly wrong is still in; but what the network cannot do without may be it.
+    return isinstance(trial, NotConvergedError)
+
+
+def _error(network: Network, gone: Observation, state: State) -> Floats:
+    """Observed - true, as the adjustment without the observation sees it."""
+    i = gone.index
+    match gone.kind:
+        case BlunderKind.IMAGE:
+            o = network.observations
+            image, point = int(o.image[i]), int(o.point[i])
+            camera = network.images[image].camera
+            lens = replace(network.cameras[camera], interior=state.interior[camera]).lens()
+            pose = state.rotation[image], state.position[image]
+            return np.asarray(-residuals(lens, *pose, state.xyz[point], o.xy[i]), dtype=float)
+        case BlunderKind.CONTROL:
+            return np.asarray(np.array(network.points[i].xyz, dtype=float) - state.xyz[i])
+        case BlunderKind.DISTANCE:
+            distance = network.distances[i]
+            return np.array([distance.value - np.linalg.norm(state.xyz[distance.end] - state.xyz[distance.start])])
+        case _:
+            step = network.differences[i]
+            return np.array([step.value - (state.xyz[step.end, step.axis] - state.xyz[step.start, step.axis])])

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import socket
 from typing import Any, Final
 
 import h11
@@ -37,6 +38,8 @@ class GuardedConnection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """A client has come."""
         super().connection_made(transport)
+        # asyncio does this by itself only for sockets that were made with the protocol's number.
+        transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._last_heard = self.loop.time()
         self._watch()
         if len(self.connections) > self.connections_max:

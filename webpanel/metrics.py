@@ -1,8 +1,9 @@
 """What the service has measured, in the text format of Prometheus."""
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterator
 
-from prometheus_client import CollectorRegistry, Counter, generate_latest
+from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.metrics_core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -17,37 +18,32 @@ from webpanel.rig_service import Metric, Quantity, RigService
 _METHODS = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE", "PUT", "OPTIONS"})
 
 
-class _Collected(Collector):
-    """Asks the service whenever somebody looks."""
+class Metrics(Collector):
+    """The service's values, asked for whenever somebody looks, and the count of requests; a registry of its own."""
 
     def __init__(self, service: RigService) -> None:
         self._service = service
-
-    def collect(self) -> Iterable[Family]:
-        """All families."""
-        return [_family(metric) for metric in self._service.metrics()]
-
-
-class Metrics:
-    """A registry of its own, with the service's values and the count of requests."""
-
-    def __init__(self, service: RigService) -> None:
+        self._requests: Counter[tuple[str, str]] = Counter()
         self._registry = CollectorRegistry(auto_describe=False)
-        self._registry.register(_Collected(service))
-        self._requests = Counter(
-            "svev_http_requests",
-            "Requests answered, by method and status.",
-            ("method", "status"),
-            registry=self._registry,
+        self._registry.register(self)
+
+    def collect(self) -> Iterator[Family]:
+        """All families."""
+        yield from (_family(metric) for metric in self._service.metrics())
+        requests = CounterMetricFamily(
+            "svev_http_requests", "Requests by method and status.", labels=("method", "status")
         )
+        for values, count in sorted(self._requests.items()):
+            requests.add_metric(values, count)
+        yield requests
 
     def text(self) -> bytes:
         """Everything, as Prometheus reads it."""
         return generate_latest(self._registry)
 
     def count(self, method: str, status: int) -> None:
-        """Count one request."""
-        self._requests.labels(method if method in _METHODS else "other", status).inc()
+        """Count one request; only from the event loop."""
+        self._requests[method if method in _METHODS else "other", str(status)] += 1
 
 
 class CountRequests:

@@ -155,12 +155,12 @@ class SessionFields(Model):
 class SessionChange(Model):
     """Session fields to change; a field that is left out stays as it is."""
 
-    athlete: Line | None = None
-    bib: Line | None = None
-    gate: Line | None = None
-    wind: Line | None = None
-    notes: Text | None = None
-    operator: Line | None = None
+    athlete: Line | None = Field(None, examples=["Ola Nordmann"])
+    bib: Line | None = Field(None, examples=["18"])
+    gate: Line | None = Field(None, examples=["11"])
+    wind: Line | None = Field(None, examples=["calm"])
+    notes: Text | None = Field(None, examples=["fell after landing"])
+    operator: Line | None = Field(None, examples=["Kari"])
 
 
 class RecordingOrder(SessionFields):

@@ -1,7 +1,7 @@
 """Recordings: start and stop, list, change, delete and restore."""
 
 from http import HTTPStatus
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Body, Path, Query, Response
 
@@ -19,13 +19,22 @@ RecordingId = Annotated[
 ]
 NoFields = Annotated[Nothing | None, Body(description="nothing, or an empty object")]
 
+_ALL_HELD: Final = RecordingOrder()
+_ORDER: Final = Body(
+    openapi_examples={
+        "a jump": {"value": {"athlete": "Ola Nordmann", "bib": "17", "gate": "12", "duration_s": 10}},
+        "what has just happened": {"value": {"bib": "17", "preroll_s": 5, "duration_s": 0}},
+    }
+)
+_LOCATED: Final = {"headers": {"Location": {"description": "address of the recording", "schema": {"type": "string"}}}}
+
 
 def recordings_router(service: RigService, catalogue: Catalogue, changes: Changes) -> APIRouter:
     """The routes that start, list and change recordings."""
     router = strict_router("Recordings")
 
     @router.post("/recordings", status_code=HTTPStatus.CREATED, responses=CHANGING | {201: _LOCATED})
-    def start_recording(response: Response, order: Annotated[RecordingOrder, Body()] = _ALL_HELD) -> Recording:
+    def start_recording(response: Response, order: Annotated[RecordingOrder, _ORDER] = _ALL_HELD) -> Recording:
         """Start a recording. The rig must be armed, and one recording at a time: two calls are two orders, not one.
 
         Left out, `preroll_s` is all that is held in memory and `duration_s` is until stopped.
@@ -77,7 +86,3 @@ def recordings_router(service: RigService, catalogue: Catalogue, changes: Change
         return recording
 
     return router
-
-
-_ALL_HELD = RecordingOrder.model_validate({})
-_LOCATED = {"headers": {"Location": {"description": "address of the recording", "schema": {"type": "string"}}}}

@@ -46,6 +46,14 @@ def exchange(panel: Panel, *pieces: bytes) -> bytes:
         return read_all(raw)
 
 
+def test_answers_do_not_wait_for_acknowledgements(panel: Panel) -> None:
+    with panel.client() as client:
+        client.get("/healthz")
+        (connection,) = panel.server.server_state.connections
+        inside = connection.transport.get_extra_info("socket")
+        assert inside.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
 def test_headers_drop_by_drop(hasty: Panel) -> None:
     with hasty.connect() as raw:
         began = time.monotonic()

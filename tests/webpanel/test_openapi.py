@@ -80,9 +80,12 @@ def test_every_reference_leads_somewhere(schema: dict[str, Any]) -> None:
 
 
 def test_bodies_have_examples(schema: dict[str, Any]) -> None:
-    fields = schema["components"]["schemas"]["RecordingOrder"]["properties"]
-    assert all(field.get("examples") for field in fields.values())
-    assert schema["components"]["schemas"]["RecordingOrder"]["additionalProperties"] is False
+    schemas = schema["components"]["schemas"]
+    for name in ("RecordingOrder", "SessionFields", "SessionChange", "Login"):
+        assert all(field.get("examples") for field in schemas[name]["properties"].values()), name
+        assert schemas[name]["additionalProperties"] is False
+    content = schema["paths"]["/api/recordings"]["post"]["requestBody"]["content"]["application/json"]
+    assert len(content["examples"]) == 2
 
 
 def test_the_token_is_described_where_one_is_needed(service: MemoryService, loopback: Loopback) -> None:
@@ -98,10 +101,10 @@ def test_the_page_of_the_description_needs_nothing_from_elsewhere(client: httpx.
     page = client.get("/docs")
     assert page.headers["content-type"].startswith("text/html")
     wanted = re.findall(r'(?:src|href)="([^"]+)"', page.text)
-    assert len(wanted) == 3
+    assert len(wanted) == 4
     for address in wanted:
-        assert address.startswith("/docs/")
+        assert address.startswith(("/docs/", "/icon.svg"))
         answer = client.get(address)
         assert answer.status_code == 200
-        assert answer.headers["content-type"].split(";")[0] in {"text/css", "text/javascript"}
+        assert answer.headers["content-type"].split(";")[0] in {"text/css", "text/javascript", "image/svg+xml"}
     assert "https:" not in page.text + page.headers["content-security-policy"]

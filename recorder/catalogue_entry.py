@@ -111,7 +111,8 @@ def _failures(ledger: Ledger) -> dict[str, Counter[FrameStatus]]:
 
 
 def _state(found: LogInfo) -> LogState:
+    unexplained = set(found.ledger.missing) - set(found.known_lost)
     unfinished_bytes = 0 if found.closed else found.torn_bytes  # what looks torn in front of a footer is damage
-    if found.damaged_bytes > unfinished_bytes or found.ledger.missing or found.ledger.out_of_order:
+    if found.damaged_bytes > unfinished_bytes or unexplained or found.ledger.out_of_order:
         return LogState.DAMAGED
     return LogState.CLOSED if found.closed else LogState.UNFINISHED

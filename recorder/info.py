@@ -6,7 +6,7 @@ from typing import Any
 
 from recorder.ledger import Ledger
 from recorder.log_items import Chunk, Damage
-from recorder.log_reader import LogReader, tag_of
+from recorder.log_reader import LogReader, known_lost, tag_of
 from recorder.session_changes import session_changes
 from rig.topics import RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA, TAG
 
@@ -26,6 +26,7 @@ class LogInfo:
         recording: id of the recording, empty if there is no pulse.
         shape: rows and columns of the triplets, None if there is no pulse.
         cameras: names, left to right.
+        known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         messages: number of messages per topic.
         library: who wrote the log.
     """
@@ -43,6 +44,7 @@ class LogInfo:
     recording: str
     shape: tuple[int, int] | None
     cameras: tuple[str, ...]
+    known_lost: tuple[tuple[int, int], ...]
     messages: dict[str, int]
     library: str
 
@@ -118,6 +120,7 @@ def original_info(path: Path) -> LogInfo:
             first.recording if first else "",
             first.shape if first else None,
             tuple(camera.name for camera in first.cameras) if first else (),
+            known_lost(reader),
             messages, reader.library,
         )  # fmt: skip
 

@@ -124,6 +124,21 @@ def span(first: int, last: int) -> str:
     return f"pulse {first}" if first == last else f"pulses {first}-{last}"
 
 
+def runs_to_text(runs: Iterable[tuple[int, int]]) -> str:
+    """Runs of pulses, shortly: "5-7 12"."""
+    return " ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in runs)
+
+
+def runs_from_text(text: str) -> list[tuple[int, int]]:
+    """What `runs_to_text` wrote; words that are no runs are left out."""
+    runs = []
+    for word in text.split():
+        first, _, last = word.partition("-")
+        if first.isdecimal() and (last or first).isdecimal():
+            runs.append((int(first), int(last or first)))
+    return runs
+
+
 def numbers(runs: Iterable[tuple[int, int]], limit: int) -> list[int]:
     """The pulses of some runs one by one, at most `limit` of them."""
     every = (pulse for first, last in runs for pulse in range(first, last + 1))

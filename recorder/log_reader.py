@@ -16,6 +16,8 @@ from mcap.records import Attachment, Channel, Header, Metadata
 from numpy.typing import NDArray
 
 from recorder.file_window import FileWindow
+from recorder.ledger import runs_from_text
+from recorder.log_channels import schemas_and_channels
 from recorder.log_items import Chunk, Damage, Item, Message, Small
 from recorder.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, RECORD
 from recorder.raw_image import pixels, view_image
@@ -23,7 +25,7 @@ from recorder.record_walk import CHUNK_HEAD, RawRecord, is_closed, walk
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.tag import TripletTag
-from rig.topics import PROFILE, TAG, TRIPLET
+from rig.topics import PROFILE, RECOVERY_METADATA, TAG, TRIPLET
 
 #: What the `mcap` library raises on bytes that are no such record.
 UNREADABLE = (struct.error, ValueError, OverflowError, McapError)
@@ -47,12 +49,13 @@ class LogReader:
         attachments: contents by name, as far as the log has been read.
     """
 
-    def __init__(self, path: Path, *, skim: bool = False) -> None:
+    def __init__(self, path: Path, *, skim: bool = False, salvage: bool = False) -> None:
         """Open the log and see that it is one.
 
         Args:
             path: the log.
             skim: only small parts of it will be read.
+            salvage: read it even if its beginning is destroyed, taking for granted what all our logs declare there.
 
         Raises:
             BadInputError: no such file, no MCAP log, or not one of ours.
@@ -62,10 +65,12 @@ class LogReader:
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.truncated = False
+        self._declared = {channel.id: channel for channel in schemas_and_channels()[1]} if salvage else {}
+        self.channels |= self._declared
         self._window = FileWindow(path, direct=not skim)
         self.size = self._window.size
         try:
-            self.library = self._check_header()
+            self.library = "" if salvage else self._check_header()
             self.closed = is_closed(self._window)
         except BaseException:
             self.close()
@@ -134,7 +139,7 @@ class LogReader:
             match record.opcode:
                 case Opcode.CHANNEL:
                     channel = Channel.read(stream(body))
-                    self.channels[channel.id] = channel
+                    self.channels[channel.id] = self._declared.get(channel.id, channel)
                 case Opcode.METADATA:
                     metadata = Metadata.read(stream(body))
                     self.metadata[metadata.name] = metadata.metadata
@@ -245,6 +250,11 @@ def tag_of(message: Message) -> TripletTag | None:
         return TripletTag.decode(message.data)
     except (ValueError, KeyError, TypeError):
         return None
+
+
+def known_lost(reader: LogReader) -> tuple[tuple[int, int], ...]:
+    """Runs of pulses of which a log that has been read says that they were lost when it was recovered."""
+    return tuple(runs_from_text(reader.metadata.get(RECOVERY_METADATA, {}).get("lost_pulses", "")))
 
 
 def stream(body: bytes) -> Any:

@@ -30,9 +30,10 @@ from recorder.write_thread import WriteThread
 from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.tag import TripletTag
-from rig.topics import CALIBRATION_ATTACHMENT, PROFILE, RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA
+from rig.topics import CALIBRATION_ATTACHMENT, EVENTS, HEALTH, PROFILE, RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA
 
 CLOSE_TIMEOUT_S = 60.0
+_CHANNELS = {EVENTS.name: EVENTS_CHANNEL, HEALTH.name: HEALTH_CHANNEL}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +100,7 @@ class LogWriter:
         self._on_released = on_released
         self._metadata = {SESSION_METADATA: dict(session), RIG_METADATA: dict(rig)}
         self._written_metadata: dict[str, dict[str, str]] = {}
-        self._sequences = {EVENTS_CHANNEL: 0, HEALTH_CHANNEL: 0}
+        self._sequences = dict.fromkeys(_CHANNELS, 0)
         schemas, channels = schemas_and_channels(calibrations or {})
         self._topics = {channel.id: channel.topic for channel in channels}
         self._index = LogIndex(schemas, channels)
@@ -165,8 +166,7 @@ class LogWriter:
             StorageError: writing has ended; the message says why and what to do.
             ValueError: `level` is none of `recorder.events.Level`.
         """
-        data = Event(time_utc, Level(level), name, message).to_protobuf()
-        self._write_small(EVENTS_CHANNEL, self._next_sequence(EVENTS_CHANNEL), data, time_utc, time_utc)
+        self.write_message(EVENTS.name, Event(time_utc, Level(level), name, message).to_protobuf(), time_utc, time_utc)
 
     def write_health(self, health: Mapping[str, Any], time_utc: UtcNs) -> None:
         """Queue a health record (anything that JSON can say); in the file within a second.
@@ -174,16 +174,21 @@ class LogWriter:
         Raises:
             StorageError: writing has ended; the message says why and what to do.
         """
-        data = json.dumps(health, separators=(",", ":")).encode()
-        self._write_small(HEALTH_CHANNEL, self._next_sequence(HEALTH_CHANNEL), data, time_utc, time_utc)
+        self.write_message(HEALTH.name, json.dumps(health, separators=(",", ":")).encode(), time_utc, time_utc)
 
-    def set_session(self, session: Mapping[str, str]) -> None:
-        """Session fields that changed since the log was opened; written when it is closed."""
-        self._metadata[SESSION_METADATA] = dict(session)
+    def write_message(self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
+        """Queue the data of an event or a health record as they stand in a log.
 
-    def set_rig(self, rig: Mapping[str, str]) -> None:
-        """Facts about the rig that changed since the log was opened; written when it is closed."""
-        self._metadata[RIG_METADATA] = dict(rig)
+        Raises:
+            StorageError: writing has ended; the message says why and what to do.
+            KeyError: it is neither.
+        """
+        self._sequences[topic] += 1
+        self._write_small(_CHANNELS[topic], self._sequences[topic], data, publish_time, log_time)
+
+    def set_metadata(self, name: str, fields: Mapping[str, str]) -> None:
+        """A metadata record that is new, or has changed since the log was opened; written when it is closed."""
+        self._metadata[name] = dict(fields)
 
     def statistics(self) -> dict[str, Any]:
         """How writing goes, for health: see `WriteThread.statistics`."""
@@ -237,10 +242,6 @@ class LogWriter:
     def _write_small(self, channel: int, sequence: int, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
         self._check()
         self._thread.submit_small(*chunk_of_one(channel, sequence, data, publish_time, log_time))
-
-    def _next_sequence(self, channel: int) -> int:
-        self._sequences[channel] += 1
-        return self._sequences[channel]
 
     def _let_go(self, slot: int) -> None:
         self._buffers.release(slot)

@@ -10,7 +10,7 @@ from recorder.events import Event
 from recorder.findings import Findings
 from recorder.ledger import Ledger, numbers
 from recorder.log_items import Chunk, Damage, Item
-from recorder.log_reader import LogReader
+from recorder.log_reader import LogReader, known_lost
 from recorder.pulse_check import PulseCheck
 from recorder.structure_check import StructureCheck
 
@@ -34,6 +34,7 @@ class VerifyReport:
         truncated: it ends in the middle of a record.
         ledger: what became of every pulse.
         findings: what is wrong with the log itself, one sentence each.
+        known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         events: events in the log.
     """
 
@@ -44,13 +45,15 @@ class VerifyReport:
     ledger: Ledger
     findings: tuple[str, ...]
     events: tuple[Event, ...]
+    known_lost: tuple[tuple[int, int], ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """The result in one word."""
-        if self.findings or not self.closed or self.ledger.missing:
+        if self.findings or not self.closed or not set(self.ledger.missing) <= set(self.known_lost):
             return Verdict.DAMAGED
-        return Verdict.CLEAN if self.ledger.complete == self.ledger.pulses else Verdict.PARTIAL
+        whole = self.ledger.complete == self.ledger.pulses and not self.ledger.missing
+        return Verdict.CLEAN if whole else Verdict.PARTIAL
 
     @property
     def damaged(self) -> bool:
@@ -104,7 +107,8 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         if not reader.closed:
             findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
         return VerifyReport(
-            path, reader.size, reader.closed, reader.truncated, pulses.ledger, findings.lines(), tuple(pulses.events)
+            path, reader.size, reader.closed, reader.truncated, pulses.ledger, findings.lines(), tuple(pulses.events),
+            known_lost(reader),
         )  # fmt: skip
 
 

@@ -29,6 +29,7 @@ HEALTH: Final = Topic("/health", "svev.Health", "json", "health")
 PROFILE: Final = "svev"
 SESSION_METADATA: Final = "svev.session"
 RIG_METADATA: Final = "svev.rig"
+RECOVERY_METADATA: Final = "svev.recovery"
 RIG_ATTACHMENT: Final = "rig.toml"
 CALIBRATION_ATTACHMENT: Final = "calibration.json"
 DEFAULT_PUBLISH: Final = "tcp://127.0.0.1:5556"

@@ -24,6 +24,7 @@ from svev.commands import (
     orient,
     plan,
     record,
+    recover,
     replay,
     schema,
     serve,
@@ -52,6 +53,7 @@ app.command("serve")(serve.serve)
 app.add_typer(ctl.app, name="ctl")
 app.command("doctor")(doctor.doctor)
 app.command("info")(info.info_command)
+app.command("recover")(recover.recover_command)
 app.command("replay")(replay.replay_command)
 app.command("schema")(schema.schema)
 app.command("verify")(verify.verify_command)

@@ -23,6 +23,7 @@ from recorder.triplet_buffers import TripletBuffers
 from recorder.verify import verify
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, StorageError
+from rig.topics import RIG_METADATA, SESSION_METADATA
 from tests.recorder.logs import (
     ALL_OK,
     LOST,
@@ -181,8 +182,8 @@ def test_the_log_says_what_it_is_before_the_first_pulse(tmp_path: Path) -> None:
 def test_changed_session_fields_are_written_at_the_end(tmp_path: Path) -> None:
     buffers = TripletBuffers((8, 16), 1)
     with open_writer(tmp_path / "log.mcap", buffers) as log:
-        log.set_session(SESSION | {"gate": "9"})
-        log.set_rig(RIG)
+        log.set_metadata(SESSION_METADATA, SESSION | {"gate": "9"})
+        log.set_metadata(RIG_METADATA, RIG)
     with (tmp_path / "log.mcap").open("rb") as file:
         records = [(m.name, m.metadata) for m in make_reader(file).iter_metadata()]
     assert records == [("svev.session", SESSION), ("svev.rig", RIG), ("svev.session", SESSION | {"gate": "9"})]

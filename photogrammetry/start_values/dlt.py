@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.start_values.homography import homogeneous, normalising
+from photogrammetry.start_values.projective_map import fit_projective, homogeneous
 from rig.errors import BadInputError
 
 _COPLANAR = 1e-7  # relative singular value: the system has a second solution
@@ -49,17 +49,11 @@ def resect_dlt(points: ArrayLike, xy: ArrayLike) -> Dlt:
     points, xy = np.asarray(points, float), np.asarray(xy, float)
     if len(points) < 6:
         raise BadInputError(f"a direct linear transformation has {len(points)} points: give at least six")
-    object_frame, image_frame = normalising(points), normalising(xy)
-    p = homogeneous(points) @ object_frame.T
-    q = homogeneous(xy) @ image_frame.T
-    zero = np.zeros_like(p)
-    rows = np.concatenate((np.hstack((p, zero, -q[:, :1] * p)), np.hstack((zero, p, -q[:, 1:2] * p))))
-    _, values, vectors = np.linalg.svd(rows)
-    extents = np.linalg.svd(p[:, :3] - p[:, :3].mean(axis=0), compute_uv=False)
+    matrix, values = fit_projective(points, xy)
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if values[10] < _COPLANAR * values[0] or extents[2] < _COPLANAR * extents[0]:
         raise BadInputError("the points of a direct linear transformation lie in a plane: add points beside it")
-    matrix = np.linalg.solve(image_frame, vectors[-1].reshape(3, 4) @ object_frame)
-    return _decompose(matrix / np.linalg.norm(matrix), points, xy)
+    return _decompose(matrix, points, xy)
 
 
 def _decompose(matrix: Array, points: Array, xy: Array) -> Dlt:

@@ -17,9 +17,11 @@ from rig.errors import BadInputError
 _COLLINEAR = 1e-6  # height of a triangle over its longest side
 _TINY = 1e-12
 _TRIPLES = 5
+_POLISH_STEPS = 20
 _REFINED = 3  # candidates that are refined
 _NEARLY_REAL = 0.2  # imaginary part of a root over its modulus: noise pushes double roots off the real axis
-_SAME_TURN = 0.02  # rad
+_SAME_TURN = 0.02  # rad,
+_SAME_EXACT = 1e-5  # and where poses are exact: closer ones differ by rounding
 _ROUNDING = 1e-7  # of c: residuals that small are none
 _AMBIGUOUS = 4.0  # ratio of square sums below which a second pose remains possible
 
@@ -70,9 +72,12 @@ def resect(points: ArrayLike, xy: ArrayLike, c: float) -> Resection:
         for triple in triples
         for camera in _three_points(points[triple], rays[triple], c)
     ]
-    candidates = _distinct(candidates)[: _REFINED if len(points) > 3 else None]
+    # three points fit each of their poses exactly, and next to the danger cylinder two of them nearly coincide
+    exact = len(points) == 3
+    if not exact:
+        candidates = _distinct(candidates, _SAME_TURN)[:_REFINED]
     refined = [refine_pose(candidate.camera, points, xy) for candidate in candidates]
-    refined = _distinct([pose for pose in refined if np.isfinite(pose.square_sum)])
+    refined = _distinct([p for p in refined if np.isfinite(p.square_sum)], _SAME_EXACT if exact else _SAME_TURN)
     if not refined:
         raise BadInputError("the points of a resection fit no pose: check point numbers and principal distance")
     best = refined[0]
@@ -134,8 +139,32 @@ def _distances(points: Array, rays: Array) -> list[Array]:
         first = np.sqrt(b / square)
         u = ((p - 1) * v * v - 2 * p * cos_b * v + 1 + p) / divisor
         if u > 0:
-            found.append(first * np.array([1.0, u, v]))
+            found.append(_polished(first * np.array([1.0, u, v]), np.array([a, b, c]), np.array([cos_a, cos_b, cos_c])))
     return found
+
+
+def _polished(distances: Array, squares: Array, cosines: Array) -> Array:
+    """Distances improved on the three triangles themselves: next to a double root the quartic has lost digits.
+
+    Args:
+        distances: (3,) from a root.
+        squares: (3,) squared sides opposite to the points.
+        cosines: (3,) of the angles between the rays to their ends.
+    """
+    best, least = distances, np.inf
+    for _ in range(_POLISH_STEPS):
+        one, other = np.roll(distances, -1), np.roll(distances, 1)
+        errors = one**2 + other**2 - 2 * one * other * cosines - squares
+        size = float(np.abs(errors / squares).max())
+        if not size < least or np.any(distances <= 0.0):
+            break
+        best, least = distances, size
+        jacobian = np.zeros((3, 3))
+        for k in range(3):
+            jacobian[k, (k + 1) % 3] = 2 * (one[k] - other[k] * cosines[k])
+            jacobian[k, (k + 2) % 3] = 2 * (other[k] - one[k] * cosines[k])
+        distances = distances - np.linalg.lstsq(jacobian, errors, rcond=None)[0]
+    return best
 
 
 def _fit(camera: IdealCamera, points: Array, rays: Array) -> float:
@@ -146,11 +175,11 @@ def _fit(camera: IdealCamera, points: Array, rays: Array) -> float:
     return float(square.mean())
 
 
-def _distinct(poses: list[RefinedPose]) -> list[RefinedPose]:
+def _distinct(poses: list[RefinedPose], same: float) -> list[RefinedPose]:
     """Poses by square sum, of each bundle of nearly equal ones the best."""
     kept: list[RefinedPose] = []
     for pose in sorted(poses, key=lambda candidate: candidate.square_sum):
         turns = [np.arccos(np.clip((np.trace(other.camera.R.T @ pose.camera.R) - 1) / 2, -1, 1)) for other in kept]
-        if all(turn > _SAME_TURN for turn in turns):
+        if all(turn > same for turn in turns):
             kept.append(pose)
     return kept

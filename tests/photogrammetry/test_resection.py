@@ -54,6 +54,19 @@ def test_three_points_give_all_poses_and_say_that_they_do(seed: int, planar: boo
         assert pose.in_front(points).all()
 
 
+@pytest.mark.parametrize(
+    ("seed", "planar"), [(12057, True), (12242, True), (12643, True), (12689, True), (12939, False)]
+)
+def test_three_points_next_to_a_double_solution(seed: int, planar: bool) -> None:
+    """Two poses that differ by 0.3 to 2 degrees fit exactly; both are given, and the true one is sharp."""
+    camera, points = _scene(np.random.default_rng(seed), 3, planar)
+    result = resect(points, camera.project(points), camera.c)
+    poses = sorted((result.camera, *result.alternatives), key=lambda pose: float(np.abs(pose.R - camera.R).max()))
+    assert np.abs(poses[0].R - camera.R).max() < 1e-6
+    assert np.abs(poses[1].R - camera.R).max() < 0.05
+    assert result.ambiguous
+
+
 @settings(max_examples=10, deadline=None)
 @given(seeds, st.integers(6, 30), st.booleans())
 def test_with_noise_it_is_the_least_squares_pose(seed: int, n: int, planar: bool) -> None:

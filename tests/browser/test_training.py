@@ -225,6 +225,7 @@ def test_a_whole_jump_by_keys_alone(training: Serving, open_page: Open) -> None:
     await_state(page, "Armed")
     page.keyboard.press("r")
     await_state(page, "Recording")
+    expect(page.locator("#next-step[data-step=recording]")).to_be_enabled()  # no longer busy with the start
     page.keyboard.press("r")
     await_state(page, "Armed")
     expect(page.locator("#last-recording")).to_contain_text("42 · Rune r s")
@@ -240,6 +241,6 @@ def test_a_whole_jump_by_keys_alone(training: Serving, open_page: Open) -> None:
     expect(page.locator("#recordings-empty")).to_be_visible()
     page.keyboard.press("v")
     await_state(page, "Armed")
-    expect(page.locator("#disarm")).to_be_visible()
+    expect(page.locator("#disarm")).to_be_enabled()
     page.keyboard.press("x")
     await_state(page, "Idle")

@@ -37,6 +37,7 @@ function drawCard(card, camera) {
   setText(head.children[0], camera.name);
   setText(head.children[1], t(`camera.${camera.state}`));
   setText(words, text);
+  words.hidden = camera.state === "ready" && camera.statement.level === "good"; // the head says it
   setText(todo, advice);
   todo.hidden = !advice;
   setText(facts, factsOf(camera));

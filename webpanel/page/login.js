@@ -4,14 +4,21 @@ import { call, onTokenNeeded } from "./api.js";
 import { $, setText } from "./dom.js";
 import { say } from "./i18n.js";
 
+let needed = false;
+
 /** @param {() => void} done called when the service lets us in */
 export function startLogin(done) {
-  onTokenNeeded(() => { if (!$("login").open) $("login").showModal(); });
-  $("login").addEventListener("cancel", (/** @type {Event} */ event) => event.preventDefault()); // there is nothing behind it
+  onTokenNeeded(show);
+  $("login").addEventListener("close", () => { if (needed) show(); }); // there is nothing behind it
   $("login-form").addEventListener("submit", (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     void login(done);
   });
+}
+
+function show() {
+  needed = true;
+  if (!$("login").open) $("login").showModal();
 }
 
 /** @param {() => void} done */
@@ -20,6 +27,7 @@ async function login(done) {
   $("login-wrong").hidden = true;
   try {
     await call("POST", "login", { token: $("login-token").value });
+    needed = false;
     $("login").close();
     done();
   } catch (error) {

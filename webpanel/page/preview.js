@@ -12,6 +12,7 @@ const USUAL_COLUMNS = 640;
 /** @type {import("./viewer.js").Viewer} */
 let viewer;
 let running = false;
+let notBefore = 0;
 let ratio = 0;
 
 export function startPreview() {
@@ -22,6 +23,7 @@ export function startPreview() {
   });
   viewer.image.addEventListener("error", () => {
     stop();
+    notBefore = Date.now() + RETRY_MS; // news of the status draw more often than that
     setTimeout(draw, RETRY_MS);
   });
   watch(draw);
@@ -43,7 +45,7 @@ export function shownCamera() {
 
 function wanted() {
   const { status, connected, visible, view } = known;
-  return connected && visible && view === "live" && ["armed", "recording"].includes(status?.state ?? "");
+  return Date.now() >= notBefore && connected && visible && view === "live" && ["armed", "recording"].includes(status?.state ?? "");
 }
 
 function draw() {

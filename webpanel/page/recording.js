@@ -10,7 +10,7 @@ import { say, t } from "./i18n.js";
 import { makeMark } from "./recordings.js";
 import { go, place } from "./router.js";
 import { clearScrubber, scrub } from "./scrubber.js";
-import { tell, tellProblem } from "./snacks.js";
+import { clearSnacks, tell, tellProblem } from "./snacks.js";
 
 /** @typedef {import("./types.js").Recording} Recording */
 
@@ -35,6 +35,7 @@ export function startRecording() {
 export async function enterRecording(id) {
   recording = null;
   clearScrubber();
+  clearSnacks();
   setText($("recording-title"), id);
   $("recording-verdict").replaceChildren();
   $("recording-buttons").replaceChildren();

@@ -26,7 +26,7 @@ export function draw() {
   fillList($("rig-facts"), [
     ...(status?.cameras ?? []).map((camera) => /** @type {[string, string]} */ ([camera.name, `${camera.backend} ${camera.address}`])),
     ...(status?.processes ?? []).map(({ name, pid, restarts }) => /** @type {[string, string]} */ (
-      [t("rig.process", { name }), pid === null ? t("rig.not_running") : t("rig.running", { pid, restarts })])),
+      [t("rig.process", { name }), pid === null ? t("rig.not_running") : t("rig.running", { pid: String(pid), restarts })])),
     [t("rig.version"), status?.version ?? "–"],
   ]);
 }

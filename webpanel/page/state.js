@@ -1,7 +1,7 @@
 /** The one big state: colour, word and icon; and the same small at the top of every view. */
 
 import { $, setIcon, setText } from "./dom.js";
-import { clock, timeOfDay } from "./format.js";
+import { clock, timeOfDay, who } from "./format.js";
 import { say, t } from "./i18n.js";
 import { known, watch } from "./store.js";
 
@@ -31,7 +31,15 @@ function inWords() {
   const { status } = known;
   if (!status) return "";
   const { text, advice } = say(status.statement);
-  return [text, advice].filter(Boolean).map(asSentence).join(" ");
+  if (status.recording && status.statement.level === "good") return recordingInWords(status.recording);
+  const todo = status.statement.level === "warning" ? "" : advice; // of a missing camera its card says what to do
+  return [text, todo].filter(Boolean).map(asSentence).join(" ");
+}
+
+/** @param {import("./types.js").Recording} recording */
+function recordingInWords({ session, counts }) {
+  const pulses = t(counts.partial ? "state.pulses_partial" : "state.pulses", { pulses: counts.pulses, partial: counts.partial });
+  return [who(session, ""), pulses].filter(Boolean).join("  –  ");
 }
 
 /** @param {string} words */

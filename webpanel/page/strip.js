@@ -34,7 +34,7 @@ export function makeStrip(strip, sought) {
  */
 export function drawStrip(strip, { cameras, pulses }) {
   strip.dataset.pulses = String(pulses.length);
-  const [names, lines, key] = strip.children;
+  const [names, lines, key] = [...strip.children].slice(-3);
   names.replaceChildren(...cameras.map((name) => make("span", {}, name)));
   const found = STATUSES.filter((status) => pulses.some(({ statuses }) => statuses.includes(status)));
   key.replaceChildren(...found.map((status) => make("li", { "data-status": status }, t(`status.${status}`))));

@@ -20,6 +20,8 @@ export const en = {
   "state.recording": "Recording",
   "state.disarming": "Closing",
   "state.fault": "Fault",
+  "state.pulses": "{pulses} pulses, all complete",
+  "state.pulses_partial": "{pulses} pulses, {partial} lack a frame",
 
   "lost.title": "Connection lost.",
   "lost.text": "What you see is old. A recording that runs goes on by itself.",
@@ -158,7 +160,7 @@ export const en = {
   "rig.lead": "The rig file in use. It is changed on the computer, and read when the service starts.",
   "rig.file": "Rig file",
   "rig.process": "Process {name}",
-  "rig.running": "{pid}, restarted {restarts} ×",
+  "rig.running": "{pid}  ·  restarted {restarts} ×",
   "rig.not_running": "not running",
   "rig.version": "Version",
 

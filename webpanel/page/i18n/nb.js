@@ -20,6 +20,8 @@ export const nb = {
   "state.recording": "Opptak",
   "state.disarming": "Stenger",
   "state.fault": "Feil",
+  "state.pulses": "{pulses} pulser, alle komplette",
+  "state.pulses_partial": "{pulses} pulser, {partial} mangler et bilde",
 
   "lost.title": "Mistet forbindelsen.",
   "lost.text": "Det du ser, er gammelt. Et opptak som er i gang, fortsetter av seg selv.",
@@ -158,7 +160,7 @@ export const nb = {
   "rig.lead": "Riggfilen som er i bruk. Den endres på datamaskinen og leses når tjenesten starter.",
   "rig.file": "Riggfil",
   "rig.process": "Prosess {name}",
-  "rig.running": "{pid}, startet på nytt {restarts} ×",
+  "rig.running": "{pid}  ·  startet på nytt {restarts} ×",
   "rig.not_running": "kjører ikke",
   "rig.version": "Versjon",
 

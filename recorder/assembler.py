@@ -36,12 +36,6 @@ def least_buffers(period_ns: int) -> int:
     return 2 * (hold_ns(period_ns) // period_ns + 1)
 
 
-_OVERRUN = (
-    "overrun: a pulse came while it was busy with the frame before, and is missed; shorten its exposure or lower "
-    "trigger.rate_hz"
-)
-
-
 #: Records of a camera that is connected.
 _STREAMING = (RecordKind.FRAME, RecordKind.DAMAGED, RecordKind.LATCH)
 
@@ -150,14 +144,7 @@ class Assembler:
             slot = part.slot if isinstance(part, _Composition) else None
             if slot is not None:
                 self._blacken(pulse, slot)
-            self._tell_overruns(pulse)
             yield Triplet(pulse, slot)
-
-    def _tell_overruns(self, pulse: ClosedPulse) -> None:
-        """A pulse missed because the camera was busy has another remedy than one that it did not see."""
-        for camera, outcome in enumerate(pulse.outcomes):
-            if outcome.overrun:
-                self._changes.append(CameraChange(camera, CameraState.NOTICE, _OVERRUN))
 
     @property
     def backlog(self) -> bool:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.adjustment import run_adjustment
+from bench.api import run_api
 from bench.capture import run_capture
 from bench.gstreamer import SINKS
 from bench.intersection import run_intersection
@@ -52,6 +53,14 @@ def _timed(name: str, run: Callable[[float], list[dict[str, Any]]], seconds: flo
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _api(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_api(seconds, directory)
+    path = write_results("api", cases, directory)
+    table = [f"{c['name']:46}{c['value']:9.2f} ms  {c['baseline_is']}: {c['baseline']:.2f}" for c in cases]
+    table.append(f"meanwhile recorded: {cases[0]['complete']} of {cases[0]['pulses']} triplets complete")
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 def _intersection(seconds: float, directory: Path) -> dict[str, Any]:
     cases = run_intersection(seconds)
     path = write_results("intersection", cases, directory)
@@ -62,6 +71,7 @@ def _intersection(seconds: float, directory: Path) -> dict[str, Any]:
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
     "parts": _parts,
+    "api": _api,
     "adjustment": partial(_timed, "adjustment", run_adjustment),
     "intersection": _intersection,
     "planning": partial(_timed, "planning", run_planning),

@@ -40,10 +40,12 @@ class CameraPresence:
     Attributes:
         state: None as long as nothing was heard.
         text: what it said of itself, or why it is not there.
+        counted: so often frames were counted since it was called silent.
     """
 
     state: CameraState | None = None
     text: str = ""
+    counted: int = 0
 
     @property
     def present(self) -> bool:
@@ -168,6 +170,7 @@ class RigProcesses:
                     self.ready = True
                 case "health":
                     self.health = message
+                    self._note_recovered(message)
         self._tend()
         return reports
 
@@ -180,6 +183,14 @@ class RigProcesses:
         if state in _PRESENCE:
             self.cameras[index] = CameraPresence(state, text)
         self._on_event(Event.now(_PRESENCE.get(state, Level.WARNING), self._names[index], f"{state}: {text}"))
+
+    def _note_recovered(self, health: Message) -> None:
+        """A camera that only seemed silent delivers on, and nobody says so: seen by its frames of a whole second."""
+        for index, camera in enumerate(self.cameras):
+            if camera.state is CameraState.SILENT:
+                counted = camera.counted + 1 if health["cameras"][index]["frames_per_s"] else 0
+                state = CameraState.CONNECTED if counted > 1 else CameraState.SILENT
+                self.cameras[index] = CameraPresence(state, camera.text, counted)
 
     def _tend(self) -> None:
         """Start dead grabbers again, after a while that grows; a dead recorder ends everything."""

@@ -88,6 +88,20 @@ class Serving:
         self.post("/api/arm")
         return self.await_state("armed")
 
+    def await_cameras(self, *states: str) -> dict[str, Any]:
+        """Wait until the cameras have these states: on a busy machine one may seem silent at first.
+
+        Returns:
+            The status.
+        """
+
+        def so() -> bool:
+            return tuple(camera["state"] for camera in self.get("/api/status")["cameras"]) == states
+
+        wait_until(so, f"cameras {states}, log:\n{self.log.read_text()}", PATIENCE_S, 0.05)
+        status: dict[str, Any] = self.get("/api/status")
+        return status
+
     def await_pulses(self, count: int) -> None:
         """Wait until the recording in progress holds so many pulses."""
 

@@ -21,8 +21,8 @@ def test_arm_record_stop_disarm(tmp_path: Path, loopback: Loopback) -> None:
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
         assert service.state() == "idle"
         assert service.call("POST", "/api/recordings", {})[0] == 409
-        status = service.arm()
-        assert [camera["state"] for camera in status["cameras"]] == ["ready"] * 3
+        service.arm()
+        service.await_cameras("ready", "ready", "ready")
         recording = service.post("/api/recordings", {"athlete": "Ola", "bib": "17", "wind": "0.5 m/s"})
         assert service.state() == "recording"
         assert service.call("POST", "/api/recordings", {})[0] == 409
@@ -77,13 +77,7 @@ def test_a_killed_grabber_comes_back(tmp_path: Path, loopback: Loopback) -> None
         pid = service.pids()["K2"]
         os.kill(pid, signal.SIGKILL)
         wait_until(lambda: service.pids()["K2"] != pid, "a new grabber", PATIENCE_S)
-
-        def back() -> bool:
-            status = service.get("/api/status")
-            assert status["state"] == "recording"
-            return all(camera["state"] == "ready" for camera in status["cameras"])
-
-        wait_until(back, "K2 is ready again", PATIENCE_S)
+        assert service.await_cameras("ready", "ready", "ready")["state"] == "recording"
         rows = {process["name"]: process for process in service.get("/api/status")["processes"]}
         assert rows["K2"]["restarts"] == 1
         assert rows["K2"]["statement"]["code"] == "process_restarted"

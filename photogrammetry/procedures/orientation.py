@@ -24,7 +24,8 @@ from photogrammetry.adjustment.suspicion import FAMILY_RISK
 from photogrammetry.adjustment.wording import describe, observation_to_json
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network import Datum, Network, Role
-from photogrammetry.procedures.reference_fit import ReferenceFit, Suspect, fit_reference
+from photogrammetry.procedures.reference_estimate import Suspect
+from photogrammetry.procedures.reference_fit import ReferenceFit, fit_reference
 from photogrammetry.procedures.reference_points import reference_points
 from photogrammetry.procedures.selection import (
     as_check_points,
@@ -64,6 +65,23 @@ class Finding:
     removed: bool
 
 
+@dataclass(frozen=True, slots=True)
+class PointTest:
+    """A reference point in the similarity transformation.
+
+    Attributes:
+        point: its name.
+        v: transformed - surveyed, X, Y, Z.
+        r: redundancy numbers.
+        w: test values; NaN where nothing controls a coordinate.
+    """
+
+    point: str
+    v: tuple[float, ...]
+    r: tuple[float, ...]
+    w: tuple[float, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
     """One stage.
@@ -72,11 +90,13 @@ class Stage:
         name: which.
         words: how it went.
         findings: what it found, in that order.
+        tests: of the reference points that it used; the other stages' tests are those of their adjustments.
     """
 
     name: StageName
     words: str
     findings: tuple[Finding, ...] = ()
+    tests: tuple[PointTest, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,16 +193,32 @@ def _similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | N
     except BadInputError as error:
         return None, [], Stage(StageName.SIMILARITY, f"left out: {error}")
     wrong = [Removed(_blunder(suspect, surveyed, network, a), network) for suspect in fit.removed]
-    findings = [Finding(describe(gone.network, gone.blunder), removed=True) for gone in wrong]
+    findings = [
+        Finding(f"{describe(gone.network, gone.blunder)}; {_tests_of(suspect)}", removed=True)
+        for gone, suspect in zip(wrong, fit.removed, strict=True)
+    ]
     if fit.suspect is not None:
-        findings.append(Finding(describe(network, _blunder(fit.suspect, surveyed, network, a)), removed=False))
+        words = describe(network, _blunder(fit.suspect, surveyed, network, a))
+        findings.append(Finding(f"{words}; {_tests_of(fit.suspect)}", removed=False))
     root = np.sqrt(np.mean(fit.residuals[list(fit.used)] ** 2, axis=0))
     words = (
         f"{len(fit.used)} reference points, redundancy {fit.redundancy}, residuals rms X Y Z "
         + " ".join(f"{value:.3g}" for value in root)
         + f" {network.length_unit}, sigma0 {fit.ratio:.3g} (a priori 1)"
     )
-    return fit, wrong, Stage(StageName.SIMILARITY, words, tuple(findings))
+    tests = tuple(
+        PointTest(network.points[surveyed[i]].name, tuple(v), tuple(r), tuple(w))
+        for i, v, r, w in zip(
+            fit.used, fit.residuals[list(fit.used)].tolist(), fit.controlled.tolist(), fit.w.tolist(), strict=True
+        )
+    )
+    return fit, wrong, Stage(StageName.SIMILARITY, words, tuple(findings), tests)
+
+
+def _tests_of(suspect: Suspect) -> str:
+    """The tests of a reference point's coordinates in words."""
+    w, r = (" ".join(f"{value:.2f}" for value in values) for values in (suspect.single, suspect.controlled))
+    return f"w of X, Y, Z {w}, redundancy numbers {r}"
 
 
 def _without_suspects(free: Outcome) -> Outcome:

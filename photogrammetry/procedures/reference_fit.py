@@ -1,90 +1,18 @@
-"""The second stage of the search for gross errors: a free block carried onto the surveyed reference points.
-
-The seven parameters of the similarity transformation are estimated with the full covariance of the free block and the
-sigmas of the survey: X = t + s R x, misclosures with covariance K = K_survey + s^2 R K_block R^T. A reference point is
-tested as a whole by the alternative that its three coordinates are wrong.
-"""
+"""The second stage of the search for gross errors: a free block carried onto the surveyed reference points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy import special
 
 from photogrammetry.adjustment.state import Floats
-from photogrammetry.adjustment.suspicion import FAMILY_RISK, SINGLE_RISK, significant
-from photogrammetry.rotation import rotation_from_vector, skew
+from photogrammetry.adjustment.suspicion import FAMILY_RISK
+from photogrammetry.procedures.reference_estimate import ReferenceEstimate, ReferencePoint, Suspect
 from photogrammetry.similarity import Similarity, fit_similarity
 from rig.errors import BadInputError
 
-_ITERATIONS: Final = 20
-_SETTLED: Final = 1e-10
-_PARAMETERS: Final = 7
-_RANK: Final = 1e-9
-#: Of the square sum a large error explains, so much may be left because its effect is not linear.
-_LINEAR: Final = 0.005
 _FEWEST: Final = 3  # points of a similarity transformation
-#: A rival explains a misclosure if no more than this is left of the suspect beside it (three coordinates).
-_EXPLAINED: Final = float(special.chdtri(3, SINGLE_RISK))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ImagePoint:
-    """An image of a reference point, which may be what is wrong instead of the survey.
-
-    Attributes:
-        index: whatever the caller knows it by.
-        shift: (3 n, 2) what an error of it does to the n reference points in the block.
-        normal: (2, 2) and
-        right: (2,) normal equations of that error in the free adjustment.
-    """
-
-    index: int
-    shift: Floats
-    normal: Floats
-    right: Floats
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ReferencePoint:
-    """A reference point in both systems.
-
-    Attributes:
-        block: (3,) in the free block.
-        surveyed: (3,).
-        sigma: (3,) of the survey; zero: error-free.
-        images: its images.
-    """
-
-    block: Floats
-    surveyed: Floats
-    sigma: Floats
-    images: tuple[ImagePoint, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Suspect:
-    """A reference point whose survey does not agree with the images.
-
-    Attributes:
-        index: of the point.
-        estimate: (3,) surveyed - true.
-        w: root of what the square sum falls by.
-        candidates: indices of the reference points that it may be instead, itself first; empty if there is none.
-        images: indices of its images that may be what is wrong instead of the survey.
-    """
-
-    index: int
-    estimate: Floats
-    w: float
-    candidates: tuple[int, ...]
-    images: tuple[int, ...] = ()
-
-    @property
-    def certain(self) -> bool:
-        """Whether nothing else explains the residuals."""
-        return not (self.candidates or self.images)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,6 +25,8 @@ class ReferenceFit:
         residuals: (n, 3) transformed - surveyed, of all points.
         ratio: estimated / a-priori sigma0.
         redundancy: 3 used - 7.
+        w: (used, 3) test values of the coordinates; NaN where nothing controls one.
+        controlled: (used, 3) their redundancy numbers, which add up to the redundancy.
         removed: wrong points that were taken out, in that order.
         suspect: one that is left: the data cannot tell which it is, or too many went before it.
     """
@@ -106,6 +36,8 @@ class ReferenceFit:
     residuals: Floats
     ratio: float
     redundancy: int
+    w: Floats
+    controlled: Floats
     removed: tuple[Suspect, ...] = ()
     suspect: Suspect | None = None
 
@@ -137,7 +69,7 @@ def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: f
     removed: list[Suspect] = []
     most = len(points) // 3  # with more something else is wrong
     while True:
-        estimate = _Estimate.of(points, covariance, used)
+        estimate = ReferenceEstimate.of(points, covariance, used)
         suspect = estimate.suspect(family_risk)
         if suspect is None or not suspect.certain or len(removed) == most or len(used) <= _FEWEST:
             break
@@ -151,140 +83,14 @@ def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: f
     residuals = estimate.transform.apply([p.block for p in points]) - [p.surveyed for p in points]
     # Without them the estimate of their errors is exact; before, they pulled at the transformation.
     gone = tuple(replace(suspect, estimate=-residuals[suspect.index]) for suspect in removed)
-    return ReferenceFit(estimate.transform, tuple(used), residuals, estimate.ratio, estimate.redundancy, gone, suspect)
-
-
-def _rows(points: Sequence[int]) -> list[int]:
-    return [3 * i + axis for i in points for axis in range(3)]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Estimate:
-    """One estimation.
-
-    Attributes:
-        transform: block to object system.
-        points: the reference points that it is from.
-        used: their indices among all.
-        v: (3 n,) residuals, transformed - surveyed.
-        projected: (3 n, 3 n) W = K^-1 - K^-1 A (A^T K^-1 A)^-1 A^T K^-1; the square sum is v^T W v.
-    """
-
-    transform: Similarity
-    points: tuple[ReferencePoint, ...]
-    used: tuple[int, ...]
-    v: Floats
-    projected: Floats
-
-    @classmethod
-    def of(cls, everything: Sequence[ReferencePoint], covariance: Floats, used: Sequence[int]) -> "_Estimate":
-        points, rows = [everything[i] for i in used], _rows(used)
-        block = np.array([p.block for p in points])
-        surveyed = np.array([p.surveyed for p in points])
-        survey, free = np.diag(np.concatenate([p.sigma for p in points]) ** 2), covariance[np.ix_(rows, rows)]
-        transform = fit_similarity(block, surveyed).transform
-        for _ in range(_ITERATIONS):
-            placed = transform.apply(block)
-            slopes = _slopes(placed)
-            turned = _turned(transform, len(points))
-            weights = _inverse(turned @ free @ turned.T + survey, slopes)
-            half = weights @ slopes
-            normals = slopes.T @ half
-            step = -np.linalg.solve(normals, half.T @ (placed - surveyed).ravel())
-            transform = _moved(transform, step, placed.mean(axis=0))
-            if np.abs(slopes @ step).max() <= _SETTLED * np.ptp(surveyed, axis=0).max():
-                break
-        projected = weights - half @ np.linalg.solve(normals, half.T)
-        v = (transform.apply(block) - surveyed).ravel()
-        return cls(transform, tuple(points), tuple(used), v, projected)
-
-    @property
-    def redundancy(self) -> int:
-        return len(self.v) - _PARAMETERS
-
-    @property
-    def square_sum(self) -> float:
-        return float(self.v @ self.projected @ self.v)
-
-    @property
-    def ratio(self) -> float:
-        return float(np.sqrt(self.square_sum / self.redundancy))
-
-    def suspect(self, family_risk: float) -> Suspect | None:
-        """The worst point that is too bad for chance, with what else it may be."""
-        count = len(self.used)
-        drops = np.array([self._drop(self._wrong(i)) for i in range(count)])
-        risk = min(SINGLE_RISK, family_risk / count)
-        if not significant(drops, 3, self.square_sum, self.redundancy, risk).any():
-            return None
-        worst = int(np.argmax(drops))
-        wrong = self._wrong(worst)
-        needed = max(_EXPLAINED * self._clean(float(drops[worst])), _LINEAR * float(drops[worst]))
-        others = [i for i in range(count) if i != worst]
-        rivals = [i for i in others if self._drop(np.hstack([wrong, self._wrong(i)])) - drops[i] < needed]
-        rivals.sort(key=lambda i: -drops[i])
-        images = [image for image in self.points[worst].images if self._left(wrong, image) < needed]
-        estimate = _pseudo_inverse(wrong.T @ self.projected @ wrong) @ wrong.T @ self.projected @ self.v
-        return Suspect(
-            self.used[worst],
-            estimate,
-            float(np.sqrt(drops[worst])) / self.ratio,
-            tuple(self.used[i] for i in (worst, *rivals)) if rivals else (),
-            tuple(image.index for image in images),
-        )
-
-    def _wrong(self, point: int) -> Floats:
-        """What an error of a point's survey does to the residuals: (3 n, 3)."""
-        effect = np.zeros((len(self.v), 3))
-        effect[3 * point : 3 * point + 3] = -np.eye(3)
-        return effect
-
-    def _drop(self, effects: Floats, normal: Floats | float = 0.0, right: Floats | float = 0.0) -> float:
-        """By how much the square sum falls with errors of these effects (3 n, k), which were felt elsewhere too."""
-        pulled = effects.T @ self.projected @ self.v + right
-        return float(pulled @ _pseudo_inverse(effects.T @ self.projected @ effects + normal) @ pulled)
-
-    def _left(self, wrong: Floats, image: ImagePoint) -> float:
-        """What is left of an error of the survey beside an error of an image, felt in the free adjustment too."""
-        shift = _turned(self.transform, len(self.used)) @ image.shift[_rows(self.used)]
-        normal, right = np.zeros((5, 5)), np.zeros(5)
-        normal[3:, 3:], right[3:] = image.normal, image.right
-        both = self._drop(np.hstack([wrong, shift]), normal, right)
-        return both - self._drop(shift, image.normal, image.right)
-
-    def _clean(self, drop: float) -> float:
-        """The variance factor without the suspect."""
-        freedom = self.redundancy - 3
-        return (self.square_sum - drop) / freedom if freedom > 0 else 1.0
-
-
-def _turned(transform: Similarity, count: int) -> Floats:
-    """The transformation's effect on small shifts of all points: (3 n, 3 n)."""
-    return np.asarray(transform.scale * np.kron(np.eye(count), transform.rotation))
-
-
-def _slopes(placed: Floats) -> Floats:
-    """Derivatives of the points by translation, rotation (rad, object axes) and logarithm of the scale: (3 n, 7)."""
-    arms = placed - placed.mean(axis=0)
-    out = np.zeros((len(placed), 3, _PARAMETERS))
-    out[:, :, :3] = np.eye(3)
-    out[:, :, 3:6] = -skew(arms)
-    out[:, :, 6] = arms
-    return out.reshape(-1, _PARAMETERS)
-
-
-def _inverse(covariance: Floats, slopes: Floats) -> Floats:
-    """The inverse, made regular along the parameters, which changes neither estimate nor residuals (Rao)."""
-    free = slopes / np.linalg.norm(slopes, axis=0)
-    return np.asarray(np.linalg.inv(covariance + np.diagonal(covariance).max() * free @ free.T))
-
-
-def _pseudo_inverse(matrix: Floats) -> Floats:
-    """Of a symmetric matrix, whose rank may be short where residuals control only part of an error."""
-    return np.asarray(np.linalg.pinv(matrix, rcond=_RANK, hermitian=True))
-
-
-def _moved(transform: Similarity, step: Floats, centre: Floats) -> Similarity:
-    turn, growth = rotation_from_vector(step[3:6]), float(np.exp(step[6]))
-    shift = growth * turn @ (transform.translation - centre) + centre + step[:3]
-    return Similarity(transform.scale * growth, turn @ transform.rotation, shift)
+    return ReferenceFit(
+        estimate.transform,
+        tuple(used),
+        residuals,
+        estimate.ratio,
+        estimate.redundancy,
+        estimate.w,
+        estimate.controlled,
+        gone,
+        suspect,
+    )

@@ -9,7 +9,7 @@ from photogrammetry.adjustment.hypotheses import observation_row
 from photogrammetry.adjustment.state import Floats
 from photogrammetry.adjustment.unknowns import Integers
 from photogrammetry.network import Point
-from photogrammetry.procedures.reference_fit import ImagePoint, ReferencePoint
+from photogrammetry.procedures.reference_estimate import ImagePoint, ReferencePoint
 
 
 def reference_points(free: Adjustment, surveyed: Sequence[Point]) -> tuple[list[ReferencePoint], Floats]:

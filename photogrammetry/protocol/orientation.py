@@ -1,14 +1,15 @@
 """The protocol of a pose estimation, and its result file."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
 from photogrammetry.adjustment.result_file import outcome_to_json
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.summary import summarise
-from photogrammetry.procedures.orientation import Orientation, Stage
+from photogrammetry.procedures.orientation import Orientation, PointTest, Stage
 from photogrammetry.protocol.adjusted import adjusted_sections
-from photogrammetry.protocol.document import Protocol, Section
+from photogrammetry.protocol.document import Protocol, Section, Table
 
 
 def orientation_to_json(orientation: Orientation) -> dict[str, Any]:
@@ -18,10 +19,15 @@ def orientation_to_json(orientation: Orientation) -> dict[str, Any]:
             "stage": stage.name.value,
             "words": stage.words,
             "findings": [{"message": finding.message, "removed": finding.removed} for finding in stage.findings],
+            "tests": [_test_to_json(test) for test in stage.tests],
         }
         for stage in orientation.stages
     ]
     return outcome_to_json(orientation.outcome) | {"stages": stages, "notes": list(orientation.notes)}
+
+
+def _test_to_json(test: PointTest) -> dict[str, Any]:
+    return {"point": test.point, "v": test.v, "r": test.r, "w": [w if math.isfinite(w) else None for w in test.w]}
 
 
 def orientation_lines(orientation: Orientation) -> list[str]:
@@ -35,7 +41,7 @@ def orientation_lines(orientation: Orientation) -> list[str]:
 def orientation_protocol(orientation: Orientation) -> Protocol:
     """The protocol."""
     stages = [
-        Section(f"Stage {number}: {stage.name.value}", (stage.words, *_findings(stage)))
+        Section(f"Stage {number}: {stage.name.value}", (stage.words, *_findings(stage), *_tests(stage)))
         for number, stage in enumerate(orientation.stages, start=1)
     ]
     sections = (Section("Procedure", orientation.notes), *stages, *adjusted_sections(_final(orientation)))
@@ -45,6 +51,20 @@ def orientation_protocol(orientation: Orientation) -> Protocol:
 def _final(orientation: Orientation) -> Outcome:
     """The constrained adjustment without what the stages have named already."""
     return replace(orientation.outcome, removed=())
+
+
+def _tests(stage: Stage) -> tuple[Table, ...]:
+    """Residuals, redundancy numbers and test values of the reference points in the similarity transformation."""
+    rows = tuple(
+        (
+            test.point,
+            *(f"{v:.4f}" for v in test.v),
+            *(f"{r:.2f}" for r in test.r),
+            *(f"{w:.1f}" if math.isfinite(w) else "-" for w in test.w),
+        )
+        for test in stage.tests
+    )
+    return (Table(("point", "vX", "vY", "vZ", "rX", "rY", "rZ", "wX", "wY", "wZ"), rows),) if rows else ()
 
 
 def _findings(stage: Stage) -> list[str]:

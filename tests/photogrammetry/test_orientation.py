@@ -114,6 +114,23 @@ def test_reference_point_is_found_in_the_transformation(error: tuple[float, floa
     assert np.abs(_errors_in_sigmas(case, orientation)).max() < 4.0
 
 
+def test_the_transformation_has_a_test_value_and_a_redundancy_number_for_each_coordinate() -> None:
+    network = _without_start(hill(3, helmets=17).network)
+    sound, spoilt = orient(network), orient(_shifted(network, 6, (0.0, 0.0, 0.5)))
+    tests = sound.stages[1].tests
+    assert len(tests) == 13  # of 15 points two have one ray only
+    r, w = (np.array([getattr(test, name) for test in tests]) for name in ("r", "w"))
+    assert r.sum() == pytest.approx(3 * len(tests) - 7)
+    assert r.min() > 0.0
+    assert r.max() < 1.0
+    assert np.abs(w).max() < 3.5
+    assert "B7" not in [test.point for test in spoilt.stages[1].tests]
+    words = spoilt.stages[1].findings[0].message.split("w of X, Y, Z ")[1]
+    single = [abs(float(value)) for value in words.split(",")[0].split()]
+    assert max(single) == single[2]
+    assert "redundancy numbers 0." in words
+
+
 def test_several_errors_are_found_each_at_its_stage() -> None:
     network = _without_start(hill(4, helmets=17).network)
     network = _spoilt(_spoilt(network, 0, 3, (9.0, 20.0)), 2, 25, (4.0, -15.0))

@@ -17,17 +17,19 @@ from typer.core import TyperGroup
 from svev import cli
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
+from tests.svev.service.serving import Serving, serving
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 SOURCES = [
     path
-    for room in ("svev", "recorder", "capture", "triggering", "simrig", "rig")
+    for room in ("svev", "webpanel", "recorder", "capture", "triggering", "simrig", "rig")
     for path in (ROOT / room).rglob("*.py")
 ]
 FENCE = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
 RUN = re.compile(
-    r"<!-- run(?: beside svev replay(?P<replay>.*?))?, prints: (?P<prints>.*?) -->\n```python\n(?P<code>.*?)```",
+    r"<!-- run(?: beside svev (?:replay(?P<replay>.*?)|(?P<serve>serve)))?, prints: (?P<prints>.*?) -->\n"
+    r"```python\n(?P<code>.*?)```",
     re.DOTALL,
 )
 #: Commands of later versions that a page may name because it says that they do not exist yet.
@@ -109,6 +111,20 @@ def log(tmp_path_factory: pytest.TempPathFactory, loopback: Loopback) -> Path:
     return Path(json.loads(done.stdout)["log"])
 
 
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory, loopback: Loopback) -> Iterator[Serving]:
+    """A service on the simulated hill, armed, with two recordings."""
+    folder = tmp_path_factory.mktemp("serve")
+    with serving(folder, write_rig(folder, loopback, backend="sim"), loopback) as running:
+        running.arm()
+        for _ in range(2):
+            recording = running.post("/api/recordings", {"athlete": "Kari"})["id"]
+            running.await_pulses(5)
+            running.post(f"/api/recordings/{recording}/stop")
+            running.await_state("armed")
+        yield running
+
+
 @contextmanager
 def _replay(log: Path, address: str, *options: str) -> Iterator[None]:
     """Another terminal, in which the log is replayed."""
@@ -121,20 +137,33 @@ def _replay(log: Path, address: str, *options: str) -> Iterator[None]:
             process.communicate(timeout=30)
 
 
-def _examples() -> Iterator[ParameterSet]:
+def _examples(*, serve: bool) -> Iterator[ParameterSet]:
     for page in PAGES:
         for number, match in enumerate(RUN.finditer(page.read_text()), start=1):
-            yield pytest.param(match, id=f"{_name(page)}-{number}")
+            if (match["serve"] is not None) is serve:
+                yield pytest.param(match, id=f"{_name(page)}-{number}")
 
 
-@pytest.mark.parametrize("example", list(_examples()))
+def _run(example: re.Match[str], folder: Path, **given: str) -> None:
+    """Run an example, with these names given to it."""
+    program = folder / "example.py"
+    program.write_text("".join(f"{name} = {value!r}\n" for name, value in given.items()) + example["code"])
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert example["prints"] in done.stdout
+
+
+@pytest.mark.parametrize("example", list(_examples(serve=False)))
 def test_examples_run(example: re.Match[str], log: Path, loopback: Loopback, tmp_path: Path) -> None:
     address = loopback.endpoint()
-    program = tmp_path / "example.py"
-    program.write_text(f"LOG = {str(log)!r}\nADDRESS = {address!r}\n{example['code']}")
     with ExitStack() as stack:
         if example["replay"] is not None:
             stack.enter_context(_replay(log, address, *example["replay"].split()))
-        done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 0, done.stderr
-    assert example["prints"] in done.stdout
+        _run(example, tmp_path, LOG=str(log), ADDRESS=address)
+
+
+@pytest.mark.parametrize("example", list(_examples(serve=True)))
+def test_examples_run_beside_the_service(example: re.Match[str], service: Serving, tmp_path: Path) -> None:
+    service.await_state("armed")
+    token = "none-is-needed-on-loopback"  # noqa: S105
+    _run(example, tmp_path, URL=service.url, FOLDER=str(tmp_path), TOKEN=token)

@@ -20,7 +20,7 @@ from recorder.findings import Findings
 from recorder.ledger import Ledger, numbers, runs_to_text
 from recorder.log_items import Chunk, Damage, Item, Message, Small
 from recorder.log_reader import LogReader, tag_of
-from recorder.mcap_layout import PADDING_OPCODE, RECORD
+from recorder.mcap_layout import PADDING_OPCODE, PAGE, RECORD
 from recorder.raw_image import pixels, view_image
 from recorder.rebuilt_log import RebuiltLog
 from recorder.salvage import salvaged_tags, tag_from_heads, without_pixels
@@ -32,6 +32,7 @@ from rig.topics import RECOVERY_METADATA, TAG, TRIPLET
 
 _PULSES_MAX: Final = 10_000
 #: An unfinished record of these kinds at the end of a log held nothing that is missed.
+_TORN_MAX: Final = 2 * PAGE
 _NOTHING_IN_IT: Final = (PADDING_OPCODE, Opcode.MESSAGE_INDEX, Opcode.DATA_END)
 
 
@@ -203,7 +204,7 @@ class _Recovery:
 
     def _held_nothing(self, damage: Damage) -> bool:
         """Whether a torn end is of a record that only helps to read others, or too short to say what it was."""
-        if not damage.torn:
+        if not damage.torn or self._reader.closed or damage.length > _TORN_MAX:
             return False
         return damage.length < RECORD.size or self._reader.read(damage.offset, 1)[0] in _NOTHING_IN_IT
 

@@ -264,6 +264,7 @@ def test_bytes_flipped_anywhere(
         lost = sum(last - first + 1 for first, last in (*report.lost_pixels, *report.ledger.missing))
         assert report.ledger.last_pulse >= 7 - len(flips)
         assert lost <= len(flips)
+        assert report.ledger.pulses == 7 or not report.lossless
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -285,3 +286,4 @@ def test_holes_anywhere(
         report = recover(folder / "log.mcap", folder / "out.mcap")
         _check(report, written)
         assert sum(1 for _, image in triplets(report.path) if image.any()) >= unhurt - 2
+        assert report.ledger.pulses == 7 or not report.lossless

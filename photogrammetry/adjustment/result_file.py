@@ -16,10 +16,15 @@ from photogrammetry.adjustment.state import Floats
 from photogrammetry.adjustment.wording import blunder_to_json, in_file_frame
 from photogrammetry.camera_model import INTERIOR
 from photogrammetry.diagnosis import Defect
-from photogrammetry.network import Difference, Role
+from photogrammetry.network import Difference, Reweight, Role
 
 FORMAT = "svev-adjustment/1"
 _AXES = "XYZ"
+_WEIGHTS = {
+    Reweight.NONE: "",
+    Reweight.HELMERT: "; the weights are estimated from the residuals, group by group",
+    Reweight.PAPER: "; the weights are estimated by D5 as the paper prints it",
+}
 
 
 def write_result(result: dict[str, Any], path: Path) -> None:
@@ -91,6 +96,7 @@ def status_of(outcome: Outcome) -> str:
     behind = a.problem.behind(a.state)
     if behind:
         words += f"; {behind} observed points lie behind their cameras: check the start values and the rotations' sense"
+    words += _WEIGHTS[a.network.reweight]
     if outcome.components is None:
         words += "; the variance components do not settle"
     return words

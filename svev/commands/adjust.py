@@ -1,32 +1,46 @@
 """`svev adjust`: adjust any photogrammetric network."""
 
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from photogrammetry.adjustment.result_extras import in_datum_of, joint_covariance, named_points, with_detectable
 from photogrammetry.adjustment.result_file import outcome_to_json
 from photogrammetry.adjustment.run import adjust as adjust_network
 from photogrammetry.adjustment.state import state_of
 from photogrammetry.adjustment.summary import summarise
-from photogrammetry.network import Network, Reweight
+from photogrammetry.network import Network
 from photogrammetry.network_file import read_network
 from photogrammetry.protocol.adjusted import adjusted_sections
 from photogrammetry.protocol.document import Protocol
 from photogrammetry.protocol.page import write_protocol
 from photogrammetry.start_values.search import complete
 from svev.commands.delivery import deliver
+from svev.commands.weights import PaperOption, ReweightOption, with_weights
 
 
 def adjust(
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1)")],
     output: Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")],
-    paper: Annotated[bool, typer.Option("--paper", help="estimate the weights by D5 as the paper prints it")] = False,
+    reweight: ReweightOption = False,
+    paper: PaperOption = False,
     snoop: Annotated[
         bool,
         typer.Option("--snoop", help="take the worst locatable gross error out, adjust again, until there is none"),
     ] = False,
+    detectable: Annotated[
+        bool, typer.Option("--detectable", help="give the smallest error of each observation that would be found")
+    ] = False,
+    covariance: Annotated[
+        list[str] | None,
+        typer.Option("--covariance", help="give the joint covariance of the points so called (* and ?); repeatable"),
+    ] = None,
+    datum: Annotated[
+        list[str] | None,
+        typer.Option("--datum", help="give the sigmas of a free network in the datum of these points; repeatable"),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
     ] = None,
@@ -40,19 +54,38 @@ def adjust(
 
     Example: svev adjust network.json -o result.json
     """
-    given = read_network(network)
-    if paper:
-        given = replace(given, reweight=Reweight.PAPER)
-    deliver(lambda: _adjusted(given, report, snoop=snoop), output, as_json=as_json)
+    given = with_weights(read_network(network), reweight=reweight, paper=paper)
+    wishes = _Wishes(snoop, detectable, tuple(covariance or ()), tuple(datum or ()), report)
+    deliver(lambda: _adjusted(given, wishes), output, as_json=as_json)
 
 
-def _adjusted(network: Network, report: Path | None, *, snoop: bool) -> tuple[dict[str, Any], list[str]]:
+@dataclass(frozen=True, slots=True)
+class _Wishes:
+    """The options that do not change the network."""
+
+    snoop: bool
+    detectable: bool
+    covariance: tuple[str, ...]
+    datum: tuple[str, ...]
+    report: Path | None
+
+
+def _adjusted(network: Network, wishes: _Wishes) -> tuple[dict[str, Any], list[str]]:
+    named_points(network, wishes.datum, "--datum")  # before anything is computed
+    named_points(network, wishes.covariance, "--covariance")
     poses = all(image.position is not None and image.rotation is not None for image in network.images)
     points = all(point.xyz is not None for point in network.points)
     started = network if poses and points else complete(network)
-    outcome = adjust_network(network, state_of(started), snoop=snoop)
+    outcome = adjust_network(network, state_of(started), snoop=wishes.snoop)
+    if wishes.datum:
+        outcome = in_datum_of(outcome, wishes.datum)
     lines = summarise(outcome)
-    if report is not None:
-        text, page = write_protocol(Protocol("Adjustment", adjusted_sections(outcome)), report)
+    if wishes.report is not None:
+        text, page = write_protocol(Protocol("Adjustment", adjusted_sections(outcome)), wishes.report)
         lines.append(f"protocol in {text} and {page}")
-    return outcome_to_json(outcome), lines
+    result = outcome_to_json(outcome)
+    if wishes.detectable:
+        result = with_detectable(result, outcome.adjustment)
+    if wishes.covariance:
+        result["joint_covariance"] = joint_covariance(outcome.adjustment, wishes.covariance)
+    return result, lines

@@ -1,19 +1,19 @@
 """`svev orient`: poses of the cameras on the hill."""
 
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from photogrammetry.network import Network, Reweight
+from photogrammetry.network import Network
 from photogrammetry.network_file import read_network
 from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
 from photogrammetry.procedures.orientation import orient as orient_network
 from photogrammetry.protocol.orientation import orientation_lines, orientation_protocol, orientation_to_json
 from photogrammetry.protocol.page import write_protocol
 from svev.commands.delivery import deliver
+from svev.commands.weights import PaperOption, ReweightOption, with_weights
 
 
 class Alternative(StrEnum):
@@ -34,7 +34,8 @@ def orient(
         Alternative, typer.Option("--alternative", help="1: static tie points alone; 2: moving ones too")
     ] = Alternative.MOVING_TOO,
     moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names")] = "H*",
-    paper: Annotated[bool, typer.Option("--paper", help="estimate the weights by D5 as the paper prints it")] = False,
+    reweight: ReweightOption = False,
+    paper: PaperOption = False,
     report: Annotated[
         Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
     ] = None,
@@ -51,8 +52,7 @@ def orient(
     given = read_network(network)
     if calibration is not None:
         given = with_calibration(given, read_calibration(calibration))
-    if paper:
-        given = replace(given, reweight=Reweight.PAPER)
+    given = with_weights(given, reweight=reweight, paper=paper)
     deliver(lambda: _oriented(given, int(alternative), moving, report), output, as_json=as_json)
 
 

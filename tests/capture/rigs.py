@@ -9,6 +9,7 @@ from rig.rigfile import CONFIG, load_rig
 from rig.settings import RigSettings
 from tests.support.loopback import Loopback
 
+_FIREWIRE_IN_MIXED = 2
 SCENARIO = CONFIG / "scenarios" / "training.toml"
 
 
@@ -27,7 +28,7 @@ def write_rig(
 
     Args:
         directory: where.
-        backend: "sim", "aravis" or "iidc".
+        backend: "sim", "aravis", "iidc", or "mixed": two FireWire cameras, then GigE Vision ones.
         loopback: addresses of the simulated cameras and of the publication.
         faults: faults of the scenario, as in its TOML.
         scenario: more TOML for the top of the scenario.
@@ -43,10 +44,11 @@ def write_rig(
         f'publish = "{loopback.endpoint()}"',
         *(f"{k} = {json.dumps(v)}" for k, v in network.items()),
     ]
-    addresses = {"sim": [""] * len(names), "aravis": loopback.cameras(len(names)), "iidc": guids(len(names))}[backend]
-    for name, address in zip(names, addresses, strict=True):
-        lines += ["[[cameras]]", f'name = "{name}"', f'backend = "{backend}"']
-        lines += [f'address = "{address}"'] if address else []
+    addresses = {"sim": [""] * len(names), "aravis": loopback.cameras(len(names)), "iidc": guids(len(names))}
+    for index, name in enumerate(names):
+        kind = backend if backend != "mixed" else "iidc" if index < _FIREWIRE_IN_MIXED else "aravis"
+        lines += ["[[cameras]]", f'name = "{name}"', f'backend = "{kind}"']
+        lines += [f'address = "{addresses[kind][index]}"'] if kind != "sim" else []
     path = directory / "rig.toml"
     path.write_text("\n".join(lines) + "\n")
     return path

@@ -53,7 +53,7 @@ def _recording(out: Path) -> Callable[[], bool]:
     return lambda: any(log.stat().st_size > 5_000_000 for log in out.glob("*.mcap"))
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis"])
+@pytest.mark.parametrize("backend", ["sim", "aravis", "iidc", "mixed"])
 def test_every_pulse_is_recorded_whole_and_unmixed(tmp_path: Path, loopback: Loopback, backend: str) -> None:
     path = write_rig(tmp_path, backend, loopback)
     code, result, err = _result(_record(path, tmp_path / "logs", 2))

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer.main
@@ -74,8 +75,16 @@ def test_options_in_the_examples_exist(page: Path) -> None:
     assert isinstance(group, TyperGroup)
     for language, body in FENCE.findall(page.read_text()):
         for command, rest in re.findall(r"^svev ([a-z]+)(.*)$", body if language == "sh" else "", re.MULTILINE):
-            known = {option for parameter in group.commands[command].params for option in parameter.opts}
+            known = {option for parameter in _parameters(group, [command, *rest.split()]) for option in parameter.opts}
             assert set(re.findall(r"--[a-z-]+", rest)) <= known, f"svev {command}{rest}"
+
+
+def _parameters(command: Any, words: list[str]) -> list[Any]:
+    """Parameters of a command and of those below it that are named."""
+    found = list(command.params)
+    if isinstance(command, TyperGroup) and words and words[0] in command.commands:
+        found += _parameters(command.commands[words[0]], words[1:])
+    return found
 
 
 def _messages() -> list[str]:

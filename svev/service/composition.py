@@ -4,7 +4,7 @@ import logging
 import signal
 import socket
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager, nullcontext
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -132,7 +132,6 @@ def _signals(server: PanelServer, supervisor: Supervisor, notify: Notify) -> Ite
         notify.stopping()
         supervisor.begin_stop()
 
-    server.capture_signals = nullcontext  # type: ignore[method-assign,assignment] # uvicorn would raise them again
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield

@@ -14,7 +14,7 @@ from webpanel.models import CameraState, State, Status
 
 _KEPT_S: Final = 10.0
 #: While the rig runs these would disturb it (the disk's speed, the cameras) or find its own sockets in the way.
-_ONLY_IDLE: Final = frozenset({"disk", "publication", "cameras", "discovery"})
+_ONLY_IDLE: Final = frozenset({"disk", "publication", "cameras", "FireWire", "discovery"})
 _RANK: Final = tuple(Level)
 
 
@@ -55,8 +55,8 @@ class Examination:
                 yield from _cameras_of(status)
             elif probe.name == "disk":
                 yield _room_of(status)
-            else:
-                yield passed(probe.topic, f"{probe.name}: in use by the rig, not examined; disarm to have it examined")
+        if not idle:
+            yield passed(Topic.CAMERAS, "what would disturb the rig is not examined while it is armed: disarm for that")
 
 
 def _cameras_of(status: Status) -> Iterator[Finding]:

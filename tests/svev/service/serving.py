@@ -68,6 +68,14 @@ class Serving:
         assert status in {200, 201}, answer
         return answer
 
+    @contextmanager
+    def watching(self, path: str) -> Iterator[None]:
+        """Within, an endless answer is being read, or rather not: it has begun, and nobody takes it."""
+        request = urllib.request.Request(self.url + path)  # noqa: S310 - our own service
+        with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:  # noqa: S310 - our own service
+            assert answer.read(1)
+            yield
+
     def state(self) -> str:
         """The present state."""
         state: str = self.get("/api/status")["state"]

@@ -62,9 +62,10 @@ def test_a_signal_while_recording_finishes_the_file(tmp_path: Path, loopback: Lo
         service.arm()
         service.post("/api/recordings", {})
         service.await_pulses(20)
-        service.signal(number)
-        service.signal(number)
-        assert service.exit_code() == 0, service.log.read_text()
+        with service.watching("/api/events"), service.watching("/api/preview.mjpg"):
+            service.signal(number)
+            service.signal(number)
+            assert service.exit_code() == 0, service.log.read_text()
     (log,) = (tmp_path / "data").glob("*.mcap")
     assert verify(log).verdict == "clean"
 

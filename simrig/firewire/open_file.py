@@ -1,7 +1,6 @@
 """One open `/dev/fw*`: its ioctls and events, as the kernel answers them (drivers/firewire/core-cdev.c)."""
 
 import errno
-import mmap
 import os
 import socket
 import struct
@@ -9,38 +8,24 @@ import time
 from collections import deque
 from typing import Final, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rig.clocks import NS_PER_US, host_now
 from simrig.firewire import abi
-from simrig.firewire.abi import Event, Ioctl, Rcode, Tcode
+from simrig.firewire.abi import Ioctl, Rcode, Tcode
 from simrig.firewire.camera import REGISTER_SPACE, Camera
 from simrig.firewire.cycle_timer import CycleTimer
-from simrig.firewire.iso_resources import Allocation, IsoResources
+from simrig.firewire.iso_file import IsoFile, Refused
+from simrig.firewire.iso_resources import IsoResources
 from simrig.firewire.loop import Loop
-from simrig.firewire.receive_context import ReceiveContext, buffers
 from simrig.firewire.transmission import Transmission
 from simrig.firewire.wire import Operation, Request, receive, reply
 
 _ROM_END: Final = REGISTER_SPACE + 0x800  # broadcasts below would reach the kernel's own registers
 _MAX_REQUEST_BYTES: Final = 2048  # asynchronous packet at S400
 _QUADLET: Final = 4
-_RECEIVE: Final = 1  # FW_CDEV_ISO_CONTEXT_RECEIVE
-_CHANNELS: Final = 64
-_IIDC_TAG: Final = 1  # bit 0: packets with tag 0
 _CARD: Final = 0
 _WRITES: Final = (Tcode.WRITE_QUADLET, Tcode.WRITE_BLOCK)
 _CLOCK_TRIES: Final = 20
 _CLOCK_GAP_NS: Final = 20_000
-
-
-class Refused(Exception):  # noqa: N818  (an answer, not a fault)
-    """An ioctl that the kernel would answer with this error number."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(errno.errorcode[number])
-        self.number = number
 
 
 class Surroundings(Protocol):
@@ -93,21 +78,18 @@ class OpenFile:
         self._unsent: deque[bytes] = deque()
         self._version = abi.KERNEL_VERSION
         self._reset_closure = 0
-        self._context: ReceiveContext | None = None
-        self._ring: NDArray[np.uint8] | None = None
-        self._allocations: dict[int, tuple[Allocation, int]] = {}
+        self._iso = IsoFile(bus.resources, self._tell)
         self._gone = False
         loop.when_readable(connection, self._serve)
 
     @property
     def receiving(self) -> bool:
         """Whether it receives isochronous packets."""
-        return self._context is not None and self._context.running
+        return self._iso.receiving
 
     def receive(self, frame: Transmission) -> None:
         """A frame was sent on the bus."""
-        if self._context is not None and self._ring is not None and self._context.channel == frame.channel:
-            self._context.receive(frame, self._ring)
+        self._iso.receive(frame)
 
     def tell_reset(self) -> None:
         """The bus was reset."""
@@ -116,16 +98,13 @@ class OpenFile:
     def unplug(self) -> None:
         """The node is gone: whoever waits for events wakes up, all else fails from now on."""
         self._gone = True
-        self._context = None
+        self._iso.drop_context()
         self._loop.when_writable(self._events, None)
         self._events.close()
 
     def close(self) -> None:
         """Let go of everything that the file holds."""
-        for allocation, _ in self._allocations.values():
-            self._bus.resources.free(allocation)
-        self._allocations.clear()
-        self._context = self._ring = None
+        self._iso.release()
         self._loop.when_readable(self._connection, None)
         self._loop.when_writable(self._events, None)
         self._connection.close()
@@ -162,20 +141,17 @@ class OpenFile:
             if self._gone:
                 reply(self._connection, -errno.ENODEV)
             elif request.operation is Operation.MMAP:
-                self._map(request)
+                self._iso.map(request.argument, request.descriptor)
                 reply(self._connection, 0)
             else:
                 self._ioctl(request)
         except Refused as refusal:
             reply(self._connection, -refusal.number)
+        except struct.error:  # an argument of another size than the kernel's
+            reply(self._connection, -errno.EINVAL)
         finally:
             if request.descriptor >= 0:
                 os.close(request.descriptor)
-
-    def _map(self, request: Request) -> None:
-        """Share the memory that frames are received into."""
-        (length,) = struct.unpack("=Q", request.argument)
-        self._ring = np.frombuffer(mmap.mmap(request.descriptor, length), np.uint8)
 
     def _ioctl(self, request: Request) -> None:
         argument = request.argument
@@ -192,17 +168,22 @@ class OpenFile:
             case Ioctl.GET_CYCLE_TIMER:
                 reply(self._connection, 0, abi.TIMER.pack(*self._cycle_time()))
             case Ioctl.ALLOCATE_ISO_RESOURCE:
-                self._allocate(argument)
+                answer, event = self._iso.allocate(argument)
+                reply(self._connection, 0, answer)
+                self._tell(event)
             case Ioctl.DEALLOCATE_ISO_RESOURCE:
-                self._deallocate(argument)
+                event = self._iso.deallocate(argument)
+                reply(self._connection, 0)
+                self._tell(event)
             case Ioctl.CREATE_ISO_CONTEXT:
-                self._create_context(argument)
+                reply(self._connection, 0, self._iso.create_context(argument, self._version))
             case Ioctl.QUEUE_ISO:
-                self._queue(argument, request.extra)
+                reply(self._connection, *self._iso.queue(argument, request.extra))
             case Ioctl.START_ISO:
-                self._start(argument)
+                self._iso.start(argument)
+                reply(self._connection, 0)
             case Ioctl.STOP_ISO:
-                self._known_context(abi.HANDLE.unpack(argument)[0]).stop()
+                self._iso.stop(argument)
                 reply(self._connection, 0)
             case _:
                 raise Refused(errno.ENOTTY)
@@ -252,67 +233,3 @@ class OpenFile:
             if after - before < _CLOCK_GAP_NS:
                 break
         return utc // NS_PER_US, self._bus.timer.register(after)
-
-    def _allocate(self, argument: bytes) -> None:
-        closure, channels, bandwidth, _ = abi.RESOURCE.unpack(argument)
-        handle = next(number for number in range(len(self._allocations) + 1) if number not in self._allocations)
-        reply(self._connection, 0, abi.RESOURCE.pack(closure, channels, bandwidth, handle))
-        allocation = self._bus.resources.allocate(channels, bandwidth)
-        if allocation.granted:
-            self._allocations[handle] = allocation, closure
-        event = abi.iso_resource(
-            Event.ISO_RESOURCE_ALLOCATED, closure, handle, allocation.channel, allocation.bandwidth
-        )
-        self._tell(event)
-
-    def _deallocate(self, argument: bytes) -> None:
-        (handle,) = abi.HANDLE.unpack(argument)
-        if handle not in self._allocations:
-            raise Refused(errno.EINVAL)
-        allocation, closure = self._allocations.pop(handle)
-        reply(self._connection, 0)
-        self._bus.resources.free(allocation)
-        channel, bandwidth = allocation.channel, allocation.bandwidth
-        self._tell(abi.iso_resource(Event.ISO_RESOURCE_DEALLOCATED, closure, handle, channel, bandwidth))
-
-    def _create_context(self, argument: bytes) -> None:
-        kind, header_bytes, channel, speed, closure, _ = abi.CONTEXT.unpack(argument)
-        if self._context is not None:
-            raise Refused(errno.EBUSY)
-        if kind != _RECEIVE or channel >= _CHANNELS or header_bytes not in {4, 8}:
-            raise Refused(errno.EINVAL)
-
-        def tell(cycle: int, headers: bytes) -> None:
-            self._tell(abi.iso_interrupt(closure, cycle, headers))
-
-        drops = self._version < abi.DROPS_HEADERS_BELOW
-        self._context = ReceiveContext(channel, header_bytes, tell, drops_headers=drops)
-        reply(self._connection, 0, abi.CONTEXT.pack(kind, header_bytes, channel, speed, closure, 0))
-
-    def _queue(self, argument: bytes, packets: bytes) -> None:
-        _, data, size, handle = abi.QUEUE.unpack(argument)
-        context = self._known_context(handle)
-        controls = struct.unpack(f"={size // _QUADLET}I", packets)
-        try:
-            entries = buffers(controls, data, context.header_bytes)
-        except ValueError:
-            raise Refused(errno.EINVAL) from None
-        end = data + sum(control & 0xFFFF for control in controls)
-        if self._ring is None or end > len(self._ring):
-            raise Refused(errno.EINVAL)
-        context.queue(entries)
-        reply(self._connection, len(controls), abi.QUEUE.pack(0, end, 0, handle))
-
-    def _start(self, argument: bytes) -> None:
-        _, sync, tags, handle = abi.START.unpack(argument)
-        context = self._known_context(handle)
-        if not 0 < tags <= 0xF or sync > 0xF:
-            raise Refused(errno.EINVAL)
-        if tags & _IIDC_TAG:  # else none of the packets on this bus matches
-            context.start(host_now())
-        reply(self._connection, 0)
-
-    def _known_context(self, handle: int) -> ReceiveContext:
-        if self._context is None or handle != 0:
-            raise Refused(errno.EINVAL)
-        return self._context

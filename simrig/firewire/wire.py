@@ -24,6 +24,9 @@ class Operation(IntEnum):
     MMAP = 4
 
 
+_WITH_DESCRIPTOR: Final = frozenset({Operation.OPEN, Operation.MMAP})
+
+
 @dataclass(frozen=True, slots=True)
 class Request:
     """One request.
@@ -44,30 +47,27 @@ class Request:
 
 
 def receive(connection: socket.socket) -> Request | None:
-    """One request; None at the end of the connection.
-
-    Raises:
-        ValueError: the packet is none of the shim's.
-    """
+    """One request; None at the end of the connection, which a packet that is none of the shim's is, too."""
     try:
         data, descriptors, _, _ = socket.recv_fds(connection, _MESSAGE_BYTES, 1)
     except ConnectionResetError:
         return None
     descriptor = descriptors[0] if descriptors else _NO_DESCRIPTOR
-    if not data:
+    request = _parsed(data, descriptor)
+    if request is None and descriptor != _NO_DESCRIPTOR:
+        os.close(descriptor)
+    return request
+
+
+def _parsed(data: bytes, descriptor: int) -> Request | None:
+    if len(data) < _REQUEST.size:
         return None
-    try:
-        operation, code, argument_bytes, extra_bytes = _REQUEST.unpack_from(data)
-        middle = _REQUEST.size + argument_bytes
-        kind = Operation(operation)
-        whole = len(data) == middle + extra_bytes
-    except (struct.error, ValueError):
-        whole = False
-    if not whole:
-        if descriptor != _NO_DESCRIPTOR:
-            os.close(descriptor)
-        raise ValueError("a packet that the shim does not send")
-    return Request(kind, code, data[_REQUEST.size : middle], data[middle:], descriptor)
+    operation, code, argument_bytes, extra_bytes = _REQUEST.unpack_from(data)
+    middle = _REQUEST.size + argument_bytes
+    complete = len(data) == middle + extra_bytes and (descriptor != _NO_DESCRIPTOR) == (operation in _WITH_DESCRIPTOR)
+    if operation not in set(Operation) or not complete:
+        return None
+    return Request(Operation(operation), code, data[_REQUEST.size : middle], data[middle:], descriptor)
 
 
 def reply(connection: socket.socket, result: int, argument: bytes = b"", extra: bytes = b"") -> None:

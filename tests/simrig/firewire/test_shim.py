@@ -2,6 +2,7 @@
 
 import errno
 import os
+import socket
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -89,6 +90,17 @@ def test_nodes_without_permission(start_hill: StartHill, start_program: StartPro
     assert program("cameras") == []
 
 
+@pytest.mark.parametrize("packet", [b"", b"nonsense", bytes(16), bytes([2]) + bytes(15), bytes([9]) + bytes(15)])
+def test_a_stranger_who_talks_nonsense_is_hung_up_on(start_hill: StartHill, packet: bytes) -> None:
+    hill = start_hill()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as stranger:
+        stranger.settimeout(5)
+        stranger.connect("\0" + hill.environment[wire.VARIABLE][1:])
+        stranger.send(packet)
+        assert stranger.recv(100) == b""
+    assert hill.bus_state().nodes == ("fw0", "fw1"), "the bus goes on"
+
+
 @pytest.mark.parametrize(
     ("number", "size", "expected"),
     [
@@ -97,6 +109,7 @@ def test_nodes_without_permission(start_hill: StartHill, start_program: StartPro
         (Ioctl.DEALLOCATE_ISO_RESOURCE, 4, errno.EINVAL),  # nothing is allocated
         (Ioctl.SEND_BROADCAST_REQUEST, 40, errno.EACCES),  # to the kernel's registers
         (0x13, 40, errno.ENOTTY),  # stream packets
+        (Ioctl.START_ISO, 8, errno.EINVAL),  # half an argument
     ],
 )
 def test_ioctls_are_refused_as_the_kernel_does(

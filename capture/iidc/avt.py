@@ -47,6 +47,11 @@ class AvtRegisters:
         for counter in (_FRAME_COUNTER, _TRIGGER_COUNTER):
             self._device.write_advanced(counter, _RESET | _ON | _LAST_LINE)
 
+    def sign_nothing(self) -> None:
+        """All pixels are picture."""
+        for register in (_SIGNATURE, _FRAME_COUNTER, _TRIGGER_COUNTER):
+            self._device.write_advanced(register, _LAST_LINE)
+
     def still_signs(self) -> bool:
         """Whether the signature is still switched on as we did it."""
         return self._device.read_advanced(_SIGNATURE) & (_ON | _LAST_LINE) == _ON | _LAST_LINE

@@ -10,11 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 from capture.iidc.library import Library, load
 from capture.iidc.structures import ListPointer
 from rig.errors import CameraError, CameraNotFoundError
+
+_DEVICES: Final = Path("/dev")
+_SYSFS: Final = Path("/sys/bus/firewire/devices")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ class Bus:
         CameraNotFoundError: there is no FireWire port.
     """
 
-    def __init__(self, devices: Path = Path("/dev")) -> None:
+    def __init__(self, devices: Path = _DEVICES) -> None:
         self.library: Library = load()
         self._devices = devices
         self.handle: int | None = self.library.get("new")
@@ -106,18 +109,19 @@ class Bus:
             self.library.get("camera_free_list", pointer)
 
 
-def why_no_camera(devices: Path = Path("/dev")) -> str:
+def why_no_camera(devices: Path = _DEVICES, sysfs: Path = _SYSFS) -> str:
     """The reason why libdc1394 lists nothing, and what to do about it.
 
     Args:
         devices: the directory of the device files.
+        sysfs: where the kernel says what they are.
     """
     if not _device_files(devices):
         return (
             "this computer has no FireWire port that the kernel drives (no /dev/fw*): fit a FireWire card, and if it "
             "has one, run: sudo modprobe firewire-ohci"
         )
-    if denied := _denied(devices):
+    if denied := _denied(devices, sysfs):
         return _permission(denied)
     return "no FireWire camera answers: check its power and cable, and its place in the chain of cables"
 
@@ -126,8 +130,17 @@ def _device_files(devices: Path) -> list[Path]:
     return sorted(path for path in devices.glob("fw*") if path.name[2:].isdigit())
 
 
-def _denied(devices: Path) -> list[Path]:
-    return [path for path in _device_files(devices) if not os.access(path, os.R_OK | os.W_OK)]
+def _denied(devices: Path, sysfs: Path = _SYSFS) -> list[Path]:
+    """Devices at the other end of a cable that may not be used. The computer's own card need not be."""
+    others = [path for path in _device_files(devices) if not _is_own_card(sysfs / path.name)]
+    return [path for path in others if not os.access(path, os.R_OK | os.W_OK)]
+
+
+def _is_own_card(device: Path) -> bool:
+    try:
+        return (device / "is_local").read_text().strip() == "1"
+    except FileNotFoundError:
+        return False
 
 
 def _permission(denied: list[Path]) -> str:

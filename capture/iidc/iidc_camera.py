@@ -26,6 +26,7 @@ from rig.frame import StampedPixels
 from rig.ring import CameraRing
 from rig.settings import CameraSettings
 
+_CLOCK_STEP_NS: Final = 5_000_000  # far more than a crystal drifts between two latches
 _LOGGER: Final = logging.getLogger("svev.iidc")
 
 
@@ -72,7 +73,9 @@ class IidcCamera:
         self._avt = AvtRegisters(device)
         self._clock: BusClock = PacketTimes()
         self._signatures: SignatureReader | None = None
-        if self._avt.signs:
+        if self._avt.signs and not settings.iidc.signature:
+            self._avt.sign_nothing()
+        elif self._avt.signs:
             self._avt.sign_last_line()
             self._clock = CycleTimer(device)
             self._signatures = SignatureReader(longest_delay_ns(settings, round(NS_PER_S / rate_hz)))
@@ -197,8 +200,19 @@ class IidcCamera:
             raise CameraError(
                 f"camera {self._settings.name} lost its settings at a FireWire bus reset; connecting again"
             )
-        self._clock.latch()
+        if abs(self._clock_step()) > _CLOCK_STEP_NS:
+            raise CameraError(
+                f"the FireWire bus of camera {self._settings.name} has another clock after a bus reset; "
+                "connecting again"
+            )
         self._notices.append("FireWire bus reset; the camera goes on as it was set")
+
+    def _clock_step(self) -> int:
+        """How far the camera's clock is off what it should show, ns."""
+        now = host_now()
+        expected = self._clock.at(now)
+        latch = self._clock.latch()
+        return (latch.device - expected) - (latch.host - now)
 
     def _gone(self, error: Dc1394Error) -> CameraError:
         return CameraError(

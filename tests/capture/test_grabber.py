@@ -3,9 +3,10 @@
 import os
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -115,6 +116,29 @@ def test_a_camera_that_delivers_is_left_alone_when_the_recorder_asks_too_late(
         ring.request_reconnect()
         station.await_records(RecordKind.FRAME, 6)
     assert {record.epoch for record in station.records} == {1}
+
+
+class NoticingCamera(SimCamera):
+    """Has something to tell after its first frame, once."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._to_tell = ["the bus was reset"]
+
+    def notices(self) -> Sequence[str]:
+        told, self._to_tell = self._to_tell, []
+        return told
+
+
+def test_what_a_camera_wants_people_to_know_is_passed_on_once(
+    tmp_path: Path, loopback: Loopback, ring: CameraRing
+) -> None:
+    rig = make_rig(tmp_path, "sim", loopback)
+    scene = SimScene(rig, 1, host_now())
+    with Station(lambda it: NoticingCamera(rig.cameras[1], it, scene), ring) as station:
+        station.await_records(RecordKind.FRAME, 3)
+    notices = [record.text for record in station.records if record.kind is RecordKind.NOTICE]
+    assert notices == ["the bus was reset"]
 
 
 def test_a_camera_that_is_not_there_is_tried_again_and_reported_once(ring: CameraRing) -> None:

@@ -109,6 +109,18 @@ def test_without_a_signature_packets_tell_the_time() -> None:
     assert {(arrival.trigger_count, arrival.stamped) for arrival in arrivals} == {(-1, None)}
 
 
+def test_a_signature_that_is_not_wanted_is_switched_off() -> None:
+    camera = settings(iidc={"signature": False})
+    with emulated_bus(), register_access() as device, camera_ring(camera) as ring:
+        with opened(settings(), ring):
+            assert device.read_advanced(0x600) & 0x02000000
+        with opened(camera, ring) as made:
+            assert not device.read_advanced(0x600) & 0x02000000
+            assert "no signature" in made.description
+            made.start()
+            assert {arrival.stamped for arrival in collect(made, ring, 3)} == {None}
+
+
 @pytest.mark.parametrize("packet", [1, 2, 100, 240])
 def test_a_lost_packet_never_passes_as_a_picture(packet: int) -> None:
     camera = settings()

@@ -39,9 +39,16 @@ def test_without_the_right_to_the_device(tmp_path: Path, monkeypatch: pytest.Mon
     assert f"no right to use the FireWire devices {tmp_path}/fw1: run: sudo usermod" in why_no_camera(tmp_path)
 
 
-def test_with_a_port_and_no_camera(tmp_path: Path) -> None:
+def test_with_a_port_and_no_camera(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The card itself belongs to root alone on many systems, and nobody needs it."""
     (tmp_path / "fw0").touch()
-    assert "no FireWire camera answers: check its power and cable" in why_no_camera(tmp_path)
+    card = tmp_path / "sysfs" / "fw0"
+    card.mkdir(parents=True)
+    (card / "is_local").write_text("1\n")
+    monkeypatch.setattr("os.access", lambda _path, _mode: False)
+    assert "no FireWire camera answers: check its power and cable" in why_no_camera(tmp_path, tmp_path / "sysfs")
+    (card / "is_local").write_text("0\n")
+    assert "no right to use the FireWire devices" in why_no_camera(tmp_path, tmp_path / "sysfs")
 
 
 def test_a_wrong_guid_is_told_the_right_ones() -> None:

@@ -6,7 +6,6 @@ from types import TracebackType
 from typing import Any, Self
 
 from capture.iidc.bus import Bus, Found, guid_text
-from capture.iidc.library import Dc1394Error
 from capture.iidc.structures import (
     FEATURE_MODE_MANUAL,
     FRAMERATE_1_875,
@@ -208,6 +207,3 @@ class Device:
         value: ctypes.c_int = c_int()
         self.call(name, *arguments, byref(value))
         return value.value
-
-
-__all__ = ["Dc1394Error", "Device"]

@@ -48,7 +48,6 @@ _ARGUMENTS: Final[dict[str, tuple[Any, ...]]] = {
     "format7_get_unit_size": (CameraPointer, c_int, _U32, _U32),
     "format7_get_unit_position": (CameraPointer, c_int, _U32, _U32),
     "format7_get_packet_parameters": (CameraPointer, c_int, _U32, _U32),
-    "format7_get_packet_size": (CameraPointer, c_int, _U32),
     "feature_is_present": (CameraPointer, c_int, POINTER(c_int)),
     "feature_set_mode": (CameraPointer, c_int, c_int),
     "feature_set_value": (CameraPointer, c_int, c_uint32),

@@ -54,6 +54,7 @@ class Scenario:
     latch_every_s: float = 2.0
     loaded_latches: float = 0.3
     trigger_counts: bool = False
+    damage_tells_time: bool = False  # as on FireWire: about when a damaged frame was triggered
     batch_ns: int = 0  # the recorder wakes only so often and then takes camera after camera
     hold_periods: float = 3.0
 
@@ -192,6 +193,9 @@ class _Camera:
         if fate is FrameStatus.DAMAGED:
             # ids and times of a damaged frame are left-overs of another one
             record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, DeviceNs(123))
+            if self.scenario.damage_tells_time:
+                about = self.device(time + self.rng.randint(-MS // 5, MS // 5))
+                record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, about, value=1)
         else:
             device = self.device(time + self.rng.random() * self.scenario.jitter_ns)
             count = self.triggers if self.scenario.trigger_counts else -1

@@ -23,6 +23,7 @@ common = {
     "modulus": st.sampled_from([65_535, 0]),
     "batch_ns": st.sampled_from([0, 0, 3 * MS, 700 * MS]),
     "trigger_counts": st.booleans(),
+    "damage_tells_time": st.booleans(),
 }
 
 

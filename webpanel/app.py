@@ -32,6 +32,7 @@ from webpanel.streams import Streams
 
 _EVENT_STREAMS_MAX = 32
 _PREVIEW_STREAMS_MAX = 16
+_DOWNLOADS_MAX = 8  # the disk is there for recording first
 #: The types of the page's files, whatever the computer's own table says.
 _TYPES: Final = {
     ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".png": "image/png",
@@ -41,13 +42,14 @@ _TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class OpenStreams:
-    """The endless answers, by kind; `end` them before the server shuts down."""
+    """The long answers, by kind; `end` the endless ones before the server shuts down."""
 
     events: Streams = field(default_factory=lambda: Streams(_EVENT_STREAMS_MAX))
     previews: Streams = field(default_factory=lambda: Streams(_PREVIEW_STREAMS_MAX))
+    downloads: Streams = field(default_factory=lambda: Streams(_DOWNLOADS_MAX))
 
     def end(self) -> None:
-        """Have all of them end."""
+        """Have those end that have no end."""
         self.events.end()
         self.previews.end()
 
@@ -82,7 +84,7 @@ def create_app(service: RigService, catalogue: Catalogue, access: Access) -> Fas
     routers = (
         rig_router(service),
         recordings_router(service, catalogue, changes),
-        images_router(service, catalogue),
+        images_router(service, catalogue, streams.downloads),
         preview_router(PreviewFeed(service), streams.previews),
         events_router(service, changes, streams.events),
         login_router(door),

@@ -94,12 +94,12 @@ class Guard:
         except ProblemError as error:
             await problem(error.status, error.code, error.detail, error.headers)(scope, receive, send_guarded)
         else:
-            await self._app(scope, _bounded(receive), send_guarded)
+            await self._app(scope, _bounded(scope, receive), send_guarded)
 
     def _check(self, request: HTTPConnection) -> None:
         """Raises ProblemError if the request is not to be answered."""
         _check_size(request.scope)
-        headers, path, reading = request.headers, request.url.path, request.scope["method"] in _READING
+        headers, path, reading = request.headers, request.scope["path"], request.scope["method"] in _READING
         check_host(request, self._door.access)
         if not reading or (path.startswith("/api/") and headers.get("sec-fetch-mode") != "navigate"):
             _check_origin(headers)
@@ -162,14 +162,17 @@ def _check_body(headers: Headers, *, reading: bool) -> None:
         raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
 
 
-def _bounded(receive: Receive) -> Receive:
+def _bounded(scope: Scope, receive: Receive) -> Receive:
     """The same, for a body that does not say how long it is."""
+    reading = scope["method"] in _READING
     received = 0
 
     async def receive_bounded() -> Message:
         nonlocal received
         message = await receive()
         received += len(message.get("body", b""))
+        if reading:
+            return {**message, "body": b""}  # means nothing here, however much it is
         if received > BODY_MAX:
             # The one kind of error that the framework hands on while it reads a body.
             raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _TOO_LARGE)

@@ -1,16 +1,18 @@
 """What is in a recording: the file, its pulses, its images."""
 
+from collections.abc import AsyncIterator
 from http import HTTPStatus
 from typing import Annotated
 
 import anyio
 import anyio.to_thread
 import numpy as np
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import FileResponse
 from numpy.typing import NDArray
 
 from recorder.catalogue import Catalogue, UnknownRecordingError
+from recorder.catalogue_entry import LogState
 from rig.frame import FrameStatus
 from webpanel.api_errors import Responses, jpeg_answer, refusals
 from webpanel.models import Pulses
@@ -20,6 +22,7 @@ from webpanel.recording_file import RecordingFile
 from webpanel.recording_view import to_pulses
 from webpanel.rig_service import RigService
 from webpanel.routes_recordings import RecordingId
+from webpanel.streams import Streams
 from webpanel.strict_route import strict_router
 
 _THUMBNAIL_WIDTH = 480
@@ -48,8 +51,8 @@ class Contents:
         """One triplet, or one camera's part of it."""
         return await anyio.to_thread.run_sync(self._jpeg, recording_id, pulse, camera, width, limiter=self._readers)
 
-    async def thumbnail(self, recording_id: str) -> bytes:
-        """The triplet in the middle."""
+    async def thumbnail(self, recording_id: str) -> tuple[bytes, bool]:
+        """The triplet in the middle; whether it will stay this one."""
         return await anyio.to_thread.run_sync(self._thumbnail, recording_id, limiter=self._readers)
 
     def _pulses(self, recording_id: str) -> Pulses:
@@ -67,19 +70,24 @@ class Contents:
         first, end = pulses.columns[pulses.cameras.index(camera)]
         return np.ascontiguousarray(image[:, first:end])
 
-    def _thumbnail(self, recording_id: str) -> bytes:
+    def _thumbnail(self, recording_id: str) -> tuple[bytes, bool]:
+        final = self._catalogue.entry(recording_id).state is LogState.CLOSED
         pulses = self._pulses(recording_id).pulses
         ok = [pulse for pulse in pulses if all(status is FrameStatus.OK for status in pulse.statuses)]
         some = ok or [pulse for pulse in pulses if FrameStatus.OK in pulse.statuses]
         if not some:
             raise UnknownRecordingError(f"recording {recording_id} has no image: no camera delivered one")
-        return self._jpeg(recording_id, some[len(some) // 2].pulse, None, _THUMBNAIL_WIDTH)
+        return self._jpeg(recording_id, some[len(some) // 2].pulse, None, _THUMBNAIL_WIDTH), final
 
 
-def images_router(service: RigService, catalogue: Catalogue) -> APIRouter:
+def images_router(service: RigService, catalogue: Catalogue, downloads: Streams) -> APIRouter:
     """The routes that read recordings."""
     router = strict_router("Recordings")
     contents = Contents(catalogue)
+
+    async def place() -> AsyncIterator[None]:
+        async with downloads.place():
+            yield
 
     def file_of(recording_id: str) -> RecordingFile:
         current = service.status().recording
@@ -91,7 +99,8 @@ def images_router(service: RigService, catalogue: Catalogue) -> APIRouter:
     @router.get(
         "/recordings/{recording_id}/file",
         response_class=FileResponse,
-        responses=_LOG | refusals(404, 409, 416),
+        dependencies=[Depends(place)],
+        responses=_LOG | refusals(404, 409, 416, 503),
     )
     def download_recording(recording_id: RecordingId) -> RecordingFile:
         """The log as a file, whole or by a `Range`; with `ETag` and `If-Range`, so that a download can be resumed."""
@@ -127,6 +136,7 @@ def images_router(service: RigService, catalogue: Catalogue) -> APIRouter:
     )
     async def get_thumbnail(recording_id: RecordingId) -> Response:
         """A small picture of a recording."""
-        return Response(await contents.thumbnail(recording_id), media_type="image/jpeg")
+        jpeg, final = await contents.thumbnail(recording_id)
+        return Response(jpeg, media_type="image/jpeg", headers=_KEPT if final else None)
 
     return router

@@ -2,6 +2,8 @@
 
 from http import HTTPStatus
 
+import anyio
+import anyio.to_thread
 from fastapi import APIRouter
 
 from webpanel.api_errors import CHANGING, refusals
@@ -14,6 +16,8 @@ from webpanel.strict_route import strict_router
 def rig_router(service: RigService) -> APIRouter:
     """The routes of the rig."""
     router = strict_router("Rig")
+    # Whoever waits for the doctor must not keep the threads from those who want to stop a recording.
+    one_at_a_time = anyio.CapacityLimiter(1)
 
     @router.get("/status")
     def get_status() -> Status:
@@ -36,8 +40,8 @@ def rig_router(service: RigService) -> APIRouter:
         return service.rig()
 
     @router.get("/doctor", responses=refusals(503))
-    def examine() -> DoctorReport:
+    async def examine() -> DoctorReport:
         """Look at everything that a recording stands on, and say what to do; takes some seconds."""
-        return service.doctor()
+        return await anyio.to_thread.run_sync(service.doctor, limiter=one_at_a_time)
 
     return router

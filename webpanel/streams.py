@@ -1,4 +1,4 @@
-"""Answers that go on for ever: how many there may be at once, and that they end when the service does."""
+"""Answers that take long, or go on for ever: how many there may be at once, and that they end when the service does."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -45,7 +45,7 @@ class Streams:
             ProblemError: 503, all are taken.
         """
         if self.open >= self._most:
-            text = f"{self._most} viewers are connected, which is the most: close some, or try again later"
+            text = f"{self._most} are connected already, which is the most: close some, or try again later"
             raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "too_many_viewers", text, {"Retry-After": "5"})
         self.open += 1
         try:

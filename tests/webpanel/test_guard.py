@@ -100,7 +100,16 @@ def test_without_the_token_only_the_page_is_seen(stranger: httpx.Client) -> None
 
 
 @pytest.mark.parametrize(
-    "path", ["//api/status", "/./api/status", "/%61pi/status", "/x/../api/status", "/API/status", "/api//status"]
+    "path",
+    [
+        "//api/status",
+        "/./api/status",
+        "/%61pi/status",
+        "/x/../api/status",
+        "/API/status",
+        "/api//status",
+        "http://localhost/api/status",
+    ],
 )
 def test_no_detour_leads_around_the_token(locked: Panel, path: str) -> None:
     with locked.connect() as raw:
@@ -177,6 +186,21 @@ def test_tokens_stand_in_no_log(stranger: httpx.Client, caplog: pytest.LogCaptur
 
 def test_the_refusal_does_not_repeat_the_token(stranger: httpx.Client) -> None:
     assert TOKEN not in stranger.post("/api/login", json={"token": [TOKEN], TOKEN: 1}).text.replace(f"body.{TOKEN}", "")
+
+
+def test_a_huge_body_where_none_belongs(
+    client: httpx.Client, service: MemoryService, caplog: pytest.LogCaptureFixture
+) -> None:
+    def pieces() -> Iterator[bytes]:
+        for _ in range(100):
+            yield b"x" * 1000
+
+    for path in ("/api/status", "/api/events"):
+        with client.stream("GET", path, content=pieces()) as answer:
+            assert answer.status_code == 200
+            list(answer.iter_raw() if path.endswith("status") else ())
+    assert client.get("/api/status").status_code == 200
+    assert not [record for record in caplog.records if record.levelno >= logging.ERROR]
 
 
 def test_huge_bodies(client: httpx.Client) -> None:

@@ -1,5 +1,7 @@
 """The file of a recording, whole and in parts; its pulses and images."""
 
+import contextlib
+
 import cv2
 import httpx
 import numpy as np
@@ -10,6 +12,7 @@ from rig.frame import FrameStatus
 from tests.recorder.logs import ALL_OK, make_image, make_tag
 from tests.webpanel.memory_service import SHAPE, MemoryService, write_recording
 from tests.webpanel.problem import refused
+from tests.webpanel.serving import Panel
 
 K2_LOST = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
 NOTHING = (FrameStatus.MISSED,) * 3
@@ -110,6 +113,16 @@ def test_the_recording_in_progress_is_not_handed_out(client: httpx.Client) -> No
     client.post("/api/arm")
     recording = client.post("/api/recordings").json()["id"]
     assert "stop it first" in refused(client.get(f"/api/recordings/{recording}/file"), 409).detail
+
+
+def test_downloads_are_limited(panel: Panel, service: MemoryService) -> None:
+    write_recording(service.catalogue.directory, "long", (ALL_OK,) * 200)
+    with contextlib.ExitStack() as downloads, panel.client(limits=httpx.Limits(max_connections=20)) as client:
+        for _ in range(8):
+            answer = downloads.enter_context(client.stream("GET", "/api/recordings/long/file"))
+            assert answer.status_code == 200
+        assert refused(client.get(FILE), 503).code == "too_many_viewers"
+        assert client.head(FILE).status_code == 200
 
 
 def test_deleted_recordings_can_still_be_read(client: httpx.Client, log: bytes) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 from bench.adjustment import run_adjustment
 from bench.api import run_api
 from bench.capture import run_capture
+from bench.firewire import run_firewire
 from bench.gstreamer import SINKS
 from bench.intersection import run_intersection
 from bench.loads import LOADS
@@ -53,6 +54,10 @@ def _timed(name: str, run: Callable[[float], list[dict[str, Any]]], seconds: flo
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _firewire(seconds: float, directory: Path) -> dict[str, Any]:
+    return _timed("firewire", lambda duration: run_firewire(duration, directory), seconds, directory)
+
+
 def _api(seconds: float, directory: Path) -> dict[str, Any]:
     cases = run_api(seconds, directory)
     path = write_results("api", cases, directory)
@@ -70,6 +75,7 @@ def _intersection(seconds: float, directory: Path) -> dict[str, Any]:
 
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
+    "firewire": _firewire,
     "parts": _parts,
     "api": _api,
     "adjustment": partial(_timed, "adjustment", run_adjustment),

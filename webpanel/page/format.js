@@ -7,7 +7,7 @@ import { languageInUse, t } from "./i18n.js";
  * @param {number} [digits] after the decimal point
  */
 export function number(value, digits = 0) {
-  return value.toLocaleString(languageInUse(), { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  return value.toLocaleString(languageInUse(), { minimumFractionDigits: digits, maximumFractionDigits: digits, signDisplay: "negative" });
 }
 
 /**

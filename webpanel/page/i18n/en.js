@@ -88,7 +88,7 @@ export const en = {
   "camera.rate": "{rate} frames/s",
   "camera.offset": "{offset} µs beside the pulse",
   "camera.damaged": "{count} damaged",
-  "camera.resent": "{count} packets resent",
+  "camera.resent": "{count} resent",
   "camera.reconnects": "{count} × reconnected",
 
   "last.title": "Last jump",

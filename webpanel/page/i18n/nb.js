@@ -88,7 +88,7 @@ export const nb = {
   "camera.rate": "{rate} bilder/s",
   "camera.offset": "{offset} µs fra pulsen",
   "camera.damaged": "{count} skadet",
-  "camera.resent": "{count} pakker sendt på nytt",
+  "camera.resent": "{count} sendt på nytt",
   "camera.reconnects": "koblet til på nytt {count} ×",
 
   "last.title": "Siste hopp",

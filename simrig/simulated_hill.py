@@ -86,19 +86,11 @@ class SimulatedHill:
             "first_block_id": first_block_id, "tick_hz": tick_hz, "resend": resend, "broadcast": broadcast,
             "ptp_offset_ns": UtcAnchor.take().offset_ns,
         }  # fmt: skip
-        self._bus = (
-            self._make_bus(common | {"cameras": dict(firewire), "permitted": permitted, "signature": signature})
-            if firewire
-            else None
-        )
-        self._cameras: dict[str, HillCamera] = {
-            name: GigeHillCamera(
-                validate(CameraConfig, {"name": name, "address": address, **gige}, f"simulated camera {name}"),
-                self._launch,
-            )
-            for name, address in addresses.items()
-        }
-        self._cameras |= self._bus.cameras if self._bus is not None else {}
+        bus = common | {"cameras": dict(firewire), "permitted": permitted, "signature": signature}
+        self._bus = self._make_bus(bus) if firewire else None
+        self._cameras = self._make_gige(addresses, gige)
+        if self._bus is not None:
+            self._cameras |= self._bus.cameras
         self.train = PulseTrain(epoch, rate_hz, truth.pauses)
         for fault in truth.faults:
             self._check_kind(fault)
@@ -227,6 +219,13 @@ class SimulatedHill:
             for camera in self._cameras.values():
                 camera.stop()
         self._starter.shutdown()
+
+    def _make_gige(self, addresses: Mapping[str, str], settings: dict[str, object]) -> dict[str, HillCamera]:
+        cameras: dict[str, HillCamera] = {}
+        for name, address in addresses.items():
+            config = validate(CameraConfig, {"name": name, "address": address, **settings}, f"simulated camera {name}")
+            cameras[name] = GigeHillCamera(config, self._launch)
+        return cameras
 
     def _make_bus(self, settings: dict[str, object]) -> HillBus:
         name = f"@svev-firewire-{os.getpid()}-{uuid.uuid4().hex[:8]}"

@@ -37,10 +37,14 @@ class HillBus:
     Args:
         config: what it is told.
         launch: starts it.
+
+    Attributes:
+        cameras: the cameras on it, by name.
     """
 
     def __init__(self, config: BusConfig, launch: Launch) -> None:
         self._config, self._launch = config, launch
+        self.cameras = {name: FireWireHillCamera(self, name) for name in config.cameras}
         self._process: CameraProcess | None = None
         self._ready = False
 
@@ -53,11 +57,6 @@ class HillBus:
         """
         preload = [str(shim()), *filter(None, [os.environ.get("LD_PRELOAD")])]
         return {"LD_PRELOAD": " ".join(preload), wire.VARIABLE: self._config.socket}
-
-    @property
-    def cameras(self) -> dict[str, "FireWireHillCamera"]:
-        """The cameras on it, by name."""
-        return {name: FireWireHillCamera(self, name) for name in self._config.cameras}
 
     @property
     def pid(self) -> int | None:

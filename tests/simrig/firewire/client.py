@@ -4,10 +4,12 @@ One JSON list per line on standard input: a method of `Client` and its arguments
 """
 
 import ctypes
+import fcntl
 import json
 import os
 import struct
 import sys
+import threading
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -19,6 +21,7 @@ from simrig.images import stamp
 from tests.simrig.firewire import dc1394
 from tests.simrig.firewire.dc1394 import Frame, Handle
 
+_GET_CYCLE_TIMER = 2 << 30 | 16 << 16 | ord("#") << 8 | 0x0C
 _SIGNATURE = struct.Struct(">III")
 
 
@@ -128,6 +131,28 @@ class Client:
         number = ctypes.get_errno() if failed else 0
         os.close(descriptor)
         return number
+
+    def hammer(self, path: str, threads: int, rounds: int) -> list[str]:
+        """Many threads at once open, ask, close and look at the files of the bus and others; what went wrong."""
+        wrong: list[str] = []
+
+        def one() -> None:
+            for _ in range(rounds):
+                try:
+                    descriptor = os.open(path, os.O_RDWR)
+                    answer = fcntl.ioctl(descriptor, _GET_CYCLE_TIMER, bytes(16))
+                    os.close(descriptor)
+                    if not any(answer) or "fw1" not in os.listdir("/dev") or Path("/dev/null").read_bytes():  # noqa: PTH208
+                        wrong.append("a wrong answer")
+                except OSError as error:
+                    wrong.append(repr(error))
+
+        workers = [threading.Thread(target=one) for _ in range(threads)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        return wrong
 
     def close(self) -> None:
         self._stack.close()

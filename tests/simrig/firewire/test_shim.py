@@ -82,6 +82,10 @@ def test_python_sees_the_nodes_too(start_hill: StartHill, start_program: StartPr
     }  # fmt: skip
 
 
+def test_many_threads_at_once(start_hill: StartHill, start_program: StartProgram) -> None:
+    assert start_program(start_hill())("hammer", "/dev/fw1", 8, 25) == []
+
+
 def test_nodes_without_permission(start_hill: StartHill, start_program: StartProgram) -> None:
     program = start_program(start_hill(1, permitted=False))
     seen = program("listing")

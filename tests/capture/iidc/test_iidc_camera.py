@@ -1,9 +1,10 @@
 """The back end against the unmodified libdc1394 on the emulated bus: what the conformance suite does not ask."""
 
+import ctypes
 import re
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ import pytest
 from capture.iidc.bus import Bus
 from capture.iidc.device import Device
 from capture.iidc.iidc_camera import IidcCamera
+from capture.iidc.library import SONAME
+from capture.iidc.structures import Feature
 from capture.seam import Arrival
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
@@ -62,15 +65,45 @@ def register_access(name: str = "K1") -> Iterator[Device]:
         yield device
 
 
-def test_the_camera_is_set_as_the_rig_file_says_and_its_exposure_stays() -> None:
-    camera = settings(exposure_us=1234.0, gain_db=6.0, trigger_edge="falling")
+def read_back(device: Device, name: str, *arguments: int) -> int:
+    """A setting that the back end never asks for."""
+    value = ctypes.c_uint32()
+    function = ctypes.CDLL(SONAME)[f"dc1394_{name}"]
+    assert function(device.pointer, *arguments, ctypes.byref(value)) == 0
+    return value.value
+
+
+@pytest.mark.parametrize(("edge", "polarity"), [("rising", 705), ("falling", 704)])
+def test_the_camera_is_set_as_the_rig_file_says_and_its_exposure_stays(edge: str, polarity: int) -> None:
+    camera = settings(exposure_us=1234.0, gain_db=6.0, trigger_edge=edge)
     with emulated_bus(), running(camera) as (made, ring), register_access() as device:
         collect(made, ring, 2)
         assert device.read_advanced(0x20C) & 0x3FFFFFF == 1234
         assert device.is_triggered()
+        assert device.transmits()
         assert device.bandwidth_units() == 1292
-        assert not device.transmits() or made.description.endswith("signs its frames")
-        assert "640 x 480, 1292 bandwidth units" in made.description
+        assert read_back(device, "external_trigger_get_polarity") == polarity
+        assert read_back(device, "external_trigger_get_mode") == 384
+        assert read_back(device, "external_trigger_get_source") == 576
+        assert read_back(device, "feature_get_value", Feature.GAIN) == round(6.0 / 0.0354)
+        assert read_back(device, "feature_get_mode", Feature.SHUTTER) == 736
+        assert read_back(device, "video_get_framerate") == 36
+        assert "640 x 480, 1292 bandwidth units, signs its frames" in made.description
+
+
+def test_the_level_of_the_pulse_can_be_the_exposure() -> None:
+    camera = settings(iidc={"trigger_mode": 1})
+    with emulated_bus(), running(camera) as (made, ring), register_access() as device:
+        assert read_back(device, "external_trigger_get_mode") == 385
+        assert all(arrival.whole for arrival in collect(made, ring, 3))
+
+
+def test_at_half_the_rate_packets_are_half_as_large() -> None:
+    camera = settings()
+    with emulated_bus(rate_hz=15.0), camera_ring(camera) as ring, closing(IidcCamera(camera, ring, 15.0)) as made:
+        assert "652 bandwidth units" in made.description
+        made.start()
+        assert all(arrival.whole for arrival in collect(made, ring, 3))
 
 
 def test_frames_are_signed_and_the_signed_pixels_are_named() -> None:
@@ -81,7 +114,7 @@ def test_frames_are_signed_and_the_signed_pixels_are_named() -> None:
         trigger = latch.host + arrivals[-1].device_time - latch.device
         pulse = stamp.read(ring.frame(arrivals[-1].slot).reshape(480, 640))
         assert pulse is not None
-        assert abs(trigger - hill.train.time(pulse.pulse)) < 200_000
+        assert abs(trigger - hill.train.time(pulse.pulse)) < 200_000 + latch.round_trip_ns / 2
     assert {(a.stamped.row, a.stamped.column, a.stamped.count) for a in arrivals if a.stamped} == {(479, 0, 12)}
     assert [arrival.frame_id for arrival in arrivals] == [arrival.trigger_count for arrival in arrivals]
 

@@ -64,13 +64,28 @@ def significant(squares: Floats, parts: int, total: ArrayLike, freedom: ArrayLik
         risk: chance that a sound observation is found.
     """
     squares, total, freedom = np.broadcast_arrays(squares, np.asarray(total, float), np.asarray(freedom, float))
+    chosen = squares > _surely(parts, total, freedom, risk)
+    open_ = ~chosen & (squares > _NOISE)  # the distributions are slow where there are thousands to be asked for
+    chosen[open_] = _too_large(squares[open_], parts, total[open_], freedom[open_], risk)
+    return np.asarray(chosen & (squares > _NOISE), dtype=bool)
+
+
+def _too_large(squares: Floats, parts: int, total: Floats, freedom: Floats, risk: float) -> NDArray[np.bool_]:
+    """By the variance that is left; with small redundancy by the a-priori sigmas too."""
     enough = freedom > parts
     left = np.where(enough, freedom - parts, 1.0)
     rest = np.maximum(total - squares, 1e-300) / left
-    chosen = enough & (special.fdtrc(parts, left, np.maximum(squares, 0.0) / parts / rest) < risk)
+    chosen = enough & (special.fdtrc(parts, left, squares / parts / rest) < risk)
     failed = (freedom <= _SMALL_REDUNDANCY) & (special.chdtrc(np.maximum(freedom, 1.0), total) < SINGLE_RISK)
-    chosen = chosen | (failed & (special.chdtrc(parts, np.maximum(squares, 0.0)) < risk))
-    return np.asarray(chosen & (squares > _NOISE), dtype=bool)
+    return np.asarray(chosen | (failed & (special.chdtrc(parts, squares) < risk)), dtype=bool)
+
+
+def _surely(parts: int, total: Floats, freedom: Floats, risk: float) -> float:
+    """A bound from which on a squared statistic is significant, whichever it is."""
+    least = float(freedom.min(initial=np.inf)) - parts
+    if not 0.0 < least < np.inf:
+        return float(np.inf)
+    return float(parts * special.fdtri(parts, least, 1.0 - risk) * total.max() / least)
 
 
 def still_found(adjustment: Adjustment, suspect: Observation) -> bool:

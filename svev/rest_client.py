@@ -58,7 +58,7 @@ class RestClient:
             headers["Authorization"] = f"Bearer {self._token}"
         request = urllib.request.Request(self._url + path, data, headers, method=method)  # noqa: S310 - checked above
         try:
-            with urllib.request.urlopen(request, timeout=_TIMEOUT_S) as answer:  # noqa: S310 - checked above
+            with _direct().open(request, timeout=_TIMEOUT_S) as answer:
                 return json.load(answer)
         except urllib.error.HTTPError as error:
             with error:
@@ -84,6 +84,18 @@ def read_token(file: Path | None, environment: Mapping[str, str] = os.environ) -
         return file.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInputError(f"{file}: token cannot be read ({error}); check path and permissions") from None
+
+
+class _NoRedirect(urllib.request.HTTPRedirectHandler):
+    """The token goes to the service alone, wherever that may point."""
+
+    def redirect_request(self, *_: object) -> None:
+        """Follow nothing: the answer is an error then."""
+
+
+def _direct() -> urllib.request.OpenerDirector:
+    """Neither proxies nor redirects: the service is on this computer, or in the network at the hill."""
+    return urllib.request.build_opener(urllib.request.ProxyHandler({}), _NoRedirect)
 
 
 def _refusal(error: urllib.error.HTTPError) -> SvevError:

@@ -200,9 +200,7 @@ class RigProcesses:
             elif child.control.ended and not self.recorder_died:
                 self.recorder_died, self.ready, self.warm, self.health = True, False, False, {}
                 self.cameras = [CameraPresence()] * len(self._names)
-                raise ProcessDiedError(
-                    f"the recorder process ended ({child.ending()}); start again, and if it recurs run: svev doctor"
-                )
+                raise ProcessDiedError(f"the recorder process ended ({child.ending()}): if it recurs, run svev doctor")
 
     def _tend_grabber(self, child: Child) -> None:
         name, now = child.spec.name, time.monotonic()

@@ -168,7 +168,7 @@ class RunningRig:
             reports = self._processes.turn(timeout_s)
         except ProcessDiedError as error:
             kept = f"; the log until then is readable: svev verify {self._path}" if self._path else ""
-            raise ProcessDiedError(f"{error}{kept}") from None
+            raise ProcessDiedError(f"{error}{kept}; then start again") from None
         for message in reports:
             if message["report"] == "failed":
                 raise reported_error(message)

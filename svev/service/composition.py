@@ -30,6 +30,8 @@ from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
 _TRASH_S: Final = 30 * 86400.0
+#: Ctrl-C, systemd, a terminal or an ssh session that is closed.
+_ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,14 +127,14 @@ def _run(
 
 @contextmanager
 def _signals(server: PanelServer, supervisor: Supervisor, notify: Notify) -> Iterator[None]:
-    """Within, SIGTERM and Ctrl-C end the service, properly, however often they come."""
+    """Within, signals end the service, properly, however often they come."""
 
     def end(*_: object) -> None:
         server.should_exit = True
         notify.stopping()
         supervisor.begin_stop()
 
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, end) for number in _ENDINGS}
     try:
         yield
     finally:

@@ -99,12 +99,12 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
 
 
 def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
-    armed = facts.heard is not None
+    trying = facts.heard is not None or facts.phase.state is State.ARMING
     heard = facts.heard or [CameraPresence()] * len(rig.cameras)
     reported: list[dict[str, Any]] = facts.health.get("cameras") or [{}] * len(rig.cameras)
     found = []
     for camera, presence, report, columns in zip(rig.cameras, heard, reported, rig.columns(), strict=True):
-        state = camera_state(armed, presence)
+        state = camera_state(trying, presence)
         found.append(
             CameraStatus(
                 name=camera.name,

@@ -11,9 +11,9 @@ from webpanel.models import CameraState, Level, State, Statement
 _CAMERA_ADVICE = "check its power and cable; it is connected again by itself"
 
 
-def camera_state(armed: bool, heard: CameraPresence) -> CameraState:
+def camera_state(trying: bool, heard: CameraPresence) -> CameraState:
     """The camera's state in the panel's words."""
-    if not armed:
+    if not trying:
         return CameraState.OFF
     match heard.state:
         case Heard.CONNECTED:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from ctypes import POINTER, Structure, byref, c_char_p, c_int, c_uint16, c_uint32, c_uint64, c_void_p
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 OFF, ON = 0, 1
@@ -54,17 +55,21 @@ class _List(Structure):
     _fields_ = (("num", c_uint32), ("ids", POINTER(_Id)))
 
 
-LIBRARY = ctypes.CDLL("libdc1394.so.25")
-LIBRARY.dc1394_new.restype = c_void_p
-LIBRARY.dc1394_camera_new.restype = POINTER(CameraStruct)
-LIBRARY.dc1394_camera_new.argtypes = (c_void_p, c_uint64)
-LIBRARY.dc1394_free.argtypes = (c_void_p,)
-LIBRARY.dc1394_camera_enumerate.argtypes = (c_void_p, POINTER(POINTER(_List)))
-LIBRARY.dc1394_camera_free_list.argtypes = (POINTER(_List),)
-for _name in ("get", "set"):
-    getattr(LIBRARY, f"dc1394_{_name}_adv_control_registers").argtypes = (
-        POINTER(CameraStruct), c_uint64, POINTER(c_uint32), c_uint32,
-    )  # fmt: skip
+@cache
+def functions() -> ctypes.CDLL:
+    """The library; loaded only where it is used, because its first user in a process decides what it stands on."""
+    loaded = ctypes.CDLL("libdc1394.so.25")
+    loaded.dc1394_new.restype = c_void_p
+    loaded.dc1394_camera_new.restype = POINTER(CameraStruct)
+    loaded.dc1394_camera_new.argtypes = (c_void_p, c_uint64)
+    loaded.dc1394_free.argtypes = (c_void_p,)
+    loaded.dc1394_camera_enumerate.argtypes = (c_void_p, POINTER(POINTER(_List)))
+    loaded.dc1394_camera_free_list.argtypes = (POINTER(_List),)
+    for name in ("get", "set"):
+        getattr(loaded, f"dc1394_{name}_adv_control_registers").argtypes = (
+            POINTER(CameraStruct), c_uint64, POINTER(c_uint32), c_uint32,
+        )  # fmt: skip
+    return loaded
 
 
 class Dc1394Error(Exception):
@@ -91,7 +96,7 @@ class Handle:
         self.camera = camera
 
     def call(self, function: str, *arguments: Any) -> None:
-        code = getattr(LIBRARY, f"dc1394_{function}")(self.camera, *arguments)
+        code = getattr(functions(), f"dc1394_{function}")(self.camera, *arguments)
         if code != 0:
             raise Dc1394Error(function, code)
 
@@ -144,7 +149,7 @@ class Handle:
     def frame(self, timeout_s: float = 1.0) -> Frame | None:
         """The next frame, None if there is none in time."""
         waiting = select.poll()
-        waiting.register(LIBRARY.dc1394_capture_get_fileno(self.camera), select.POLLIN)
+        waiting.register(functions().dc1394_capture_get_fileno(self.camera), select.POLLIN)
         for _ in range(8):  # events other than frames end the waiting, too
             events = waiting.poll(timeout_s * 1000)
             if not events:
@@ -167,28 +172,28 @@ class Handle:
 
 @contextmanager
 def library() -> Iterator[Any]:
-    context = LIBRARY.dc1394_new()
+    context = functions().dc1394_new()
     assert context
     try:
         yield context
     finally:
-        LIBRARY.dc1394_free(context)
+        functions().dc1394_free(context)
 
 
 def guids(context: Any) -> list[int]:
     found = POINTER(_List)()
-    code = LIBRARY.dc1394_camera_enumerate(context, byref(found))
+    code = functions().dc1394_camera_enumerate(context, byref(found))
     assert code == 0
     numbers = [found.contents.ids[index].guid for index in range(found.contents.num)]
-    LIBRARY.dc1394_camera_free_list(found)
+    functions().dc1394_camera_free_list(found)
     return numbers
 
 
 @contextmanager
 def opened(context: Any, guid: int) -> Iterator[Handle]:
-    camera = LIBRARY.dc1394_camera_new(context, guid)
+    camera = functions().dc1394_camera_new(context, guid)
     assert camera, f"no camera {guid:x}"
     try:
         yield Handle(camera)
     finally:
-        LIBRARY.dc1394_camera_free(camera)
+        functions().dc1394_camera_free(camera)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
 from tests.webpanel.conftest import client, panel, service
 
@@ -16,6 +16,8 @@ __all__ = ["browser", "client", "open_page", "panel", "service"]
 PATIENCE_MS = 40_000
 #: What the browser itself says of answers that the page handles: refusals, and a service that is gone on purpose.
 _HANDLED = ("Failed to load resource", "net::ERR_")
+
+expect.set_options(timeout=PATIENCE_MS)
 
 Open = Callable[..., Page]
 

@@ -17,7 +17,8 @@ from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, serving
 from webpanel.access import Access
-from webpanel.models import State
+from webpanel.models import Recording, RecordingOrder, State
+from webpanel.rig_service import StateForbidsError
 
 AXE = Path(__file__).with_name("npm") / "node_modules" / "axe-core" / "axe.min.js"
 TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
@@ -93,15 +94,19 @@ def test_every_state_has_its_word_and_its_button(
     wanted.to_be_enabled() if state is State.FAULT else wanted.to_be_disabled()
 
 
-def test_a_refusal_is_shown_with_what_to_do(panel: Panel, service: MemoryService, open_page: Open) -> None:
-    page = open_page(panel.url)
+def test_a_refusal_is_shown_with_what_to_do(
+    panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(order: RecordingOrder) -> Recording:
+        raise StateForbidsError("the disk is asleep: wake it first")
+
     service.arm()
-    expect(page.locator("#next-step")).to_have_text("Record")
-    page.route("**/api/events", lambda route: route.abort())
-    service.state = State.IDLE  # nobody is told: as if another operator had been quicker
-    page.locator("#next-step").click()
-    expect(page.get_by_role("alert").filter(has_text="arm it first")).to_be_visible()
-    expect(page.locator("#next-step")).not_to_have_attribute("aria-busy", "true")
+    monkeypatch.setattr(service, "start_recording", refuse)
+    page = open_page(panel.url)
+    page.locator("#next-step[data-step=armed]").click()
+    expect(page.get_by_role("alert").filter(has_text="the disk is asleep: wake it first")).to_be_visible()
+    expect(page.locator("#next-step")).to_be_enabled()
+    expect(page.locator("#next-step")).to_have_attribute("aria-busy", "false")
 
 
 def test_names_of_athletes_are_text_and_nothing_else(panel: Panel, jumps: None, open_page: Open) -> None:
@@ -200,8 +205,22 @@ def _grave(page: Page) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("look", ["light", "dark", "outdoor"])
-@pytest.mark.parametrize("width", [360, 1280])
+def test_a_jump_that_runs_can_be_looked_at_once_it_is_stopped(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    started = service.start_recording(RecordingOrder(bib="5"))
+    page = open_page(f"{panel.url}/#/recordings/{started.id}")
+    expect(page.locator("#recording-verdict")).to_contain_text("is being recorded")
+    expect(page.locator("#player")).to_be_hidden()
+    service.stop_recording(started.id)
+    expect(page.locator("#frame-strip li")).to_have_count(1)
+    expect(page.locator("#recording-verdict")).to_contain_text("Complete")
+
+
+@pytest.mark.parametrize(
+    ("look", "width"), [("light", 360), ("light", 1280), ("dark", 360), ("dark", 1280), ("outdoor", 360)]
+)
 def test_axe_finds_nothing_grave(
     panel: Panel, service: MemoryService, jumps: None, open_page: Open, look: str, width: int
 ) -> None:

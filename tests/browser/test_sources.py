@@ -71,6 +71,9 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
         stated |= set(re.findall(r'\bcode="(\w+)"', text))
         stated |= set(re.findall(r'_working\("(\w+)"', text))
         stated |= {f"{code}_partly" for code in re.findall(r'_working\("(\w+)"', text)}
+        stated |= set(
+            re.findall(r'(?:ProblemError\(|_unauthorized\(|_refuse\(|problem\()\s*(?:[\w.]+, )?"(\w+)"', text)
+        )
     verdicts = (ROOT / "webpanel" / "recording_view.py").read_text()
     stated |= {f"verdict_{word}" for word in re.findall(r'Level\.\w+, "(\w+)", ', verdicts)}
     assert len(stated) > 20

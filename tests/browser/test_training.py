@@ -14,7 +14,7 @@ from recorder.verify import verify
 from rig.clocks import host_now
 from rig.rigfile import CONFIG
 from simrig.simulated_hill import SimulatedHill
-from tests.browser.conftest import PATIENCE_MS, Open
+from tests.browser.conftest import Open
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 from tests.svev.service.serving import Serving, serving
@@ -52,12 +52,12 @@ def press(page: Page, name: str) -> None:
 
 def await_state(page: Page, word: str) -> None:
     """Wait until the big state says so."""
-    expect(page.locator("#state-word")).to_have_text(word, timeout=PATIENCE_MS)
+    expect(page.locator("#state-word")).to_have_text(word)
 
 
 def await_kept(page: Page) -> None:
     """Wait until the page offers to save what has happened: pulses are arriving."""
-    expect(page.locator("#save-last")).to_be_enabled(timeout=PATIENCE_MS)
+    expect(page.locator("#save-last")).to_be_enabled()
 
 
 def await_image(image: Locator) -> None:
@@ -77,7 +77,7 @@ def record(page: Page, seconds: int = 1) -> None:
     """Record so long on the page's own clock, and stop."""
     page.locator("#next-step[data-step=armed]").click()
     await_state(page, "Recording")
-    expect(page.locator("#state-time")).to_have_text(re.compile(rf"0:0[{seconds}-9]"), timeout=PATIENCE_MS)
+    expect(page.locator("#state-time")).to_have_text(re.compile(rf"0:0[{seconds}-9]"))
     page.locator("#next-step[data-step=recording]").click()
     await_state(page, "Armed")
 
@@ -173,7 +173,7 @@ def test_a_dead_camera_is_named_with_what_to_do(tmp_path: Path, loopback: Loopba
         await_state(page, "Recording")
         hill.kill("K2")
         card = page.locator("#cameras > li").nth(1)
-        expect(card).to_contain_text(re.compile("Silent|Absent"), timeout=PATIENCE_MS)
+        expect(card).to_contain_text(re.compile("Silent|Absent"))
         expect(card.locator(".advice")).to_contain_text("check its")
         expect(page.locator("#preview .block").nth(1).locator(".cover strong")).to_have_text(
             re.compile("Silent|Absent")
@@ -181,7 +181,7 @@ def test_a_dead_camera_is_named_with_what_to_do(tmp_path: Path, loopback: Loopba
         expect(page.locator("#preview .block").nth(0).locator(".cover")).to_be_hidden()
         expect(page.locator("#state-text")).to_contain_text("2 of 3 cameras: without K2")
         hill.restart("K2")
-        expect(card).to_contain_text("Ready", timeout=PATIENCE_MS)
+        expect(card).to_contain_text("Ready")
         page.locator("#next-step[data-step=recording]").click()
         await_state(page, "Armed")
         page.get_by_role("button", name="Look at it").click()
@@ -200,13 +200,13 @@ def test_a_lost_connection_is_said_and_comes_back(tmp_path: Path, loopback: Loop
         await_state(page, "Idle")
         expect(page.locator("#banner")).to_be_hidden()
         service.signal(signal.SIGTERM)
-        expect(page.locator("#banner")).to_contain_text("Connection lost.", timeout=PATIENCE_MS)
+        expect(page.locator("#banner")).to_contain_text("Connection lost.")
         expect(page.locator("#next-step")).to_be_disabled()
         expect(page.locator("#action-reason")).to_contain_text("No connection")
         expect(page.locator("#state-time")).to_contain_text("as of")
     port = int(service.url.rpartition(":")[2])
     with serving(tmp_path, rig, loopback, port=port):
-        expect(page.locator("#banner")).to_be_hidden(timeout=PATIENCE_MS)
+        expect(page.locator("#banner")).to_be_hidden()
         expect(page.locator("#next-step")).to_be_enabled()
 
 

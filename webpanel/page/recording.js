@@ -42,7 +42,7 @@ export async function enterRecording(id) {
   try {
     recording = await call("GET", `recordings/${encodeURIComponent(id)}`);
     draw();
-    scrub(await call("GET", `recordings/${encodeURIComponent(id)}/pulses`));
+    if (!isRunning()) scrub(await call("GET", `recordings/${encodeURIComponent(id)}/pulses`));
   } catch (error) {
     tellProblem(error);
   }
@@ -50,13 +50,14 @@ export async function enterRecording(id) {
 
 /** Put the recording shown into the trash. */
 export async function deleteShown() {
-  if (recording && !recording.deleted && recording.state !== "recording" && await remove(recording)) go("recordings");
+  if (recording && !recording.deleted && !isRunning() && await remove(recording)) go("recordings");
 }
 
 /** Somebody may have changed it. */
 async function reload() {
   const { view, id } = place();
   if (view !== "recording") return;
+  if (isRunning()) return void enterRecording(id); // it may have ended: then there is something to look at
   try {
     recording = await call("GET", `recordings/${encodeURIComponent(id)}`);
     draw();
@@ -65,19 +66,25 @@ async function reload() {
   }
 }
 
+/** While it is being written, a recording has nothing to look at yet. */
+function isRunning() {
+  return recording?.state === "recording";
+}
+
 /** Draw what is not an image. */
 export function draw() {
   if (!recording) return;
   const { id, session, verdict } = recording;
   setText($("recording-title"), who(session, t("recordings.nobody")));
-  const { text, advice } = say(verdict);
+  const { text, advice } = isRunning() ? { text: t("recording.running"), advice: "" } : say(verdict);
+  $("player").hidden = isRunning();
   $("recording-verdict").replaceChildren(makeMark(verdict.level, verdict.level, [text, advice].filter(Boolean).join(" – ")));
   writeFields($("recording-session"), session);
   drawFacts(recording);
-  $("recording-buttons").replaceChildren(
+  $("recording-buttons").replaceChildren(...isRunning() ? [] : [
     make("a", { class: "button primary", href: partOf(id, "file"), download: `${id}.mcap` }, icon("download"), make("span", {}, t("recording.download"))),
     recording.deleted ? makeButton("restore", t("trash.restore"), restoreShown) : makeButton("trash", t("recording.delete"), deleteShown),
-  );
+  ]);
 }
 
 /** @param {Recording} shown */
@@ -99,7 +106,7 @@ function drawFacts({ id, started, duration_s, bytes, counts }) {
  * @param {() => Promise<void>} action
  */
 function makeButton(picture, words, action) {
-  return make("button", { type: "button", disabled: recording?.state === "recording", onclick: () => void action() }, icon(picture), make("span", {}, words));
+  return make("button", { type: "button", onclick: () => void action() }, icon(picture), make("span", {}, words));
 }
 
 async function restoreShown() {

@@ -101,6 +101,7 @@ export const en = {
   "trash.empty": "The trash is empty.",
   "trash.restore": "Restore",
 
+  "recording.running": "This jump is being recorded. It can be looked at when it is stopped.",
   "recording.back": "Back to all jumps",
   "recording.session": "Jumper and conditions",
   "recording.file": "File",

@@ -101,6 +101,7 @@ export const nb = {
   "trash.empty": "Papirkurven er tom.",
   "trash.restore": "Hent tilbake",
 
+  "recording.running": "Dette hoppet tas opp nå. Det kan ses på når det er stoppet.",
   "recording.back": "Tilbake til alle hopp",
   "recording.session": "Hopper og forhold",
   "recording.file": "Fil",

@@ -27,7 +27,7 @@ from webpanel.models import (
 from webpanel.recording_view import to_recording
 from webpanel.rig_service import Metric, Preview, StateForbidsError
 
-_SOON_S: Final = 5.0
+_SOON_S: Final = 10.0
 _OPEN_S: Final = 15.0
 #: A log of some GB may wait for a slow disk.
 _CLOSE_S: Final = 60.0

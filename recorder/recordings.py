@@ -24,7 +24,7 @@ from triggering.pairing import ClosedPulse
 
 _SLICE_NS: Final = NS_PER_S // 200
 #: So long after its start a recording waits for subscribers that take its past more slowly than the disk does.
-_PATIENCE_NS: Final = NS_PER_S
+_PATIENCE_NS: Final = 10 * NS_PER_S
 #: So long a recording waits to be closed for a disk that does not take what was written.
 _FLUSH_NS: Final = 30 * NS_PER_S
 
@@ -186,8 +186,11 @@ class Recordings:
 
     def _subscribers_lag(self, recording: Recording, held: Held, now: HostNs) -> bool:
         """Whether the past comes faster than subscribers take it: what they cannot take they would miss."""
-        is_past = held.triplet.pulse.time < recording.commanded
-        return is_past and now < recording.commanded + _PATIENCE_NS and self._publisher.busy
+        if held.triplet.pulse.time >= recording.commanded or now > recording.commanded + _PATIENCE_NS:
+            return False
+        in_flight = self._buffers.count - self._preroll.triplets
+        # Subscribers that are slower than the cameras get no more time: the memory is for the frames that come.
+        return self._publisher.busy and self._buffers.free_count > in_flight // 2
 
     def _write(self, recording: Recording, held: Held) -> None:
         pulse, slot = held.triplet.pulse, held.triplet.slot

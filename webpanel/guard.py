@@ -1,5 +1,6 @@
 """Looks at every request before anything else does: name called, page it comes from, token; and guards every answer."""
 
+import math
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Final
@@ -40,12 +41,11 @@ class Door:
         Raises:
             ProblemError: 401 wrong token, 429 too many of them.
         """
-        wait_s = self.brake.seconds_to_wait(client)
+        wait_s = math.ceil(self.brake.seconds_to_wait(client))
         if wait_s:
-            text = f"too many wrong tokens from here: wait {wait_s:.0f} s, then try again"
-            raise ProblemError(
-                HTTPStatus.TOO_MANY_REQUESTS, "too_many_wrong_tokens", text, {"Retry-After": f"{wait_s:.0f}"}
-            )
+            text = f"too many wrong tokens from here: wait {wait_s} s, then try again"
+            headers = {"Retry-After": str(wait_s)}
+            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, "too_many_wrong_tokens", text, headers)
         if not self.access.knows(candidate):
             self.brake.wrong(client)
             raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")

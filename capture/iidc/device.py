@@ -3,7 +3,7 @@
 import ctypes
 from ctypes import byref, c_float, c_int, c_uint32, c_uint64
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from capture.iidc.bus import Bus, Found, guid_text
 from capture.iidc.structures import (
@@ -21,6 +21,8 @@ from capture.iidc.structures import (
     VideoModes,
 )
 from rig.errors import CameraError
+
+_TRIGGER_INQ: Final = 0x530  # IIDC 1.31, table "Trigger_Mode": bit 16 from the left is mode 0
 
 
 class Device:
@@ -172,10 +174,17 @@ class Device:
         self.call("external_trigger_get_supported_sources", byref(sources))
         return [int(source) - TRIGGER_SOURCE_0 for source in sources.sources[: sources.num]]
 
-    def set_trigger(self, *, mode: int, source: int, rising: bool) -> None:
-        """Let pulses trigger."""
+    def trigger_modes(self) -> list[int]:
+        """Numbers of its trigger modes, of 0 to 5."""
+        word = c_uint32()
+        self.call("get_control_registers", _TRIGGER_INQ, byref(word), 1)
+        return [mode for mode in range(6) if word.value & 0x8000 >> mode]
+
+    def set_trigger(self, *, mode: int, source: int | None, rising: bool) -> None:
+        """Let pulses trigger; `source` None: the camera has one input only and no choice."""
         self.call("external_trigger_set_mode", TRIGGER_MODE_0 + mode)
-        self.call("external_trigger_set_source", TRIGGER_SOURCE_0 + source)
+        if source is not None:
+            self.call("external_trigger_set_source", TRIGGER_SOURCE_0 + source)
         if self._int("external_trigger_has_polarity"):
             self.call("external_trigger_set_polarity", Polarity.ACTIVE_HIGH if rising else Polarity.ACTIVE_LOW)
         elif not rising:

@@ -20,10 +20,15 @@ def set_trigger(device: Device, camera: CameraSettings) -> None:
     if not device.has(Feature.TRIGGER):
         raise CameraError(f"camera {camera.name} has no trigger input: use another camera")
     source, sources = int(camera.trigger_input.removeprefix("Line")), device.trigger_sources()
-    if source not in sources:
-        names = " or ".join(f'"Line{number}"' for number in sources) or "none"
+    # Cameras older than IIDC 1.31 have one input and do not number it.
+    if source not in (sources or [0]):
+        names = " or ".join(f'"Line{number}"' for number in sources or [0])
         raise CameraError(f"camera {camera.name} has no trigger_input {camera.trigger_input}, but {names}: correct it")
-    device.set_trigger(mode=camera.iidc.trigger_mode, source=source, rising=camera.trigger_edge == "rising")
+    mode = camera.iidc.trigger_mode
+    if mode not in device.trigger_modes():
+        raise CameraError(f"camera {camera.name} has no trigger mode {mode}: choose another iidc.trigger_mode")
+    rising = camera.trigger_edge == "rising"
+    device.set_trigger(mode=mode, source=source if sources else None, rising=rising)
 
 
 def set_gain(device: Device, camera: CameraSettings) -> None:

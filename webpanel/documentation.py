@@ -8,7 +8,7 @@ from fastapi.openapi.utils import get_openapi
 from fastapi.responses import Response
 
 from webpanel.access import Access
-from webpanel.models import Problem
+from webpanel.models import Event, Problem
 
 DESCRIPTION: Final = """
 Operates the three-camera rig and its recordings. Times are UTC. Unknown fields and parameters are refused.
@@ -54,8 +54,9 @@ def _asset(package: str, name: str, media_type: str) -> Any:
 def _schema(app: FastAPI, access: Access) -> dict[str, Any]:
     schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
     components = schema.setdefault("components", {})
-    problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-    components["schemas"] |= problem.pop("$defs") | {"Problem": problem}
+    for model in (Problem, Event):  # no call returns these as such
+        described = model.model_json_schema(ref_template="#/components/schemas/{model}")
+        components["schemas"] |= described.pop("$defs", {}) | {model.__name__: described}
     if access.token is not None:
         components["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         schema["security"] = [{"token": []}]

@@ -1,10 +1,14 @@
 """The rules of access: which addresses need a token, what a token is, which names are ours."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from rig.errors import BadInputError
+from rig.rigfile import CONFIG
 from webpanel.access import Access, is_loopback
 
 TOKEN = "a-token-for-the-tests-only"  # noqa: S105
@@ -22,6 +26,33 @@ def test_elsewhere_it_is(host: str) -> None:
     with pytest.raises(BadInputError, match="--token-file"):
         Access.for_address(host, environment={})
     assert Access.for_address(host, environment={"SVEV_TOKEN": TOKEN}).token == TOKEN.encode()
+
+
+def test_the_service_does_not_start_without_it(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "svev",
+        "serve",
+        "--rig",
+        "config/rigs/sim.toml",
+        "--host",
+        EVERYWHERE,
+        "--port",
+        "0",
+    ]
+    environment = {name: text for name, text in os.environ.items() if name != "SVEV_TOKEN"}
+    done = subprocess.run(
+        [*command, "--port", "0", "--data", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env=environment,
+    )
+    assert done.returncode == 2
+    assert "--token-file" in done.stderr
+    assert len(done.stderr.strip().splitlines()) <= 3
 
 
 def test_the_token_comes_from_a_file_before_the_environment(tmp_path: Path) -> None:

@@ -76,6 +76,7 @@ def test_every_refusal_is_declared_as_a_problem(schema: dict[str, Any]) -> None:
 def test_every_reference_leads_somewhere(schema: dict[str, Any]) -> None:
     for name in re.findall(r'"#/components/schemas/(\w+)"', json.dumps(schema)):
         assert name in schema["components"]["schemas"]
+    assert {"Problem", "FieldError", "Status", "Event"} <= set(schema["components"]["schemas"])
     assert "HTTPValidationError" not in schema["components"]["schemas"]
 
 

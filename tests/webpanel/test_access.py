@@ -29,18 +29,8 @@ def test_elsewhere_it_is(host: str) -> None:
 
 
 def test_the_service_does_not_start_without_it(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "svev",
-        "serve",
-        "--rig",
-        "config/rigs/sim.toml",
-        "--host",
-        EVERYWHERE,
-        "--port",
-        "0",
-    ]
+    rig = str(CONFIG / "rigs" / "sim.toml")
+    command = [sys.executable, "-m", "svev", "serve", "--rig", rig, "--host", EVERYWHERE]
     environment = {name: text for name, text in os.environ.items() if name != "SVEV_TOKEN"}
     done = subprocess.run(
         [*command, "--port", "0", "--data", str(tmp_path)],

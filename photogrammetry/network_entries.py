@@ -14,7 +14,7 @@ Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, l
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Sigmas = Annotated[list[Positive], Field(min_length=3, max_length=3)]
-Pixels = Annotated[int, Field(strict=True, gt=0)]
+Pixels = Annotated[int, Field(strict=True, gt=0, le=1_000_000)]
 Name = Annotated[str, Field(strict=True)]
 
 #: How far the rows of R may be from orthonormal: what rounding to five digits does.

@@ -43,8 +43,15 @@ class StartValues:
 
 
 def complete(network: Network) -> Network:
-    """The network with start values for all poses and points that have none."""
-    return find_start_values(network).network
+    """The network with start values for all poses and points that have none.
+
+    Raises:
+        BadInputError: the numbers are so absurd that nothing can be computed.
+    """
+    try:
+        return find_start_values(network).network
+    except np.linalg.LinAlgError:
+        raise BadInputError("the numbers leave all bounds; check units and sizes, or give start values") from None
 
 
 def find_start_values(network: Network) -> StartValues:

@@ -97,6 +97,10 @@ _BAD: dict[str, tuple[Change, str]] = {
     "reweight": (lambda d: d.update(reweight="yes"), r"reweight"),
     "size missing": (lambda d: d["cameras"]["K1"].pop("size"), r'cameras\.K1: key "size" is missing'),
     "size of one": (lambda d: d["cameras"]["K1"].update(size=[640]), r"cameras\.K1: .*size.*correct it"),
+    "size beyond all bounds": (
+        lambda d: d["cameras"]["K1"].update(size=[10**25, 480]),
+        r"cameras\.K1: .*size.*correct it",
+    ),
     "negative c": (lambda d: d["cameras"]["K1"].update(c=-1400), r"cameras\.K1: .*\"c\".*correct it"),
     "c as text": (lambda d: d["cameras"]["K1"].update(c="1400"), r"cameras\.K1: .*\"c\".*correct it"),
     "c as truth": (lambda d: d["cameras"]["K1"].update(c=True), r"cameras\.K1: .*\"c\".*correct it"),

@@ -12,7 +12,10 @@ const KEPT = 500;
 
 /** @type {Event[]} */
 let events = [];
+/** Whether the page shows all of them. */
 let drawn = false;
+/** Whether that will be seen to at the next frame. */
+let planned = false;
 
 export function startLog() {
   hear({
@@ -23,9 +26,12 @@ export function startLog() {
   watch(draw);
 }
 
+/** At the beginning hundreds come at once: they are drawn together. */
 function changed() {
   drawn = false;
-  draw();
+  if (planned) return;
+  planned = true;
+  requestAnimationFrame(() => { planned = false; draw(); });
 }
 
 /** Draw it, if it is looked at and something is new. */

@@ -87,10 +87,11 @@ class Recorder:
         """Turn until the recording is closed; its report."""
 
         def closed() -> bool:
+            self.clock.advance_to(self.clock.time + 5 * MS)
             self.step()
             return not self.recordings.running
 
-        wait_until(closed, "the recording is closed", poll_s=0.001)
+        wait_until(closed, "the recording is closed", timeout_s=30, poll_s=0.001)
         assert self.reports[-1]["report"] == "finished", self.reports[-1]
         return self.reports[-1]
 
@@ -220,7 +221,7 @@ def test_hundreds_of_pulses_are_written_in_slices_while_new_ones_come(tmp_path: 
             before = recorder.clock.time
             recorder.step()
             assert recorder.clock.time - before < 8 * MS, "no turn takes long"
-            wait_until(lambda: recorder.buffers.free_count > 3, "the disk has taken something", poll_s=0.001)
+            wait_until(lambda: recorder.buffers.free_count > 3, "the disk takes something", timeout_s=30, poll_s=0.001)
         assert turns > 10
     assert _pulses(path) == list(range(1, 331))
 

@@ -44,7 +44,14 @@ def _version() -> str:
 def _cache() -> Path:
     """The user's own cache directory: nobody else may put a library there."""
     base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if Path(base).is_absolute() else Path.home() / ".cache") / "svev"
+    if Path(base).is_absolute():
+        return Path(base) / "svev"
+    try:
+        return Path.home() / ".cache" / "svev"
+    except RuntimeError:
+        raise BadInputError(
+            "no place for the FireWire shim: this user has no home directory; set XDG_CACHE_HOME to a directory of its own"
+        ) from None
 
 
 def _compile(library: Path) -> None:

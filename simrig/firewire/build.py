@@ -50,7 +50,7 @@ def _cache() -> Path:
         return Path.home() / ".cache" / "svev"
     except RuntimeError:
         raise BadInputError(
-            "no place for the FireWire shim: this user has no home directory; set XDG_CACHE_HOME to a directory of its own"
+            "no place for the FireWire shim: this user has no home directory; set XDG_CACHE_HOME to one of its own"
         ) from None
 
 

@@ -63,7 +63,7 @@ class ServedRig:
             time.sleep(0.1)
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the connection; the next call opens another."""
         self._connection.close()
 
 

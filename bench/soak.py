@@ -85,6 +85,7 @@ def _phase(service: ServedRig, seconds: float, turn: Callable[[dict[str, Any]], 
     while (now := time.monotonic() - began) < seconds:
         turn(result)
         samples.append(_look(service, now))
+        service.close()  # the service closes connections that idle for so long
         time.sleep(_EVERY_S)
     return result | _figures(samples) | {"samples": [asdict(sample) for sample in samples]}
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from recorder.catalogue import UnknownRecordingError
 from recorder.events import Event, Level
 from rig.control import Message
-from rig.errors import ProcessDiedError, SvevError
+from rig.errors import BadInputError, ProcessDiedError, StorageError, SvevError
 from rig.settings import RigSettings
 from svev.recording_run import new_log_path
 from svev.running_rig import reported_error
@@ -68,15 +68,14 @@ class RecordingControl:
 
         Raises:
             StateForbidsError: not armed, or a recording is being opened.
-            StorageError: no room.
-            BadInputError: the folder cannot be written.
+            StorageError: no room, or the folder cannot be written.
         """
         state, processes = self._machine.state, self._session.processes
         if processes is None or state is not State.ARMED or self.current is not None:
             raise StateForbidsError(FORBIDDEN["start", State.RECORDING if state is State.ARMED else state])
         length_s = self._rig.recorder.jump_s if order.duration_s is None else order.duration_s
         check_room_for(self._rig, self._data, length_s)
-        path = new_log_path(self._data)
+        path = self._new_path()
         self.current, self.notice = RecordingInProgress(path, order, opened), None
         processes.tell(
             {
@@ -85,6 +84,14 @@ class RecordingControl:
                 "seconds": order.duration_s, "preroll_s": self._reach_s(order), "rig_toml": self._rig_toml,
             }
         )  # fmt: skip
+
+    def _new_path(self) -> Path:
+        try:
+            return new_log_path(self._data)
+        except BadInputError:
+            raise StorageError(
+                f"{self._data}: cannot be written; correct its permissions, or start the service with another --data"
+            ) from None
 
     def _reach_s(self, order: RecordingOrder) -> float:
         """How far to begin in the past: before the rig was armed, cameras were missing."""

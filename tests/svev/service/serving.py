@@ -77,6 +77,13 @@ class Serving:
             assert answer.read(1)
             yield
 
+    def text(self, path: str) -> str:
+        """A GET whose answer is no JSON."""
+        request = urllib.request.Request(self.url + path)  # noqa: S310 - our own service
+        with _DIRECT.open(request, timeout=PATIENCE_S) as answer:
+            content: str = answer.read().decode()
+            return content
+
     def state(self) -> str:
         """The present state."""
         state: str = self.get("/api/status")["state"]

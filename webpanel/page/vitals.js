@@ -19,7 +19,7 @@ function draw() {
   const warmest = Math.max(...status.cameras.map((camera) => camera.temperature_c ?? -Infinity));
   fillList($("vitals"), [
     [t("vitals.pulses"), pulses.arriving ? quantity(pulses.rate_hz, 1, "/s") : t(on ? "vitals.none" : "vitals.off"), on && !pulses.arriving ? "warning" : ""],
-    [t("vitals.spread"), quantity(pulses.spread_us, 1, "µs")],
+    [t("vitals.spread"), quantity(pulses.arriving ? pulses.spread_us : null, 1, "µs")],
     [t("vitals.preroll"), quantity(preroll.seconds, 1, "s")],
     [t("vitals.jumps"), number(disk.jumps_left), disk.jumps_left < 1 ? "error" : disk.jumps_left < FEW_JUMPS ? "warning" : ""],
     [t("vitals.free"), quantity(disk.free_gb, 0, "GB")],

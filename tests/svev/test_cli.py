@@ -12,7 +12,7 @@ from svev import cli
 
 
 def _commands() -> list[str]:
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(cli.command_line())
     assert isinstance(group, TyperGroup)
     return sorted(group.commands)
 

@@ -142,7 +142,7 @@ def test_four_marlins_on_one_bus_fail() -> None:
 
 def test_the_command_starts_the_emulated_bus_of_a_simulated_rig() -> None:
     rig = CONFIG / "rigs" / "sim-firewire.toml"
-    done = CliRunner().invoke(cli.app, ["doctor", "--bus", "firewire", "--rig", str(rig), "--json"])
+    done = CliRunner().invoke(cli.command_line(), ["doctor", "--bus", "firewire", "--rig", str(rig), "--json"])
     report = json.loads(done.stdout[done.stdout.index("{") :])
     assert (done.exit_code, report["counts"]["FAIL"]) == (0, 0), done.stdout
     assert {"K1", "K2", "K3"} == {f["what"][:2] for f in report["findings"] if "goes on after a bus reset" in f["what"]}
@@ -150,7 +150,7 @@ def test_the_command_starts_the_emulated_bus_of_a_simulated_rig() -> None:
 
 def test_the_command_refuses_a_rig_without_firewire() -> None:
     rig = CONFIG / "rigs" / "hill-gige.toml"
-    done = CliRunner().invoke(cli.app, ["doctor", "--bus", "firewire", "--rig", str(rig)])
+    done = CliRunner().invoke(cli.command_line(), ["doctor", "--bus", "firewire", "--rig", str(rig)])
     assert done.exit_code == 3
     assert "has no FireWire camera" in done.stdout
 

@@ -150,9 +150,10 @@ def serving(
     prefix: tuple[str, ...] = (),
     data: Path | None = None,
     token: str = "",
+    ends_with: int = 0,
     port: int | None = None,
 ) -> Iterator[Serving]:
-    """A service on a port of this test's own (or the one given); ended by SIGTERM, which must give exit code 0."""
+    """A service on a port of this test's own, or the one given; ended by SIGTERM, with the exit code `ends_with`."""
     port = loopback.free_port() if port is None else port
     log, data = folder / "service.log", folder / "data" if data is None else data
     arguments = ["--rig", str(rig), "--host", loopback.host, "--port", str(port), "--data", str(data), *more]
@@ -169,7 +170,7 @@ def serving(
         wait_until(lambda: _answers(service), "the API answers", PATIENCE_S)
         yield service
         process.terminate()
-        assert process.wait(PATIENCE_S) == 0, log.read_text()
+        assert process.wait(PATIENCE_S) == ends_with, log.read_text()
     finally:
         if process.poll() is None:
             process.kill()

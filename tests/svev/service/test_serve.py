@@ -105,6 +105,24 @@ def test_a_killed_recorder_ends_the_recording_and_the_rig_is_armed_again(tmp_pat
         assert service.get(f"/api/recordings/{again['id']}")["state"] == "finished"
 
 
+def test_a_killed_service_leaves_a_whole_log_and_no_process(tmp_path: Path, loopback: Loopback) -> None:
+    rig = write_rig(tmp_path, "sim", loopback)
+    with serving(tmp_path, rig, loopback, ends_with=-signal.SIGKILL) as service:
+        service.arm()
+        recording = service.post("/api/recordings", {})
+        service.await_pulses(20)
+        pids = service.pids()
+        service.signal(signal.SIGKILL)
+        assert service.exit_code() == -signal.SIGKILL
+        wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids.values()), "all gone", PATIENCE_S)
+    report = verify(service.data / f"{recording['id']}.mcap")
+    assert report.closed
+    assert any("service process is gone" in event.message for event in report.events)
+    with serving(tmp_path, rig, loopback) as again:
+        (found,) = again.get("/api/recordings")
+        assert (found["id"], found["state"]) == (recording["id"], "finished")
+
+
 def test_a_second_service_is_refused(tmp_path: Path, loopback: Loopback) -> None:
     rig = write_rig(tmp_path, "sim", loopback)
     with serving(tmp_path, rig, loopback) as service:

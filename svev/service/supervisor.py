@@ -36,7 +36,7 @@ _TURN_S: Final = 0.2
 _PICTURE_S: Final = 1.0
 _FINISH_S: Final = 4.0
 #: A loop that has not come round for so long hangs.
-_TURNS_S: Final = 2.0
+_TURNS_S: Final = 5.0
 
 
 class Supervisor:

@@ -54,3 +54,9 @@ def serving(service: MemoryService, access: Access) -> Iterator[Panel]:
         thread.join(20)
         listener.close()
     assert not thread.is_alive()
+    wait_until(lambda: not _workers(), "the server's worker threads have ended", 20)
+
+
+def _workers() -> list[threading.Thread]:
+    """The threads in which handlers run; they end by themselves with their event loop."""
+    return [thread for thread in threading.enumerate() if thread.name == "AnyIO worker thread"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
 from photogrammetry.adjustment.blunders import Blunder
 from photogrammetry.adjustment.removal import Removed
-from photogrammetry.adjustment.snooping import explained
+from photogrammetry.adjustment.snooping import explained, suspicions
 from photogrammetry.adjustment.snooping import snoop as snooped
 from photogrammetry.adjustment.state import State, state_of
 from photogrammetry.adjustment.suspicion import FAMILY_RISK, find_blunders
@@ -58,7 +58,7 @@ def adjust(
         adjustment, blunders, removed = cleaned.adjustment, cleaned.left, cleaned.removed
     else:
         adjustment = _adjusted(network, start, family_risk)
-        blunders = tuple(find_blunders(adjustment, family_risk))
+        blunders = tuple(suspicions(adjustment, start, family_risk))
     if not adjustment.problem.n_observations:
         raise BadInputError("the network has no observations: nothing to adjust; add some")
     components: tuple[Component, ...] | None

@@ -93,6 +93,20 @@ def point_of_view(network: Network, start: State, current: Adjustment | NotConve
         raise current from None
 
 
+def suspicions(adjustment: Adjustment, start: State, family_risk: float) -> list[Blunder]:
+    """Suspected gross errors of an adjustment whose optimum they may have bent.
+
+    Args:
+        adjustment: with all observations.
+        start: where it started.
+        family_risk: chance that anything at all is suspected in sound data.
+    """
+    found = find_blunders(adjustment, family_risk)
+    if not found or adjustment.ratio <= _BENT:
+        return found
+    return find_blunders(point_of_view(adjustment.network, start, adjustment), family_risk)
+
+
 def explained(error: NotConvergedError, network: Network, start: State, family_risk: float) -> NotConvergedError:
     """The error with what keeps the network from an optimum, as far as that can be told."""
     left, located = _judged_all(point_of_view(network, start, error), family_risk)

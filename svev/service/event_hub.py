@@ -22,7 +22,7 @@ class EventHub:
 
     def __init__(self, write_line: Callable[[events.Event], None]) -> None:
         self._write_line = write_line
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a listener may ask for events, or leave, while it is woken
         self._events: deque[Event] = deque(maxlen=_KEPT)
         self._number = 0
         self._listeners: dict[object, Callable[[], None]] = {}
@@ -46,8 +46,11 @@ class EventHub:
     def listen(self, wake: Callable[[], None]) -> Callable[[], None]:
         """Have `wake` called at every event and change.
 
+        Args:
+            wake: must not wait for anything: everybody else waits for it.
+
         Returns:
-            A function that ends this.
+            A function that ends this; when it has returned, `wake` is not called any more.
         """
         ticket = object()
         with self._lock:
@@ -60,8 +63,7 @@ class EventHub:
         return end
 
     def wake(self) -> None:
-        """Call all listeners, outside the lock: they may ask for events at once."""
+        """Call all listeners."""
         with self._lock:
-            listeners = list(self._listeners.values())
-        for listener in listeners:
-            listener()
+            for listener in list(self._listeners.values()):
+                listener()

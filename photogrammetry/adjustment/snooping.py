@@ -29,6 +29,7 @@ _MOST_REMOVED = 0.1
 #: An estimated sigma0 so many times the a-priori one may come from errors that bend the optimum.
 _BENT = 2.0
 _NAMED = 3  # so many suspects stand in an error message
+_COMPARED = 3  # of those that can be located where all is bent
 _MOST_TRIALS = 12  # with more candidates the data cannot tell anyway
 #: What vTPv falls by, by chance, for 1, 2 and 3 coordinates: makes observations of different kinds comparable.
 _BY_CHANCE = special.chdtri(np.array([1.0, 2.0, 3.0]), SINGLE_RISK)
@@ -128,18 +129,25 @@ def _adjusted(network: Network, start: State) -> Adjustment | NotConvergedError:
 
 
 def _judged_all(view: Adjustment, family_risk: float) -> tuple[list[Blunder], tuple[Blunder, Adjustment] | None]:
-    """What cannot be located, up to the first that can; that one with the adjustment without it."""
+    """What cannot be located, and the worst that can, with the adjustment without it.
+
+    Where all is bent, consequences may look worse than their cause: then the one counts that straightens it most.
+    """
     trials: dict[Observation, Trial] = {}
     left: list[Blunder] = []
+    located: list[tuple[Blunder, Adjustment]] = []
     for blunder in find_blunders(view, family_risk):
         if any(blunder.suspect in other.candidates for other in left):
             continue
         judged = _judged(view, blunder, trials)
         trial = trials.get(judged.suspect)
-        if judged.locatable and isinstance(trial, Adjustment):
-            return left, (judged, trial)
-        left.append(judged)
-    return left, None
+        if not judged.locatable or not isinstance(trial, Adjustment):
+            left.append(judged)
+            continue
+        located.append((judged, trial))
+        if view.ratio <= _BENT or len(located) == _COMPARED:
+            break
+    return left, min(located, key=lambda one: one[1].ratio) if located else None
 
 
 def _judged(view: Adjustment, blunder: Blunder, trials: dict[Observation, Trial]) -> Blunder:
@@ -162,8 +170,15 @@ def _judged(view: Adjustment, blunder: Blunder, trials: dict[Observation, Trial]
 
 def _trial(view: Adjustment, gone: Observation) -> Trial:
     """The adjustment without one observation, or why there is none."""
+    network = without(view.network, gone)
     try:
-        return adjust_once(without(view.network, gone), view.state)
+        return adjust_once(network, view.state)
+    except NotSolvableError as error:
+        return error
+    except NotConvergedError:
+        pass  # from nearer by it may arrive
+    try:
+        return adjust_once(network, robust_state(network, view.state))
     except (NotSolvableError, NotConvergedError) as error:
         return error
 

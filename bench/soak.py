@@ -30,7 +30,8 @@ class Sample:
 
     Attributes:
         time_s: since the phase began.
-        memory_mb: proportional set size of each process (shared pages counted once).
+        memory_mb: anonymous memory of each process: heap, stacks, triplet buffers. Pages of libraries are left out:
+            whether they count as ours changes with every other program that starts or ends.
         cpu_s: user and system time of all of them since they began.
     """
 
@@ -98,9 +99,9 @@ def _look(service: ServedRig, now: float) -> Sample:
 
 def _memory_mb(pid: int) -> float:
     for line in Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii").splitlines():
-        if line.startswith("Pss:"):
+        if line.startswith("Pss_Anon:"):
             return round(int(line.split()[1]) * 1024 / _MB, 2)
-    raise ValueError(f"process {pid} has no Pss")
+    raise ValueError(f"process {pid} has no Pss_Anon")
 
 
 def _figures(samples: list[Sample]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ def bench(
     paper, saturated, double: three GigE Vision cameras received, paired, composed, checksummed, published and written,
     beside gst-launch-1.0 aravissrc ! fakesink and ! filesink for the same cameras. CPU-seconds per GB of image data;
     the simulated cameras are not counted. parts: pairing, composing, checksum, and drawing on their own.
+    api: how fast the service answers while it records at 30 Hz, beside the same while idle.
     adjustment: free networks with full covariance, beside scipy's least_squares on the same problem.
 
     Example: svev bench saturated --seconds 10

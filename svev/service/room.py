@@ -17,7 +17,7 @@ class Room:
 
     Attributes:
         free_bytes: free on the disk.
-        seconds: so long until only the reserve is left.
+        seconds: so long until only the reserve is left, whole seconds.
         jumps: so many jumps of `recorder.jump_s`.
     """
 
@@ -30,7 +30,7 @@ def room_for(rig: RigSettings, free_bytes: int) -> Room:
     """What fits into free bytes beside the reserve, all cameras delivering at the rig's rate."""
     rows, columns = rig.triplet_shape
     usable = max(0.0, free_bytes - rig.recorder.reserve_gb * _GB)
-    seconds = usable / (rows * columns * rig.trigger.rate_hz)
+    seconds = usable // (rows * columns * rig.trigger.rate_hz)
     return Room(free_bytes, seconds, int(seconds / rig.recorder.jump_s))
 
 

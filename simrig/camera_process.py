@@ -147,3 +147,30 @@ class CameraProcess:
     def _died(self) -> ProcessDiedError:
         code = self._process.wait(_STOP_S)
         return ProcessDiedError(f"{self._what} ended by itself (exit code {code}): see its messages above")
+
+
+class ProcessOwner:
+    """Base of what is made of one process that is started later, and perhaps again."""
+
+    def __init__(self) -> None:
+        self._process: CameraProcess | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Its process id, None if it does not run."""
+        return self._process.pid if self._process is not None and self._process.alive else None
+
+    def begin_stop(self) -> None:
+        """Ask it to end, without waiting."""
+        if self._process is not None:
+            self._process.begin_stop()
+
+    def stop(self) -> None:
+        """End it."""
+        if self._process is not None:
+            self._process.stop()
+            self._process = None
+
+    def _running(self) -> CameraProcess:
+        assert self._process is not None, "started"  # noqa: S101  (SimulatedHill starts all before it does anything else)
+        return self._process

@@ -1,6 +1,8 @@
 """What a simulated camera reports of itself, whatever bus it is on."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 from rig.clocks import HostNs
 
@@ -32,3 +34,9 @@ class CameraStatistics:
     acquiring: bool
     controlled: bool
     last_packets: dict[int, HostNs]
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """Read what a camera's process answers; JSON has turned pulse numbers into text."""
+        last = {int(pulse): HostNs(moment) for pulse, moment in data["last_packets"].items()}
+        return cls(**{**data, "last_packets": last})

@@ -4,8 +4,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from rig.clocks import HostNs
-from simrig.camera_process import CameraProcess
+from simrig.camera_process import ProcessOwner
 from simrig.faults import ON_FIREWIRE, Fault
 from simrig.firewire import wire
 from simrig.firewire.build import shim
@@ -31,7 +30,7 @@ class BusState:
     nodes: tuple[str, ...]
 
 
-class HillBus:
+class HillBus(ProcessOwner):
     """The bus's process.
 
     Args:
@@ -43,9 +42,9 @@ class HillBus:
     """
 
     def __init__(self, config: BusConfig, launch: Launch) -> None:
+        super().__init__()
         self._config, self._launch = config, launch
         self.cameras = {name: FireWireHillCamera(self, name) for name in config.cameras}
-        self._process: CameraProcess | None = None
         self._ready = False
 
     @property
@@ -57,11 +56,6 @@ class HillBus:
         """
         preload = [str(shim()), *filter(None, [os.environ.get("LD_PRELOAD")])]
         return {"LD_PRELOAD": " ".join(preload), wire.VARIABLE: self._config.socket}
-
-    @property
-    def pid(self) -> int | None:
-        """Its process id, None if it does not run."""
-        return self._process.pid if self._process is not None and self._process.alive else None
 
     def start(self) -> None:
         """Begin to start it, once."""
@@ -89,24 +83,7 @@ class HillBus:
 
     def statistics(self, camera: str) -> CameraStatistics:
         """What one of its cameras did."""
-        data = self.ask("statistics", camera=camera)["statistics"]
-        data["last_packets"] = {int(pulse): HostNs(moment) for pulse, moment in data["last_packets"].items()}
-        return CameraStatistics(**data)
-
-    def begin_stop(self) -> None:
-        """Ask it to end."""
-        if self._process is not None:
-            self._process.begin_stop()
-
-    def stop(self) -> None:
-        """End it."""
-        if self._process is not None:
-            self._process.stop()
-            self._process = None
-
-    def _running(self) -> CameraProcess:
-        assert self._process is not None, "started"  # noqa: S101  (SimulatedHill starts all before it does anything else)
-        return self._process
+        return CameraStatistics.from_json(self.ask("statistics", camera=camera)["statistics"])
 
 
 class FireWireHillCamera:

@@ -1,26 +1,20 @@
 """A simulated GigE Vision camera of the hill: one process."""
 
-from rig.clocks import HostNs
-from simrig.camera_process import CameraProcess
+from simrig.camera_process import ProcessOwner
 from simrig.faults import ON_GIGE, Fault
 from simrig.gige.config import CameraConfig
 from simrig.gige.counters import GigeStatistics
 from simrig.hill_camera import Launch
 
 
-class GigeHillCamera:
+class GigeHillCamera(ProcessOwner):
     """See `simrig.hill_camera.HillCamera`."""
 
     kinds = ON_GIGE
 
     def __init__(self, config: CameraConfig, launch: Launch) -> None:
+        super().__init__()
         self._config, self._launch = config, launch
-        self._process: CameraProcess | None = None
-
-    @property
-    def pid(self) -> int | None:
-        """See `HillCamera`."""
-        return self._process.pid if self._process is not None and self._process.alive else None
 
     @property
     def killed(self) -> bool:
@@ -65,21 +59,4 @@ class GigeHillCamera:
 
     def statistics(self) -> GigeStatistics:
         """See `HillCamera`."""
-        data = self._running().ask({"command": "statistics"})["statistics"]
-        data["last_packets"] = {int(pulse): HostNs(moment) for pulse, moment in data["last_packets"].items()}
-        return GigeStatistics(**data)
-
-    def begin_stop(self) -> None:
-        """See `HillCamera`."""
-        if self._process is not None:
-            self._process.begin_stop()
-
-    def stop(self) -> None:
-        """See `HillCamera`."""
-        if self._process is not None:
-            self._process.stop()
-            self._process = None
-
-    def _running(self) -> CameraProcess:
-        assert self._process is not None, "started"  # noqa: S101  (SimulatedHill starts all before it does anything else)
-        return self._process
+        return GigeStatistics.from_json(self._running().ask({"command": "statistics"})["statistics"])

@@ -51,18 +51,21 @@ def stored_triplets(reader: LogReader) -> list[StoredTriplet]:
     return found
 
 
-def liveliest(reader: LogReader, triplets: Sequence[StoredTriplet], count: int) -> list[StoredTriplet]:
+def liveliest(
+    reader: LogReader, triplets: Sequence[StoredTriplet], count: int, samples: int = _SAMPLES
+) -> list[StoredTriplet]:
     """`count` triplets spread evenly over the stretch in which most moves; over all of them if nothing does.
 
-    Looks at small images of a few hundred pulses spread over the log, then at those of the stretch that it has found.
+    Looks at small images of at most `samples` pulses spread over the log, then at as many of the stretch that it has
+    found: what moves for a shorter time than lies between two of them may be overlooked.
     """
-    places = _evenly(len(triplets), _SAMPLES)
+    places = _evenly(len(triplets), samples)
     if len(places) <= count:
         return [triplets[place] for place in places]
     background = _background(reader, [triplets[place] for place in _evenly(len(triplets), _BACKGROUND_SAMPLES)])
     first, last = _lively_run(_activity(reader, [triplets[place] for place in places], background))
     begin, end = places[max(0, first - 1)], places[min(len(places) - 1, last + 1)]
-    closer = [begin + place for place in _evenly(end - begin + 1, _SAMPLES)]
+    closer = [begin + place for place in _evenly(end - begin + 1, samples)]
     first, last = _lively_run(_activity(reader, [triplets[place] for place in closer], background))
     begin, end = closer[first], closer[last]
     missing = max(0, count - (end - begin + 1))

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.activity import stored_triplets
+from recorder.activity import liveliest, stored_triplets
 from recorder.catalogue_entry import Entry, LogState, read_entry, with_changes
 from recorder.log_items import Chunk
 from recorder.log_reader import ForeignFileError, LogReader, tag_of
@@ -20,6 +20,7 @@ from recorder.raw_image import pixels, view_image
 from recorder.session_changes import session_changes, write_session_changes
 from recorder.trash import SUFFIX, Trash
 from rig.errors import LogDamagedError, StorageError, SvevError
+from rig.frame import FrameStatus
 from rig.tag import TripletTag
 from rig.topics import TAG
 
@@ -28,6 +29,8 @@ _ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", re.ASCII)
 _PATIENCE: Final = 10
 #: So many logs' places of images are kept.
 _PLACES_MAX: Final = 4
+#: So many images are looked at, twice, to find the one that stands for a recording: a flight lasts some tenths of it.
+_SAMPLES: Final = 24
 
 _FileKey = tuple[int, int, int]
 
@@ -125,6 +128,27 @@ class Catalogue:
                 raise LogDamagedError(
                     f"{path}: the image of pulse {pulse} is damaged ({error}); see the others with `svev verify`"
                 ) from None
+
+    def liveliest_pulse(self, recording: str) -> int:
+        """The pulse that shows best what a recording is: amid the stretch in which most moves, complete if any is.
+
+        Raises:
+            UnknownRecordingError: there is no such recording, or no camera delivered a frame.
+            BadInputError: it cannot be read.
+            LogDamagedError: one of the images that were looked at is damaged.
+        """
+        path = self._path(recording)
+        with LogReader(path, skim=True) as reader:
+            stored = stored_triplets(reader)
+            shown = [triplet for triplet in stored if triplet.tag.complete] or [
+                triplet for triplet in stored if any(camera.status is FrameStatus.OK for camera in triplet.tag.cameras)
+            ]
+            if not shown:
+                raise UnknownRecordingError(f"recording {recording} has no image: no camera delivered one")
+            try:
+                return liveliest(reader, shown, 3, _SAMPLES)[len(shown[:3]) // 2].tag.pulse
+            except ValueError as error:
+                raise LogDamagedError(f"{path}: an image is damaged ({error}); see which with `svev verify`") from None
 
     def change_session(self, recording: str, changes: Mapping[str, str]) -> Entry:
         """Set some fields of a recording's session; beside the log, which stays as it is.

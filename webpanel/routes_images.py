@@ -11,9 +11,8 @@ from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import FileResponse
 from numpy.typing import NDArray
 
-from recorder.catalogue import Catalogue, UnknownRecordingError
+from recorder.catalogue import Catalogue
 from recorder.catalogue_entry import LogState
-from rig.frame import FrameStatus
 from webpanel.api_errors import Responses, jpeg_answer, refusals
 from webpanel.models import Pulses
 from webpanel.preview import to_jpeg
@@ -52,7 +51,7 @@ class Contents:
         return await anyio.to_thread.run_sync(self._jpeg, recording_id, pulse, camera, width, limiter=self._readers)
 
     async def thumbnail(self, recording_id: str) -> tuple[bytes, bool]:
-        """The triplet in the middle; whether it will stay this one."""
+        """The triplet that stands for the recording; whether it will stay this one."""
         return await anyio.to_thread.run_sync(self._thumbnail, recording_id, limiter=self._readers)
 
     def _pulses(self, recording_id: str) -> Pulses:
@@ -72,12 +71,7 @@ class Contents:
 
     def _thumbnail(self, recording_id: str) -> tuple[bytes, bool]:
         final = self._catalogue.entry(recording_id).state is LogState.CLOSED
-        pulses = self._pulses(recording_id).pulses
-        ok = [pulse for pulse in pulses if all(status is FrameStatus.OK for status in pulse.statuses)]
-        some = ok or [pulse for pulse in pulses if FrameStatus.OK in pulse.statuses]
-        if not some:
-            raise UnknownRecordingError(f"recording {recording_id} has no image: no camera delivered one")
-        return self._jpeg(recording_id, some[len(some) // 2].pulse, None, _THUMBNAIL_WIDTH), final
+        return self._jpeg(recording_id, self._catalogue.liveliest_pulse(recording_id), None, _THUMBNAIL_WIDTH), final
 
 
 def images_router(service: RigService, catalogue: Catalogue, downloads: Streams) -> APIRouter:
@@ -132,7 +126,7 @@ def images_router(service: RigService, catalogue: Catalogue, downloads: Streams)
     @router.get(
         "/recordings/{recording_id}/thumbnail.jpg",
         response_class=Response,
-        responses=jpeg_answer("The triplet in the middle, 480 columns wide.") | refusals(404),
+        responses=jpeg_answer("A triplet in which most moves, 480 columns wide.") | refusals(404),
     )
     async def get_thumbnail(recording_id: RecordingId) -> Response:
         """A small picture of a recording."""

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from recorder.catalogue import Catalogue
 from recorder.contact_sheet import write_contact_sheet
 from recorder.log_writer import LogWriter
 from recorder.triplet_buffers import TripletBuffers
@@ -46,6 +47,17 @@ def test_the_pulses_shown_are_those_in_which_something_moves(tmp_path: Path) -> 
     assert pulses == sorted(set(pulses))
     assert 149 <= pulses[0] <= 153
     assert 176 <= pulses[-1] <= 180
+
+
+def test_the_pulse_that_stands_for_a_recording_is_one_in_which_something_moves(tmp_path: Path) -> None:
+    _write_scene(tmp_path / "log.mcap", 300, range(240, 270), lost=range(250, 256))
+    assert Catalogue(tmp_path).liveliest_pulse("log") in {*range(240, 250), *range(256, 270)}
+
+
+@pytest.mark.parametrize("pulses", [1, 2, 3])
+def test_a_pulse_stands_for_a_short_recording_too(tmp_path: Path, pulses: int) -> None:
+    _write_scene(tmp_path / "log.mcap", pulses, range(0))
+    assert Catalogue(tmp_path).liveliest_pulse("log") in range(1, pulses + 1)
 
 
 def test_lost_frames_are_no_motion(tmp_path: Path) -> None:

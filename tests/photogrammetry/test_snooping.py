@@ -39,7 +39,9 @@ def _spoilt(network: Network, row: int, error: tuple[float, float]) -> Network:
         (29, 7, (237.5, -183.3)),  # the end of a rod, so that the block is turned wrongly to begin with
         (65, 4, (293.5, -62.2)),
         (66, 56, (299.8, 11.9)),
-        (77, 2, (-256.9, -155.0)),  # a distance was accused instead
+        (77, 2, (-256.9, -155.0)),  # a distance was accused instead,
+        (91, 1, (-269.7, -131.4)),  # and here
+        (111, 52, (270.9, -128.8)),
     ],
 )
 def test_300_px_in_a_weak_network_without_start_values(seed: int, row: int, error: tuple[float, float]) -> None:

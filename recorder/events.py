@@ -1,6 +1,7 @@
 """Events of a recording: arm, start, stop, fault, recovery; in the log, on ZeroMQ and for people."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -48,6 +49,15 @@ class Event:
             "name": self.name,
             "message": self.message,
         }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "Event":
+        """Read what `to_json` wrote.
+
+        Raises:
+            KeyError, ValueError: the data is no event.
+        """
+        return cls(UtcNs(int(data["time_ns"])), Level(data["level"]), data["name"], data["message"])
 
     def to_protobuf(self) -> bytes:
         """The form of the log, a serialized `foxglove.Log`."""

@@ -1,8 +1,9 @@
 """The recorder process's loop: rings in, log and publication out, commands and reports over the control channel.
 
 Commands: `{"command": "start", "path", "recording", "session", "pulses", "seconds", "preroll_s", "rig_toml"}`,
-`{"command": "stop"}`, `{"command": "camera_gone", "camera", "reason"}`, `{"command": "quit"}`. Reports carry `report`:
-`ready`, `camera`, `warm`, `started`, `progress`, `health`, `finished`, `failed`.
+`{"command": "stop"}`, `{"command": "camera_gone", "camera", "reason"}`, `{"command": "event", ...}` with the JSON
+of an event, `{"command": "quit"}`. Reports carry `report`: `ready`, `camera`, `warm`, `started`, `progress`, `health`,
+`finished`, `failed`.
 """
 
 import os
@@ -144,6 +145,8 @@ class RecorderLoop:
                 self._recordings.stop()
             case "camera_gone":
                 self._assembler.disconnected(message["camera"], message["reason"], host_now())
+            case "event":
+                self._recordings.happened(Event.from_json(message))
             case "quit":
                 self._quit = True
 

@@ -141,9 +141,9 @@ class RigProcesses:
         """When the recorder was started, on the monotonic clock, s."""
         return self._processes[RECORDER].started
 
-    def tell(self, command: Message) -> None:
-        """Send a command to the recorder."""
-        self._processes[RECORDER].control.send(command)
+    def tell(self, command: Message, *, or_drop: bool = False) -> None:
+        """Send a command to the recorder; if `or_drop`, not to one that does not read."""
+        self._processes[RECORDER].control.send(command, or_drop=or_drop)
 
     def kill_recorder(self) -> None:
         """End a recorder that does not answer; the next turn tells its death."""

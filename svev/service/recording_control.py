@@ -30,8 +30,7 @@ class RecordingControl:
         rig_toml: the rig file's text, attached to every log.
         data: where logs go.
         machine: moved between armed and recording.
-        session: has the recorder.
-        tell: is told what happens.
+        session: has the recorder, and is told what happens.
 
     Attributes:
         current: the recording in progress or being opened.
@@ -47,10 +46,9 @@ class RecordingControl:
         data: Path,
         machine: StateMachine,
         session: RigSession,
-        tell: Callable[[Event], None],
     ) -> None:
         self._rig, self._rig_toml, self._data = rig, rig_toml, data
-        self._machine, self._session, self._tell = machine, session, tell
+        self._machine, self._session = machine, session
         self.current: RecordingInProgress | None = None
         self.last: str | None = None
         self.notice: Statement | None = None
@@ -181,4 +179,4 @@ class RecordingControl:
             self._answers.append(current.end)
 
     def _say(self, level: Level, text: str) -> None:
-        self._tell(Event.now(level, "service", text))
+        self._session.tell(Event.now(level, "service", text))

@@ -21,7 +21,7 @@ class RigSession:
 
     Args:
         rig: the rig.
-        on_event: is told of cameras and processes, from the thread that turns the processes.
+        on_event: is told of cameras and processes, from the thread that turns the processes, and of what `tell` tells.
         on_done: called from the background when something is done, to wake the supervisor.
         recorder: more configuration for the recorder.
         inherit: descriptors that the recorder inherits for it.
@@ -57,6 +57,12 @@ class RigSession:
     def empty(self) -> bool:
         """Nothing runs, nothing is being done, and no simulated hill is held."""
         return not self.busy and self.processes is None and self._hill is None
+
+    def tell(self, event: Event) -> None:
+        """Tell of an event, also the recorder, if there is one: it publishes it and writes it into its log."""
+        self._on_event(event)
+        if self.processes is not None:
+            self.processes.tell({"command": "event", **event.to_json()}, or_drop=True)
 
     def begin_set_up(self) -> None:
         """Start everything."""

@@ -78,7 +78,7 @@ class Supervisor:
         self.commands = Commands()
         self._machine = StateMachine(self._moved)
         self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder or {}, inherit=inherit)
-        self.recordings = RecordingControl(rig, rig_toml, data, self._machine, self._session, hub.tell)
+        self.recordings = RecordingControl(rig, rig_toml, data, self._machine, self._session)
         self._fault = Fault()
         self._wanted = False
         self._settling, self._watch = Settling(), RecorderWatch()
@@ -225,7 +225,7 @@ class Supervisor:
         for message in processes.turn(_TURN_S, (self.commands.bell,)):
             self._hear(message)
         if not processes.recorder_died and self._watch.stuck(processes):
-            self._hub.tell(Event.now(Level.FATAL, RECORDER, f"no sign of life for {STUCK_S:g} s: it is ended"))
+            self._session.tell(Event.now(Level.FATAL, RECORDER, f"no sign of life for {STUCK_S:g} s: it is ended"))
             processes.kill_recorder()
 
     def _hear(self, message: Message) -> None:
@@ -263,13 +263,13 @@ class Supervisor:
             return
         if self._machine.state is not State.FAULT:
             self._machine.move(State.FAULT)
-        self._hub.tell(Event.now(Level.FATAL, RECORDER, text))
+        self._session.tell(Event.now(Level.FATAL, RECORDER, text))
 
     def _moved(self, before: State, to: State) -> None:
         self._dirty = True
         level = Level.ERROR if to is State.FAULT else Level.INFO
         why = f": {self._fault.statement.text}" if to is State.FAULT and self._fault.statement else ""
-        self._hub.tell(Event.now(level, "service", f"{before} -> {to}{why}"))
+        self._session.tell(Event.now(level, "service", f"{before} -> {to}{why}"))
 
     def _refresh(self) -> Status:
         self._dirty, self._pictured = False, time.monotonic()

@@ -1,8 +1,15 @@
 """What others see of an armed service: metrics, the live log, the doctor, pictures."""
 
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 
+import zmq
+
+from recorder.events import Event
+from recorder.log_reader import LogReader
+from rig.rigfile import load_rig
+from rig.topics import EVENTS
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
@@ -49,3 +56,30 @@ def test_an_armed_service_can_be_watched(tmp_path: Path, loopback: Loopback) -> 
         saved = service.post("/api/recordings", {"duration_s": 0})
         ended = service.post(f"/api/recordings/{saved['id']}/stop")
         assert 55 <= ended["counts"]["pulses"] <= 66, "the two seconds that were held"
+
+
+def test_arming_and_starting_stand_in_the_log_and_on_zeromq(tmp_path: Path, loopback: Loopback) -> None:
+    rig = write_rig(tmp_path, "sim", loopback)
+    published: list[str] = []
+    with (
+        zmq.Context() as context,
+        context.socket(zmq.SUB) as subscriber,
+        serving(tmp_path, rig, loopback, "--preroll", "5") as service,
+    ):
+        subscriber.subscribe(b"event")
+        subscriber.connect(load_rig(rig).network.publish)
+
+        def heard(text: str) -> bool:
+            while subscriber.poll(0):
+                published.append(json.loads(subscriber.recv_multipart()[1])["message"])
+            return any(text in message for message in published)
+
+        service.arm()
+        recording = service.post("/api/recordings", {"duration_s": 0.5})
+        wait_until(lambda: heard("recording -> armed"), "the end of the recording is published", PATIENCE_S)
+        path = service.data / f"{recording['id']}.mcap"
+    assert any("armed -> recording" in message for message in published)
+    with LogReader(path) as reader:
+        events = [Event.from_protobuf(m.data).message for m in reader.messages(EVENTS.name) if m.data is not None]
+    assert any("arming -> armed" in text for text in events), "the pre-roll reaches back to the arming"
+    assert any("armed -> recording" in text for text in events)

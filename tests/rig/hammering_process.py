@@ -1,8 +1,9 @@
-"""A process that writes preview images as fast as it can, until its standard input ends.
+"""A process that writes preview images thousands of times a second, until its standard input ends.
 
 python -m tests.rig.hammering_process FD
 
-Image number n is of one grey value, n % 251, its time is n, and its statuses go round with n.
+Image number n is of one grey value, n % 251, its time is n, and its statuses go round with n. Between two images it
+pauses for none to a few tenths of a millisecond: a reader that needs longer than that for a copy finds no whole one.
 """
 
 import select
@@ -15,6 +16,7 @@ from rig.frame import FrameStatus
 from rig.preview import PreviewSlot
 
 KINDS = tuple(FrameStatus)
+_PAUSE_S = 2e-4
 
 
 def _main(fd: int) -> None:
@@ -22,7 +24,7 @@ def _main(fd: int) -> None:
     slot.take_over()
     pixels = np.zeros(slot.shape, np.uint8)
     number = 0
-    while not select.select([sys.stdin], [], [], 0)[0]:
+    while not select.select([sys.stdin], [], [], number % 4 * _PAUSE_S)[0]:
         number += 1
         pixels.fill(number % 251)
         slot.write(number, HostNs(number), (KINDS[number % len(KINDS)],) * slot.cameras, pixels, HostNs(number))

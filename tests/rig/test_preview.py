@@ -49,7 +49,7 @@ def test_a_reader_never_sees_two_images_in_one(slot: PreviewSlot) -> None:
         deadline = time.monotonic() + 60
         while len(seen) < IMAGES and time.monotonic() < deadline:
             image = slot.read()
-            if image is None:  # hammered without a pause there may be no moment of rest
+            if image is None:  # no whole one within the reader's patience
                 continue
             assert set(np.unique(image.pixels)) == {image.pulse % 251}
             assert image.time == image.pulse

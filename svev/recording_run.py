@@ -11,6 +11,7 @@ from rig.control import Message
 from rig.errors import BadInputError
 from rig.settings import RigSettings
 from svev import console
+from svev.room import bytes_per_s, usable_bytes
 from svev.running_rig import RunningRig
 
 
@@ -43,9 +44,8 @@ def check_room(directory: Path, rig: RigSettings, seconds: float) -> None:
     Raises:
         BadInputError: it does not.
     """
-    rows, columns = rig.triplet_shape
-    needed = rows * columns * rig.trigger.rate_hz * seconds / 1e9
-    room = shutil.disk_usage(directory).free / 1e9 - rig.recorder.reserve_gb
+    needed = bytes_per_s(rig) * seconds / 1e9
+    room = usable_bytes(rig, shutil.disk_usage(directory).free) / 1e9
     if needed > room:
         raise BadInputError(
             f"{directory}: {seconds:g} s need {needed:.2f} GB, but there is room for {max(0.0, room):.2f} GB beside "

@@ -17,13 +17,13 @@ from photogrammetry.protocol.adjusted import adjusted_sections
 from photogrammetry.protocol.document import Protocol
 from photogrammetry.protocol.page import write_protocol
 from photogrammetry.start_values.search import complete
-from svev.commands.delivery import deliver
+from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver
 from svev.commands.weights import PaperOption, ReweightOption, with_weights
 
 
 def adjust(
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1)")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")],
+    output: OutputOption,
     reweight: ReweightOption = False,
     paper: PaperOption = False,
     snoop: Annotated[
@@ -41,12 +41,8 @@ def adjust(
         list[str] | None,
         typer.Option("--datum", help="give the sigmas of a free network in the datum of these points; repeatable"),
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="end with one JSON object: the result without its lists")
-    ] = False,
+    report: ReportOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Adjust a network of images: bundle adjustment with covariance, tests and variance components.
 

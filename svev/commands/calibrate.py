@@ -10,18 +10,14 @@ from photogrammetry.network_file import read_network
 from photogrammetry.procedures.calibration import calibrate as calibrate_network
 from photogrammetry.protocol.calibration import calibration_lines, calibration_protocol, calibration_to_json
 from photogrammetry.protocol.page import write_protocol
-from svev.commands.delivery import deliver
+from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver
 
 
 def calibrate(
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with images of the frame")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")],
-    report: Annotated[
-        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="end with one JSON object: the result without its lists")
-    ] = False,
+    output: OutputOption,
+    report: ReportOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Calibrate cameras: free adjustment of a frame of unknown targets with self-calibration.
 

@@ -1,14 +1,18 @@
-"""What commands that adjust a network have in common: result file, words, exit code."""
+"""What commands that adjust a network have in common: options of the outcome, result file, words, exit code."""
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
 from photogrammetry.adjustment.result_file import failure_to_json, write_result
 from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
+
+OutputOption = Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")]
+ReportOption = Annotated[Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")]
+JsonOption = Annotated[bool, typer.Option("--json", help="end with one JSON object: the result without its lists")]
 
 _NOT_SOLVABLE: Final = 3
 _NOT_CONVERGED: Final = 4

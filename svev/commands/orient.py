@@ -12,7 +12,7 @@ from photogrammetry.procedures.calibrated_cameras import read_calibration, with_
 from photogrammetry.procedures.orientation import orient as orient_network
 from photogrammetry.protocol.orientation import orientation_lines, orientation_protocol, orientation_to_json
 from photogrammetry.protocol.page import write_protocol
-from svev.commands.delivery import deliver
+from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver
 from svev.commands.weights import PaperOption, ReweightOption, with_weights
 
 
@@ -25,7 +25,7 @@ class Alternative(StrEnum):
 
 def orient(
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with reference points")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")],
+    output: OutputOption,
     calibration: Annotated[
         Path | None,
         typer.Option("--calibration", help="result of a calibration; the network's own cameras if left out"),
@@ -36,12 +36,8 @@ def orient(
     moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names")] = "H*",
     reweight: ReweightOption = False,
     paper: PaperOption = False,
-    report: Annotated[
-        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="end with one JSON object: the result without its lists")
-    ] = False,
+    report: ReportOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Estimate the cameras' poses from reference points, with a search for gross errors in three stages.
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 from rig.control import Message
 from rig.settings import RigSettings
 from svev.rig_processes import CameraPresence
+from svev.room import Room
 from svev.service.pulse_rate import PulseRate
-from svev.service.room import Room
 from svev.service.state_machine import Phase
 from svev.service.statements import about_camera, about_state, camera_state, process_restarted
 from webpanel.models import (

@@ -12,10 +12,10 @@ from rig.control import Message
 from rig.errors import BadInputError, ProcessDiedError, StorageError, SvevError
 from rig.settings import RigSettings
 from svev.recording_run import new_log_path
+from svev.room import check_room_for
 from svev.running_rig import reported_error
 from svev.service.recording import RecordingInProgress
 from svev.service.rig_session import RigSession
-from svev.service.room import check_room_for
 from svev.service.state_machine import StateMachine
 from svev.service.statements import FORBIDDEN, recording_ended
 from webpanel.models import Recording, RecordingOrder, SessionChange, State, Statement

@@ -17,6 +17,7 @@ from rig.control import Message
 from rig.errors import ProcessDiedError, SvevError
 from rig.settings import RigSettings
 from svev.rig_processes import RECORDER
+from svev.room import free_bytes, room_for
 from svev.running_rig import reported_error
 from svev.service.commands import Commands
 from svev.service.event_hub import EventHub
@@ -25,7 +26,6 @@ from svev.service.picture import Facts, picture
 from svev.service.recorder_watch import STUCK_S, RecorderWatch
 from svev.service.recording_control import RecordingControl
 from svev.service.rig_session import RigSession
-from svev.service.room import free_bytes, room_for
 from svev.service.settling import Settling
 from svev.service.state_machine import StateMachine
 from svev.service.statements import FORBIDDEN

@@ -13,12 +13,12 @@ from recorder.events import Event, Level
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, ProcessDiedError, StorageError
 from svev.back_off import BackOff
+from svev.room import check_room_for, room_for
 from svev.service.commands import Commands
 from svev.service.data_lock import data_lock
 from svev.service.event_hub import EventHub
 from svev.service.journal import log_line
 from svev.service.pulse_rate import PulseRate
-from svev.service.room import check_room_for, room_for
 from tests.support.rigs import SIM
 
 

@@ -26,11 +26,20 @@ class Room:
     jumps: int
 
 
-def room_for(rig: RigSettings, free_bytes: int) -> Room:
-    """What fits into free bytes beside the reserve, all cameras delivering at the rig's rate."""
+def usable_bytes(rig: RigSettings, free_bytes: int) -> float:
+    """What may be recorded into free bytes beside the reserve; less than 0 if that is short already."""
+    return free_bytes - rig.recorder.reserve_gb * _GB
+
+
+def bytes_per_s(rig: RigSettings) -> float:
+    """What a recording takes, all cameras delivering at the rig's rate."""
     rows, columns = rig.triplet_shape
-    usable = max(0.0, free_bytes - rig.recorder.reserve_gb * _GB)
-    seconds = usable // (rows * columns * rig.trigger.rate_hz)
+    return rows * columns * rig.trigger.rate_hz
+
+
+def room_for(rig: RigSettings, free_bytes: int) -> Room:
+    """What fits into free bytes."""
+    seconds = max(0.0, usable_bytes(rig, free_bytes)) // bytes_per_s(rig)
     return Room(free_bytes, seconds, int(seconds / rig.recorder.jump_s))
 
 

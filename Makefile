@@ -1,5 +1,5 @@
-# Svev. `make demo` and `make test` do all their own set-up on a fresh Debian 12; the second time it takes no time.
-# ARGS goes to the program behind the target:  make test ARGS="tests/rig -x"   make demo ARGS="--seconds 5"
+# Svev. `make demo` and `make test` set up everything that they need on a fresh Debian 12, the first time.
+# ARGS is passed to the program that the target runs:  make test ARGS="tests/rig -x"   make demo ARGS="--seconds 5"
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -10,7 +10,7 @@ SHELL := /bin/bash
 ARGS ?=
 PREFIX ?= /usr/local
 BIN := .venv/bin
-# pip: only its errors are shown (-qq); locked versions with hashes, nothing else.
+# pip shows only errors (-qq), and installs only locked versions with hashes.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 VENV := .venv/.setup-venv
 LOCKED := .venv/.setup-locked
@@ -30,7 +30,9 @@ bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)
 
 test: setup $(NPM) ## all tests
-	@$(BIN)/pytest -n 2 $(ARGS)
+	@$(BIN)/pytest -n 2 $(ARGS) || { status=$$?; test $$status = 1 || exit $$status; \
+	  echo "what failed is tried once more, one test at a time, on the now quiet machine"; \
+	  $(BIN)/pytest --last-failed --last-failed-no-failures none $(ARGS); }
 
 check: style test ## what CI does before it tries the wheel: format, lint, types, layers, tests
 
@@ -46,7 +48,7 @@ wheel: setup ## build a wheel and try it in an empty environment outside the che
 install: setup ## the program and its systemd service, into PREFIX (as root: /usr/local)
 	@systemd/install "$(PREFIX)"
 
-uninstall: ## remove both from PREFIX; configuration and recordings stay
+uninstall: ## remove both from PREFIX; keep configuration and recordings
 	@systemd/uninstall "$(PREFIX)"
 
 lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
@@ -54,12 +56,12 @@ lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 	@build/uv/bin/uv pip compile pyproject.toml --group dev --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file requirements.lock $(ARGS)
 
-clean: ## remove everything that make made; recordings stay
+clean: ## remove everything that make made; keep recordings
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	rm -rf tests/*/npm/node_modules
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Set-up. A stamp is made when its step is done, so an interrupted step starts over.
+# Set-up. Each step makes a stamp file when it is done, so that an interrupted step is repeated.
 setup: $(SVEV)
 
 system:

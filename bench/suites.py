@@ -5,17 +5,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bench.adjustment import run_adjustment
-from bench.api import run_api
-from bench.capture import run_capture
-from bench.firewire import run_firewire
-from bench.gstreamer import SINKS
-from bench.intersection import run_intersection
-from bench.loads import LOADS
-from bench.parts import run_parts
-from bench.planning import run_planning
+from bench.photogrammetry.adjustment import run_adjustment
+from bench.photogrammetry.intersection import run_intersection
+from bench.photogrammetry.planning import run_planning
+from bench.recording.capture import run_capture
+from bench.recording.firewire import run_firewire
+from bench.recording.gstreamer import SINKS
+from bench.recording.loads import LOADS
+from bench.recording.parts import run_parts
 from bench.results import write_results
-from svev.subscriber import free_address
+from bench.service.api import run_api
+from recorder.publishing.subscriber import free_address
 
 Suite = Callable[[float, Path], dict[str, Any]]
 

@@ -1,8 +1,8 @@
-"""The grabber's loop: one camera, its ring, and nothing else.
+"""The loop of a grabber process: fetches the frames of one camera into its ring.
 
-It opens the camera, reads its clock against the host's, and queues one record per arrival. When the camera fails,
-or the recorder asks for it because the camera fell silent, it tears the camera down, sets it up from scratch and
-begins a new epoch; it never gives up and never blocks the other cameras.
+The grabber opens the camera, reads the camera's clock against the host's, and queues one record per arrival. When the
+camera fails, or falls silent so that the recorder asks for a new connection, the grabber closes the camera, opens it
+again from scratch and begins a new epoch. It never gives up, and never blocks the other cameras.
 """
 
 import os
@@ -14,7 +14,7 @@ from capture.seam import Arrival, Camera, OpenCamera
 from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.frame import NO_SLOT, Record, RecordKind
-from rig.ring import CameraRing
+from rig.transport.ring import CameraRing
 
 _LATCHES_AT_START: Final = 16
 _LATCH_EVERY_NS: Final = NS_PER_S // 4
@@ -25,15 +25,15 @@ _RETRY_S: Final = 0.5
 
 
 class Grabber:
-    """Drives one camera until told to stop.
+    """Drives one camera until it is told to stop.
 
     Args:
         open_camera: connects and configures the camera from scratch.
-        ring: where frames and records go; the only writer.
+        ring: where frames and records go; the grabber is its only writer.
         doorbell: eventfd that wakes the recorder.
-        period_ns: of the pulses.
+        period_ns: time between two pulses.
         stopping: tells whether the loop shall end; asked at least every 50 ms while the camera answers.
-        stop_fd: becomes readable when `stopping` may have changed, so that waiting for a retry ends at once.
+        stop_fd: becomes readable when `stopping` may have changed, so that the wait for a retry ends at once.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Grabber:
         stop_fd: int,
     ) -> None:
         self._open, self._ring, self._doorbell = open_camera, ring, doorbell
-        # If the camera delivers after all, a frame comes within this time.
+        # A camera that delivers after all has a frame within this time.
         self._last_look_s = _RECEIVE_S + 1.5 * period_ns / NS_PER_S
         self._stopping, self._stop_fd = stopping, stop_fd
         self._epoch = 0
@@ -55,7 +55,7 @@ class Grabber:
         self._last_failure = ""
 
     def run(self) -> None:
-        """Grab until told to stop."""
+        """Fetch frames until told to stop."""
         self._ring.reclaim()
         while not self._stopping():
             try:
@@ -72,7 +72,7 @@ class Grabber:
                 camera.close()
 
     def _stream(self, camera: Camera) -> None:
-        """One epoch: from a fresh connection to its end."""
+        """Fetch the frames of one epoch: from a fresh connection to its end."""
         self._epoch += 1
         self._last_failure = ""
         asked = self._ring.reconnect_requests()
@@ -89,11 +89,11 @@ class Grabber:
             if arrival is not None:
                 self._put_arrival(arrival)
             elif requests != asked:
-                # Asked before we looked once more: the camera is silent, not we were late.
+                # The recorder asked, then we looked once more and found nothing: the camera is silent, we are not late.
                 raise CameraError("no frame while the other cameras have theirs; connecting again")
             asked = requests
-            # Clock and counters are read just after a frame, when the next one is farthest away and the camera is sure
-            # to answer: a dead one blocks for seconds. Without pulses they are read all the same, but not at once.
+            # Clock and counters are read just after a frame: the next one is farthest away, and the camera is sure to
+            # answer (a dead one blocks for seconds). Without pulses they are read after a second of quiet.
             now = host_now()
             last_arrival = now if arrival is not None else last_arrival
             if arrival is None and now < last_arrival + _QUIET_NS:
@@ -124,7 +124,7 @@ class Grabber:
         self._queue(Record(RecordKind.LATCH, self._epoch, time, device_time=device, value=round_trip))
 
     def _report_failure(self, reason: str) -> None:
-        """Say it once, not at every retry."""
+        """Report a failure once, not at every retry."""
         if reason != self._last_failure:
             self._put(RecordKind.DISCONNECTED, text=reason)
         self._last_failure = reason

@@ -1,7 +1,7 @@
-"""The seam between the grabber and whatever delivers frames.
+"""What every camera back end offers to the grabber: the `Camera` protocol, and the `Arrival` that it hands over.
 
-A back end writes frames into slots of the camera's ring that it takes itself (`CameraRing.take_slot`), and hands
-out one `Arrival` per frame. One conformance suite runs over every back end.
+A back end takes free slots of the camera's ring itself (`CameraRing.take_slot`), writes frames into them, and returns
+one `Arrival` per frame. One conformance suite (`tests/capture/test_conformance.py`) runs over every back end.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,17 +14,17 @@ from rig.frame import NO_SLOT, StampedPixels
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """Something arrived from a camera.
+    """A frame, whole or damaged, that came from a camera.
 
     Attributes:
-        whole: a whole frame. If not, ids are meaningless and there are no pixels.
-        host_time: when it was handed over.
+        whole: the frame is whole. A damaged one has no pixels, and its ids mean nothing.
+        host_time: when the back end handed it over.
         slot: slot of the ring that holds the pixels; the caller queues or returns it.
-        frame_id: block id or frame counter.
+        frame_id: block id (GigE Vision) or frame counter (IIDC).
         id_modulus: how many different ids there are, 0 if they never wrap.
-        device_time: device clock at the trigger; of a damaged frame only about so, 0 if it cannot be told.
+        device_time: device clock at the trigger; for a damaged frame an estimate, or 0 if it is not known.
         trigger_count: the camera's own count of triggers, -1 if it has none.
-        stamped: pixels that are no picture but the camera's signature.
+        stamped: pixels that carry the camera's signature instead of the picture.
     """
 
     whole: bool
@@ -42,11 +42,11 @@ class Camera(Protocol):
 
     @property
     def description(self) -> str:
-        """Vendor, model, serial number, and what was set, in one line for people."""
+        """Vendor, model, serial number and settings, in one line for people."""
         ...
 
     def start(self) -> None:
-        """Begin to take frames.
+        """Begin to take frames, from the next pulse on.
 
         Raises:
             CameraError: the camera refuses.
@@ -57,10 +57,10 @@ class Camera(Protocol):
         """Wait for the next arrival, at most `timeout_s` seconds.
 
         Returns:
-            None if nothing came, which is healthy while there are no pulses.
+            None if nothing came, which is no error while there are no pulses.
 
         Raises:
-            CameraError: the camera is gone or refuses; close it and open a new one.
+            CameraError: the camera is gone or fails; close it and open a new one.
         """
         ...
 
@@ -73,15 +73,15 @@ class Camera(Protocol):
         ...
 
     def counters(self) -> Mapping[str, int]:
-        """What the back end has counted, by the names of `rig.ring.COUNTERS`."""
+        """Totals of the back end, by the names of `rig.transport.ring.COUNTERS`."""
         ...
 
     def notices(self) -> Sequence[str]:
-        """What happened since the last call that people should find in the event log, one line each."""
+        """Messages since the last call that belong in the event log, one line each."""
         ...
 
     def close(self) -> None:
-        """Stop and let go of the camera. Takes a bounded time and never raises."""
+        """Stop and release the camera. Takes a bounded time and never raises."""
         ...
 
 

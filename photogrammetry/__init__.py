@@ -1,1 +1,1 @@
-"""Calibration, pose estimation, intersection: the paper's photogrammetry as pure functions."""
+"""Photogrammetry for the three cameras: calibration, pose estimation, intersection, planning; numpy and scipy alone."""

@@ -1,1 +1,1 @@
-"""The shared vocabulary: settings, pulse, frame, tag, clocks, errors, topics, shared-memory ring."""
+"""The vocabulary that all rooms share: settings, pulse, frame, tag, clocks, status, errors, topics, transport."""

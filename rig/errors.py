@@ -1,7 +1,7 @@
-"""The error tree, split by what the caller does next.
+"""Errors that a person can act on, as a tree that is split by what the caller does next.
 
-Every message is one line that names what is wrong and ends in what to do about it. The command line prints
-it without a traceback and exits with `exit_code`.
+Every message is one line that names what is wrong and ends in what to do about it. The command line prints the message
+without a traceback and exits with `exit_code`.
 """
 
 
@@ -12,7 +12,7 @@ class SvevError(Exception):
 
 
 class BadInputError(SvevError):
-    """What was handed in is wrong: a file, a key, an option, an address. Correct it and call again."""
+    """A file, key, option or address given by the caller is wrong: correct it and call again."""
 
     exit_code = 2
 
@@ -28,7 +28,7 @@ class CameraError(SvevError):
 
 
 class StorageError(SvevError):
-    """The log cannot be written any further: disk full, device gone. What is written stays readable."""
+    """The log cannot be written any further (disk full, device gone). What is written stays readable."""
 
     exit_code = 4
 
@@ -40,10 +40,22 @@ class ProcessDiedError(SvevError):
 
 
 class LogDamagedError(SvevError):
-    """A log that is truncated or inconsistent; what could be read has been reported."""
+    """A log was not closed or is damaged; what could be read has been reported."""
 
     exit_code = 3
 
 
 class LogTruncatedError(BadInputError):
-    """A log that ends in the middle of a record: a part of a file, not what a recorder leaves behind."""
+    """A log ends in the middle of a record: an incomplete copy, since a recorder never leaves a log like that."""
+
+
+class UnknownRecordingError(SvevError):
+    """The recording does not exist, or has no such pulse."""
+
+
+class StateForbidsError(SvevError):
+    """The service refuses the call in its present state; the message says what to do instead."""
+
+
+class StillRecordingError(StateForbidsError):
+    """The caller asked for the log of a recording in progress."""

@@ -1,7 +1,7 @@
-"""What a grabber process says about a camera: the records that travel beside the pixels.
+"""The records in which a grabber process describes frames and events of its camera to the recorder.
 
-The pixels stay in the slot of the camera's ring (`rig.ring`); a `Record` of fixed size names the slot and
-carries ids and times. Records of one camera are in order; nothing is ever paired by that order.
+The pixels stay in a slot of the camera's ring (`rig.transport.ring`); a `Record` of fixed size names the slot and
+carries ids and times. Records of one camera are in order, but frames are never paired by that order.
 """
 
 import struct
@@ -12,24 +12,24 @@ from rig.clocks import DeviceNs, HostNs
 
 
 class FrameStatus(StrEnum):
-    """What became of one pulse in one camera. Four ways to fail, four different facts."""
+    """What became of one pulse in one camera; a frame can fail to come in four different ways."""
 
     OK = "ok"
     LOST = "lost"  #: the camera took the frame, the transfer lost it
     MISSED = "missed"  #: the camera did not see the pulse
     DAMAGED = "damaged"  #: the frame came, but not whole; its pixels are not used
-    ABSENT = "absent"  #: the camera was not there
+    ABSENT = "absent"  #: the camera was not connected
 
 
 class RecordKind(IntEnum):
-    """Meaning of a record."""
+    """What a record tells of."""
 
     FRAME = 1  #: a whole frame in `slot`; ids and times valid; `value` = `StampedPixels.to_value`, 0 if there are none
-    DAMAGED = 2  #: something arrived that is no whole frame; believe `host_time`, and `device_time` if `value` is 1
-    LATCH = 3  #: clock reading: `device_time`, `host_time`, `value` = round trip in ns
-    CONNECTED = 4  #: camera (re)configured and streaming; a new epoch begins; `text` says what it is
-    DISCONNECTED = 5  #: camera gone, epoch over; `text` says why
-    NOTICE = 6  #: something for the event log; `text` says what
+    DAMAGED = 2  #: a frame that is not whole; only `host_time` is valid, and `device_time` if `value` is 1
+    LATCH = 3  #: a clock reading: `device_time`, `host_time`, `value` = round trip in ns
+    CONNECTED = 4  #: the camera is set up and streams; a new epoch begins; `text` describes the camera
+    DISCONNECTED = 5  #: the camera is gone, the epoch is over; `text` says why
+    NOTICE = 6  #: a message for the event log, in `text`
 
 
 NO_SLOT = 0xFFFFFFFF
@@ -40,12 +40,12 @@ RECORD_BYTES = _LAYOUT.size
 
 @dataclass(frozen=True, slots=True)
 class StampedPixels:
-    """Pixels of a frame that carry the camera's signature instead of the picture.
+    """Pixels of a frame that hold a signature of the camera instead of the picture.
 
     Attributes:
-        row: of the frame.
-        column: the first of them.
-        count: how many, to the right.
+        row: row of the frame.
+        column: first column.
+        count: number of pixels, to the right.
     """
 
     row: int
@@ -53,30 +53,30 @@ class StampedPixels:
     count: int
 
     def to_value(self) -> int:
-        """As one number, for `Record.value`."""
+        """The three numbers packed into one, for `Record.value`."""
         return self.row << 32 | self.column << 16 | self.count
 
     @classmethod
     def from_value(cls, value: int) -> "StampedPixels | None":
-        """Read what `to_value` gave; None for 0."""
+        """Unpack the number that `to_value` made; None for 0."""
         return cls(value >> 32, value >> 16 & 0xFFFF, value & 0xFFFF) if value else None
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One entry of a camera's descriptor queue.
+    """One entry of a camera's record queue.
 
     Attributes:
-        kind: what the record means.
+        kind: what the record tells of.
         epoch: number of the connection, 1 for the first; ids and device times of different epochs are unrelated.
+        host_time: host clock when the record was made, ns.
         slot: slot of the ring that holds the pixels, `NO_SLOT` if none.
         frame_id: the camera's block id (GigE Vision) or frame counter (IIDC).
-        id_modulus: how many different ids there are (65535 for 16-bit block ids, which skip 0); 0: never wraps.
-        device_time: device clock at the trigger, ns; of a damaged frame, if at all, only about so.
-        host_time: host clock when the record was made, ns.
+        id_modulus: number of different ids (65535 for 16-bit block ids, which skip 0); 0: the ids never wrap.
+        device_time: device clock at the trigger, ns; approximate for a damaged frame, if valid at all.
         trigger_count: the camera's own count of triggers seen, -1 if it has none.
         value: see `RecordKind`.
-        text: for people; cut at 176 bytes.
+        text: message for people; cut at 176 bytes.
     """
 
     kind: RecordKind
@@ -91,7 +91,7 @@ class Record:
     text: str = ""
 
     def pack_into(self, buffer: memoryview, offset: int) -> None:
-        """Write the record to `buffer` at `offset`; it takes `RECORD_BYTES`."""
+        """Write the record into `buffer` at `offset`; it takes `RECORD_BYTES`."""
         text = self.text.encode()[:TEXT_BYTES].decode(errors="ignore").encode()
         _LAYOUT.pack_into(
             buffer, offset, self.kind, 0, 0, self.epoch, self.slot, self.id_modulus,

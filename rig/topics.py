@@ -1,4 +1,4 @@
-"""The one table of topics that publisher, recorder, replay and panel read."""
+"""Names of topics, schemas, metadata and attachments, in the log and on ZeroMQ: the one table of them."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,13 +6,13 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """One channel of the log and its twin on ZeroMQ.
+    """One channel of the log and the corresponding topic on ZeroMQ.
 
     Attributes:
-        name: channel of the MCAP log.
+        name: name of the channel in the MCAP log.
         schema: name of the message schema.
         encoding: encoding of the messages in the log.
-        live: topic of the ZeroMQ message, None where the topic is not published on its own.
+        live: topic on ZeroMQ; None: not published on its own.
     """
 
     name: str

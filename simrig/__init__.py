@@ -1,1 +1,1 @@
-"""The simulated hill: scenario, jumper, renderer, camera simulators, faults."""
+"""The simulated hill: a scenario, the jumper and the images that it shows, simulated cameras of both buses, faults."""

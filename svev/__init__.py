@@ -1,4 +1,4 @@
-"""The front door: command line, composition of the running system, process table."""
+"""The command line `svev`, and what only it needs: doctor, demonstration, composition of the service."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""`python -m svev` is the same as `svev`."""
+"""Makes `python -m svev` the same as `svev`."""
 
 import sys
 

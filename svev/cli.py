@@ -1,8 +1,8 @@
-"""The command line: `svev COMMAND`.
+"""The command line `svev COMMAND`: finds the command, runs it, turns errors into one line and an exit code.
 
 Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, `doctor` found a FAIL, or a network is not solvable,
 4 storage failed or an adjustment did not converge, 5 a camera failed, 6 one of our processes died, 130 interrupted.
-Errors are one line; `--debug` anywhere shows the traceback.
+`--debug` anywhere on the command line shows the traceback of an error.
 """
 
 import sys
@@ -16,29 +16,29 @@ import typer
 from rig.errors import SvevError
 from svev import console
 
-#: In the order of the help: module in `svev.commands`, and what stands for the command there. Only the module of the
-#: command that is called is imported: `svev ctl` answers at once, and the service carries no photogrammetry around.
+#: Commands in the order of the help: module in `svev.commands`, function in it, one line of help. Only the module of
+#: the called command is imported, so that `svev ctl` starts at once and the service does not load photogrammetry.
 _COMMANDS: Final = {
-    "demo": ("demo", "demo"),
-    "record": ("record", "record"),
-    "serve": ("serve", "serve"),
-    "ctl": ("ctl", "app"),
-    "doctor": ("doctor", "doctor"),
-    "info": ("info", "info_command"),
-    "recover": ("recover", "recover_command"),
-    "replay": ("replay", "replay_command"),
-    "schema": ("schema", "schema"),
-    "verify": ("verify", "verify_command"),
-    "adjust": ("adjust", "adjust"),
-    "calibrate": ("calibrate", "calibrate"),
-    "orient": ("orient", "orient"),
-    "plan": ("plan", "plan"),
-    "bench": ("bench", "bench"),
+    "demo": ("recording", "demo", "Record jumps on the simulated hill; needs no camera."),
+    "record": ("recording", "record", "Record once with the cameras of a rig file."),
+    "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
+    "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
+    "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
+    "info": ("logs", "info_command", "Say what a log holds."),
+    "recover": ("logs", "recover_command", "Repair a log that was not closed or is damaged."),
+    "replay": ("replay", "replay_command", "Publish a log again, as it was published live."),
+    "schema": ("setup", "schema", "Print the JSON schema of rig files."),
+    "verify": ("logs", "verify_command", "Check every byte of a log."),
+    "adjust": ("adjust", "adjust", "Adjust a network of images (bundle adjustment)."),
+    "calibrate": ("calibrate", "calibrate", "Calibrate cameras with images of a 3D frame."),
+    "orient": ("orient", "orient", "Estimate the poses of the cameras on the hill."),
+    "plan": ("plan", "plan", "Predict the accuracy of planned cameras."),
+    "bench": ("bench", "bench", "Measure how fast this computer records."),
 }
 
 
 def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
-    """The command line with these commands."""
+    """Make the command line with the commands `names`."""
     app = typer.Typer(
         name="svev",
         help="Live capture and photogrammetry for three synchronized cameras at a ski jump.",
@@ -50,12 +50,12 @@ def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
     )
     app.callback()(_every_command)
     for name in names:
-        module, attribute = _COMMANDS[name]
+        module, attribute, short_help = _COMMANDS[name]
         command = getattr(import_module(f"svev.commands.{module}"), attribute)
         if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
+            app.add_typer(command, name=name, short_help=short_help)
         else:
-            app.command(name)(command)
+            app.command(name, short_help=short_help)(command)
     return app
 
 
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        The exit code, see the module's description.
+        The exit code, see the docstring of this module.
     """
     argv = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in argv
@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # --help, a wrong option, or a command that ends with a code of its own
         return end.code if isinstance(end.code, int) else 1
     except BrokenPipeError:
-        # Whoever read our output went away; there is nobody left to tell.
+        # The reader of our output has gone: a message would reach nobody.
         sys.stderr.close()
         return 1
     except (SvevError, OSError) as error:
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _one_line(error: SvevError | OSError) -> str:
-    """The error for people: what is wrong and what to do."""
+    """The error as one line: what is wrong and what to do."""
     if isinstance(error, SvevError):
         return str(error)
     return f"{error.filename or 'system call'}: {error.strerror}; check the path and its permissions"

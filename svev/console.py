@@ -1,4 +1,4 @@
-"""What the commands print: plain lines, progress on long work, one JSON object with `--json`."""
+"""Prints what commands say: lines for people, a progress bar for long work, one JSON object with `--json`."""
 
 import json
 import sys
@@ -10,18 +10,18 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-#: People read this one; with `--json` standard output belongs to the JSON object alone.
+#: For people; with `--json` only the JSON object goes to standard output.
 _stderr = Console(stderr=True, highlight=False, soft_wrap=True)
 _stdout = Console(highlight=False, soft_wrap=True)
 
 
 def say(line: str, *, aside: bool = False) -> None:
-    """Print one line for people; `aside` sends it to standard error (commentary beside a `--json` result)."""
+    """Print one line for people; `aside`: on standard error, beside a result on standard output."""
     (_stderr if aside else _stdout).print(line, markup=False)
 
 
 def say_marked(mark: str, style: str, line: str) -> None:
-    """Print one indented line for people behind a coloured mark, e.g. PASS."""
+    """Print one indented line for people after a coloured mark, e.g. PASS."""
     _stdout.print(Text.assemble("  ", (mark, style), "  ", line))
 
 
@@ -32,20 +32,20 @@ def print_json(result: dict[str, Any]) -> None:
 
 
 def complain(line: str) -> None:
-    """Print one line of error."""
+    """Print an error as one line on standard error."""
     _stderr.print(f"svev: {line}", style="bold red", markup=False)
 
 
 @contextmanager
 def progress(label: str, total: int | None) -> Iterator[Callable[[int], None]]:
-    """A progress bar on standard error; silent when that is no terminal.
+    """Show a progress bar on standard error; show nothing if that is not a terminal.
 
     Args:
-        label: what is going on.
+        label: the work, in a few words.
         total: number of steps, None if unknown.
 
     Yields:
-        A function that is told how many steps are done so far.
+        A function to call with the number of steps done so far.
     """
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=_stderr, disable=not _stderr.is_terminal, transient=True) as bar:

@@ -1,23 +1,25 @@
-"""The main job on the simulated hill: record a few jumps, publish, count, verify, show."""
+"""Runs the demonstration on the simulated hill: records, publishes, checks the log, writes pictures and truth."""
 
+import json
 import socket
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
-from recorder.contact_sheet import write_contact_sheet
-from recorder.verify import verify
-from rig.clocks import host_now
-from rig.control import Message
+from analysis.images.contact_sheet import write_contact_sheet
+from recorder.checking.verify import verify
+from recorder.publishing.subscriber import free_address, subscriber
+from recorder.reading.triplets import triplets
 from rig.errors import BadInputError
-from rig.rigfile import CONFIG, load_rig
-from rig.settings import RigSettings
-from svev.recording_run import new_log_path, run_recording
-from svev.running_rig import RunningRig
-from svev.simulation import environment, simulated_hill
-from svev.subscriber import Subscriber, free_address
-from svev.truth_file import write_truth
+from rig.pulse import HillPulse, PulseNumber
+from rig.settings.file import CONFIG, load_rig
+from rig.settings.model import RigSettings
+from service.headless import HeadlessRig, record
+from service.recordings.storage import new_log_path
+from simrig.images import stamp
+from simrig.world.scenario import load_scenario
+from simrig.world.truth import truth
+from svev import console
 
 Bus = Literal["gige", "firewire", "sim"]
 
@@ -31,41 +33,75 @@ _GVCP_PORT: Final = 3956
 _BLOCKS: Final = 64
 
 
-def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) -> Message:
-    """Record for `seconds` on the simulated hill, with a subscriber that counts.
+def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) -> dict[str, Any]:
+    """Record for `seconds` on the simulated hill, with a subscriber that counts the triplets.
+
+    Args:
+        bus: how the simulated cameras are connected.
+        seconds: length of the recording.
+        out: folder for the files.
+        say: prints a line for people.
 
     Returns:
-        The recording's result, what the subscriber counted, the verdict, and the files made.
+        The recording's result, what the subscriber counted, the verdict of the check, and paths of the files.
     """
     rig_file = CONFIG / "rigs" / _RIGS[bus]
     rig = _on_free_addresses(load_rig(rig_file))
     path = new_log_path(out)
-    epoch = host_now()
-    with ExitStack() as stack:
-        hill = stack.enter_context(simulated_hill(rig, epoch))
-        say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
-        running = stack.enter_context(
-            RunningRig(rig, rig_file.read_text(encoding="utf-8"), say, epoch, environment(hill))
-        )
-        subscriber = stack.enter_context(Subscriber(rig.network.publish))
-        session = {"session": "demo", "athlete": "simulated jumper"}
-        result = run_recording(running, rig, path, seconds, allow_absent=False, session=session)
-        counted = subscriber.count()
+    say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
+    with HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running:
+        running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+        with subscriber(rig.network.publish) as count_received:
+            session = {"session": "demo", "athlete": "simulated jumper"}
+            result = record(running, rig, path, seconds, allow_absent=False, session=session, progress=console.progress)
+            counted = count_received()
     say("checking the log")
     report = verify(path)
-    sheet, truth = path.with_suffix(".png"), write_truth(path, rig)
+    sheet = path.with_suffix(".png")
     write_contact_sheet(path, sheet)
     return result | {
         "rate_hz": rig.trigger.rate_hz,
-        "subscriber": counted,
+        "subscriber": {name: getattr(counted, name) for name in ("received", "missing", "bytes", "latency_ms")},
         "verdict": report.verdict,
         "contact_sheet": str(sheet),
-        "truth": str(truth),
+        "truth": str(_write_truth(path, rig)),
     }
 
 
+def hill_pulses(log: Path, rig: RigSettings) -> dict[PulseNumber, set[HillPulse]]:
+    """For each pulse of a recording, the hill's pulses that its frames were stamped with; more than one is a mix-up."""
+    columns = rig.columns()
+    found: dict[PulseNumber, set[HillPulse]] = {}
+    for tag, image in triplets(log):
+        stamps = [
+            stamp.read(image[:, first:end])
+            for (first, end), camera in zip(columns, tag.cameras, strict=True)
+            if camera.status == "ok"
+        ]
+        found[tag.pulse] = {seen.pulse for seen in stamps if seen is not None}
+    return found
+
+
+def _write_truth(log: Path, rig: RigSettings) -> Path:
+    """Write `LOG.truth.json`: what the cameras really saw, by pulse number of the log.
+
+    Returns:
+        The path of the file.
+    """
+    if rig.simulation is None:
+        raise ValueError("only the simulated hill knows the truth")
+    scenario = load_scenario(rig.simulation.scenario)
+    of_recording = {pulse: min(hill) for pulse, hill in hill_pulses(log, rig).items() if hill}
+    region = rig.cameras[0].region
+    content = truth(scenario, of_recording.values(), rig.trigger.rate_hz, (region.width, region.height))
+    content["hill_pulse_of_recording"] = {str(pulse): hill for pulse, hill in of_recording.items()}
+    path = log.with_suffix(".truth.json")
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
 def _on_free_addresses(rig: RigSettings) -> RigSettings:
-    """The rig with a port of its own for publication and, if they are taken, other loopback addresses."""
+    """The rig with a free port for publication and, if its loopback addresses are in use, with other ones."""
     network = rig.network.model_copy(update={"publish": free_address()})
     for block in range(_BLOCKS):
         cameras = tuple(

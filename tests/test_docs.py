@@ -16,15 +16,26 @@ from _pytest.mark.structures import ParameterSet
 from typer.core import TyperGroup
 
 from svev import cli
+from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
-from tests.svev.service.serving import Serving, serving
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 SOURCES = [
     path
-    for room in ("svev", "webpanel", "recorder", "capture", "triggering", "simrig", "rig")
+    for room in (
+        "svev",
+        "webpanel",
+        "service",
+        "analysis",
+        "recorder",
+        "photogrammetry",
+        "capture",
+        "triggering",
+        "simrig",
+        "rig",
+    )
     for path in (ROOT / room).rglob("*.py")
 ]
 FENCE = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)

@@ -1,1 +1,1 @@
-"""The control panel: REST API and web page. It talks to the service through `rig_service`, never to a camera."""
+"""The control panel: REST API and web page. It operates the rig through `service.seam`, and never sees a camera."""

@@ -1,9 +1,8 @@
-"""The web application: puts routes, guard and page together."""
+"""The web application of the panel: puts routes, guard, documentation and page together."""
 
 import mimetypes
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Final
@@ -11,55 +10,34 @@ from typing import Final
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from recorder.catalogue import Catalogue
-from webpanel.access import Access
-from webpanel.api_errors import COMMON
-from webpanel.changes import Changes
+from service.seam import RigService
 from webpanel.documentation import DESCRIPTION, serve_documentation
-from webpanel.guard import Door, Guard
-from webpanel.metrics import CountRequests, Metrics
-from webpanel.preview import PreviewFeed
+from webpanel.door.access import Access
+from webpanel.door.guard import Guard
+from webpanel.door.logins import Door
+from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
-from webpanel.rig_service import RigService
-from webpanel.routes_events import events_router
-from webpanel.routes_images import images_router
-from webpanel.routes_login import login_router
-from webpanel.routes_observing import observing_router
-from webpanel.routes_preview import preview_router
-from webpanel.routes_recordings import recordings_router
-from webpanel.routes_rig import rig_router
-from webpanel.streams import Streams
+from webpanel.routes.common import COMMON
+from webpanel.routes.contents import contents_router
+from webpanel.routes.events import Changes, events_router
+from webpanel.routes.login import login_router
+from webpanel.routes.observing import CountRequests, Metrics, observing_router
+from webpanel.routes.preview import preview_router
+from webpanel.routes.recordings import recordings_router
+from webpanel.routes.rig import rig_router
 
-_EVENT_STREAMS_MAX = 32
-_PREVIEW_STREAMS_MAX = 16
-_DOWNLOADS_MAX = 8  # the disk is there for recording first
-#: The types of the page's files, whatever the computer's own table says.
+#: The media types of the page's files; the computer's own table may lack some or have others.
 _TYPES: Final = {
     ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".png": "image/png",
     ".json": "application/json", ".webmanifest": "application/manifest+json", ".woff2": "font/woff2",
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class OpenStreams:
-    """The long answers, by kind; `end` the endless ones before the server shuts down."""
-
-    events: Streams = field(default_factory=lambda: Streams(_EVENT_STREAMS_MAX))
-    previews: Streams = field(default_factory=lambda: Streams(_PREVIEW_STREAMS_MAX))
-    downloads: Streams = field(default_factory=lambda: Streams(_DOWNLOADS_MAX))
-
-    def end(self) -> None:
-        """Have those end that have no end."""
-        self.events.end()
-        self.previews.end()
-
-
-def create_app(service: RigService, catalogue: Catalogue, access: Access) -> FastAPI:
+def create_app(service: RigService, access: Access) -> FastAPI:
     """The panel of one running service.
 
     Args:
-        service: what operates the rig.
-        catalogue: its recordings, for reading.
+        service: operates the rig.
         access: who may reach the panel.
 
     Returns:
@@ -83,9 +61,9 @@ def create_app(service: RigService, catalogue: Catalogue, access: Access) -> Fas
     app.add_middleware(CountRequests, metrics=metrics)
     routers = (
         rig_router(service),
-        recordings_router(service, catalogue, changes),
-        images_router(service, catalogue, streams.downloads),
-        preview_router(PreviewFeed(service), streams.previews),
+        recordings_router(service, changes),
+        contents_router(service, streams.downloads),
+        preview_router(service, streams.previews),
         events_router(service, changes, streams.events),
         login_router(door),
         observing_router(service, metrics),

@@ -1,4 +1,4 @@
-"""The API's own documentation at `/docs`: Swagger UI from this computer, nothing from elsewhere."""
+"""The documentation of the API at `/docs`: Swagger UI, served from this computer, for a hill without internet."""
 
 from importlib.resources import files
 from typing import Any, Final
@@ -7,15 +7,16 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import Response
 
-from webpanel.access import Access
-from webpanel.models import Event, Problem
+from rig.status import Event
+from webpanel.door.access import Access
+from webpanel.problems import Problem
 
 DESCRIPTION: Final = """
 Operates the three-camera rig and its recordings. Times are UTC. Unknown fields and parameters are refused.
 
 Every error is a problem (RFC 9457, `application/problem+json`): `code` is stable, `detail` says what to do.
 """
-#: Swagger UI draws its icons as data: images and sets styles as it goes.
+#: Swagger UI draws its icons as data: images and sets styles from scripts.
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'"
@@ -31,7 +32,7 @@ _ASSETS: Final = {
 
 
 def serve_documentation(app: FastAPI, access: Access) -> None:
-    """Add the pages, and have the schema complete."""
+    """Add the pages, and complete the schema."""
     for path, (package, name, media_type) in _ASSETS.items():
         app.get(path, include_in_schema=False)(_asset(package, name, media_type))
 
@@ -54,7 +55,7 @@ def _asset(package: str, name: str, media_type: str) -> Any:
 def _schema(app: FastAPI, access: Access) -> dict[str, Any]:
     schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
     components = schema.setdefault("components", {})
-    for model in (Problem, Event):  # no call returns these as such
+    for model in (Problem, Event):  # no route returns these by themselves
         described = model.model_json_schema(ref_template="#/components/schemas/{model}")
         components["schemas"] |= described.pop("$defs", {}) | {model.__name__: described}
     if access.token is not None:

@@ -1,23 +1,38 @@
-"""Every refusal and failure as problem details (RFC 9457), also what the web framework refuses by itself."""
+"""Refusals and failures as problem details (RFC 9457), also those of the web framework; headers of every answer."""
 
 import re
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
+from typing import Final
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.routing import APIRoute
+from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from recorder.catalogue import UnknownRecordingError
-from rig.errors import BadInputError, StorageError, SvevError
-from webpanel.models import FieldError, Problem
-from webpanel.rig_service import StateForbidsError
-from webpanel.security_headers import SECURITY_HEADERS
+from rig.errors import BadInputError, StateForbidsError, StorageError, SvevError, UnknownRecordingError
+from rig.status import Model
 
+_PAGE_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
+    "font-src 'self'; manifest-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+)
+#: What every answer forbids the browser to do, unless the answer sets the header itself.
+SECURITY_HEADERS: Final = {
+    "content-security-policy": _PAGE_POLICY,
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=()",
+}
+#: Headers of an answer that does not pass through the guard, and behind which the server closes the connection.
+CLOSING: Final = {**SECURITY_HEADERS, "Connection": "close"}
 MEDIA_TYPE = "application/problem+json"
-#: The statuses of our own errors; the first class that fits.
+#: The status of an error of ours: that of the first class in the table that it belongs to.
 _STATUSES: tuple[tuple[type[SvevError], HTTPStatus], ...] = (
     (UnknownRecordingError, HTTPStatus.NOT_FOUND),
     (StateForbidsError, HTTPStatus.CONFLICT),
@@ -25,22 +40,42 @@ _STATUSES: tuple[tuple[type[SvevError], HTTPStatus], ...] = (
     (StorageError, HTTPStatus.INSUFFICIENT_STORAGE),
     (SvevError, HTTPStatus.SERVICE_UNAVAILABLE),
 )
-#: What to do about the errors that the framework raises.
+#: The advice for errors that the framework raises.
 _ADVICE = {
     HTTPStatus.NOT_FOUND: "there is nothing at this address; see /docs",
     HTTPStatus.METHOD_NOT_ALLOWED: "this address does not take this method; see the Allow header",
 }
 
 
+class FieldError(Model):
+    """One thing that is wrong in a request."""
+
+    where: str = Field(examples=["body.duration_s"])
+    text: str = Field(examples=["Input should be greater than or equal to 0"])
+
+
+class Problem(BaseModel):
+    """Problem details (RFC 9457); `code` is stable, `detail` says what to do."""
+
+    type: str = "about:blank"
+    title: str
+    status: int
+    detail: str
+    instance: str = ""
+    code: str
+    errors: tuple[FieldError, ...] = Field((), description="with status 422: what is wrong, one by one")
+
+
 class ProblemError(Exception):
-    """A refusal that is made in the panel itself; handled here, never seen outside."""
+    """A refusal by the panel itself; it becomes an answer and never leaves the panel."""
 
     def __init__(self, status: HTTPStatus, code: str, detail: str, headers: Mapping[str, str] | None = None) -> None:
         super().__init__(detail)
-        self.status = status
-        self.code = code
-        self.detail = detail
-        self.headers = headers
+        self._arguments = status, code, detail, headers
+
+    def answer(self) -> JSONResponse:
+        """The refusal as an answer."""
+        return problem(*self._arguments)
 
 
 def problem(
@@ -50,7 +85,7 @@ def problem(
     headers: Mapping[str, str] | None = None,
     errors: tuple[FieldError, ...] = (),
 ) -> JSONResponse:
-    """The answer that says no: what is wrong, and in `detail` what to do."""
+    """The answer to a request that is refused or failed; `detail` says what to do."""
     body = Problem(title=status.phrase, status=status, detail=detail, code=code, errors=errors)
     return JSONResponse(
         body.model_dump(mode="json", exclude_defaults=True) | {"type": body.type}, status, headers, MEDIA_TYPE
@@ -58,19 +93,17 @@ def problem(
 
 
 def handle_errors(app: FastAPI, routes: Iterable[APIRoute]) -> None:
-    """Have all errors of an application answered as problems.
+    """Answer all errors of an application with problems.
 
     Args:
         app: the application.
-        routes: all that there are, so that who uses a wrong method is told all right ones.
+        routes: all routes, to tell a client that uses a wrong method which methods are right.
     """
     table = list(routes)
-    # The answer to an unforeseen error passes no middleware, and the server closes the connection behind it.
-    closing = {**SECURITY_HEADERS, "Connection": "close"}
 
     @app.exception_handler(ProblemError)
     async def _panel(_: Request, error: ProblemError) -> JSONResponse:
-        return problem(error.status, error.code, error.detail, error.headers)
+        return error.answer()
 
     @app.exception_handler(SvevError)
     async def _svev(_: Request, error: SvevError) -> JSONResponse:
@@ -80,7 +113,7 @@ def handle_errors(app: FastAPI, routes: Iterable[APIRoute]) -> None:
     @app.exception_handler(HTTPException)
     async def _framework(request: Request, error: HTTPException) -> JSONResponse:
         status = HTTPStatus(error.status_code)
-        if status is HTTPStatus.BAD_REQUEST:  # text that no JSON parser can do anything with
+        if status is HTTPStatus.BAD_REQUEST:  # no JSON parser can read it, e.g. broken UTF-8
             return problem(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid_request", "the body is no JSON: correct it")
         headers = dict(error.headers or {})
         if status is HTTPStatus.METHOD_NOT_ALLOWED:
@@ -99,11 +132,11 @@ def handle_errors(app: FastAPI, routes: Iterable[APIRoute]) -> None:
         detail = (
             f"an error in svev itself ({type(error).__name__}): try again; what happened stands in the service's log"
         )
-        return problem(HTTPStatus.INTERNAL_SERVER_ERROR, "internal_error", detail, closing)
+        return problem(HTTPStatus.INTERNAL_SERVER_ERROR, "internal_error", detail, CLOSING)
 
 
 def code_of(error: SvevError) -> str:
-    """The stable name of an error: its class, e.g. `state_forbids`."""
+    """The stable name of an error, from the name of its class: e.g. `state_forbids`."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", type(error).__name__.removesuffix("Error")).lower()
 
 

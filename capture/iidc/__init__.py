@@ -1,1 +1,1 @@
-"""FireWire cameras (IIDC) through libdc1394 2.2 as the distribution ships it."""
+"""FireWire cameras (IIDC) through libdc1394 2.2."""

@@ -1,6 +1,7 @@
-"""The advanced registers of AVT's cameras (Marlin technical manual, chapter "Advanced features").
+"""What AVT's cameras can do beyond the standard: sign frames, count triggers, set the exposure in microseconds.
 
-Offsets are relative to 0xFFFFF1000000. Bit 0 of the standard is the most significant; it says that a register is there.
+Source: Marlin technical manual, chapter "Advanced features". Offsets are relative to 0xFFFFF1000000. Bits are counted
+from the most significant one, as in the standard; bit 0 of a register says whether the camera has it.
 """
 
 from typing import Final
@@ -21,14 +22,14 @@ _STEPS: Final = 4095  # of the ordinary shutter
 
 
 class AvtRegisters:
-    """What AVT's cameras can do beyond the standard.
+    """The advanced registers of a camera.
 
     Args:
         device: an open camera of any maker.
 
     Attributes:
-        signs: it can write a secure image signature.
-        extended_shutter: its exposure can be set in microseconds.
+        signs: the camera can write a secure image signature.
+        extended_shutter: the exposure can be set in microseconds.
     """
 
     def __init__(self, device: Device) -> None:
@@ -39,34 +40,34 @@ class AvtRegisters:
         self.extended_shutter = avt and self._has(_EXTENDED_SHUTTER)
 
     def sign_last_line(self) -> None:
-        """Cycle time, frame and trigger counter into the last line's first pixels; both counters begin at 0.
+        """Write cycle time, frame and trigger counter into the first pixels of the last line; set both counters to 0.
 
-        In the last line, because after any lost packet it is no longer where it should be.
+        In the last line, because any lost packet moves it.
         """
         self._device.write_advanced(_SIGNATURE, _ON | _LAST_LINE)
         for counter in (_FRAME_COUNTER, _TRIGGER_COUNTER):
             self._device.write_advanced(counter, _RESET | _ON | _LAST_LINE)
 
     def sign_nothing(self) -> None:
-        """All pixels are picture."""
+        """Switch the signature off: all pixels are picture."""
         for register in (_SIGNATURE, _FRAME_COUNTER, _TRIGGER_COUNTER):
             self._device.write_advanced(register, _LAST_LINE)
 
     def still_signs(self) -> bool:
-        """Whether the signature is still switched on as we did it."""
+        """Whether the signature is still switched on, in the last line."""
         return self._device.read_advanced(_SIGNATURE) & (_ON | _LAST_LINE) == _ON | _LAST_LINE
 
     def counters(self) -> tuple[int, int]:
-        """Frames read out of the sensor, trigger pulses seen."""
+        """Frames read out of the sensor, and trigger pulses seen."""
         frames = self._device.read_advanced(_FRAME_COUNTER + _COUNT)
         return frames, self._device.read_advanced(_TRIGGER_COUNTER + _COUNT)
 
     def set_extended_shutter(self, exposure_us: float) -> None:
-        """Exposure in microseconds. Inactive again after any change of format or rate: write it last."""
+        """Set the exposure in microseconds. Any change of format or rate cancels it: call this last."""
         self._device.write_advanced(_EXTENDED_SHUTTER, min(_LONGEST_US, max(1, round(exposure_us))))
 
     def shutter_steps(self, exposure_us: float, offset_us: float) -> int | None:
-        """The ordinary shutter's value for an exposure; None if it cannot be told or does not fit."""
+        """Value of the ordinary shutter register for an exposure; None if it is out of range or its step unknown."""
         if not (self._avt and self._has(_TIMEBASE)):
             return None
         number = self._device.read_advanced(_TIMEBASE) & 0xF
@@ -79,4 +80,4 @@ class AvtRegisters:
         try:
             return bool(self._device.read_advanced(register) & _PRESENT)
         except Dc1394Error:
-            return False  # older firmware answers with an address error: the register is not there
+            return False  # older firmware answers with an address error: it has no such register

@@ -1,8 +1,8 @@
-"""How much of a FireWire bus a camera takes, computed as libdc1394 and the bus do.
+"""Computes how much of a FireWire bus each camera needs, and refuses a rig whose cameras do not fit.
 
 Of each cycle of 125 us, 100 us may be isochronous: 4915 units, each the time of four bytes at 1600 Mbit/s. A camera
-sends one packet per cycle, with three quadlets of header and checksums. A rig must be refused before it starts:
-the kernel says only that no channel is to be had (libdc1394's error -7, not -8).
+sends one packet per cycle, with three quadlets of header and checksums. The rig must be checked before it starts,
+because the kernel reports a full bus only as a missing channel (libdc1394's error -7, not -8).
 """
 
 import math
@@ -10,21 +10,21 @@ from collections import defaultdict
 from dataclasses import dataclass
 from typing import Final
 
-from capture.iidc.cycle_time import CYCLE_NS
+from capture.iidc.clock import CYCLE_NS
 from capture.iidc.structures import VideoMode
 from rig.errors import BadInputError
-from rig.settings import CameraSettings, RigSettings
+from rig.settings.model import CameraSettings, RigSettings
 
 UNITS_PER_BUS: Final = 4915
 _OVERHEAD_QUADLETS: Final = 3
 _UNITS_PER_QUADLET: Final = {100: 16, 200: 8, 400: 4, 800: 2}
 #: IIDC's frame rates for fixed formats, in libdc1394's order; each fixes the packet size.
 FRAMERATES: Final = (1.875, 3.75, 7.5, 15.0, 30.0, 60.0, 120.0, 240.0)
-#: A pulse generator may be so much faster than a frame rate of the standard.
+#: A pulse generator may be faster than a frame rate of the standard by this factor.
 _FAST: Final = 1.01
-#: Share of the period in which a Format7 frame is sent, so that the next one never has to wait for it.
+#: A Format7 frame is sent within this share of the period, so that the next one never waits for it.
 _SHARE: Final = 0.9
-#: Formats that the standard fixes, by width and height: libdc1394's mode, and a frame's cycles at 30 fps.
+#: Formats that the standard fixes, by width and height: libdc1394's mode, and cycles per frame at 30 frames per second.
 FIXED_FORMATS: Final = {
     (640, 480): (VideoMode.MONO8_640X480, 240),
     (800, 600): (VideoMode.MONO8_800X600, 240),
@@ -36,7 +36,7 @@ FIXED_FORMATS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """What one camera takes.
+    """What one camera needs of its bus.
 
     Attributes:
         packet_bytes: payload of one packet.
@@ -50,21 +50,21 @@ class Need:
 
     @property
     def transport_ns(self) -> int:
-        """From the first packet of a frame to its last."""
+        """Time from the first packet of a frame to its last."""
         return self.packets * CYCLE_NS
 
 
 def is_fixed_format(camera: CameraSettings) -> bool:
-    """Whether the region is a whole image of a format that the standard fixes; anything else is Format7."""
+    """Whether the region is the whole image of a fixed format of the standard; any other region needs Format7."""
     region = camera.region
     return region.x == region.y == 0 and (region.width, region.height) in FIXED_FORMATS
 
 
 def framerate_index(rate_hz: float) -> int:
-    """Which of `FRAMERATES`: the slowest that is not slower than the pulses.
+    """Index in `FRAMERATES` of the slowest rate that is not slower than the pulses.
 
     Raises:
-        BadInputError: none is.
+        BadInputError: the pulses are faster than all of them.
     """
     for index, framerate in enumerate(FRAMERATES):
         if rate_hz <= framerate * _FAST:
@@ -73,13 +73,13 @@ def framerate_index(rate_hz: float) -> int:
 
 
 def need(camera: CameraSettings, rate_hz: float, *, fixed: bool | None = None, unit_bytes: int = 4) -> Need:
-    """What a camera takes of its bus.
+    """What a camera needs of its bus.
 
     Args:
         camera: its settings.
-        rate_hz: of the pulses.
-        fixed: whether it sends a fixed format; None: if its region is one.
-        unit_bytes: packets of Format7 are a multiple of this; the camera tells.
+        rate_hz: pulses per second.
+        fixed: whether it sends a fixed format; None: if its region is that of one.
+        unit_bytes: packets of Format7 are a multiple of this, which the camera tells.
     """
     if is_fixed_format(camera) if fixed is None else fixed:
         _, cycles_at_30 = FIXED_FORMATS[camera.region.width, camera.region.height]
@@ -96,10 +96,10 @@ def units(packet_bytes: int, iso_speed: int) -> int:
 
 
 def check_bandwidth(rig: RigSettings) -> None:
-    """Whether the FireWire cameras of a rig find room on their buses.
+    """Check that the FireWire cameras of a rig fit on their buses.
 
     Raises:
-        BadInputError: they do not.
+        BadInputError: they do not fit.
     """
     buses: dict[int, list[CameraSettings]] = defaultdict(list)
     for camera in rig.cameras:

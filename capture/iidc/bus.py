@@ -1,6 +1,6 @@
-"""Which FireWire cameras there are, and why one is not among them: four reasons, four remedies.
+"""Finds FireWire cameras, and tells why one is not found: no port, no permission, no camera at all, or another GUID.
 
-libdc1394 gives the same answer, an empty list, whether there is no FireWire port, no right to use it, or no camera.
+libdc1394 gives the same answer, an empty list, in the first three cases.
 """
 
 import ctypes
@@ -34,7 +34,7 @@ class Found:
 
 
 def guid_text(guid: int) -> str:
-    """As it stands on the camera's label and in the rig file."""
+    """A GUID as the camera's label and the rig file have it."""
     return f"{guid:016x}"
 
 
@@ -63,7 +63,7 @@ class Bus:
         self.close()
 
     def close(self) -> None:
-        """Let go of the library's view; idempotent."""
+        """Close the library's handle; a second call does nothing."""
         if self.handle:
             self.library.get("free", self.handle)
         self.handle = None
@@ -72,13 +72,13 @@ class Bus:
         """All cameras that answer.
 
         Raises:
-            CameraError: libdc1394 cannot look.
+            CameraError: libdc1394 cannot list them.
         """
         with self._camera_list() as found:
             return [Found(int(found.ids[i].guid), int(found.ids[i].unit)) for i in range(found.num)]
 
     def find(self, guid: int) -> Found:
-        """One camera.
+        """The camera with a GUID.
 
         Raises:
             CameraNotFoundError: it is not there; the message says why and what to do.
@@ -131,7 +131,7 @@ def _device_files(devices: Path) -> list[Path]:
 
 
 def _denied(devices: Path, sysfs: Path = _SYSFS) -> list[Path]:
-    """Devices at the other end of a cable that may not be used. The computer's own card need not be."""
+    """Device files of other devices than the computer's own card that this user may not open."""
     others = [path for path in _device_files(devices) if not _is_own_card(sysfs / path.name)]
     return [path for path in others if not os.access(path, os.R_OK | os.W_OK)]
 

@@ -1,4 +1,4 @@
-"""One open FireWire camera: libdc1394's calls that we use, typed. Knows nothing of rigs, rings or pulses."""
+"""One open FireWire camera: the calls of libdc1394 that we use, with types. Knows nothing of rigs, rings or pulses."""
 
 import ctypes
 from ctypes import byref, c_float, c_int, c_uint32, c_uint64
@@ -47,17 +47,17 @@ class Device:
         self.close()
 
     def close(self) -> None:
-        """Let go of it; its channel and bandwidth are free again. Idempotent."""
+        """Close the camera and free its channel and bandwidth; a second call does nothing."""
         if self.pointer:
             self._library.get("camera_free", self.pointer)
         self.pointer = None
 
     def call(self, name: str, *arguments: Any) -> None:
-        """`dc1394_<name>` of this camera."""
+        """Call `dc1394_<name>` for this camera."""
         self._library.call(name, self.pointer, *arguments)
 
     def file_descriptor(self) -> int:
-        """What becomes readable when a frame is complete or the bus was reset; -1 while capture is not set up."""
+        """Descriptor that is readable when a frame is complete or the bus was reset; -1 while capture is not set up."""
         return int(self._library.get("capture_get_fileno", self.pointer))
 
     @property
@@ -69,39 +69,39 @@ class Device:
 
     @property
     def has_advanced_registers(self) -> bool:
-        """Whether the maker has registers of its own."""
+        """Whether the camera has registers of its maker's own."""
         return bool(self.pointer.contents.advanced_features_csr)
 
     @property
     def vendor_id(self) -> int:
-        """IEEE number of the maker."""
+        """The maker's IEEE vendor id."""
         return int(self.pointer.contents.vendor_id)
 
     # -- transmission and bus ------------------------------------------------------------------------------------
 
     def set_transmission(self, *, on: bool) -> None:
-        """Let the camera send frames, or not."""
+        """Switch the sending of frames on or off."""
         self.call("video_set_transmission", int(on))
 
     def transmits(self) -> bool:
-        """Whether it sends frames."""
+        """Whether the camera sends frames."""
         return bool(self._int("video_get_transmission"))
 
     def set_iso_speed(self, mbit_s: int) -> None:
-        """Speed of the frames; more than 400 needs IEEE 1394b."""
+        """Set the speed at which frames are sent; more than 400 needs IEEE 1394b."""
         speed = IsoSpeed[f"S{mbit_s}"]
         mode = OperationMode.B_1394 if speed > IsoSpeed.S400 else OperationMode.LEGACY
         self.call("video_set_operation_mode", mode)
         self.call("video_set_iso_speed", speed)
 
     def cycle_timer(self) -> int:
-        """The bus's cycle timer, one word."""
+        """The cycle timer of the bus, one word."""
         word, utc_us = c_uint32(), c_uint64()
         self.call("read_cycle_timer", byref(word), byref(utc_us))
         return word.value
 
     def bandwidth_units(self) -> int:
-        """What the frames take of the bus, as the camera is set now."""
+        """Bandwidth units that the camera needs with its present settings."""
         return self._u32("video_get_bandwidth_usage")
 
     # -- picture -------------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ class Device:
         return [int(mode) for mode in modes.modes[: modes.num]]
 
     def framerates(self, mode: int) -> list[int]:
-        """Places in `bandwidth.FRAMERATES` that a fixed format can have."""
+        """Indices in `bandwidth.FRAMERATES` that the camera has for a fixed format."""
         rates = Framerates()
         self.call("video_get_supported_framerates", mode, byref(rates))
         return [int(rate) - FRAMERATE_1_875 for rate in rates.framerates[: rates.num]]
@@ -123,12 +123,12 @@ class Device:
         return self._int("video_get_mode")
 
     def set_fixed_format(self, mode: VideoMode, framerate: int) -> None:
-        """A format of the standard, and the place of its rate in `bandwidth.FRAMERATES`."""
+        """Set a fixed format of the standard, and its rate by index in `bandwidth.FRAMERATES`."""
         self.call("video_set_mode", mode)
         self.call("video_set_framerate", FRAMERATE_1_875 + framerate)
 
     def pair(self, name: str, *arguments: Any) -> tuple[int, int]:
-        """A function that gives two numbers."""
+        """Call a function that returns two numbers."""
         first, second = c_uint32(), c_uint32()
         self.call(name, *arguments, byref(first), byref(second))
         return first.value, second.value
@@ -140,15 +140,15 @@ class Device:
         return bool(self._int("feature_is_present", feature))
 
     def set_by_hand(self, feature: Feature) -> None:
-        """No automatism of the camera changes the feature."""
+        """Set a feature to manual, so that the camera does not change it by itself."""
         self.call("feature_set_mode", feature, FEATURE_MODE_MANUAL)
 
     def set_raw(self, feature: Feature, value: int) -> None:
-        """Set a feature in the camera's own steps."""
+        """Set a feature, in the camera's own steps."""
         self.call("feature_set_value", feature, value)
 
     def boundaries(self, feature: Feature) -> tuple[int, int]:
-        """Least and greatest value in the camera's own steps."""
+        """Least and greatest value of a feature, in the camera's own steps."""
         return self.pair("feature_get_boundaries", feature)
 
     def has_absolute(self, feature: Feature) -> bool:
@@ -156,12 +156,12 @@ class Device:
         return bool(self._int("feature_has_absolute_control", feature))
 
     def set_absolute(self, feature: Feature, value: float) -> None:
-        """Set a feature in physical units (shutter: s, gain: dB)."""
+        """Set a feature, in physical units (shutter: s, gain: dB)."""
         self.call("feature_set_absolute_control", feature, 1)
         self.call("feature_set_absolute_value", feature, value)
 
     def absolute_boundaries(self, feature: Feature) -> tuple[float, float]:
-        """Least and greatest value in physical units."""
+        """Least and greatest value of a feature, in physical units."""
         least, greatest = c_float(), c_float()
         self.call("feature_get_absolute_boundaries", feature, byref(least), byref(greatest))
         return least.value, greatest.value
@@ -175,13 +175,22 @@ class Device:
         return [int(source) - TRIGGER_SOURCE_0 for source in sources.sources[: sources.num]]
 
     def trigger_modes(self) -> list[int]:
-        """Numbers of its trigger modes, of 0 to 5."""
+        """The trigger modes, of 0 to 5, that the camera has."""
         word = c_uint32()
         self.call("get_control_registers", _TRIGGER_INQ, byref(word), 1)
         return [mode for mode in range(6) if word.value & 0x8000 >> mode]
 
     def set_trigger(self, *, mode: int, source: int | None, rising: bool) -> None:
-        """Let pulses trigger; `source` None: the camera has one input only and no choice."""
+        """Let pulses trigger the camera.
+
+        Args:
+            mode: trigger mode of the standard.
+            source: number of the input; None if the camera has only one and does not number it.
+            rising: whether the rising edge triggers.
+
+        Raises:
+            CameraError: the camera triggers on rising edges only.
+        """
         self.call("external_trigger_set_mode", TRIGGER_MODE_0 + mode)
         if source is not None:
             self.call("external_trigger_set_source", TRIGGER_SOURCE_0 + source)
@@ -192,19 +201,19 @@ class Device:
         self.call("external_trigger_set_power", 1)
 
     def is_triggered(self) -> bool:
-        """Whether pulses trigger."""
+        """Whether pulses trigger the camera."""
         return bool(self._int("external_trigger_get_power"))
 
     # -- the maker's registers -----------------------------------------------------------------------------------
 
     def read_advanced(self, offset: int) -> int:
-        """One of the maker's registers."""
+        """Read one of the maker's registers."""
         word = c_uint32()
         self.call("get_adv_control_registers", offset, byref(word), 1)
         return word.value
 
     def write_advanced(self, offset: int, value: int) -> None:
-        """One of the maker's registers."""
+        """Write one of the maker's registers."""
         self.call("set_adv_control_registers", offset, byref(c_uint32(value)), 1)
 
     def _u32(self, name: str, *arguments: Any) -> int:

@@ -1,4 +1,4 @@
-"""The kernel's ring of frames, through libdc1394: set up, wait with a deadline, take, give back."""
+"""Fetches frames from the kernel's ring of DMA buffers, through libdc1394, with a deadline for each wait."""
 
 import ctypes
 import select
@@ -22,11 +22,11 @@ class DmaRing:
 
     Args:
         device: the camera, its format set.
-        frames: so many the ring holds.
+        frames: size of the ring, frames.
         name: of the camera, for messages.
 
     Attributes:
-        disturbed: `wait` ended because something else than a frame came: the bus was reset. The caller clears it.
+        disturbed: `wait` ended without a frame because the bus was reset. The caller clears it.
 
     Raises:
         CameraError: no channel, no bandwidth, no memory.
@@ -38,7 +38,7 @@ class DmaRing:
         try:
             device.call("capture_setup", frames, CAPTURE_FLAGS_DEFAULT)
         except Dc1394Error as error:
-            # The kernel has one answer for both, so libdc1394 says -7 (no channel) where the bandwidth is exhausted.
+            # The kernel has one error for both, so libdc1394 reports -7 (no channel) if there is no bandwidth left.
             if error.code not in (Code.NO_ISO_CHANNEL, Code.NO_BANDWIDTH):
                 raise
             raise CameraError(
@@ -51,13 +51,13 @@ class DmaRing:
         self._poll.register(self._descriptor, select.POLLIN)
 
     def wait(self, timeout_s: float) -> Any:
-        """The next frame.
+        """Wait for the next frame.
 
         Args:
-            timeout_s: at most so long.
+            timeout_s: longest wait, s.
 
         Returns:
-            Pointer to a `VideoFrame`, the caller's to `give_back`; None if none came, or if `disturbed`.
+            Pointer to a `VideoFrame`, which the caller must `give_back`; None if none came, or if `disturbed`.
 
         Raises:
             CameraError: the camera was unplugged.
@@ -79,11 +79,11 @@ class DmaRing:
             return None
 
     def give_back(self, frame: Any) -> None:
-        """Its memory may be written again."""
+        """Return a frame's buffer to the ring."""
         self._device.call("capture_enqueue", frame)
 
     def close(self) -> None:
-        """Stop, and free the ring even if the camera is gone.
+        """Stop, and free the ring, even if the camera is gone.
 
         Raises:
             Dc1394Error: the card does not stop.
@@ -91,13 +91,13 @@ class DmaRing:
         try:
             self._device.call("capture_stop")
         except Dc1394Error:
-            # libdc1394 2.2.6 gives up at its first step, and would leave descriptor and memory behind for good.
+            # libdc1394 2.2.6 gives up at its first step and leaks descriptor and memory: free them here.
             close(self._descriptor)
             if self._memory:
                 _libc.munmap(self._memory, self._bytes)
             raise
 
     def _note_memory(self, frame: VideoFrame) -> None:
-        """Where the ring lies: its frames stand one behind the other."""
+        """Note address and size of the ring, whose frames stand one behind the other, for `close`."""
         self._memory = frame.image - frame.id * frame.total_bytes
         self._bytes = frame.total_bytes * self._frames

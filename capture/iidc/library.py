@@ -1,4 +1,4 @@
-"""libdc1394's functions, found by the library's soname, typed, with its errors as ours and its messages in our log."""
+"""Loads libdc1394 and calls its functions: with types, its errors as exceptions and its messages in our log."""
 
 import ctypes
 import logging
@@ -25,7 +25,7 @@ _LOGGER: Final = logging.getLogger("svev.libdc1394")
 _LEVELS: Final = {Log.ERROR: logging.WARNING, Log.WARNING: logging.INFO, Log.DEBUG: logging.DEBUG}
 _U32, _U64, _FLOAT = POINTER(c_uint32), POINTER(c_uint64), POINTER(c_float)
 
-#: Arguments of the functions that give an error code. An `enum` of C is an int.
+#: Arguments of the functions that return an error code. A C `enum` is an int.
 _ARGUMENTS: Final[dict[str, tuple[Any, ...]]] = {
     "camera_enumerate": (c_void_p, POINTER(ListPointer)),
     "log_register_handler": (c_int, LogHandler, c_void_p),
@@ -70,7 +70,7 @@ _ARGUMENTS: Final[dict[str, tuple[Any, ...]]] = {
     "capture_enqueue": (CameraPointer, FramePointer),
 }
 
-#: The others: result, arguments.
+#: The other functions: result, arguments.
 _OTHERS: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "new": (c_void_p, ()),
     "free": (None, (c_void_p,)),
@@ -81,7 +81,7 @@ _OTHERS: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "error_get_string": (c_char_p, (c_int,)),
 }
 
-#: What libdc1394 said first during the present call: its error codes alone rarely tell the reason.
+#: The first message of libdc1394 during the present call: its error codes alone rarely tell the reason.
 _first_words: Final[list[str]] = []
 
 
@@ -98,7 +98,7 @@ class Dc1394Error(CameraError):
 
 
 class Library:
-    """libdc1394 in this process. Use `load`, which makes only one."""
+    """The functions of libdc1394. Use `load`, which makes one per process."""
 
     def __init__(self, loaded: ctypes.CDLL) -> None:
         self._functions: dict[str, Any] = {}
@@ -113,14 +113,14 @@ class Library:
         self._functions[name] = function
 
     def call(self, name: str, *arguments: Any) -> None:
-        """Call a function that gives an error code.
+        """Call a function that returns an error code.
 
         Args:
-            name: without `dc1394_`.
+            name: its name without `dc1394_`.
             arguments: its arguments.
 
         Raises:
-            Dc1394Error: the code is not success.
+            Dc1394Error: it failed.
         """
         _first_words.clear()
         code = self._functions[name](*arguments)
@@ -130,12 +130,12 @@ class Library:
             raise Dc1394Error(name, code, f"dc1394_{name}: {said.decode(errors='replace')} ({code}{words})")
 
     def get(self, name: str, *arguments: Any) -> Any:
-        """Call a function that gives something else than an error code."""
+        """Call a function that returns something else than an error code."""
         return self._functions[name](*arguments)
 
 
 def _to_our_log(kind: int, message: bytes, _user: object) -> None:
-    """What libdc1394 says, in our log."""
+    """Log handler for libdc1394."""
     text = message.decode(errors="replace").strip()
     if kind != Log.DEBUG and not _first_words:
         _first_words.append(text)
@@ -147,7 +147,7 @@ _HANDLER: Final = LogHandler(_to_our_log)  # libdc1394 keeps the pointer: this l
 
 @cache
 def load() -> Library:
-    """libdc1394, once per process.
+    """Load libdc1394, once per process.
 
     Raises:
         BadInputError: it is not installed.

@@ -1,11 +1,11 @@
-"""The secure image signature of AVT's cameras: what the first twelve bytes of a frame's last line say.
+"""Reads the secure image signature that AVT's cameras write into a frame: its trigger time, and whether it is torn.
 
-Three words: the bus's cycle time when the exposure began, the count of frames read out, the count of triggers seen.
-Whether a camera writes them with the high or the low byte first is found out by comparing with the bus's cycle timer.
+The first twelve bytes of the last line are three words: the cycle time of the bus when the exposure began, the count
+of frames read out, the count of triggers seen. Cameras differ in the order of the bytes in a word; the reader tries
+both and compares the time with the cycle timer of the bus.
 
-libdc1394 on Linux delivers a frame that has lost a packet as if nothing had happened: all that comes after the gap has
-moved up, and the end is the beginning of the next frame. The signature is then not where it should be, which is how
-such frames are caught.
+libdc1394 on Linux does not report a frame that has lost a packet: everything behind the gap has moved up, and the
+frame's end is the beginning of the next frame. Then the signature is not where it should be: so torn frames are found.
 """
 
 import struct
@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from capture.iidc.cycle_time import CYCLE_NS, CycleTime, unwrap
+from capture.iidc.clock import CYCLE_NS, CycleTime, unwrap
 from rig.clocks import NS_PER_S
 
 SIGNATURE_BYTES: Final = 12
 
-#: The kernel stamps packets with three bits of seconds only.
+#: The kernel's time stamps of packets have three bits of seconds only.
 _PACKET_WRAP_NS: Final = 8 * NS_PER_S
-#: After so many refusals in a row it is the last frame that was misread, or the camera began anew.
+#: After this many refusals in a row the last accepted frame was misread, or the camera was reset: forget it.
 _MOST_REFUSALS: Final = 3
-#: More frames or triggers than this between two frames that came are none.
+#: A signature that counts more frames or triggers than this since the last frame is none.
 _MOST_STEPS: Final = 1 << 16
 
 
@@ -35,12 +35,12 @@ class ByteOrder(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """What a frame says about itself.
+    """What the signature of a frame says.
 
     Attributes:
-        trigger_ns: when its exposure began, on the bus's cycle time line, unwrapped.
+        trigger_ns: when its exposure began, unwrapped cycle time of the bus.
         frames: frames read out of the sensor, this one included.
-        triggers: triggers seen, those included that came while the camera was busy.
+        triggers: triggers seen, including those that came while the camera was busy.
     """
 
     trigger_ns: int
@@ -52,11 +52,11 @@ class SignatureReader:
     """Reads the signatures of one camera, in the order of its frames.
 
     Args:
-        longest_delay_ns: the first packet leaves the camera at most so long after the exposure began.
-        order: of the bytes, if it is known.
+        longest_delay_ns: longest time from the beginning of the exposure to the first packet.
+        order: order of the bytes, if it is known.
 
     Attributes:
-        order: of the bytes; None until a frame has told.
+        order: order of the bytes; None until a frame has shown it.
     """
 
     def __init__(self, longest_delay_ns: int, order: ByteOrder | None = None) -> None:
@@ -70,8 +70,8 @@ class SignatureReader:
 
         Args:
             data: the first `SIGNATURE_BYTES` of the last line.
-            first_packet_ns: when the frame's first packet came, on the bus's cycle time line; known to 125 us, and if
-                the frame was not fetched for long, wrong by a multiple of 8 s.
+            first_packet_ns: when the frame's first packet came, unwrapped cycle time, in steps of 125 us; wrong by a
+                multiple of 8 s if the frame was fetched very late.
 
         Returns:
             None if there is no signature: the frame is torn.
@@ -86,13 +86,14 @@ class SignatureReader:
         self._refused = 0
         if len(found) == 1:
             self.order = found[0][0]
-        # Both orders may make sense once in a long while: counters that began at 0 decide, the next frame confirms.
+        # Very rarely both orders make sense. The counters began at 0, so the smaller count is taken; the next frame
+        # confirms it or not.
         signature = min((signature for _, signature in found), key=lambda signature: signature.frames)
         self._last = signature
         return signature
 
     def _try(self, data: bytes, first_packet_ns: int, order: ByteOrder) -> Signature | None:
-        """The signature if it makes sense in this order of bytes."""
+        """The signature, if it is plausible in this order of bytes."""
         word, frames, triggers = struct.unpack(f"{order.value}III", data)
         time = CycleTime.from_word(word)
         if not time.valid:

@@ -1,4 +1,4 @@
-"""libdc1394 2.2's structures and numbers, as its headers lay them out.
+"""Structures and constants of libdc1394 2.2, for calls through ctypes.
 
 `tests/capture/iidc/test_structures.py` compares every size, offset and number with the installed headers.
 """
@@ -128,7 +128,7 @@ class Log(IntEnum):
 
 
 class VideoMode(IntEnum):
-    """Those of `dc1394video_mode_t` that give 8-bit monochrome images."""
+    """The values of `dc1394video_mode_t` for 8-bit monochrome images."""
 
     MONO8_640X480 = 69
     MONO8_800X600 = 73
@@ -146,7 +146,7 @@ class OperationMode(IntEnum):
 
 
 class IsoSpeed(IntEnum):
-    """`dc1394speed_t`, by the megabits per second."""
+    """`dc1394speed_t`, named by Mbit/s."""
 
     S100 = 0
     S200 = 1
@@ -155,7 +155,7 @@ class IsoSpeed(IntEnum):
 
 
 class Feature(IntEnum):
-    """Those of `dc1394feature_t` that we set."""
+    """The values of `dc1394feature_t` that we use."""
 
     SHUTTER = 423
     GAIN = 424
@@ -170,7 +170,7 @@ class Polarity(IntEnum):
 
 
 COLOR_CODING_MONO8: Final = 352
-FRAMERATE_1_875: Final = 32  #: the next numbers are twice as fast each, up to 240
+FRAMERATE_1_875: Final = 32  #: each of the next numbers is twice as fast, up to 240
 TRIGGER_MODE_0: Final = 384
 TRIGGER_SOURCE_0: Final = 576
 FEATURE_MODE_MANUAL: Final = 736

@@ -1,4 +1,1 @@
-"""The bundle adjustment (paper, appendix D): any network of `photogrammetry.network`, solved with honest sigmas.
-
-`adjust` is the front door; the other modules do one thing each.
-"""
+"""The bundle adjustment (paper, appendix D) of any network, with covariance and tests; `run.adjust` is its entry."""

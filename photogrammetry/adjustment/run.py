@@ -1,29 +1,28 @@
-"""The whole of an adjustment as a network file asks for it: weights, gross errors, variance components."""
+"""Adjusts a network as its file asks for it: weights, search for gross errors, variance components."""
 
 from dataclasses import dataclass
 
-from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
-from photogrammetry.adjustment.blunders import Blunder
-from photogrammetry.adjustment.removal import Removed
-from photogrammetry.adjustment.snooping import explained, suspicions
-from photogrammetry.adjustment.snooping import snoop as snooped
-from photogrammetry.adjustment.state import State, state_of
-from photogrammetry.adjustment.suspicion import FAMILY_RISK, find_blunders
+from photogrammetry.adjustment.equations.unknowns import State, state_of
+from photogrammetry.adjustment.gross_errors.blunders import Blunder, Removed
+from photogrammetry.adjustment.gross_errors.snooping import explained, suspicions
+from photogrammetry.adjustment.gross_errors.snooping import snoop as snooped
+from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK, find_blunders
+from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
 from photogrammetry.adjustment.variance_components import Component, estimate_by_paper, estimate_components
-from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
-from photogrammetry.network import Network, Reweight
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.model import Network, Reweight
 from rig.errors import BadInputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """An adjusted network with everything that is reported of it.
+    """An adjusted network with its gross errors and variance components.
 
     Attributes:
         adjustment: with the weights the network asks for.
         blunders: suspected gross errors, the largest test value first.
         components: variance components; None where they do not settle.
-        removed: what snooping took out, in that order.
+        removed: the observations that snooping took out, in that order.
     """
 
     adjustment: Adjustment
@@ -40,7 +39,7 @@ def adjust(
     Args:
         network: the network; its values are the observed ones where they have a sigma.
         start: start values of everything; the network's own if left out.
-        snoop: take the worst locatable gross error out and adjust again, until there is none.
+        snoop: take out the worst locatable gross error and adjust again, until there is none.
         family_risk: chance that anything at all is suspected in sound data.
 
     Returns:
@@ -54,8 +53,7 @@ def adjust(
     start = state_of(network) if start is None else start
     removed: tuple[Removed, ...] = ()
     if snoop:
-        cleaned = snooped(network, start, family_risk)
-        adjustment, blunders, removed = cleaned.adjustment, cleaned.left, cleaned.removed
+        adjustment, blunders, removed = snooped(network, start, family_risk)
     else:
         adjustment = _adjusted(network, start, family_risk)
         blunders = tuple(suspicions(adjustment, start, family_risk))
@@ -66,7 +64,7 @@ def adjust(
         try:
             components, _ = estimate_components(adjustment)
         except (NotConvergedError, NotSolvableError):
-            components = None  # the adjustment stands; only the weights cannot be estimated
+            components = None  # the adjustment is valid without them
     else:
         estimate = estimate_by_paper if network.reweight is Reweight.PAPER else estimate_components
         components, adjustment = estimate(adjustment)
@@ -75,7 +73,7 @@ def adjust(
 
 
 def _adjusted(network: Network, start: State, family_risk: float) -> Adjustment:
-    """Adjust; where that does not converge, say which observations are to blame."""
+    """Adjust; if that does not converge, raise the error with the observations that prevent it."""
     try:
         return adjust_once(network, start)
     except NotConvergedError as error:

@@ -1,31 +1,29 @@
-"""Variance components: how accurate each group of observations really is.
+"""Variance components: estimates how accurate each group of observations is.
 
 Helmert/Foerstner: factor^2 = vTPv of the group / its redundancy (sum of its redundancy numbers), repeated with the new
-weights until nothing changes. The paper's way (D5) takes n2 - 7 for the redundancy of n2 reference points, as printed.
+weights until no factor changes. The paper (D5) takes n2 - 7 for the redundancy of n2 reference points.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.adjustment.adjustment import Adjustment, refine
-from photogrammetry.adjustment.problem import Problem
-from photogrammetry.adjustment.relations import Kind
-from photogrammetry.adjustment.state import Floats
-from photogrammetry.adjustment.unknowns import Integers
-from photogrammetry.diagnosis import NotConvergedError
+from photogrammetry.adjustment.equations.problem import Problem
+from photogrammetry.adjustment.equations.relations import Kind
+from photogrammetry.adjustment.solution.adjustment import Adjustment, refine
+from photogrammetry.network.diagnosis import NotConvergedError
+from rig.arrays import Flags, Floats, Integers
 from rig.errors import BadInputError
 
-#: The factors have arrived when none changes by more than this part of itself.
+#: The iteration ends when no factor changes by more than this part of itself.
 _SETTLED = 1e-8
 _MAX_ROUNDS = 100
-#: A group with less redundancy has none.
+#: A group with less redundancy counts as not controlled.
 _NO_REDUNDANCY = 1e-3
-#: A group that is driven below this part of its a-priori sigmas has too little redundancy to be estimated.
+#: A group whose factor falls below this has too little redundancy to be estimated.
 _FLOOR = 1e-4
 _MEMORY = 3  # rounds that the extrapolation looks back
-#: Reference points that equation D5b takes off as if they were conditions.
+#: Equation D5b subtracts so many from the number of reference points.
 _PAPER_CONDITIONS = 7
 
 
@@ -81,7 +79,7 @@ def estimate_components(adjustment: Adjustment) -> tuple[tuple[Component, ...], 
 
 
 def _only_one(adjustment: Adjustment, groups: _Groups) -> tuple[tuple[Component, ...], Adjustment]:
-    """One group alone: the weights cancel, its factor is the ratio of the sigma0."""
+    """One group alone: its factor is the ratio of the estimated to the a-priori sigma0."""
     factors = np.array([max(adjustment.ratio, _FLOOR)])
     problem = _reweighted(adjustment.problem, groups, factors)
     redundancies = np.array([float(adjustment.redundancy)])
@@ -99,8 +97,8 @@ class _Rounds:
         self._points: list[Floats] = []
         self._moves: list[Floats] = []
 
-    def give_up(self, hopeless: NDArray[np.bool_]) -> None:
-        """Leave groups at their a-priori sigmas for good: nothing controls them, or less with every round."""
+    def give_up(self, hopeless: Flags) -> None:
+        """Keep some groups at their a-priori sigmas from now on: they are not controlled, or less so in every round."""
         self.gave_up_just_now = bool(np.any(hopeless & self.usable & (self.factors != 1.0)))
         self.usable &= ~hopeless
         if self.gave_up_just_now:
@@ -108,7 +106,7 @@ class _Rounds:
             self._points, self._moves = [], []
 
     def next(self, change: Floats) -> Floats:
-        """New factors, given by how much the estimation wants to change the present ones."""
+        """New factors from the changes of the present ones that the last round estimated."""
         point, move = np.log(self.factors), np.where(self.usable, np.log(change), 0.0)
         self._points = [*self._points, point][-_MEMORY:]
         self._moves = [*self._moves, move][-_MEMORY:]
@@ -188,7 +186,7 @@ def _reweighted(problem: Problem, groups: _Groups, factors: Floats) -> Problem:
 
 
 def _components(
-    problem: Problem, groups: _Groups, factors: Floats, redundancies: Floats, known: NDArray[np.bool_]
+    problem: Problem, groups: _Groups, factors: Floats, redundancies: Floats, known: Flags
 ) -> tuple[Component, ...]:
     components = []
     for i, name in enumerate(groups.names):

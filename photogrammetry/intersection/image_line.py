@@ -1,8 +1,8 @@
-"""Image lines from measured line points: appendix C.2, step A (C7, C11, C12).
+"""Fits image lines to measured line points (of a ski): appendix C.2, step A (C7, C11, C12).
 
 C12 with P = (1 + a^2)^-1 is the sum of squared distances of the points from the line. P is the same for all points of
-a line, so the repeated estimation with P held fixed, as printed, never leaves the first, ordinary regression, which
-pulls a towards zero. What C12 asks for has a closed solution, the principal axis of the points, and that is taken.
+a line, so the printed iteration, which holds P fixed, never leaves its first step: ordinary regression, which biases a
+towards zero. The minimum of C12 itself has a closed solution, the principal axis of the points; this module takes it.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogrammetry.ideal_camera import Array
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 
 
@@ -29,19 +29,19 @@ class ImageLines:
         vtpv: (...) sum of squared distances over sigma^2; redundancy points - 2.
     """
 
-    a: Array
-    b: Array
-    covariance: Array
-    turned: NDArray[np.bool_]
-    centre: Array
-    vtpv: Array
+    a: Floats
+    b: Floats
+    covariance: Floats
+    turned: Flags
+    centre: Floats
+    vtpv: Floats
 
     @property
-    def present(self) -> NDArray[np.bool_]:
+    def present(self) -> Flags:
         """(...) where there is a line."""
         return np.isfinite(self.a)
 
-    def homogeneous(self) -> Array:
+    def homogeneous(self) -> Floats:
         """Lines g (..., 3) of appendix C.3, coordinates not turned: g . (x, y, 1) = 0, unit normal (g1, g2)."""
         one = np.ones_like(self.a)
         g = np.where(
@@ -52,7 +52,7 @@ class ImageLines:
         return np.asarray(g / np.sqrt(1 + self.a**2)[..., None])
 
 
-def fit_image_lines(xy: ArrayLike, sigma: float, *, seen: NDArray[np.bool_] | None = None) -> ImageLines:
+def fit_image_lines(xy: ArrayLike, sigma: float, *, seen: Flags | None = None) -> ImageLines:
     """Fit a line to the points of each image line (step A, C12).
 
     Args:
@@ -87,7 +87,7 @@ def fit_image_lines(xy: ArrayLike, sigma: float, *, seen: NDArray[np.bool_] | No
 
 
 def _lines(
-    centre: Array, axis: Array, along: Array, count: NDArray[np.int_], across: Array, sigma: float
+    centre: Floats, axis: Floats, along: Floats, count: NDArray[np.int_], across: Floats, sigma: float
 ) -> ImageLines:
     """Slope and intercept with covariance: the angle and the offset at the centroid are uncorrelated."""
     turned = np.abs(axis[..., 1]) > np.abs(axis[..., 0])

@@ -1,4 +1,4 @@
-"""Lines in space from image lines: appendix C.2, step B (C13, C14) and in one step (C15), for many lines at a time.
+"""Lines in space (skis) from points measured on their images: appendix C.2 in one step (C15), many lines at a time.
 
 The space line is C8: Z = alpha X + gamma, Y = beta X + delta. Its direction is (1, beta, alpha) (C.3 prints another
 one), and its parameters stay well-conditioned while the direction is near X, as that of a ski is.
@@ -11,26 +11,27 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.intersection.image_line import ImageLines, fit_image_lines
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.intersection.image_line import fit_image_lines
 from photogrammetry.intersection.line_start import LineStart, start_lines
+from rig.arrays import Flags, Floats
 
 _MAX_STEPS = 25
 _STEP_SIGMAS = 1e-6  # of a sigma
-_STEP_RELATIVE = 1e-12  # limit of the arithmetic
-_MAX_POSITION_SIGMA = 1 / 3  # of the distance: beyond it the planes do not tell where the line is
+_STEP_RELATIVE = 1e-12  # of the distance: steps below it are rounding
+_MAX_POSITION_SIGMA = 1 / 3  # of the distance: with a larger sigma the planes do not determine the line
 _MIN_EIGENVALUE = 1e-13  # of the scaled normal matrix
 
-Equations = Callable[[Array], tuple[Array, Array]]
+Equations = Callable[[Floats], tuple[Floats, Floats]]
 
 
 class LineState(IntEnum):
-    """What became of one line."""
+    """Result of one line."""
 
     OK = 0
     FEW_IMAGES = 1  #: measured in none or one image
     SINGULAR = 2  #: the planes of the images coincide within their accuracy
-    ACROSS = 3  #: the line runs across the X axis; C8 cannot hold it
+    ACROSS = 3  #: the line runs across the X axis; C8 cannot represent it
     NOT_CONVERGED = 4
 
     @property
@@ -56,81 +57,48 @@ class SpaceLines:
     Attributes:
         parameters: (n, 4) alpha, beta, gamma, delta; NaN where the state is FEW_IMAGES, SINGULAR or ACROSS.
         covariance: (n, 4, 4) of the parameters, from the a-priori sigmas.
-        residuals: adjusted - observed over their sigmas: step B (n, m, 2), decorrelated (a, b); one step (n, m, k),
-            distances of the line points from the adjusted image lines. NaN where nothing was measured.
+        residuals: (n, m, k) distances of the line points from the adjusted image lines over sigma, adjusted - observed;
+            NaN where nothing was measured.
         redundancy: (n,) number of residuals - 4.
         state: (n,) values of `LineState`.
     """
 
-    parameters: Array
-    covariance: Array
-    residuals: Array
+    parameters: Floats
+    covariance: Floats
+    residuals: Floats
     redundancy: NDArray[np.int_]
     state: NDArray[np.int8]
 
     @property
-    def ok(self) -> NDArray[np.bool_]:
+    def ok(self) -> Flags:
         """(n,) whether the line is determined."""
         return np.asarray(self.state == LineState.OK)
 
     @property
-    def direction(self) -> Array:
+    def direction(self) -> Floats:
         """(n, 3) unit vectors along (1, beta, alpha)."""
         alpha, beta = self.parameters[:, 0], self.parameters[:, 1]
         vector = np.stack((np.ones_like(alpha), beta, alpha), axis=1)
         return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))
 
     @property
-    def vtpv(self) -> Array:
+    def vtpv(self) -> Floats:
         """(n,) weighted square sum of the residuals."""
         return np.asarray(np.nansum(self.residuals**2, axis=tuple(range(1, self.residuals.ndim))))
 
-    def at(self, x: ArrayLike) -> Array:
+    def at(self, x: ArrayLike) -> Floats:
         """Points (n, 3) of the lines at X = x, one for all or (n,)."""
         alpha, beta, gamma, delta = self.parameters.T
         x = np.broadcast_to(np.asarray(x, float), alpha.shape)
         return np.stack((x, beta * x + delta, alpha * x + gamma), axis=1)
 
-    def covariance_at(self, x: ArrayLike) -> Array:
+    def covariance_at(self, x: ArrayLike) -> Floats:
         """Covariance (n, 2, 2) of (Y, Z) at X = x, one for all or (n,)."""
         return _covariance_at(self.covariance, np.asarray(x, float))
 
 
-def intersect_lines(cameras: Sequence[IdealCamera], lines: ImageLines) -> SpaceLines:
-    """Intersect n lines from m images (step B): least squares C14 on C13, correlation of (a, b) respected.
-
-    Args:
-        cameras: the m cameras, constant.
-        lines: (n, m) image lines of step A.
-
-    Returns:
-        The lines, with covariance and state; start values are found by appendix C.3.
-    """
-    start = start_lines(cameras, lines)
-    with np.errstate(all="ignore"):
-        weights = np.where(lines.present[..., None, None], _inverse_root(lines.covariance), 0.0)
-    turned = lines.turned[..., None]
-    r1, r2, r3 = np.array([camera.R for camera in cameras]).transpose(2, 0, 1)
-    axes = (np.where(turned, r2, r1), np.where(turned, -r1, r2), np.broadcast_to(r3, (*lines.a.shape, 3)))
-    observed = np.nan_to_num(np.stack((lines.a, lines.b), axis=-1))
-    c = np.array([camera.c for camera in cameras])
-
-    def equations(parameters: Array) -> tuple[Array, Array]:
-        u, du = _plane_normals(parameters, start.centres)
-        (big_u, d_u), (w, d_w), (v, d_v) = (_along(u, du, axis) for axis in axes)
-        w, d_w = -w, -d_w
-        a, b = big_u / w, -c * v / w
-        d_a = (d_u - a[..., None] * d_w) / w[..., None]
-        d_b = (-c[:, None] * d_v - b[..., None] * d_w) / w[..., None]
-        misclosure = observed - np.stack((a, b), axis=-1)
-        jacobian = np.stack((d_a, d_b), axis=-2)
-        return np.einsum("nmij,nmj->nmi", weights, misclosure), weights @ jacobian
-
-    return _adjust(start, equations, np.repeat(lines.present[..., None], 2, axis=-1))
-
-
 def intersect_lines_in_one_step(
-    cameras: Sequence[IdealCamera], xy: ArrayLike, sigma: float, *, seen: NDArray[np.bool_] | None = None
+    cameras: Sequence[IdealCamera], xy: ArrayLike, sigma: float, *, seen: Flags | None = None
 ) -> SpaceLines:
     """Intersect n lines from line points in m images by one error equation C15 per point.
 
@@ -153,7 +121,7 @@ def intersect_lines_in_one_step(
     axes = np.array([camera.R for camera in cameras]).transpose(2, 0, 1)
     c = np.array([camera.c for camera in cameras])[:, None]
 
-    def equations(parameters: Array) -> tuple[Array, Array]:
+    def equations(parameters: Floats) -> tuple[Floats, Floats]:
         u, du = _plane_normals(parameters, start.centres)
         (big_u, d_u), (w, d_w), (v, d_v) = (
             (p[..., None], d[..., None, :]) for p, d in (_along(u, du, r) for r in axes)
@@ -169,7 +137,7 @@ def intersect_lines_in_one_step(
     return _adjust(start, equations, there)
 
 
-def _plane_normals(parameters: Array, centres: Array) -> tuple[Array, Array]:
+def _plane_normals(parameters: Floats, centres: Floats) -> tuple[Floats, Floats]:
     """Vectors u of C9 (n, m, 3), normals of the planes through line and centre, and derivatives (n, m, 3, 4)."""
     alpha, beta, gamma, delta = (parameters[:, i, None] for i in range(4))
     x0, y0, z0 = np.moveaxis(centres, -1, 0)
@@ -180,27 +148,17 @@ def _plane_normals(parameters: Array, centres: Array) -> tuple[Array, Array]:
     return u, np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _along(u: Array, du: Array, axis: Array) -> tuple[Array, Array]:
+def _along(u: Floats, du: Floats, axis: Floats) -> tuple[Floats, Floats]:
     """Product of u and of its derivatives with axes (n, m, 3) or (m, 3)."""
     return (u * axis).sum(axis=-1), (du * axis[..., None]).sum(axis=-2)
 
 
-def _inverse_root(covariance: Array) -> Array:
-    """Lower triangular L (..., 2, 2) with L K L^T = I."""
-    p, q, r = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
-    first = 1 / np.sqrt(p)
-    second = 1 / np.sqrt(r - q * q / p)
-    out = np.zeros_like(covariance)
-    out[..., 0, 0], out[..., 1, 0], out[..., 1, 1] = first, -second * q / p, second
-    return out
-
-
-def _adjust(start: LineStart, equations: Equations, there: NDArray[np.bool_]) -> SpaceLines:
-    """Gauss-Newton of all lines together, in the lines' own origins; back into the object system at the end."""
+def _adjust(start: LineStart, equations: Equations, there: Flags) -> SpaceLines:
+    """Gauss-Newton of all lines together, each relative to its own origin; the result is in the object system."""
     parameters = start.parameters.copy()
     n = len(parameters)
     converged = np.zeros(n, bool)
-    with np.errstate(all="ignore"):  # what diverges is recognised and flagged
+    with np.errstate(all="ignore"):  # lines that diverge are flagged below
         for _ in range(_MAX_STEPS):
             residuals, jacobian = equations(parameters)
             flat = jacobian.reshape(n, -1, 4)
@@ -227,7 +185,7 @@ def _adjust(start: LineStart, equations: Equations, there: NDArray[np.bool_]) ->
     return SpaceLines(parameters, covariance, residuals, redundancy, state)
 
 
-def _invert(normal: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _invert(normal: Floats) -> tuple[Floats, Flags]:
     """Inverses of symmetric matrices (n, 4, 4) and which of them are regular; the others come as zeros."""
     diagonal = np.diagonal(normal, axis1=1, axis2=2)
     usable = np.asarray(np.isfinite(normal).all(axis=(1, 2)) & (diagonal > 0).all(axis=1))
@@ -240,7 +198,7 @@ def _invert(normal: Array) -> tuple[Array, NDArray[np.bool_]]:
     return np.where(regular[:, None, None], inverse, 0.0), regular
 
 
-def _covariance_at(covariance: Array, x: Array) -> Array:
+def _covariance_at(covariance: Floats, x: Floats) -> Floats:
     x = np.broadcast_to(x, covariance.shape[:1])
     zero, one = np.zeros_like(x), np.ones_like(x)
     rows = np.stack((np.stack((zero, x, zero, one), -1), np.stack((x, zero, one, zero), -1)), axis=1)
@@ -248,7 +206,7 @@ def _covariance_at(covariance: Array, x: Array) -> Array:
 
 
 def _states(
-    start: LineStart, parameters: Array, cofactors: Array, converged: NDArray[np.bool_], regular: NDArray[np.bool_]
+    start: LineStart, parameters: Floats, cofactors: Floats, converged: Flags, regular: Flags
 ) -> NDArray[np.int8]:
     position = np.linalg.eigvalsh(_covariance_at(cofactors, np.zeros(1)))[:, -1]
     slopes = (parameters[:, :2] ** 2).sum(axis=1)

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.intersection.image_line import ImageLines
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 
-_COINCIDENT = 1e-12  # angle (rad) between planes that are one plane to the arithmetic
-_COINCIDENT_SIGMAS = 3.0  # and, in standard deviations of the angle, within their accuracy
-_ACROSS = 0.01  # X component of a direction that C8 cannot hold
+_COINCIDENT = 1e-12  # rad; planes with a smaller angle between them coincide to working precision
+_COINCIDENT_SIGMAS = 3.0  # standard deviations of that angle; below it planes coincide within their accuracy
+_ACROSS = 0.01  # X component of a unit direction below which C8 cannot represent the line
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,17 +26,17 @@ class LineStart:
         centres: (n, m, 3) projection centres relative to the origins.
         distance: (n,) from the nearest projection centre to the origin.
         images: (n,) number of images in which the line was measured.
-        coincident: (n,) whether all planes are one within their accuracy.
+        coincident: (n,) whether all planes of a line coincide within their accuracy.
         across: (n,) whether the line runs across the X axis.
     """
 
-    parameters: Array
-    origins: Array
-    centres: Array
-    distance: Array
+    parameters: Floats
+    origins: Floats
+    centres: Floats
+    distance: Floats
     images: NDArray[np.int_]
-    coincident: NDArray[np.bool_]
-    across: NDArray[np.bool_]
+    coincident: Flags
+    across: Flags
 
 
 def start_lines(cameras: Sequence[IdealCamera], lines: ImageLines) -> LineStart:
@@ -49,7 +50,7 @@ def start_lines(cameras: Sequence[IdealCamera], lines: ImageLines) -> LineStart:
         lines: (n, m) image lines.
 
     Returns:
-        Start values; where the planes coincide, or the line runs across X, harmless ones with the flag set.
+        Start values; finite dummies with the flag set where the planes coincide or the line runs across X.
 
     Raises:
         BadInputError: the number of cameras is not that of the images.
@@ -79,7 +80,7 @@ def start_lines(cameras: Sequence[IdealCamera], lines: ImageLines) -> LineStart:
     return LineStart(parameters, origins, relative, distance, lines.present.sum(axis=1), coincident, across)
 
 
-def _planes(cameras: Sequence[IdealCamera], lines: ImageLines, centres: Array) -> Array:
+def _planes(cameras: Sequence[IdealCamera], lines: ImageLines, centres: Floats) -> Floats:
     """Rows (n, m, 4) P^T g with unit normals; zero where there is no line."""
     scale = np.array([(-camera.c, -camera.c, 1.0) for camera in cameras])
     rotations = np.array([camera.R for camera in cameras])
@@ -90,7 +91,7 @@ def _planes(cameras: Sequence[IdealCamera], lines: ImageLines, centres: Array) -
     return np.asarray(planes / np.where(length > 0, np.linalg.norm(planes, axis=2, keepdims=True), 1.0))
 
 
-def _coincident(planes: Array, lines: ImageLines) -> NDArray[np.bool_]:
+def _coincident(planes: Floats, lines: ImageLines) -> Flags:
     """Whether the planes' normals differ by no more than the directions of the image lines are uncertain.
 
     The second eigenvalue of the sum of N N^T is the square sum of the normals' angles from their mean.
@@ -105,7 +106,7 @@ def _coincident(planes: Array, lines: ImageLines) -> NDArray[np.bool_]:
     return np.asarray(square_sum < np.maximum(_COINCIDENT_SIGMAS**2 * expected, _COINCIDENT**2))
 
 
-def _seen_points(cameras: Sequence[IdealCamera], lines: ImageLines, point: Array, direction: Array) -> Array:
+def _seen_points(cameras: Sequence[IdealCamera], lines: ImageLines, point: Floats, direction: Floats) -> Floats:
     """Points on the lines next to the ray through the middle of the first image line."""
     first = lines.present.argmax(axis=1)
     each = np.arange(len(first))
@@ -115,5 +116,5 @@ def _seen_points(cameras: Sequence[IdealCamera], lines: ImageLines, point: Array
     across = np.cross(direction, rays)
     square = np.maximum((across**2).sum(axis=1), np.finfo(float).tiny)
     along = np.einsum("ni,ni->n", np.cross(centres - point, rays), across) / square
-    # a ray along the line meets it anywhere: stay near the cameras then
+    # a ray parallel to the line has no nearest point: stay near the cameras then
     return np.asarray(point + np.where(square > 1e-12, along, 0.0)[:, None] * direction)

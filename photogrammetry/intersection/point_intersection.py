@@ -1,8 +1,8 @@
-"""Points by intersection of two or more rays: appendix C.1, for many points at a time.
+"""Intersects points from two or more rays: appendix C.1, for many points at a time.
 
-Repeated least squares on the error equations C5: first with P = 1, then with P = depth^-2. A fixed point of these
-two steps is not yet the minimum of C3 (it neglects the residual in the derivative, about epsilon / c of a sigma),
-so the last steps put the adjusted image coordinates in place of the measured ones: that is Gauss-Newton on Eq. A1.
+Repeated least squares on the error equations C5: first with P = 1, then with P = depth^-2. Where these two steps end is
+not yet the minimum of C3: they neglect the residual in the derivative, an error of about epsilon / c of a sigma. So the
+last steps are Gauss-Newton on Eq. A1: the adjusted image coordinates take the place of the measured ones in C5.
 
 The normal matrix of one image is linear in (1, x, y, x^2 + y^2), with coefficients that depend on the camera alone.
 So a matrix product builds the normal equations of all points at once, and a closed 3 x 3 solution solves them.
@@ -15,20 +15,21 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 
 CHUNK = 4096  # points at a time: all intermediate arrays stay in the cache
 _MAX_STEPS = 12
-_STEP_SIGMAS = 1e-6  # steps shorter than this part of a sigma end the iteration,
-_STEP_DEPTHS = 1e-13  # and so do steps at the limit of the arithmetic
-_MAX_DEPTH_SIGMA = 1 / 3  # of the distance: beyond it the rays do not tell the point from infinity
+_STEP_SIGMAS = 1e-6  # of a sigma; a shorter step ends the iteration
+_STEP_DEPTHS = 1e-13  # of the depth; a shorter step is rounding and ends it too
+_MAX_DEPTH_SIGMA = 1 / 3  # of the distance: with a larger sigma the point may as well be at infinity
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 _ROWS, _COLUMNS = (np.array(index) for index in zip(*_PAIRS, strict=True))
 
 
 class PointState(IntEnum):
-    """What became of one intersection."""
+    """Result of one intersection."""
 
     OK = 0
     FEW_RAYS = 1  #: none or one ray
@@ -62,18 +63,18 @@ class IntersectedPoints:
         state: (n,) values of `PointState`.
     """
 
-    X: Array
-    covariance: Array
-    residuals: Array
+    X: Floats
+    covariance: Floats
+    residuals: Floats
     state: NDArray[np.int8]
 
     @property
-    def ok(self) -> NDArray[np.bool_]:
+    def ok(self) -> Flags:
         """(n,) whether the point is determined and in front of its cameras."""
         return np.asarray(self.state == PointState.OK)
 
     @property
-    def sigma(self) -> Array:
+    def sigma(self) -> Floats:
         """(n, 3) standard deviations of X, Y, Z."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
@@ -82,7 +83,7 @@ def intersect_points(
     cameras: Sequence[IdealCamera],
     xy: ArrayLike,
     *,
-    seen: NDArray[np.bool_] | None = None,
+    seen: Flags | None = None,
     sigma: ArrayLike = 1.0,
 ) -> IntersectedPoints:
     """Intersect n points from m images with constant orientations (appendix C.1).
@@ -103,7 +104,7 @@ def intersect_points(
     n, m = weight.shape
     system = _System(cameras)
     out = IntersectedPoints(np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, m, 2)), np.empty(n, np.int8))
-    with np.errstate(all="ignore"):  # singular systems are recognised and flagged
+    with np.errstate(all="ignore"):  # singular systems are flagged below
         for first in range(0, n, CHUNK):
             part = slice(first, first + CHUNK)
             system.intersect(xy[part], weight[part], out, part)
@@ -112,7 +113,7 @@ def intersect_points(
     return out
 
 
-def _checked(m: int, xy: Array, seen: NDArray[np.bool_] | None, sigma: Array) -> tuple[Array, Array]:
+def _checked(m: int, xy: Floats, seen: Flags | None, sigma: Floats) -> tuple[Floats, Floats]:
     """Image coordinates without NaN and weights (n, m), 0 for missing rays."""
     if xy.ndim != 3 or xy.shape[1:] != (m, 2):
         raise BadInputError(f"image coordinates have shape {xy.shape}: give (points, {m} images, 2)")
@@ -156,7 +157,7 @@ class _System:
         #: (3, 3 m): gradient for the features e_x / depth, e_y / depth, (x e_x + y e_y) / depth
         self.gradient = -np.concatenate((self.c * r1, self.c * r2, r3)).T.copy()
 
-    def intersect(self, xy: Array, weight: Array, out: IntersectedPoints, part: slice) -> None:
+    def intersect(self, xy: Floats, weight: Floats, out: IntersectedPoints, part: slice) -> None:
         """Solve for one chunk of points and put the results in place."""
         n, m = weight.shape
         x, y = np.ascontiguousarray(xy.transpose(2, 1, 0))
@@ -180,12 +181,12 @@ class _System:
             for result in (out.X, out.covariance, out.residuals):
                 result[part][lost] = np.nan
 
-    def _linear(self, x: Array, y: Array, w: Array) -> Array:
+    def _linear(self, x: Floats, y: Floats, w: Floats) -> Floats:
         """Error equations C5 with weights w (m, n): points (3, n)."""
         system = self.direct @ np.concatenate((w, w * x, w * y, w * (x * x + y * y)))
         return _solve(_invert(system[:6]), system[6:])
 
-    def _gauss_newton(self, point: Array, x: Array, y: Array, w: Array) -> tuple[Array, Array, Array, Array, Array]:
+    def _gauss_newton(self, point: Floats, x: Floats, y: Floats, w: Floats) -> tuple[Floats, ...]:
         """One step with the adjusted coordinates: points, squared step in sigmas, cofactors, residuals, depths."""
         m = len(self.c)
         local = (self.axes @ point - self.offset).reshape(3, m, -1)
@@ -203,9 +204,7 @@ class _System:
         sigmas[np.abs(delta).max(axis=0) < _STEP_DEPTHS * np.abs(local[2]).min(axis=0)] = 0.0
         return point + delta, sigmas, cofactors, -np.stack((ex, ey)), local[2]
 
-    def _state(
-        self, point: Array, cofactors: Array, depth: Array, w: Array, converged: NDArray[np.bool_]
-    ) -> NDArray[np.int8]:
+    def _state(self, point: Floats, cofactors: Floats, depth: Floats, w: Floats, converged: Flags) -> NDArray[np.int8]:
         present = w > 0
         variance = np.abs(cofactors[0]) + np.abs(cofactors[3]) + np.abs(cofactors[5])
         nearest = np.where(present, np.abs(depth), np.inf).min(axis=0)
@@ -217,7 +216,7 @@ class _System:
         return state
 
 
-def _invert(normal: Array) -> Array:
+def _invert(normal: Floats) -> Floats:
     """Inverses (6, n) of symmetric matrices given by their upper triangles (6, n)."""
     a, b, c, d, e, f = normal
     out = np.empty_like(normal)
@@ -231,7 +230,7 @@ def _invert(normal: Array) -> Array:
     return out
 
 
-def _solve(inverse: Array, right: Array) -> Array:
+def _solve(inverse: Floats, right: Floats) -> Floats:
     a, b, c, d, e, f = inverse
     x, y, z = right
     return np.stack((a * x + b * y + c * z, b * x + d * y + e * z, c * x + e * y + f * z))

@@ -1,9 +1,9 @@
-"""Left and right ski interchanged? The trifocal relation over three images answers (Hartley, Zisserman 2003, ch. 15).
+"""Checks whether left and right ski were interchanged in one of three images (Hartley, Zisserman 2003, ch. 15).
 
-A space line seen in two images is transferred into the third by the trifocal tensor: g_i = g'^T T_i g''. For each way
-in which the two skis may have been named (as given, or interchanged in one image), both lines are transferred and
-compared with the measured ones; the misclosures, weighted by the covariances of all six image lines, are chi-square
-with four degrees of freedom if the naming is right.
+The trifocal tensor transfers a space line seen in two images into the third: g_i = g'^T T_i g''. For each hypothesis
+(the naming as given, or interchanged in one image) both lines are transferred and compared with the measured ones. If
+the hypothesis is true, the misclosures, weighted by the covariances of all six image lines, are chi-square distributed
+with four degrees of freedom.
 """
 
 from collections.abc import Sequence
@@ -13,11 +13,12 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.intersection.image_line import ImageLines
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 
-#: Image with interchanged skis in each hypothesis; -1: none. Interchanging in all images, or in two, is only naming.
+#: Image with interchanged skis in each hypothesis; -1: none. Interchanged in two images is the same as in the third.
 HYPOTHESES = (-1, 0, 1, 2)
 _FITS = 18.47  # chi-square, 4 degrees of freedom, 0.1 %
 _SURE = 0.99
@@ -30,17 +31,17 @@ class SideCheck:
     Attributes:
         tests: (n, 4) test value of each hypothesis, chi-square with 4 degrees of freedom; NaN where a line is missing.
         proposal: (n,) image in which left and right should be interchanged, -1: none.
-        confidence: (n,) probability of the proposal among the four hypotheses; 0.25 where nothing can be said.
-        fits: (n,) whether the proposal fits the accuracy of the lines at all (0.1 % level).
+        confidence: (n,) probability of the proposal among the four hypotheses; 0.25 where a line is missing.
+        fits: (n,) whether the proposal is compatible with the accuracy of the lines (0.1 % level).
     """
 
-    tests: Array
+    tests: Floats
     proposal: NDArray[np.int_]
-    confidence: Array
-    fits: NDArray[np.bool_]
+    confidence: Floats
+    fits: Flags
 
     def words(self, instant: int, images: Sequence[str]) -> str:
-        """The finding of one instant for people.
+        """The result of one instant in words.
 
         Args:
             instant: index of the instant.
@@ -58,10 +59,10 @@ class SideCheck:
         return f"left and right are interchanged in {images[proposal]}: interchange them there"
 
 
-def trifocal_tensor(cameras: Sequence[IdealCamera]) -> Array:
+def trifocal_tensor(cameras: Sequence[IdealCamera]) -> Floats:
     """Tensor (3, 3, 3) of slices T_i for transfer into the first of three cameras, scaled to norm 1."""
     first, second, third = cameras
-    # the system in which the first camera is (I, 0): X = X0 + M^-1 x, scaled by the base so that numbers stay near 1
+    # in the system in which the first camera is (I, 0): X = X0 + M^-1 x, scaled by the base so that numbers are near 1
     inverse = np.linalg.inv(first.matrix()[:, :3])
     scale = np.linalg.norm(second.X0 - first.X0) + np.linalg.norm(third.X0 - first.X0)
     frame = np.zeros((4, 4))
@@ -71,7 +72,7 @@ def trifocal_tensor(cameras: Sequence[IdealCamera]) -> Array:
     return np.asarray(tensor / np.linalg.norm(tensor))
 
 
-def transfer_lines(tensor: Array, second: Array, third: Array) -> Array:
+def transfer_lines(tensor: Floats, second: Floats, third: Floats) -> Floats:
     """Lines (..., 3) in the first image from lines (..., 3) in the second and third."""
     return np.asarray(np.einsum("ijk,...j,...k->...i", tensor, second, third))
 
@@ -107,7 +108,7 @@ def check_sides(cameras: Sequence[IdealCamera], left: ImageLines, right: ImageLi
     return SideCheck(tests, np.array(HYPOTHESES)[best], confidence, complete & (known.min(axis=1) < _FITS))
 
 
-def _covariance(lines: ImageLines) -> Array:
+def _covariance(lines: ImageLines) -> Floats:
     """Covariance (..., 3, 3) of the homogeneous lines (a, -1, b) or (1, a, b) divided by the root of 1 + a^2."""
     turned = lines.turned
     one, zero = np.ones_like(lines.a), np.zeros_like(lines.a)
@@ -120,7 +121,7 @@ def _covariance(lines: ImageLines) -> Array:
     return np.asarray(jacobian @ lines.covariance @ np.swapaxes(jacobian, -1, -2))
 
 
-def _interchanged(image: int, lines: Array, covariances: Array) -> tuple[Array, Array]:
+def _interchanged(image: int, lines: Floats, covariances: Floats) -> tuple[Floats, Floats]:
     if image < 0:
         return lines, covariances
     lines, covariances = lines.copy(), covariances.copy()
@@ -129,7 +130,7 @@ def _interchanged(image: int, lines: Array, covariances: Array) -> tuple[Array, 
     return lines, covariances
 
 
-def _test(cameras: Sequence[IdealCamera], lines: Array, covariances: Array) -> Array:
+def _test(cameras: Sequence[IdealCamera], lines: Floats, covariances: Floats) -> Floats:
     """Sum of both skis' test values (n,), each transferred into the image where the transfer is most accurate."""
     values, spreads = zip(*(_transfer_test(cameras, order, lines, covariances) for order in _orders()), strict=True)
     pick = np.argmin(spreads, axis=0)
@@ -141,8 +142,8 @@ def _orders() -> list[tuple[int, ...]]:
 
 
 def _transfer_test(
-    cameras: Sequence[IdealCamera], order: tuple[int, ...], lines: Array, covariances: Array
-) -> tuple[Array, Array]:
+    cameras: Sequence[IdealCamera], order: tuple[int, ...], lines: Floats, covariances: Floats
+) -> tuple[Floats, Floats]:
     """Test values (2, n) of lines transferred into image order[0], and the variance of the transferred direction."""
     tensor = trifocal_tensor([cameras[i] for i in order])
     measured, second, third = (lines[:, :, i] for i in order)
@@ -170,5 +171,5 @@ def _transfer_test(
     return (w * solved[..., 0]).sum(axis=-1), total[..., 0, 0]
 
 
-def _sandwich(jacobian: Array, covariance: Array) -> Array:
+def _sandwich(jacobian: Floats, covariance: Floats) -> Floats:
     return np.asarray(jacobian @ covariance @ np.swapaxes(jacobian, -1, -2))

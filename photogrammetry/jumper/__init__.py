@@ -1,1 +1,1 @@
-"""The jumper in numbers."""
+"""The jumper: the stick model of Fig. 6."""

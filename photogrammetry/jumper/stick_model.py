@@ -1,6 +1,6 @@
-"""The stick model of Fig. 6: from points and ski directions to the numbers that describe a pose.
+"""The stick model of Fig. 6: computes the angles that describe a jumper's pose from points and ski directions.
 
-The drawing's angles are read so, X' being the mean direction of the skis (tail to tip), O the midpoint of P3 and P4:
+How this module reads the drawing, with X' the mean direction of the skis (tail to tip), O the midpoint of P3 and P4:
 
 - alpha: between X' and the legs O-P2;
 - beta: at the hip, between P2-O and P2-P1; 180 degrees would be a straight body;
@@ -10,9 +10,8 @@ The drawing's angles are read so, X' being the mean direction of the skis (tail 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rig.arrays import Floats
 
 #: Order of the angles.
 ANGLES = ("alpha", "beta", "gamma", "dphi", "phi")
@@ -60,6 +59,6 @@ def _unit(direction: Floats) -> Floats:
 
 
 def _between(one: Floats, other: Floats) -> Floats:
-    """Angle between vectors, precise also where it is small."""
+    """Angle between vectors (..., 3), rad; precise also for small angles."""
     across = np.linalg.norm(np.cross(one, other), axis=-1)
     return np.asarray(np.arctan2(across, np.sum(one * other, axis=-1)))

@@ -1,1 +1,1 @@
-"""How accurate a network will be, before anybody carries a ball up the hill."""
+"""Predicts how accurate a network will be before it is built: by covariance and by Monte Carlo."""

@@ -1,4 +1,4 @@
-"""The planner's network file: strict TOML, every error names file, key and remedy."""
+"""Reads the planner's network files: strict TOML; every error names file, key and remedy."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from photogrammetry.network_entries import Entry, Finite, Name, Pixels, Positive, Triple
-from rig.rigfile import read_toml, validate
+from photogrammetry.network.entries import Finite, Name, Pixels, Positive, Triple
+from rig.settings.strict_toml import StrictModel, read_toml, validate
 
 Parameter = Literal["c", "x0", "y0", "a1", "a2", "a3", "b1", "b2", "c1", "c2"]
 
 
-class ImageEntry(Entry):
-    """One image: where the camera stands, where it looks, how far it is turned about its axis."""
+class ImageEntry(StrictModel):
+    """One image: where the camera stands, where it looks, how far it is turned clockwise as seen from behind it."""
 
     X0: Triple
     look_at: Triple
@@ -27,8 +27,8 @@ class ImageEntry(Entry):
         return self
 
 
-class CameraEntry(Entry):
-    """A camera, what of it is unknown, and its images."""
+class CameraEntry(StrictModel):
+    """A camera, its unknown parameters, and its images."""
 
     name: Name
     size: Annotated[list[Pixels], Field(min_length=2, max_length=2)]
@@ -37,7 +37,7 @@ class CameraEntry(Entry):
     images: Annotated[list[ImageEntry], Field(min_length=1)]
 
 
-class BallEntry(Entry):
+class BallEntry(StrictModel):
     """A target: surveyed (control), unknown (tie) or the origin itself (fixed)."""
 
     name: Name
@@ -45,7 +45,7 @@ class BallEntry(Entry):
     X: Triple
 
 
-class RodEntry(Entry):
+class RodEntry(StrictModel):
     """A vertical rod with a target at its foot (`NAME-1`) and one `length` above it (`NAME-2`)."""
 
     name: Name
@@ -53,8 +53,8 @@ class RodEntry(Entry):
     length: Positive
 
 
-class DifferenceEntry(Entry):
-    """A known coordinate difference between two targets: along `axis` they lie as the file says, within `sigma`."""
+class DifferenceEntry(StrictModel):
+    """A measured coordinate difference of two targets: that of their given coordinates along `axis`, with `sigma`."""
 
     start: Name
     end: Name
@@ -62,8 +62,8 @@ class DifferenceEntry(Entry):
     sigma: Positive
 
 
-class SigmaEntry(Entry):
-    """What is measured how well: image points (px), surveyed targets, rods."""
+class SigmaEntry(StrictModel):
+    """Standard deviations of the measurements: image points (px), surveyed targets, rods."""
 
     image: Positive
     control: Positive | None = None
@@ -71,7 +71,7 @@ class SigmaEntry(Entry):
     rod_verticality: Positive | None = None  # shift of the upper target across / length
 
 
-class SkiEntry(Entry):
+class SkiEntry(StrictModel):
     """A ski: the point of the jumper that it passes through, its direction and length."""
 
     point: Name
@@ -79,8 +79,8 @@ class SkiEntry(Entry):
     length: Positive
 
 
-class StickEntry(Entry):
-    """Which points and skis make the angles of Fig. 6; O lies midway between the points of the two skis."""
+class StickEntry(StrictModel):
+    """The points and skis that define the angles of Fig. 6; O lies midway between the points of the two skis."""
 
     helmet: Name
     hip: Name
@@ -88,11 +88,11 @@ class StickEntry(Entry):
     left: Name
 
 
-class JumperEntry(Entry):
+class JumperEntry(StrictModel):
     """The jumper, carried along the flight without turning.
 
-    Points are given relative to the path, one place of it per pulse. `tie` names those whose places also act as tie
-    points (alternative 2).
+    Points are relative to the path, which has one place per pulse. `tie` names the points whose places are also tie
+    points of step 2 (alternative 2).
     """
 
     points: Annotated[dict[Name, Triple], Field(min_length=1)]
@@ -121,7 +121,7 @@ class JumperEntry(Entry):
         return self
 
 
-class Description(Entry):
+class Description(StrictModel):
     """A planned network."""
 
     name: Name

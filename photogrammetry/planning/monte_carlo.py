@@ -1,48 +1,47 @@
-"""Predicted sigmas by Monte Carlo: steps 2 and 3 done again and again with new errors (Hastedt 2004).
+"""Predicts sigmas by Monte Carlo: repeats steps 2 and 3 with new random errors (Hastedt 2004).
 
-All samples of a chunk iterate together, with exact derivatives: each ends at its own least-squares solution.
+All samples of a chunk iterate together, with exact derivatives; each ends at its own least-squares solution.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.adjustment.adjustment import Adjustment
-from photogrammetry.adjustment.state import State
+from photogrammetry.adjustment.equations.unknowns import State
+from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.planning.plan import Flight, Plan
 from photogrammetry.planning.prediction import Sigmas, no_flight
-from photogrammetry.planning.step_three import error_free_sights, intersect_flight
-from photogrammetry.planning.step_three_samples import intersect_samples
+from photogrammetry.planning.step_three import (
+    error_free_sights,
+    features,
+    intersect_flight,
+    intersect_samples,
+    speeds,
+    stick_values,
+)
 from photogrammetry.planning.step_two_samples import StepTwo
-from photogrammetry.planning.stick_features import features, speeds, stick_values
+from rig.arrays import Floats
 
-Floats = NDArray[np.float64]
-
-#: A simulated sigma is known to 1 / sqrt(2 samples) of itself: 1.1 %. The worst of some hundred figures is off by 3.5
-#: times that, less than the 5 % within which the two predictions must agree.
+#: The relative sigma of a simulated sigma is 1 / sqrt(2 samples): 1.1 %. The worst of some hundred figures is off by
+#: 3.5 times that, less than the 5 % within which the two predictions must agree.
 SAMPLES = 4000
 
 
-def _nobody(_: int) -> None:
-    """Nobody watches."""
-
-
 def simulate(
-    plan: Plan, adjusted: Adjustment, *, samples: int, seed: int, done: Callable[[int], None] = _nobody
+    plan: Plan, adjusted: Adjustment, *, samples: int, seed: int, done: Callable[[int], None] = lambda _: None
 ) -> Sigmas:
     """Standard deviations about the true values, from repeated steps 2 and 3.
 
     Args:
-        plan: the network.
+        plan: the planned network.
         adjusted: its step 2 without errors.
         samples: number of repetitions.
-        seed: the same seed gives the same figures.
-        done: is told how many samples are done.
+        seed: of the random numbers.
+        done: progress callback, called with the number of samples done so far; does nothing by default.
 
     Raises:
-        NotConvergedError: the errors are so large that step 2 leads nowhere.
+        NotConvergedError: the errors are so large that a sample does not converge.
     """
     rng, truth, step_two = np.random.default_rng(seed), adjusted.state, StepTwo(adjusted)
     selection = adjusted.problem.unknowns.selection
@@ -59,7 +58,7 @@ def simulate(
 
 
 class _RepeatedFlight:
-    """Step 3, again and again."""
+    """Step 3 of a plan, prepared for repetition."""
 
     def __init__(self, plan: Plan, flight: Flight, truth: State) -> None:
         self.network, self.flight = plan.network, flight
@@ -68,7 +67,7 @@ class _RepeatedFlight:
         self.true_stick = self._stick(flight.points, self.truth.angles.reshape(*flight.skis.shape[:2], 2))
 
     def errors(self, states: State, rng: np.random.Generator) -> list[Floats]:
-        """Errors in the order of `Sigmas`; tie points stay where step 2 left them."""
+        """Errors in the order of `Sigmas`; for jumper points that are tie points, those of step 2."""
         flight, sights, n = self.flight, self.sights, len(states.xyz)
         noisy = replace(
             sights,

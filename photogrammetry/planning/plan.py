@@ -1,13 +1,13 @@
-"""A planned network with the observations it will have: every target in every picture that shows it, without error."""
+"""Makes a network out of a description: observes every target in every image that shows it, without error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.camera_model import INTERIOR, Lens, camera_coordinates, image_point
-from photogrammetry.network import (
+from photogrammetry.geometry.camera_model import INTERIOR, Lens, camera_coordinates, image_point
+from photogrammetry.network.model import (
+    AXES,
     Camera,
     Datum,
     DatumType,
@@ -19,10 +19,10 @@ from photogrammetry.network import (
     Point,
     Role,
 )
-from photogrammetry.planning.description import Description, ImageEntry, JumperEntry
+from photogrammetry.planning.description import Description, JumperEntry
+from rig.arrays import Flags, Floats, Integers
 from rig.errors import BadInputError
-
-Floats = NDArray[np.float64]
+from rig.viewing import look_at
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Stick:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flight:
-    """What step 3 intersects, true values.
+    """The jumper's points and skis that step 3 intersects, true values.
 
     Attributes:
         points: (t, p, 3) jumper points at t positions.
@@ -46,12 +46,12 @@ class Flight:
         tie: (t, p) index of the same point in the network of step 2; -1: it is no tie point there.
         skis: (t, s, k, 3) measured points of s skis.
         ski_names: of the s skis.
-        stick: what makes the angles of the body; None: nothing is said of them.
+        stick: definition of the body angles; None: they are not predicted.
     """
 
     points: Floats
     names: tuple[str, ...]
-    tie: NDArray[np.intp]
+    tie: Integers
     skis: Floats
     ski_names: tuple[str, ...]
     stick: Stick | None
@@ -65,7 +65,7 @@ class Plan:
         name: for people.
         network: step 2 (or the laboratory's step 1): true values, error-free observations.
         sigma: of an image coordinate (px).
-        flight: step 3; None where nobody jumps.
+        flight: step 3; None without a jumper.
     """
 
     name: str
@@ -75,14 +75,14 @@ class Plan:
 
 
 def plan_from(description: Description) -> Plan:
-    """Work out who sees what.
+    """The planned network with the observations of all images.
 
     Raises:
         BadInputError: a jumper point or ski that fewer than two images show.
     """
     cameras = tuple(_camera(entry.name, entry.c, entry.size, entry.estimate) for entry in description.cameras)
     images = tuple(
-        Image(f"{entry.name}-{number}", index, np.array(image.X0), _rotation(image))
+        Image(f"{entry.name}-{number}", index, np.array(image.X0), look_at(image.X0, image.look_at, image.roll_deg))
         for index, entry in enumerate(description.cameras)
         for number, image in enumerate(entry.images, 1)
     )
@@ -105,7 +105,7 @@ def plan_from(description: Description) -> Plan:
     return Plan(description.name, network, description.sigma.image, flight)
 
 
-def in_picture(camera: Camera, image: Image, xyz: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def in_picture(camera: Camera, image: Image, xyz: Floats) -> tuple[Floats, Flags]:
     """Image coordinates (..., 2) of points (..., 3), and whether they lie in front and within the picture (...)."""
     if image.position is None or image.rotation is None or camera.size is None:
         raise ValueError("a planned image has a pose and a size")
@@ -123,16 +123,6 @@ def _camera(name: str, c: float, size: list[int], estimate: Sequence[str]) -> Ca
     return Camera(name, interior, size=(size[0], size[1]), estimate=chosen)
 
 
-def _rotation(image: ImageEntry) -> Floats:
-    """Columns: the camera's axes; upright, then turned about its axis."""
-    back = np.subtract(image.X0, image.look_at)
-    back = back / np.linalg.norm(back)
-    right = np.cross((0.0, 0.0, 1.0), back)
-    right /= np.linalg.norm(right)
-    up, roll = np.cross(back, right), np.radians(image.roll_deg)
-    return np.column_stack((np.cos(roll) * right + np.sin(roll) * up, np.cos(roll) * up - np.sin(roll) * right, back))
-
-
 def _targets(description: Description) -> tuple[list[Point], list[Distance], list[Difference]]:
     """Balls and rods as points, distances and differences."""
     sigma, index = description.sigma, {name: i for i, name in enumerate(description.target_names())}
@@ -147,7 +137,7 @@ def _targets(description: Description) -> tuple[list[Point], list[Distance], lis
     ]
     distances, differences = [], []
     for rod in description.rods:
-        if sigma.rod_length is None or sigma.rod_verticality is None:  # the description has refused it
+        if sigma.rod_length is None or sigma.rod_verticality is None:  # `Description` refuses it
             raise ValueError("rods without sigmas")
         foot, start = np.array(rod.foot), len(points)
         points += [
@@ -158,7 +148,7 @@ def _targets(description: Description) -> tuple[list[Point], list[Distance], lis
         across = sigma.rod_verticality * rod.length
         differences += [Difference(start, start + 1, axis, 0.0, across) for axis in (0, 1)]
     for entry in description.differences:
-        start, end, axis = index[entry.start], index[entry.end], "XYZ".index(entry.axis)
+        start, end, axis = index[entry.start], index[entry.end], AXES.index(entry.axis)
         here, there = points[start].xyz, points[end].xyz
         if here is not None and there is not None:
             differences.append(Difference(start, end, axis, float(there[axis] - here[axis]), entry.sigma))
@@ -195,7 +185,7 @@ def _stick(jumper: JumperEntry) -> Stick | None:
 
 
 def _check_flight(flight: Flight, cameras: tuple[Camera, ...], images: tuple[Image, ...]) -> None:
-    """Every point in at least two images, every ski whole in at least two."""
+    """Raise BadInputError unless two images show every point, and two images every ski as a whole."""
     for names, xyz in ((flight.names, flight.points[:, :, None]), (flight.ski_names, flight.skis)):
         seen = np.sum([in_picture(cameras[image.camera], image, xyz)[1].all(axis=-1) for image in images], axis=0)
         for position, which in np.argwhere(seen < 2):

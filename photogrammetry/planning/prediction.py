@@ -1,18 +1,24 @@
-"""Predicted sigmas by covariance propagation: step 2, then step 3 with step 2's errors carried along."""
+"""Predicts sigmas by covariance propagation: step 2, then step 3 with the covariance of step 2."""
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
-from photogrammetry.adjustment.adjustment import Adjustment, adjust_once
+from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
 from photogrammetry.planning.plan import Flight, Plan, Stick
-from photogrammetry.planning.step_three import Intersected, Sights, error_free_sights, intersect_flight
-from photogrammetry.planning.stick_features import features, origin_weights, stick_slopes
+from photogrammetry.planning.step_three import (
+    Intersected,
+    Sights,
+    error_free_sights,
+    features,
+    intersect_flight,
+    origin_weights,
+    stick_slopes,
+)
+from rig.arrays import Floats
 
-Floats = NDArray[np.float64]
-
-_STEP = 0.1  # sigmas: the differences are of third order in it
+_STEP = 0.1  # sigmas, of central differences; their errors are of third order in it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,20 +41,16 @@ class Sigmas:
     body: Floats
     speed: Floats
 
-    def flat(self) -> Floats:
-        """All of them in one row."""
-        return np.concatenate([part.ravel() for part in astuple(self)])
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """Step 3 as a linear function of everything that errs: the unknowns of step 2, and the rays of step 3.
+    """Step 3 linearised: a function of the unknowns of step 2 and of the rays of step 3.
 
     Attributes:
         values: (t, f) features of each position: points, then slope and heading of the skis.
         by_unknowns: (t, f, u) derivatives by all unknowns of step 2.
-        own: (t, f, f) covariance that the rays of step 3 add; no two positions share a ray.
-        covariance: (t, f, f) in all.
+        own: (t, f, f) covariance from the rays of step 3; no two positions share a ray.
+        covariance: (t, f, f) from both.
     """
 
     values: Floats
@@ -58,16 +60,16 @@ class Carried:
 
 
 def adjusted_plan(plan: Plan) -> Adjustment:
-    """Step 2 of the plan, error-free; its cofactors are the covariance that the given sigmas lead to.
+    """Step 2 of the plan with error-free observations; its cofactors are the covariance that follows from the sigmas.
 
     Raises:
-        NotSolvableError: the network does not determine its unknowns; says which and why.
+        NotSolvableError: the network does not determine its unknowns; names them and the causes.
     """
     return adjust_once(plan.network)
 
 
 def predict(plan: Plan, adjusted: Adjustment) -> Sigmas:
-    """Propagate: covariance of what is intersected = that of its rays + that of the orientations."""
+    """Predicted sigmas. The covariance of intersected points is that of their rays plus that of the orientations."""
     unknowns, flight = adjusted.problem.unknowns, plan.flight
     variance = np.append(np.diagonal(adjusted.cofactors), 0.0)
     positions, interior = np.sqrt(variance[unknowns.pose[:, :3]]), np.sqrt(variance[unknowns.camera])
@@ -85,15 +87,15 @@ def predict(plan: Plan, adjusted: Adjustment) -> Sigmas:
 
 
 def no_flight() -> tuple[Floats, Floats, Floats, Floats]:
-    """Points, angles, body and speed where nobody jumps."""
+    """Empty points, angles, body and speed, of a plan without a jumper."""
     return np.zeros((0, 0, 3)), np.zeros((0, 0, 2)), np.zeros((0, 0)), np.zeros(0)
 
 
 def carry(plan: Plan, flight: Flight, adjusted: Adjustment) -> Carried:
     """Linearise step 3.
 
-    A jumper point that is a tie point of step 2 comes out of step 3 where step 2 left it (same observations, same
-    orientations), so it is an unknown of step 2 itself.
+    For a jumper point that is a tie point of step 2, step 3 gives the result of step 2 (same observations, same
+    orientations), so it is taken as an unknown of step 2.
     """
     unknowns = adjusted.problem.unknowns
     sights = error_free_sights(plan, flight)
@@ -117,15 +119,11 @@ def _features(flight: Flight, intersected: Intersected) -> Floats:
 
 
 def _own(flight: Flight, alone: Intersected) -> Floats:
-    """(t, f, f): blocks of the points, then of the skis."""
+    """Covariance (t, f, f) from the rays of step 3: blocks of the points, then of the skis."""
     t, p, s = len(flight.points), len(flight.names), len(flight.ski_names)
-    own = np.zeros((t, 3 * p + 2 * s, 3 * p + 2 * s))
-    for i, block in enumerate(alone.points_covariance.reshape(t, p, 3, 3).swapaxes(0, 1)):
-        own[:, 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = block
-    for i, block in enumerate(alone.angles_covariance.reshape(t, s, 2, 2).swapaxes(0, 1)):
-        first = 3 * p + 2 * i
-        own[:, first : first + 2, first : first + 2] = block
-    return own
+    points = alone.points_covariance.reshape(t, p, 3, 3)
+    skis = alone.angles_covariance.reshape(t, s, 2, 2)
+    return np.array([block_diag(*points[i], *skis[i]) for i in range(t)])
 
 
 def _by_orientations(plan: Plan, flight: Flight, adjusted: Adjustment, sights: Sights) -> Floats:
@@ -144,7 +142,7 @@ def _by_orientations(plan: Plan, flight: Flight, adjusted: Adjustment, sights: S
 
 
 def _speed(stick: Stick, carried: Carried, cofactors: Floats) -> Floats:
-    """Of O from each pulse to the next: what both places owe to the same orientations cancels in their difference."""
+    """Sigma of the speed of O between pulses; errors that both places have from the same orientations cancel."""
     weights = origin_weights(stick, carried.values.shape[-1])
     along = np.diff(carried.values, axis=0) @ weights.T
     along /= np.linalg.norm(along, axis=1, keepdims=True)

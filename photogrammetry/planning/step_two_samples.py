@@ -1,35 +1,88 @@
-"""Step 2 of many samples at a time: each with its own errors of all observations, and its own optimum.
+"""Repeats step 2 of a plan for many samples at a time, each with its own random errors and its own optimum.
 
-Gauss-Newton. A point that no distance or difference ties to others is eliminated (Schur complement). Where a camera
-parameter is weak (decentring beside the principal point) Gauss-Newton overshoots by a nearly constant factor; two steps
-in a row tell that factor, and the next one goes where they would end (Anderson's extrapolation, one step deep).
+Gauss-Newton. Points that no distance or difference ties to others are eliminated (Schur complement). Where a camera
+parameter is weak (decentring beside the principal point) Gauss-Newton overshoots by a nearly constant factor. Two
+successive steps determine that factor, and the next move goes to where the steps would end (Anderson's extrapolation
+with a memory of one step).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.adjustment.adjustment import Adjustment
-from photogrammetry.adjustment.datum import datum_points, inner_operator
-from photogrammetry.adjustment.problem import Problem
-from photogrammetry.adjustment.state import State
-from photogrammetry.adjustment.unknowns import Integers
-from photogrammetry.camera_model import Lens, linearise
-from photogrammetry.diagnosis import NotConvergedError
-from photogrammetry.planning.relation_samples import Normals, add_relations
-from photogrammetry.rotation import rotation_from_vector
-
-Floats = NDArray[np.float64]
+from photogrammetry.adjustment.equations.problem import Problem
+from photogrammetry.adjustment.equations.relations import Kind
+from photogrammetry.adjustment.equations.unknowns import State
+from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.adjustment.solution.datum import datum_points, inner_operator
+from photogrammetry.geometry.camera_model import Lens, linearise
+from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.network.diagnosis import NotConvergedError
+from rig.arrays import Floats, Integers
 
 _CHUNK_NUMBERS = 400_000  # of derivatives at a time: they stay in the cache
-_STEPS = 200  # few samples need many, and those alone go on
+_STEPS = 200  # few samples need many steps; only those iterate on
 _ENOUGH = 1e-3  # of a sigma; the scatter of 4000 samples is only known to 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Normals:
+    """Normal equations of n samples, in units of the sigmas; the last kept column collects the constants.
+
+    Attributes:
+        kept: (n, k + 1, k + 1) cameras, poses and points that are not eliminated.
+        gradient: (n, k + 1).
+        own: (n, p, 3, 3) of each eliminated point.
+        own_gradient: (n, p, 3).
+        mixed: (n, p, 3, k + 1).
+    """
+
+    kept: Floats
+    gradient: Floats
+    own: Floats
+    own_gradient: Floats
+    mixed: Floats
+
+    @classmethod
+    def zeros(cls, samples: int, kept: int, eliminated: int) -> "Normals":
+        """Normal equations without any observation."""
+        wide = kept + 1
+        return cls(
+            np.zeros((samples, wide, wide)),
+            np.zeros((samples, wide)),
+            np.zeros((samples, eliminated, 3, 3)),
+            np.zeros((samples, eliminated, 3)),
+            np.zeros((samples, eliminated, 3, wide)),
+        )
+
+    def add(self, columns: Integers, slopes: Floats, v: Floats) -> None:
+        """Add rows with kept unknowns only: slopes (n, rows, c) by distinct `columns` (c,); residuals (n, rows)."""
+        transposed = slopes.swapaxes(1, 2)
+        self.kept[:, columns[:, None], columns] += transposed @ slopes
+        self.gradient[:, columns] += (transposed @ v[..., None])[..., 0]
+
+    def add_cross(self, one: Integers, other: Integers, by_one: Floats, by_other: Floats) -> None:
+        """Add the mixed terms of two groups of kept unknowns; slopes (n, rows, columns)."""
+        product = by_one.swapaxes(1, 2) @ by_other
+        self.kept[:, one[:, None], other] += product
+        self.kept[:, other[:, None], one] += product.swapaxes(1, 2)
+
+    def add_own(self, place: Integers, columns: Integers, by_own: Floats, by_kept: Floats, v: Floats) -> None:
+        """Add pairs of rows of m distinct eliminated points: slopes (n, m, 2, 3) and (n, m, 2, c)."""
+        self.own[:, place] += _products(by_own, by_own)
+        self.own_gradient[:, place] += by_own[:, :, 0] * v[:, :, :1] + by_own[:, :, 1] * v[:, :, 1:]
+        self.mixed[:, place[:, None, None], np.arange(3)[:, None], columns] += _products(by_own, by_kept)
+
+
+def _products(one: Floats, other: Floats) -> Floats:
+    """Transposed `one` times `other`, both (n, m, 2, .); faster than numpy's products of many small matrices."""
+    products: Floats = one[:, :, 0, :, None] * other[:, :, 0, None] + one[:, :, 1, :, None] * other[:, :, 1, None]
+    return products
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Observed:
-    """What samples have observed: xy (samples, n, 2); whitened errors of the other observations (samples, m)."""
+    """Observations of samples: xy (samples, n, 2); errors of the relations (samples, m), in units of their sigmas."""
 
     xy: Floats
     errors: Floats
@@ -39,7 +92,7 @@ class _Observed:
 
 
 class StepTwo:
-    """Step 2 of a plan, ready to be repeated.
+    """Step 2 of a plan, prepared for repetition.
 
     Args:
         adjusted: the error-free adjustment.
@@ -51,7 +104,7 @@ class StepTwo:
         self.sigma = np.sqrt(np.diagonal(adjusted.cofactors))
         problem, unknowns = self.problem, self.problem.unknowns
         points = datum_points(adjusted.network)
-        #: free motions (u, d) and the conditions (d, u) of the datum that stop them
+        #: free motions (u, d) and the conditions (d, u) of the datum that exclude them
         self.moves, self.conditions = inner_operator(problem, adjusted.state, adjusted.free, points)
         self.columns = problem.global_columns()
         #: (n,) place among the eliminated points; -1: not eliminated
@@ -59,13 +112,13 @@ class StepTwo:
         block[unknowns.eliminated] = np.arange(len(unknowns.eliminated))
         self.block = block[problem.point]
         numbers = 2 * len(problem.image) * (len(unknowns.selection) + 9) + unknowns.n_kept_end * unknowns.count
-        self.chunk = max(1, _CHUNK_NUMBERS // numbers)  #: so many samples at a time are quickest
+        self.chunk = max(1, _CHUNK_NUMBERS // numbers)  #: number of samples at a time that is fastest
 
     def repeated(self, count: int, rng: np.random.Generator) -> State:
         """The optima of `count` samples; arrays begin with the sample.
 
         Raises:
-            NotConvergedError: the errors are so large that a sample leads nowhere.
+            NotConvergedError: the errors are so large that a sample does not converge.
         """
         problem, truth = self.problem, self.truth
         xy = problem.xy + problem.sigma * rng.standard_normal((count, *problem.xy.shape))
@@ -105,7 +158,7 @@ class StepTwo:
         return in_datum
 
     def _normals(self, state: State, observed: _Observed) -> Normals:
-        """Normal equations of all samples at their states; image by image, for a point is there once in an image."""
+        """Normal equations of all samples at their states, image by image: an image has each point once."""
         problem, split = self.problem, self.problem.unknowns.n_kept_end
         v, by_global, by_point = self._linearised(state, observed.xy)
         normals = Normals.zeros(len(v), split, len(problem.unknowns.eliminated))
@@ -158,7 +211,7 @@ def _taken(state: State, which: Integers) -> State:
 
 
 def _extrapolated(step: Floats, before: Floats, moved: Floats) -> Floats:
-    """Where the steps of each sample would end, if they went on to shrink (or to turn) as the last two did.
+    """The move to where the steps of each sample would end if each shrank (or turned) as the last did.
 
     Args:
         step: this Gauss-Newton step (samples, u), in sigmas.
@@ -170,3 +223,42 @@ def _extrapolated(step: Floats, before: Floats, moved: Floats) -> Floats:
     weight = np.sum(step * change, axis=1, keepdims=True) / np.where(size > 0.0, size, 1.0)
     move: Floats = step - np.clip(weight, -1.0, 1.0) * (moved + change)
     return move
+
+
+def add_relations(normals: Normals, problem: Problem, truth: Floats, xyz: Floats, errors: Floats) -> None:
+    """Control points, distances and differences (a plan has no other relations).
+
+    Args:
+        normals: to add to.
+        problem: the planned network.
+        truth: (points, 3).
+        xyz: (n, points, 3) of the samples.
+        errors: (n, m) of the observed values, whitened.
+    """
+    network, relations, unknowns = problem.network, problem.relations, problem.unknowns
+    for row, (kind, i, axis) in enumerate(zip(relations.kind, relations.item, relations.part, strict=True)):
+        weight, error = 1.0 / problem.relation_sigma[row], errors[:, row]
+        if kind == Kind.CONTROL:
+            v, column = weight * (xyz[:, i, axis] - truth[i, axis]) - error, unknowns.point[i, axis]
+            if column < unknowns.n_kept_end:
+                normals.kept[:, column, column] += weight**2
+                normals.gradient[:, column] += weight * v
+            else:
+                place = (column - unknowns.n_kept_end) // 3
+                normals.own[:, place, axis, axis] += weight**2
+                normals.own_gradient[:, place, axis] += weight * v
+            continue
+        if kind == Kind.DIFFERENCE:
+            e = network.differences[i]
+            start, end, value = e.start, e.end, e.value
+            direction = np.broadcast_to(np.eye(3)[axis], (len(xyz), 3))
+            length = xyz[:, end, axis] - xyz[:, start, axis]
+        else:
+            d = network.distances[i]
+            start, end, value = d.start, d.end, d.value
+            direction = xyz[:, end] - xyz[:, start]
+            length = np.linalg.norm(direction, axis=1)
+            direction = direction / length[:, None]
+        slopes = weight * np.concatenate([-direction, direction], axis=1)[:, None]
+        columns = np.append(unknowns.point[start], unknowns.point[end])
+        normals.add(columns, slopes, (weight * (length - value) - error)[:, None])

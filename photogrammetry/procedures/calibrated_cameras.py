@@ -1,4 +1,4 @@
-"""Interior orientations from the result of a calibration, for use as constants (step 2 on the result of step 1)."""
+"""Reads interior orientations from the result file of a calibration; step 2 takes them as constants."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,16 +8,16 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field
 
-from photogrammetry.camera_model import INTERIOR, Distortion
-from photogrammetry.network import Network
-from photogrammetry.network_entries import Finite, Positive
-from photogrammetry.network_file import read_json
+from photogrammetry.geometry.camera_model import INTERIOR, Distortion
+from photogrammetry.network.entries import Finite, Positive
+from photogrammetry.network.file import read_json
+from photogrammetry.network.model import Network
 from rig.errors import BadInputError
-from rig.rigfile import validate
+from rig.settings.strict_toml import validate
 
 
 class CalibratedCamera(BaseModel):
-    """One of `cameras` of a result; sigmas and correlations beside these are of no use here."""
+    """One of `cameras` of a result; its sigmas and correlations are ignored."""
 
     c: Positive
     x0: Finite
@@ -34,7 +34,7 @@ class CalibratedCamera(BaseModel):
 
 
 class _Result(BaseModel):
-    """What a calibration must have; whatever else it says is not asked."""
+    """The keys of a result that a calibration must have; all others are ignored."""
 
     format: Literal["svev-adjustment/1"]
     converged: bool
@@ -45,7 +45,7 @@ def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
     """Read the cameras of a result file (`svev-adjustment/1`).
 
     Raises:
-        BadInputError: missing, unreadable, no result, or one without numbers.
+        BadInputError: missing, unreadable, no result file, or one of a calibration that did not converge.
     """
     result = validate(_Result, read_json(path), path)
     if not result.converged:

@@ -1,7 +1,7 @@
 """Calibration of the cameras (paper, step 1): free adjustment of a 3D frame of unknown targets, self-calibrating.
 
-The paper keeps the free network regular by weighted poses (D.2); here inner constraints do it, which pull at nothing.
-Distances and coordinate differences stay: a scale bar gives the frame its size.
+The paper makes the free network regular by weighted poses (D.2). This module takes inner constraints, which do not
+influence the residuals. Distances and coordinate differences stay: a scale bar gives the scale.
 """
 
 from collections.abc import Iterator
@@ -10,17 +10,16 @@ from itertools import combinations
 
 import numpy as np
 
-from photogrammetry.adjustment.adjustment import Adjustment
+from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.run import Outcome, adjust
-from photogrammetry.adjustment.state import state_of
-from photogrammetry.network import Datum, DatumType, Network, Point, Role
-from photogrammetry.procedures.selection import only_points, rays, require_unknown_poses
+from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.network.model import Datum, DatumType, Network, Point, Role
+from photogrammetry.network.selection import only_points, rays, require_unknown_poses
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
-_RAYS = 2  # that a target needs
-_INSIGNIFICANT = 1.96
-_STRONG = 0.95  # correlation of two interior parameters that can hardly be told apart
+_RAYS = 2  # a target needs at least so many
+_STRONG = 0.95  # correlation beyond which two interior parameters can hardly be told apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +28,7 @@ class Calibration:
 
     Attributes:
         outcome: the free adjustment.
-        notes: what was done to the network, and what is doubtful about the parameters.
+        notes: changes that were made to the network, and doubtful parameters.
     """
 
     outcome: Outcome
@@ -42,7 +41,7 @@ def calibrate(network: Network) -> Calibration:
     Gross errors that can be located are taken out, the worst first.
 
     Args:
-        network: images of a frame. Surveyed coordinates are no more than start values.
+        network: images of a frame. Surveyed coordinates are used as start values only.
 
     Raises:
         BadInputError: no camera estimates anything, or a pose is constant.
@@ -54,7 +53,7 @@ def calibrate(network: Network) -> Calibration:
 
 
 def _free(network: Network) -> tuple[Network, list[str]]:
-    """The free network, and what had to be changed for it."""
+    """The free network, and notes on the changes that make it one."""
     if not any(camera.estimate for camera in network.cameras):
         raise BadInputError(
             'no camera estimates anything; list its unknown parameters under "estimate", for instance ["c", "x0", "y0"]'
@@ -88,20 +87,15 @@ def _free(network: Network) -> tuple[Network, list[str]]:
 
 
 def _doubts(a: Adjustment) -> Iterator[str]:
-    """Parameters that the images hardly determine."""
+    """Parameters that the images hardly determine, in words."""
     for i, camera in enumerate(a.network.cameras):
-        columns = a.problem.unknowns.camera[i]
-        chosen = columns >= 0
-        sigma = a.sigmas(columns[chosen])
-        values = a.state.interior[i][a.problem.unknowns.selection[chosen]]
-        small = np.abs(values) < _INSIGNIFICANT * sigma
-        zero = [name for name, doubtful in zip(camera.estimate, small, strict=True) if doubtful and name != "c"]
+        parameters, correlations = a.parameters(i)
+        zero = [parameter.name for parameter in parameters if parameter.insignificant]
         if zero:
             yield f"camera {camera.name}: not significantly different from zero: {', '.join(zero)}"
-        correlation = a.covariance(columns[chosen]) / np.maximum(np.outer(sigma, sigma), 1e-300)
         for (k, one), (j, other) in combinations(enumerate(camera.estimate), 2):
-            if abs(correlation[j, k]) >= _STRONG:
+            if abs(correlations[j, k]) >= _STRONG:
                 yield (
                     f"camera {camera.name}: {one} and {other} can hardly be told apart "
-                    f"(correlation {correlation[j, k]:.3f}); add images rolled by 90 degrees, or drop one of them"
+                    f"(correlation {correlations[j, k]:.3f}); add images rolled by 90 degrees, or drop one of them"
                 )

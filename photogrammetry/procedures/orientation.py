@@ -1,11 +1,12 @@
 """Pose estimation on the hill (paper, step 2) with the search for gross errors in three stages.
 
-1. Free adjustment of the images alone: shows gross errors of image coordinates, whatever the survey says.
+1. Free adjustment of the images alone: shows gross errors of image coordinates, independently of the survey.
 2. Similarity transformation of the free block onto the reference points: shows gross errors of the survey.
-3. Adjustment with the reference coordinates as weighted observations (D3b): shows what is left, with the best geometry.
+3. Adjustment with the reference coordinates as weighted observations (D3b): shows the remaining gross errors, with the
+   strongest geometry.
 
-What a stage takes out stays out. The tie points are the static ones (alternative 1) or these and the places of moving
-ones such as the helmet (alternative 2, footnote 3).
+An observation that a stage takes out stays out. The tie points are the static ones (alternative 1) or these and the
+places of moving ones such as the helmet (alternative 2, footnote 3).
 """
 
 from collections.abc import Sequence
@@ -15,19 +16,22 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from photogrammetry.adjustment.adjustment import Adjustment
-from photogrammetry.adjustment.blunders import Blunder, BlunderKind, Observation
-from photogrammetry.adjustment.removal import Removed
+from photogrammetry.adjustment.equations.unknowns import State, state_of
+from photogrammetry.adjustment.gross_errors.blunders import (
+    Blunder,
+    BlunderKind,
+    Observation,
+    Removed,
+    describe,
+    observation_to_json,
+)
+from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK
 from photogrammetry.adjustment.run import Outcome, adjust
-from photogrammetry.adjustment.state import State, state_of
-from photogrammetry.adjustment.suspicion import FAMILY_RISK
-from photogrammetry.adjustment.wording import describe, observation_to_json
-from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
-from photogrammetry.network import Datum, Network, Role
-from photogrammetry.procedures.reference_estimate import Suspect
-from photogrammetry.procedures.reference_fit import ReferenceFit, fit_reference
-from photogrammetry.procedures.reference_points import reference_points
-from photogrammetry.procedures.selection import (
+from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.geometry.similarity import Similarity
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.model import Datum, Network, Role
+from photogrammetry.network.selection import (
     as_check_points,
     observation_names,
     only_points,
@@ -35,12 +39,13 @@ from photogrammetry.procedures.selection import (
     without_observations,
     without_survey,
 )
-from photogrammetry.similarity import Similarity
+from photogrammetry.procedures.reference_estimate import Suspect
+from photogrammetry.procedures.reference_fit import ReferenceFit, fit_reference, reference_points
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)
-#: Chance that a stage suspects anything in sound data: of all three together it is that of one adjustment.
+#: Probability that a stage suspects anything in sound data; all three together have that of one adjustment.
 _STAGE_RISK = FAMILY_RISK / 3
 
 
@@ -54,10 +59,10 @@ class StageName(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a stage found.
+    """A gross error that a stage found.
 
     Attributes:
-        message: in words, with the culprit named.
+        message: names the observation, with its tests.
         removed: whether it was taken out.
     """
 
@@ -87,10 +92,10 @@ class Stage:
     """One stage.
 
     Attributes:
-        name: which.
-        words: how it went.
-        findings: what it found, in that order.
-        tests: of the reference points that it used; the other stages' tests are those of their adjustments.
+        name: of the stage.
+        words: its figures, or why it was left out.
+        findings: its gross errors, in the order found.
+        tests: of the reference points, in the similarity transformation only.
     """
 
     name: StageName
@@ -104,9 +109,9 @@ class Orientation:
     """The oriented images.
 
     Attributes:
-        outcome: the constrained adjustment; `removed` has what all stages took out.
+        outcome: the constrained adjustment; `removed` has the observations that all stages took out.
         stages: the three stages.
-        notes: what else a reader must know.
+        notes: changes that were made to the network.
     """
 
     outcome: Outcome
@@ -118,7 +123,7 @@ def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orient
     """Estimate the poses of all images; interior orientations are constant.
 
     Args:
-        network: images, reference points and tie points. What its cameras estimate is held.
+        network: images, reference points and tie points. Interior parameters that its cameras estimate are held.
         alternative: 1: static tie points alone; 2: moving ones too.
         moving: pattern of the moving points' names (`*` and `?`).
 
@@ -139,7 +144,7 @@ def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orient
         stages.append(stage)
         removed = [*removed, *wrong]
         cleaned = _cleaned(network, removed)
-        start = None if fit is None else _carried(cleaned, free, fit.transform)
+        start = None if fit is None else _carried(cleaned, free, fit.estimate.transform)
     outcome = adjust(
         cleaned, state_of(complete(cleaned)) if start is None else start, snoop=True, family_risk=_STAGE_RISK
     )
@@ -172,7 +177,7 @@ def _prepared(network: Network, alternative: int, moving: str) -> tuple[Network,
 
 
 def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]:
-    """Adjust the images alone; None where they do not determine a block."""
+    """Adjust the images alone; None if they do not determine a block."""
     alone = without_survey(network)
     try:
         outcome = adjust(alone, state_of(complete(alone)), snoop=True, family_risk=_STAGE_RISK)
@@ -182,7 +187,7 @@ def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]
 
 
 def _similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | None, list[Removed], Stage]:
-    """Carry the free block onto the survey; None where there are too few reference points."""
+    """Carry the free block onto the reference points; None if there are too few of them."""
     a = free.adjustment
     place = {point.name: i for i, point in enumerate(a.network.points)}
     surveyed = [
@@ -200,17 +205,17 @@ def _similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | N
     if fit.suspect is not None:
         words = describe(network, _blunder(fit.suspect, surveyed, network, a))
         findings.append(Finding(f"{words}; {_tests_of(fit.suspect)}", removed=False))
-    root = np.sqrt(np.mean(fit.residuals[list(fit.used)] ** 2, axis=0))
+    estimate = fit.estimate
+    v = estimate.v.reshape(-1, 3)
     words = (
-        f"{len(fit.used)} reference points, redundancy {fit.redundancy}, residuals rms X Y Z "
-        + " ".join(f"{value:.3g}" for value in root)
-        + f" {network.length_unit}, sigma0 {fit.ratio:.3g} (a priori 1)"
+        f"{len(estimate.used)} reference points, redundancy {estimate.redundancy}, residuals rms X Y Z "
+        + " ".join(f"{value:.3g}" for value in np.sqrt(np.mean(v**2, axis=0)))
+        + f" {network.length_unit}, sigma0 {estimate.ratio:.3g} (a priori 1)"
     )
+    figures = (v.tolist(), estimate.controlled.tolist(), estimate.w.tolist())
     tests = tuple(
-        PointTest(network.points[surveyed[i]].name, tuple(v), tuple(r), tuple(w))
-        for i, v, r, w in zip(
-            fit.used, fit.residuals[list(fit.used)].tolist(), fit.controlled.tolist(), fit.w.tolist(), strict=True
-        )
+        PointTest(network.points[surveyed[i]].name, *(tuple(values) for values in rows))
+        for i, *rows in zip(estimate.used, *figures, strict=True)
     )
     return fit, wrong, Stage(StageName.SIMILARITY, words, tuple(findings), tests)
 
@@ -222,7 +227,7 @@ def _tests_of(suspect: Suspect) -> str:
 
 
 def _without_suspects(free: Outcome) -> Outcome:
-    """The free block without what it could not decide about: that must not bend it. As it was, if it needs them."""
+    """The free block without the undecided candidates, which might deform it; unchanged if it needs them."""
     if not free.blunders:
         return free
     network = free.adjustment.network
@@ -236,7 +241,7 @@ def _without_suspects(free: Outcome) -> Outcome:
 
 
 def _blunder(suspect: Suspect, surveyed: Sequence[int], network: Network, free: Adjustment) -> Blunder:
-    """A wrong reference point as the adjustment would name it."""
+    """A wrong reference point in the form of the adjustment's blunders."""
     rows = {names: i for i, names in enumerate(observation_names(network))}
     names = observation_names(free.network)
     itself = Observation(BlunderKind.CONTROL, surveyed[suspect.index])
@@ -247,7 +252,7 @@ def _blunder(suspect: Suspect, surveyed: Sequence[int], network: Network, free: 
 
 
 def _cleaned(network: Network, removed: Sequence[Removed]) -> Network:
-    """The network without what was taken out, which is named: indices differ from stage to stage."""
+    """The network without the removed observations, matched by name because indices differ from stage to stage."""
     named = [observation_to_json(gone.network, gone.blunder.suspect) for gone in removed]
     rows = {(n["image"], n["point"]) for n in named if n["kind"] == BlunderKind.IMAGE}
     points = {n["point"] for n in named if n["kind"] == BlunderKind.CONTROL}
@@ -255,7 +260,7 @@ def _cleaned(network: Network, removed: Sequence[Removed]) -> Network:
 
 
 def _carried(network: Network, free: Outcome, transform: Similarity) -> State | None:
-    """Start values from the free block; None where it lacks a tie point."""
+    """Start values from the free block; None if it lacks a tie point."""
     state, place = free.adjustment.state, {p.name: i for i, p in enumerate(free.adjustment.network.points)}
     xyz = [transform.apply(state.xyz[place[p.name]]) if p.name in place else p.xyz for p in network.points]
     if any(known is None for known in xyz):

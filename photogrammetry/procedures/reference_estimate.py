@@ -1,4 +1,4 @@
-"""One estimation of the seven parameters that carry a free block onto its reference points, with its tests.
+"""Estimates the seven parameters that carry a free block onto its reference points, and tests the points.
 
 X = t + s R x with the full covariance of the free block and the sigmas of the survey: misclosures with covariance
 K = K_survey + s^2 R K_block R^T. A reference point is tested as a whole by the alternative that its three coordinates
@@ -12,31 +12,31 @@ from typing import Final
 import numpy as np
 from scipy import special
 
-from photogrammetry.adjustment.state import Floats
-from photogrammetry.adjustment.statistics import UNCONTROLLED
-from photogrammetry.adjustment.suspicion import SINGLE_RISK, significant
-from photogrammetry.rotation import rotation_from_vector, skew
-from photogrammetry.similarity import Similarity, fit_similarity
+from photogrammetry.adjustment.gross_errors.suspicion import SINGLE_RISK, significant
+from photogrammetry.adjustment.solution.statistics import UNCONTROLLED
+from photogrammetry.geometry.rotation import rotation_from_vector, skew
+from photogrammetry.geometry.similarity import Similarity, fit_similarity
+from rig.arrays import Floats
 
 _ITERATIONS: Final = 20
 _SETTLED: Final = 1e-10
 _PARAMETERS: Final = 7
 _RANK: Final = 1e-9
-#: Of the square sum a large error explains, so much may be left because its effect is not linear.
+#: Part of the square sum of a large error that may remain with the culprit eliminated: its effect is not linear.
 _LINEAR: Final = 0.005
-#: A rival explains a misclosure if no more than this is left of the suspect beside it (three coordinates).
+#: A rival explains the misclosures if the suspect's test value with the rival eliminated is below this (3 coordinates).
 _EXPLAINED: Final = float(special.chdtri(3, SINGLE_RISK))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImagePoint:
-    """An image of a reference point, which may be what is wrong instead of the survey.
+    """An image point of a reference point; it may be wrong instead of the survey.
 
     Attributes:
-        index: whatever the caller knows it by.
-        shift: (3 n, 2) what an error of it does to the n reference points in the block.
-        normal: (2, 2) and
-        right: (2,) normal equations of that error in the free adjustment.
+        index: the caller's number of it.
+        shift: (3 n, 2) change of the n reference points in the block by an error of it.
+        normal: (2, 2) normal matrix of that error in the free adjustment.
+        right: (2,) right-hand side of the same.
     """
 
     index: int
@@ -69,11 +69,11 @@ class Suspect:
     Attributes:
         index: of the point.
         estimate: (3,) surveyed - true.
-        w: root of what the square sum falls by.
+        w: root of the decrease of the square sum, over sigma0.
         single: (3,) test values of its coordinates.
         controlled: (3,) redundancy numbers of its coordinates.
-        candidates: indices of the reference points that it may be instead, itself first; empty if there is none.
-        images: indices of its images that may be what is wrong instead of the survey.
+        candidates: indices of the reference points any of which may be wrong, itself first; empty without rivals.
+        images: indices of its image points that may be wrong instead of the survey.
     """
 
     index: int
@@ -86,7 +86,7 @@ class Suspect:
 
     @property
     def certain(self) -> bool:
-        """Whether nothing else explains the residuals."""
+        """Whether no other observation explains the residuals."""
         return not (self.candidates or self.images)
 
 
@@ -96,11 +96,11 @@ def _rows(points: Sequence[int]) -> list[int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceEstimate:
-    """One estimation.
+    """One estimation, from some of the reference points.
 
     Attributes:
         transform: block to object system.
-        points: the reference points that it is from.
+        points: the n reference points used.
         used: their indices among all.
         v: (3 n,) residuals, transformed - surveyed.
         projected: (3 n, 3 n) W = K^-1 - K^-1 A (A^T K^-1 A)^-1 A^T K^-1; the square sum is v^T W v.
@@ -125,7 +125,7 @@ class ReferenceEstimate:
         block = np.array([p.block for p in points])
         surveyed = np.array([p.surveyed for p in points])
         survey, free = np.diag(np.concatenate([p.sigma for p in points]) ** 2), covariance[np.ix_(rows, rows)]
-        transform = fit_similarity(block, surveyed).transform
+        transform = fit_similarity(block, surveyed)
         for _ in range(_ITERATIONS):
             placed = transform.apply(block)
             slopes = _slopes(placed)
@@ -150,7 +150,7 @@ class ReferenceEstimate:
 
     @property
     def square_sum(self) -> float:
-        """What is minimised, in a-priori variances."""
+        """The minimised square sum, in a-priori variances."""
         return float(self.v @ self.projected @ self.v)
 
     @property
@@ -167,7 +167,7 @@ class ReferenceEstimate:
         return np.asarray(w.reshape(-1, 3))
 
     def suspect(self, family_risk: float) -> Suspect | None:
-        """The worst point that is too bad for chance, with what else it may be."""
+        """The worst point, with its rivals; None if no point is significant."""
         count = len(self.used)
         drops = np.array([self._drop(self._wrong(i)) for i in range(count)])
         risk = min(SINGLE_RISK, family_risk / count)
@@ -192,18 +192,18 @@ class ReferenceEstimate:
         )
 
     def _wrong(self, point: int) -> Floats:
-        """What an error of a point's survey does to the residuals: (3 n, 3)."""
+        """Change of the residuals by an error of a point's surveyed coordinates: (3 n, 3)."""
         effect = np.zeros((len(self.v), 3))
         effect[3 * point : 3 * point + 3] = -np.eye(3)
         return effect
 
     def _drop(self, effects: Floats, normal: Floats | float = 0.0, right: Floats | float = 0.0) -> float:
-        """By how much the square sum falls with errors of these effects (3 n, k), which were felt elsewhere too."""
+        """Decrease of the square sum by errors with effects (3 n, k); normal and right add their parts elsewhere."""
         pulled = effects.T @ self.projected @ self.v + right
         return float(pulled @ _pseudo_inverse(effects.T @ self.projected @ effects + normal) @ pulled)
 
     def _left(self, wrong: Floats, image: ImagePoint) -> float:
-        """What is left of an error of the survey beside an error of an image, felt in the free adjustment too."""
+        """Decrease by an error of the survey beside an error of an image point, which the free adjustment sees too."""
         shift = _turned(self.transform, len(self.used)) @ image.shift[_rows(self.used)]
         normal, right = np.zeros((5, 5)), np.zeros(5)
         normal[3:, 3:], right[3:] = image.normal, image.right

@@ -1,4 +1,4 @@
-"""The second stage of the search for gross errors: a free block carried onto the surveyed reference points."""
+"""Carries a free block onto the surveyed reference points and takes wrong reference points out (step 2, stage 2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,10 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from photogrammetry.adjustment.state import Floats
-from photogrammetry.adjustment.suspicion import FAMILY_RISK
-from photogrammetry.procedures.reference_estimate import ReferenceEstimate, ReferencePoint, Suspect
-from photogrammetry.similarity import Similarity, fit_similarity
+from photogrammetry.adjustment.gross_errors.hypotheses import observation_row
+from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK
+from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.geometry.similarity import fit_similarity
+from photogrammetry.network.model import Point
+from photogrammetry.procedures.reference_estimate import ImagePoint, ReferenceEstimate, ReferencePoint, Suspect
+from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 
 _FEWEST: Final = 3  # points of a similarity transformation
@@ -17,40 +20,28 @@ _FEWEST: Final = 3  # points of a similarity transformation
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceFit:
-    """The transformation with its residuals.
+    """The transformation of a free block onto its reference points.
 
     Attributes:
-        transform: block to object system.
-        used: indices of the points that it was estimated from.
-        residuals: (n, 3) transformed - surveyed, of all points.
-        ratio: estimated / a-priori sigma0.
-        redundancy: 3 used - 7.
-        w: (used, 3) test values of the coordinates; NaN where nothing controls one.
-        controlled: (used, 3) their redundancy numbers, which add up to the redundancy.
+        estimate: the final estimation, from the points that are left.
         removed: wrong points that were taken out, in that order.
-        suspect: one that is left: the data cannot tell which it is, or too many went before it.
+        suspect: a further wrong point, which cannot be located, or too many were taken out before it.
     """
 
-    transform: Similarity
-    used: tuple[int, ...]
-    residuals: Floats
-    ratio: float
-    redundancy: int
-    w: Floats
-    controlled: Floats
-    removed: tuple[Suspect, ...] = ()
-    suspect: Suspect | None = None
+    estimate: ReferenceEstimate
+    removed: tuple[Suspect, ...]
+    suspect: Suspect | None
 
 
 def fit_reference(
     points: Sequence[ReferencePoint], covariance: Floats, family_risk: float = FAMILY_RISK
 ) -> ReferenceFit:
-    """Carry a free block onto its reference points and take wrong ones out, the worst first.
+    """Carry a free block onto its reference points and take out wrong ones, the worst first.
 
     Args:
         points: n reference points.
         covariance: (3 n, 3 n) of their coordinates in the block.
-        family_risk: chance that anything at all is suspected in sound data.
+        family_risk: probability that anything is suspected in sound data.
 
     Raises:
         BadInputError: fewer than three points, all on a line, or numbers beyond all bounds.
@@ -67,7 +58,7 @@ def fit_reference(
 def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: float) -> ReferenceFit:
     used = list(range(len(points)))
     removed: list[Suspect] = []
-    most = len(points) // 3  # with more something else is wrong
+    most = len(points) // 3  # with more wrong points the cause is not single points
     while True:
         estimate = ReferenceEstimate.of(points, covariance, used)
         suspect = estimate.suspect(family_risk)
@@ -80,17 +71,42 @@ def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: f
             break
         removed.append(suspect)
         used = remaining
-    residuals = estimate.transform.apply([p.block for p in points]) - [p.surveyed for p in points]
-    # Without them the estimate of their errors is exact; before, they pulled at the transformation.
-    gone = tuple(replace(suspect, estimate=-residuals[suspect.index]) for suspect in removed)
-    return ReferenceFit(
-        estimate.transform,
-        tuple(used),
-        residuals,
-        estimate.ratio,
-        estimate.redundancy,
-        estimate.w,
-        estimate.controlled,
-        gone,
-        suspect,
+    # The final transformation, free of their errors, gives better estimates than the one they took part in.
+    wrong = [points[suspect.index] for suspect in removed]
+    errors = [point.surveyed - estimate.transform.apply(point.block) for point in wrong]
+    gone = tuple(replace(suspect, estimate=error) for suspect, error in zip(removed, errors, strict=True))
+    return ReferenceFit(estimate, gone, suspect)
+
+
+def reference_points(free: Adjustment, surveyed: Sequence[Point]) -> tuple[list[ReferencePoint], Floats]:
+    """The reference points in both systems and the covariance of their coordinates in the block.
+
+    Args:
+        free: the free adjustment, which has them as tie points.
+        surveyed: n points with coordinates.
+
+    Returns:
+        n reference points, and the covariance (3 n, 3 n).
+    """
+    place = {point.name: i for i, point in enumerate(free.network.points)}
+    indices = np.array([place[point.name] for point in surveyed], dtype=np.intp)
+    columns = free.problem.unknowns.point[indices].reshape(-1)
+    points = []
+    for index, point in zip(indices, surveyed, strict=True):
+        sigma = np.zeros(3) if point.sigma is None else point.sigma
+        rows = np.flatnonzero(free.problem.point == index)
+        images = tuple(_image_point(free, int(row), columns) for row in rows)
+        points.append(ReferencePoint(free.state.xyz[index], np.asarray(point.xyz), sigma, images))
+    return points, free.covariance(columns)
+
+
+def _image_point(free: Adjustment, row: int, columns: Integers) -> ImagePoint:
+    """The image point of a row of the problem; errors in units of its standard deviations."""
+    where, slopes = observation_row(free, np.array([2 * row, 2 * row + 1]))
+    variance = free.ratio**2
+    return ImagePoint(
+        int(free.problem.order[row]),
+        free.cofactors[np.ix_(columns, where)] @ slopes.T,
+        free.controlled.image[row] / variance,
+        -free.equations.v[row] / variance,
     )

@@ -1,38 +1,37 @@
-"""Absolute orientation: carry a block from its own system into the object system by whatever defines that.
+"""Absolute orientation: transforms a block from its own system into the object system.
 
-Three known points do it in closed form. Otherwise known points, distances and coordinate differences (Eq. 3: rods) are
-fitted together by the seven parameters, from several starting rotations. What they leave open (a turn about the
-vertical, the whole datum of a free network) keeps a harmless value, and the adjustment says what is missing.
+Three known points give the seven parameters in closed form. Otherwise known points, distances and coordinate
+differences (Eq. 3: rods) are fitted together, from several starting rotations. Parameters that these leave undetermined
+(a turn about the vertical, the whole datum of a free network) get arbitrary values; the rank analysis names them.
 """
 
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.ideal_camera import Array
-from photogrammetry.network import Network, Role
-from photogrammetry.rotation import rotation_from_vector
-from photogrammetry.similarity import Similarity, fit_similarity
+from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.geometry.similarity import Similarity, fit_similarity
+from photogrammetry.network.model import Network, Role
 from photogrammetry.start_values.image_block import ImageBlock
+from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 
 _STEPS = 30
 _ROBUST_ROUNDS = 8
-_WRONG = 6.0  # residual over the typical one from which on something is grossly wrong
-_LENGTH = -1  # in place of an axis
-_SAME_FIT = 1.05  # ratio of square sums up to which two fits are equally good,
-_SMALL_FIT = 1e-6  # and square sum below which all are
-_LEAST_SIGMA = 1e-4  # of the largest sigma or value: error-free points weigh much, but not infinitely
+_WRONG = 6.0  # times the typical residual: a larger one calls for the robust fit
+_LENGTH = -1  # in place of an axis: the length of the vector was observed
+_SAME_FIT = 1.05  # fits with square sums up to this ratio are equally good
+_SMALL_FIT = 1e-6  # and so are all fits with a smaller square sum
+_LEAST_SIGMA = 1e-4  # of the largest sigma or value: bounds the weight of error-free points
 
 
 def orient_block(block: ImageBlock, network: Network) -> None:
-    """Transform a block into the object system as far as the network's information goes.
+    """Transform a block into the object system as far as the network determines it.
 
     Args:
         block: in any system; changed in place.
-        network: its control and fixed points, distances and differences are used; failing all these, the approximate
+        network: gives control and fixed points, distances and differences; without any of these, the approximate
             coordinates of other points.
     """
     known = np.flatnonzero(block.known)
@@ -58,13 +57,13 @@ def _by_points(block: ImageBlock, network: Network, points: list[int]) -> Simila
     if len(points) < 3:
         return None
     try:
-        return fit_similarity(block.xyz[points], np.array([network.points[i].xyz for i in points], float)).transform
+        return fit_similarity(block.xyz[points], np.array([network.points[i].xyz for i in points], float))
     except BadInputError:
-        return None  # on a line: other information must help
+        return None  # the points lie on a line: distances and differences may help
 
 
 def _overlaid(block: ImageBlock, network: Network) -> Similarity | None:
-    """A block that nothing ties to the object system: over the known points there, so that all see them in front."""
+    """For a block without ties: the transformation that puts it over the known points, so that all images face them."""
     known = {Role.CONTROL, Role.FIXED}
     given = np.array([p.xyz for p in network.points if p.role in known and p.xyz is not None], float).reshape(-1, 3)
     inside = block.xyz[block.known]
@@ -80,22 +79,22 @@ class _Ties:
     """q observations of the seven parameters: coordinates of points, of vectors, and lengths.
 
     Attributes:
-        origin: (3,) in the block, the middle of the known points: turns about it leave them where they are.
+        origin: (3,) in the block, the middle of the known points; the rotation is about it.
         vectors: (q, 3) point relative to the origin, or difference of two points, in the block.
         axis: (q,) which component in the object system was observed; _LENGTH: the length.
-        shifted: (q,) 1 for a point, 0 for a vector: whether the translation counts.
+        shifted: (q,) 1 for a point, which the translation moves, 0 for a vector.
         values: (q,) observed.
         weights: (q,) reciprocal sigmas.
     """
 
-    origin: Array
-    vectors: Array
-    axis: NDArray[np.intp]
-    shifted: Array
-    values: Array
-    weights: Array
+    origin: Floats
+    vectors: Floats
+    axis: Integers
+    shifted: Floats
+    values: Floats
+    weights: Floats
 
-    def linearised(self, transform: Similarity) -> tuple[Array, Array]:
+    def linearised(self, transform: Similarity) -> tuple[Floats, Floats]:
         """Weighted residuals (q,) and derivatives (q, 7) by log scale, turns in the object system, translation."""
         length = self.axis == _LENGTH
         moved = transform.scale * self.vectors @ transform.rotation.T
@@ -110,7 +109,7 @@ class _Ties:
 
     @property
     def fixes_scale(self) -> bool:
-        """Whether something in the ties has a size."""
+        """Whether the ties determine the scale: two different points, or a length or difference that is not zero."""
         points = self.vectors[self.shifted > 0]
         several = len(points) > 0 and bool(np.ptp(points, axis=0).max() > 0)
         return several or bool((self.values[self.shifted == 0] != 0).any())
@@ -119,7 +118,7 @@ class _Ties:
 def _ties(block: ImageBlock, network: Network, given: list[int]) -> _Ties | None:
     known = block.known
     origin = block.xyz[given].mean(axis=0) if given else np.zeros(3)
-    rows: list[tuple[Array, int, int, float, float]] = []
+    rows: list[tuple[Floats, int, int, float, float]] = []
     for i in given:
         point = network.points[i]
         sigma = np.zeros(3) if point.sigma is None else point.sigma
@@ -141,7 +140,8 @@ def _ties(block: ImageBlock, network: Network, given: list[int]) -> _Ties | None
 
 
 def _by_ties(block: ImageBlock, network: Network, ties: _Ties) -> Similarity:
-    fits = [_fitted(ties, rotation) for rotation in _cube_rotations()]
+    scale, origin = _first_scale(ties), np.zeros(3)
+    fits = [_improved(ties, Similarity(scale, rotation, origin)) for rotation in _cube_rotations()]
     least = min(square_sum for _, square_sum in fits)
     residuals, _ = ties.linearised(min(fits, key=lambda fit: fit[1])[0])
     if np.abs(residuals).max() > _WRONG * _typical(residuals):
@@ -153,12 +153,12 @@ def _by_ties(block: ImageBlock, network: Network, ties: _Ties) -> Similarity:
     return min(moved, key=lambda transform: _oddness(block, network, transform))
 
 
-def _typical(residuals: Array) -> float:
+def _typical(residuals: Floats) -> float:
     return max(float(np.median(np.abs(residuals))) / 0.6745, 1.0)
 
 
-def _robustly_fitted(ties: _Ties, rotation: Array) -> tuple[Similarity, float]:
-    """The fit in which what fits badly has little weight (Cauchy): a wrong image point spoils the ties of its point."""
+def _robustly_fitted(ties: _Ties, rotation: Floats) -> tuple[Similarity, float]:
+    """The fit with reweighting (Cauchy): one wrong image point spoils all ties of its point."""
     transform = Similarity(_first_scale(ties), rotation, np.zeros(3))
     for _ in range(_ROBUST_ROUNDS):
         residuals, _ = ties.linearised(transform)
@@ -168,8 +168,8 @@ def _robustly_fitted(ties: _Ties, rotation: Array) -> tuple[Similarity, float]:
     return transform, float(np.log1p(residuals**2).sum())
 
 
-def _cube_rotations() -> list[Array]:
-    """The 24 rotations that carry axes into axes."""
+def _cube_rotations() -> list[Floats]:
+    """The 24 rotations that map the axes onto axes."""
     found = []
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         matrix = np.eye(3)[list(order)] * np.array(signs)[:, None]
@@ -178,13 +178,8 @@ def _cube_rotations() -> list[Array]:
     return found
 
 
-def _fitted(ties: _Ties, rotation: Array) -> tuple[Similarity, float]:
-    """The least-squares fit from one rotation."""
-    return _improved(ties, Similarity(_first_scale(ties), rotation, np.zeros(3)))
-
-
 def _improved(ties: _Ties, transform: Similarity) -> tuple[Similarity, float]:
-    """Damped Gauss-Newton; parameters that nothing determines do not move."""
+    """Damped Gauss-Newton; parameters that the ties do not determine stay."""
     residuals, jacobian = ties.linearised(transform)
     damping = 1e-3
     for _ in range(_STEPS):
@@ -224,7 +219,7 @@ def _first_scale(ties: _Ties) -> float:
 
 
 def _oddness(block: ImageBlock, network: Network, transform: Similarity) -> float:
-    """Of several fits the one near approximate coordinates, or with the images upright and X to the right."""
+    """Smallest for the fit nearest to approximate coordinates; without any, for upright images with X to the right."""
     rough = _approximate(block, network)
     if rough:
         given = np.array([network.points[i].xyz for i in rough], float)

@@ -1,16 +1,16 @@
-"""Closed solutions of the relative orientation of five points: essential matrices and what they hold.
+"""Closed solutions of the relative orientation from five points: essential matrices, their rotations and bases.
 
 E = [b]x R satisfies u^T E v = 0 for each pair of rays, det E = 0 and 2 E E^T E = tr(E E^T) E. Five pairs leave four
 matrices; the cubic constraints on their combination are ten equations in the twenty monomials of three unknowns. Solved
-for the ten cubic monomials, they give the matrix of multiplication by the first unknown, whose eigenvectors hold the
-up to ten solutions.
+for the ten cubic monomials, they give the matrix of multiplication by the first unknown; its eigenvectors contain the
+solutions, up to ten.
 """
 
 from itertools import combinations_with_replacement, product
 
 import numpy as np
 
-from photogrammetry.ideal_camera import Array
+from rig.arrays import Floats
 
 #: Exponent tuples as sorted index triples of (x, y, z, 1): ten cubic ones, then those of degree two, one and zero.
 _MONOMIALS: list[tuple[int, ...]] = sorted(
@@ -28,7 +28,7 @@ _TINY = 1e-12
 _REAL = 1e-6  # imaginary part over modulus below which an eigenvector is real
 
 
-def essential_matrices(u: Array, v: Array) -> Array:
+def essential_matrices(u: Floats, v: Floats) -> Floats:
     """Essential matrices of sets of homologous rays.
 
     Args:
@@ -56,10 +56,10 @@ def essential_matrices(u: Array, v: Array) -> Array:
     return np.asarray(found / np.linalg.norm(found, axis=(1, 2), keepdims=True))
 
 
-def orientations_of(essential: Array) -> tuple[Array, Array]:
+def orientations_of(essential: Floats) -> tuple[Floats, Floats]:
     """Both rotations and the base of each essential matrix: (k, 3, 3) to (2 k, 3, 3) and (2 k, 3).
 
-    The rotations differ by half a turn about the base, whose sign is open.
+    The two rotations differ by half a turn about the base. The sign of the base is undetermined.
     """
     left, _, right = np.linalg.svd(essential)
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

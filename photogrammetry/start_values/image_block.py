@@ -1,28 +1,36 @@
-"""A block of oriented images and intersected points, and how it grows: the paper's steps 1Bb and 1Bc.
+"""A block of oriented images and intersected points: how it begins and how it grows (the paper's steps 1Ba to 1Bc).
 
-Points are intersected from the images that have a pose, images are resected from the points that have coordinates, in
-turns, until nothing more can be added.
+`seed_block` orients a well-chosen pair of images relatively. `ImageBlock.grow` then takes turns: it intersects points
+from the images that have a pose, and resects images from the points that have coordinates, until nothing more can be
+added.
 """
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.ideal_camera import Array, IdealCamera
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.geometry.similarity import Similarity
 from photogrammetry.intersection.point_intersection import PointState, intersect_points
-from photogrammetry.similarity import Similarity
-from photogrammetry.start_values.pose_refinement import refine_pose
-from photogrammetry.start_values.resection import Resection, resect
+from photogrammetry.start_values.relative_orientation import RelativeOrientation, orient_relatively
+from photogrammetry.start_values.resection import Resection, refine_pose, resect
 from photogrammetry.start_values.sightings import Sightings
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 
 _LEVELS = (8, 6, 4, 3)  # known points that an image must see: the well-determined images come first
-_OUTLIER = 4.0  # residual over the median residual beyond which a point is left out of a resection,
-_GOOD_SHARE, _LEAST_POINTS = 0.8, 6  # as long as so many remain
-_CAUTION = 30.0  # poses are start values: the rays are less accurate than the image points
+_OUTLIER = 4.0  # times the median residual: a resection leaves out points with larger ones
+_GOOD_SHARE, _LEAST_POINTS = 0.8, 6  # but keeps this share of the points, and at least so many
+_CAUTION = 30.0  # poses are start values, so rays are that much less accurate than the image points
 _POLISH_ROUNDS = 2
 _USUAL, _USUAL_SQUARE = 0.8, 3.219  # quantile of squared residuals, and its value for two standard normal numbers
+_MIN_COMMON = 5
+_ORIENTED = 16  # pairs whose relative orientation is computed
+_TRIED = 3  # pairs from which a trial block is grown
+_TRIAL_IMAGES = 4
+_ENOUGH_COMMON = 30  # more common points do not raise the score of a pair
+_ENOUGH_PARALLAX = 0.5  # rad; a larger angle between the rays does not either
 
 
 @dataclass(slots=True, eq=False)
@@ -30,17 +38,17 @@ class ImageBlock:
     """Poses and points in one system.
 
     Attributes:
-        sightings: what the images saw.
+        sightings: of all images.
         cameras: pose of each oriented image, by its index.
         xyz: (points, 3) coordinates, NaN where unknown.
-        held: (points,) whose coordinates are given and not touched.
-        settled: images whose pose is given and not touched.
+        held: (points,) whose coordinates are given and stay.
+        settled: indices of images whose pose is given and stays.
     """
 
     sightings: Sightings
     cameras: dict[int, IdealCamera] = field(default_factory=dict)
-    xyz: Array = field(default_factory=lambda: np.empty((0, 3)))
-    held: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, bool))
+    xyz: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    held: Flags = field(default_factory=lambda: np.empty(0, bool))
     settled: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -49,11 +57,11 @@ class ImageBlock:
             self.held = np.zeros(self.sightings.n_points, bool)
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Flags:
         """(points,) which points have coordinates."""
         return np.asarray(np.isfinite(self.xyz[:, 0]))
 
-    def with_c(self, c: Array) -> "ImageBlock":
+    def with_c(self, c: Floats) -> "ImageBlock":
         """A copy with other principal distances (cameras,)."""
         sightings = self.sightings.with_c(c)
         cameras = {i: replace(camera, c=sightings.c_of(i)) for i, camera in self.cameras.items()}
@@ -77,7 +85,7 @@ class ImageBlock:
     def intersect(self, again: bool = False, caution: float = _CAUTION) -> None:
         """Coordinates of all points with two or more rays; with `again` also of those that have some already.
 
-        Points that would not be determined by rays `caution` times less accurate than the image points are left.
+        Leaves out points that rays `caution` times less accurate than the image points would not determine.
         """
         images = sorted(self.cameras)
         seen = self.sightings.seen()[images] if images else np.zeros((0, self.sightings.n_points), bool)
@@ -106,16 +114,16 @@ class ImageBlock:
             self.intersect(again=True)
 
     def residual(self) -> float:
-        """Root mean square of the residuals of all rays to known points over their sigmas, blunders cut at 100."""
+        """Root mean square of the residuals of all rays to known points over their sigmas, each at most 100."""
         every = self._squares()
         return float(np.sqrt(np.minimum(every, 1e4).mean())) if len(every) else np.inf
 
     def typical_residual(self) -> float:
-        """The same by the residual that four fifths of the rays do not exceed: a few blunders do not change it."""
+        """A robust `residual`, from the size that four fifths of the residuals do not exceed."""
         every = self._squares()
         return float(np.sqrt(2.0 * np.quantile(every, _USUAL) / _USUAL_SQUARE)) if len(every) else np.inf
 
-    def _squares(self) -> Array:
+    def _squares(self) -> Floats:
         """Squared residuals of all rays to known points over their variances."""
         squares = [np.zeros(0)]
         for image, camera in self.cameras.items():
@@ -131,7 +139,7 @@ class ImageBlock:
             moved = similarity.apply(camera.X0)
             self.cameras[image] = IdealCamera(camera.c, moved, similarity.turn(camera.R))
 
-    def _known_points(self, image: int) -> tuple[Array, Array]:
+    def _known_points(self, image: int) -> tuple[Floats, Floats]:
         known = self.known[self.sightings.points[image]]
         return self.xyz[self.sightings.points[image][known]], self.sightings.xy[image][known]
 
@@ -161,12 +169,12 @@ class ImageBlock:
                 result = resect(points, xy, c)
                 size = np.linalg.norm(result.residuals, axis=1)
         except BadInputError:
-            return False  # points on a line, or that fit no pose: other points may come
+            return False  # points on a line, or that fit no pose: retried when more points are known
         self.cameras[image] = self._chosen(image, result)
         return True
 
     def _chosen(self, image: int, result: Resection) -> IdealCamera:
-        """Of several possible poses the one that fits the rays to points that are not known yet."""
+        """Of several possible poses the one that fits best the rays to points that are not known yet."""
         if not result.ambiguous or not self.cameras:
             return result.camera
         others = sorted(self.cameras)
@@ -184,3 +192,75 @@ class ImageBlock:
             return float(np.median(np.where(crossing.ok, square, np.inf)))
 
         return min((result.camera, *result.alternatives), key=misfit)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    first: int
+    second: int
+    orientation: RelativeOrientation
+    score: float
+
+
+def seed_block(sightings: Sightings, images: list[int]) -> ImageBlock | None:
+    """Orient the most promising pair of images.
+
+    The number of common points and the angle between their rays score the pairs. From the best pairs, trial blocks of a
+    few images are grown, one for each possible relative orientation; the one with the smallest residuals is taken.
+
+    Args:
+        sightings: of all images.
+        images: indices of the images to choose from.
+
+    Returns:
+        The best trial block, in the system of one of its images and with a base of length 1; None if no pair has five
+        common points and a relative orientation.
+    """
+    pairs = _pairs(sightings, images)
+    trials = [
+        (pair, solution) for pair in pairs[:_TRIED] for solution in (pair.orientation, *pair.orientation.alternatives)
+    ]
+    if not trials:
+        return None
+    blocks = []
+    for pair, solution in trials:
+        trial = _block(sightings, pair, solution)
+        trial.grow(most_images=_TRIAL_IMAGES)
+        blocks.append(trial)
+    return min(blocks, key=lambda block: block.residual() / np.sqrt(len(block.cameras)))
+
+
+def _pairs(sightings: Sightings, images: list[int]) -> list[_Pair]:
+    seen = sightings.seen().astype(int)
+    counts = seen @ seen.T
+    candidates = [(i, j) for i, j in combinations(images, 2) if counts[i, j] >= _MIN_COMMON]
+    candidates.sort(key=lambda pair: (-min(int(counts[pair]), _ENOUGH_COMMON), pair))
+    found = []
+    for first, second in _spread(candidates):
+        _, a, b = sightings.common(first, second)
+        try:
+            orientation = orient_relatively(a, b, sightings.c_of(first), sightings.c_of(second))
+        except BadInputError:
+            continue  # no solution for this pair
+        score = min(len(a), _ENOUGH_COMMON) * min(orientation.parallax, _ENOUGH_PARALLAX) * orientation.in_front
+        found.append(_Pair(first, second, orientation, score / (1 + len(orientation.alternatives))))
+    return sorted(found, key=lambda pair: -pair.score)
+
+
+def _spread(candidates: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The first candidates, with each image in at most four of them."""
+    chosen: list[tuple[int, int]] = []
+    uses: dict[int, int] = {}
+    for pair in candidates:
+        if len(chosen) < _ORIENTED and all(uses.get(image, 0) < 4 for image in pair):
+            chosen.append(pair)
+            for image in pair:
+                uses[image] = uses.get(image, 0) + 1
+    return chosen
+
+
+def _block(sightings: Sightings, pair: _Pair, solution: RelativeOrientation) -> ImageBlock:
+    block = ImageBlock(sightings)
+    cameras = solution.cameras(sightings.c_of(pair.first), sightings.c_of(pair.second))
+    block.cameras = dict(zip((pair.first, pair.second), cameras, strict=True))
+    return block

@@ -1,9 +1,9 @@
-"""Relative orientation of two images without start values (section 1, Fig. 1): many starts, then coplanarity iteration.
+"""Relative orientation of two images without start values (section 1, Fig. 1).
 
-The paper tries probable rotations R_j with linearly derived base components. Here the rotations are not guessed: they
-are the closed solutions of several sets of five points. For each, the base follows linearly from all points, and the
-best are refined by damped Gauss-Newton steps. Blunders among many points are left out. The distinct minima with the
-points in front of both cameras are the solutions; there may be several for five points, and two for points in a plane.
+The paper tries probable rotations R_j with linearly derived base components. This module takes the rotations from the
+closed solutions of several sets of five points instead. For each, it derives the base linearly from all points; damped
+Gauss-Newton steps refine the best. Blunders among many points are left out. The distinct minima with the points in
+front of both cameras are the solutions: there may be several for five points, and two for points in a plane.
 
 Condition: b . (u x R v) = 0 with u, v = (x, y, -c), divided by the root of the sum of the squared derivatives by the
 four image coordinates: then its square sum is that of the residuals in the image, to second order of the residuals.
@@ -13,31 +13,32 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.rotation import rotation_from_vector, skew
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.geometry.rotation import rotation_from_vector, skew
 from photogrammetry.start_values.essential_matrix import essential_matrices, orientations_of
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 
 _SETS = 16  # sets of five points
-_STARTS = 12  # candidates that are refined,
-_FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points soon only the best of those with the points in front
-_NEAR = 0.02  # rad: candidates closer than that are refined once
-_MANY = 10
-_ENOUGH_TO_JUDGE = 20  # points; fewer fit a wrong solution too easily when some are left out
-_GOOD_SHARE = 0.75  # of the points are no blunders,
-_OUTLIER = 6.0  # nor is one with a residual up to so many median ones,
-_WORTH = 100.0  # and leaving out is worth while if the square sum falls to a hundredth
+_STARTS = 12  # candidates that are refined, at most
+_FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points only the best few are refined beyond the first steps
+_NEAR = 0.02  # rad: of candidates closer than that only the best is refined
+_MANY = 10  # points, from here on "many" for _FIRST_STEPS
+_ENOUGH_TO_JUDGE = 20  # points; with fewer none is left out, the rest would fit a wrong solution too easily
+_GOOD_SHARE = 0.75  # of the points are taken as good in any case
+_OUTLIER = 6.0  # times the median residual: larger ones are blunders
+_WORTH = 100.0  # blunders are left out only if that divides the square sum by more than this
 _STEPS = 30
-_SETTLED = 1e-9  # relative decrease of the square sum,
-_GIVEN_UP = 1.0  # damping without any decrease
-_EPIPOLE = 1e-9
+_SETTLED = 1e-9  # relative decrease of the square sum that ends the iteration
+_GIVEN_UP = 1.0  # damping at which a start without any decrease is given up
+_EPIPOLE = 1e-9  # least length of a derivative: guards points that lie in both epipoles
 _SAME = 1e-3  # rad: rotations and bases closer than that are one solution
 _POSSIBLE = 4.0  # ratio of square sums below which a second solution remains possible
-_ROUNDING = 1e-7  # of c: residuals that small are none
+_ROUNDING = 1e-7  # of c: smaller residuals are rounding
 
-_Minima: TypeAlias = tuple[Array, Array, Array]  # rotations (k, 3, 3), bases (k, 3), square sums (k,)
+_Minima: TypeAlias = tuple[Floats, Floats, Floats]  # rotations (k, 3, 3), bases (k, 3), square sums (k,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +55,9 @@ class RelativeOrientation:
         alternatives: other solutions that fit nearly as well, best first (they have no alternatives themselves).
     """
 
-    rotation: Array
-    base: Array
-    residuals: Array
+    rotation: Floats
+    base: Floats
+    residuals: Floats
     square_sum: float
     in_front: float
     parallax: float
@@ -64,7 +65,7 @@ class RelativeOrientation:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether a second solution fits nearly as well: then only a third image or further points decide."""
+        """Whether a second solution fits nearly as well; then a third image or further points must decide."""
         return bool(self.alternatives)
 
     def cameras(self, c_first: float, c_second: float) -> tuple[IdealCamera, IdealCamera]:
@@ -106,7 +107,7 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     return replace(head, alternatives=tuple(others))
 
 
-def _robust_minima(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[NDArray[np.bool_], _Minima]:
+def _robust_minima(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> tuple[Flags, _Minima]:
     """Points that are no blunders (n,), and the minima of their square sums."""
     good = _good_points(rotations, bases, u, v)
     minima = _minima(rotations, u, v)
@@ -121,7 +122,7 @@ def _robust_minima(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[
     return good, _iterate(*without[:2], u[good], v[good], _STEPS)
 
 
-def _minima(rotations: Array, u: Array, v: Array) -> _Minima:
+def _minima(rotations: Floats, u: Floats, v: Floats) -> _Minima:
     """Minima reached from the best candidates, the base from all points: rotations, bases, square sums."""
     bases = _linear_bases(rotations, u, v)
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
@@ -135,7 +136,7 @@ def _minima(rotations: Array, u: Array, v: Array) -> _Minima:
     return _iterate(rotations, bases, u, v, _STEPS)
 
 
-def _good_points(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[np.bool_]:
+def _good_points(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> Flags:
     """Points that are no blunders by the candidate that fits the most of them best; of few points all are good."""
     if len(u) < _ENOUGH_TO_JUDGE:
         return np.ones(len(u), bool)
@@ -147,18 +148,18 @@ def _good_points(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[
     return np.asarray(np.abs(residuals) <= limit)
 
 
-def _candidates(u: Array, v: Array) -> tuple[Array, Array]:
+def _candidates(u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Rotations (k, 3, 3) and bases (k, 3): closed solutions of sets of five points, and of all together."""
     solutions = [essential_matrices(u[None], v[None])]
     if len(u) > 5:
-        shuffled = np.random.default_rng(len(u))  # the same sets each time
+        shuffled = np.random.default_rng(len(u))  # seeded, so that equal input gives equal output
         sets = np.array([shuffled.choice(len(u), 5, replace=False) for _ in range(_SETS)])
         solutions.append(essential_matrices(u[sets], v[sets]))
     return orientations_of(np.concatenate(solutions))
 
 
-def _distinct_starts(rotations: Array, sums: Array) -> list[int]:
-    """Indices of the best candidates, of each bundle of nearly equal rotations one."""
+def _distinct_starts(rotations: Floats, sums: Floats) -> list[int]:
+    """Indices of the best candidates, one of each group of nearly equal rotations."""
     kept: list[int] = []
     for i in np.argsort(sums, kind="stable"):
         if not (np.abs(rotations[kept] - rotations[i]).max(axis=(1, 2)) < _NEAR).any():
@@ -168,18 +169,18 @@ def _distinct_starts(rotations: Array, sums: Array) -> list[int]:
     return kept
 
 
-def _vectors(xy: Array, c: float) -> Array:
+def _vectors(xy: Floats, c: float) -> Floats:
     return np.column_stack((xy, np.full(len(xy), -c)))
 
 
-def _linear_bases(rotations: Array, u: Array, v: Array) -> Array:
+def _linear_bases(rotations: Floats, u: Floats, v: Floats) -> Floats:
     """For each rotation the base (k, 3) nearest to all epipolar planes."""
     normals = np.cross(u, v @ rotations.transpose(0, 2, 1))
     normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
     return np.asarray(np.linalg.eigh(normals.transpose(0, 2, 1) @ normals)[1][:, :, 0])
 
 
-def _conditions(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[Array, Array]:
+def _conditions(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Normalised conditions (k, n) and derivatives (k, n, 5): three turns, two shifts of the base across itself."""
     turned = v @ rotations.transpose(0, 2, 1)
     across_base = skew(bases)
@@ -189,7 +190,7 @@ def _conditions(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[Arr
     in_second = normal @ rotations
     by_second = in_second[..., :2]
     root = np.sqrt(np.einsum("kni,kni->kn", by_first, by_first) + np.einsum("kni,kni->kn", by_second, by_second))
-    root = np.maximum(root, _EPIPOLE * np.linalg.norm(u, axis=1))  # a point in both epipoles says nothing
+    root = np.maximum(root, _EPIPOLE * np.linalg.norm(u, axis=1))  # a point in both epipoles carries no information
     jacobian = np.empty((*closure.shape, 5))
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         jacobian[..., i] = v[:, j] * in_second[..., k] - v[:, k] * in_second[..., j]
@@ -198,7 +199,7 @@ def _conditions(rotations: Array, bases: Array, u: Array, v: Array) -> tuple[Arr
     return -closure / root, jacobian / -root[..., None]
 
 
-def _across(bases: Array) -> Array:
+def _across(bases: Floats) -> Floats:
     """Two unit vectors (k, 3, 2) at right angles to each base."""
     helper = np.eye(3)[np.abs(bases).argmin(axis=1)]
     first = np.cross(bases, helper)
@@ -206,8 +207,8 @@ def _across(bases: Array) -> Array:
     return np.stack((first, np.cross(bases, first)), axis=2)
 
 
-def _iterate(rotations: Array, bases: Array, u: Array, v: Array, steps: int) -> _Minima:
-    """Damped Gauss-Newton from all starts together; a start that gets worse is damped, one that has settled rests."""
+def _iterate(rotations: Floats, bases: Floats, u: Floats, v: Floats, steps: int) -> _Minima:
+    """Damped Gauss-Newton from all starts together, each with its own damping."""
     damping = np.full(len(bases), 1e-3)
     values, jacobian = _conditions(rotations, bases, u, v)
     sums = (values**2).sum(axis=1)
@@ -236,7 +237,7 @@ def _iterate(rotations: Array, bases: Array, u: Array, v: Array, steps: int) -> 
 
 
 def _solutions(
-    rotations: Array, bases: Array, sums: Array, u: Array, v: Array, rounding: float
+    rotations: Floats, bases: Floats, sums: Floats, u: Floats, v: Floats, rounding: float
 ) -> list[RelativeOrientation]:
     """Distinct minima, those with most points in front first, then by square sum."""
     kept: list[RelativeOrientation] = []
@@ -255,12 +256,12 @@ def _solutions(
                     )
                 )
     least = min((s.square_sum for s in kept), default=0.0)
-    # a few points may lie behind by noise: the share counts in steps, and before a far larger square sum
+    # noise may put a few points behind: the share counts in tenths, after a far larger square sum
     kept.sort(key=lambda s: (s.square_sum > 100 * least + rounding, -round(s.in_front, 1), s.square_sum))
     return kept
 
 
-def _possible(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[np.bool_]:
+def _possible(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> Flags:
     """Whether at least half of the points lie in front, with the base or its opposite."""
     shares = [
         max(_share_in_front(rotation, sign * base, u, v) for sign in (1, -1))
@@ -269,7 +270,7 @@ def _possible(rotations: Array, bases: Array, u: Array, v: Array) -> NDArray[np.
     return np.array(shares) >= 0.5
 
 
-def _share_in_front(rotation: Array, base: Array, u: Array, v: Array) -> float:
+def _share_in_front(rotation: Floats, base: Floats, u: Floats, v: Floats) -> float:
     """Share of the points whose rays meet at positive distances from both projection centres."""
     a, b = u / np.linalg.norm(u, axis=1, keepdims=True), v @ rotation.T
     b = b / np.linalg.norm(b, axis=1, keepdims=True)
@@ -280,7 +281,7 @@ def _share_in_front(rotation: Array, base: Array, u: Array, v: Array) -> float:
     return float(((first > 0) & (second > 0)).mean())
 
 
-def _parallax(rotation: Array, u: Array, v: Array) -> float:
+def _parallax(rotation: Floats, u: Floats, v: Floats) -> float:
     a, b = u / np.linalg.norm(u, axis=1, keepdims=True), v @ rotation.T
     b = b / np.linalg.norm(b, axis=1, keepdims=True)
     return float(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)).mean())

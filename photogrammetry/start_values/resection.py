@@ -1,7 +1,8 @@
-"""Direct space resection with known interior orientation: no start values, three or more points, planar too.
+"""Space resection: the pose of one image with known interior orientation from three or more known points.
 
-Three points and their rays fix the three distances up to at most four solutions (Grunert's quartic). With more points
-the solutions of several well-spread triples are judged by all points, and the best are refined by least squares.
+`resect` needs no start values. Three points and their rays fix the three distances up to at most four solutions
+(Grunert's quartic). With more points it computes the solutions of several well-spread triples, judges each by all
+points, and refines the best by least squares (`refine_pose`). The points may lie in a plane.
 """
 
 from dataclasses import dataclass
@@ -9,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogrammetry.ideal_camera import Array, IdealCamera, unit_rays
-from photogrammetry.similarity import fit_similarity
-from photogrammetry.start_values.pose_refinement import RefinedPose, refine_pose
+from photogrammetry.geometry.ideal_camera import IdealCamera, unit_rays
+from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.geometry.similarity import fit_similarity
+from rig.arrays import Floats
 from rig.errors import BadInputError
 
 _COLLINEAR = 1e-6  # height of a triangle over its longest side
@@ -20,10 +22,15 @@ _TRIPLES = 5
 _POLISH_STEPS = 20
 _REFINED = 3  # candidates that are refined
 _NEARLY_REAL = 0.2  # imaginary part of a root over its modulus: noise pushes double roots off the real axis
-_SAME_TURN = 0.02  # rad,
-_SAME_EXACT = 1e-5  # and where poses are exact: closer ones differ by rounding
-_ROUNDING = 1e-7  # of c: residuals that small are none
+_SAME_TURN = 0.02  # rad: poses closer than that are one solution
+_SAME_EXACT = 1e-5  # rad: the same for three points, whose poses are exact
+_ROUNDING = 1e-7  # of c: smaller residuals are rounding
 _AMBIGUOUS = 4.0  # ratio of square sums below which a second pose remains possible
+_MAX_STEPS = 30
+_DAMPING = 1e-3
+_TOO_DAMPED = 1e12
+_ENOUGH = 1e-9  # relative decrease of the square sum
+_EXACT = 1e-12  # of c: with smaller residuals the iteration ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +44,26 @@ class Resection:
     """
 
     camera: IdealCamera
-    residuals: Array
+    residuals: Floats
     alternatives: tuple[IdealCamera, ...]
 
     @property
     def ambiguous(self) -> bool:
-        """Whether another pose fits nearly as well: then only further points decide."""
+        """Whether another pose fits nearly as well; then further points must decide."""
         return bool(self.alternatives)
+
+
+@dataclass(frozen=True, slots=True)
+class RefinedPose:
+    """Pose with its square sum of residuals.
+
+    Attributes:
+        camera: the image's camera.
+        square_sum: of the residuals, image unit squared; infinite if a point lies behind the camera.
+    """
+
+    camera: IdealCamera
+    square_sum: float
 
 
 def resect(points: ArrayLike, xy: ArrayLike, c: float) -> Resection:
@@ -55,7 +75,7 @@ def resect(points: ArrayLike, xy: ArrayLike, c: float) -> Resection:
         c: principal distance, image unit.
 
     Returns:
-        The pose with the smallest residuals and those that the points cannot tell from it.
+        The pose with the smallest residuals, and the other poses that fit nearly as well.
 
     Raises:
         BadInputError: fewer than three points, points on a line, or points and image coordinates that fit no pose.
@@ -86,7 +106,7 @@ def resect(points: ArrayLike, xy: ArrayLike, c: float) -> Resection:
     return Resection(best.camera, best.camera.project(points) - xy, tuple(others))
 
 
-def _triples(points: Array) -> list[list[int]]:
+def _triples(points: Floats) -> list[list[int]]:
     """Triples of points that span large triangles: the largest first, then those of other points."""
     chosen: list[list[int]] = []
     pool = np.arange(len(points))
@@ -101,21 +121,21 @@ def _triples(points: Array) -> list[list[int]]:
             break
         triple = [int(pool[i]) for i in (a, b, third)]
         chosen.append(triple)
-        # the next triple leaves out one of these, so that every point has its turn and few points still give several
+        # the next triple leaves out one of these, so that few points still give several triples
         pool = pool[pool != triple[len(chosen) % 3]]
     return chosen
 
 
-def _three_points(points: Array, rays: Array, c: float) -> list[IdealCamera]:
+def _three_points(points: Floats, rays: Floats, c: float) -> list[IdealCamera]:
     """Poses from three points (3, 3) and unit rays (3, 3) in the camera system."""
     cameras = []
     for distances in _distances(points, rays):
-        fit = fit_similarity(rays * distances[:, None], points, scale=1.0).transform
+        fit = fit_similarity(rays * distances[:, None], points, scale=1.0)
         cameras.append(IdealCamera(c, fit.translation, fit.rotation))
     return cameras
 
 
-def _distances(points: Array, rays: Array) -> list[Array]:
+def _distances(points: Floats, rays: Floats) -> list[Floats]:
     """Distances (3,) from the projection centre to three points: the positive roots of Grunert's quartic."""
     a, b, c = (float(((points[i] - points[j]) ** 2).sum()) for i, j in ((1, 2), (0, 2), (0, 1)))
     cos_a, cos_b, cos_c = (float(rays[i] @ rays[j]) for i, j in ((1, 2), (0, 2), (0, 1)))
@@ -143,8 +163,8 @@ def _distances(points: Array, rays: Array) -> list[Array]:
     return found
 
 
-def _polished(distances: Array, squares: Array, cosines: Array) -> Array:
-    """Distances improved on the three triangles themselves: next to a double root the quartic has lost digits.
+def _polished(distances: Floats, squares: Floats, cosines: Floats) -> Floats:
+    """Distances improved by Newton steps on the three triangles: next to a double root the quartic loses digits.
 
     Args:
         distances: (3,) from a root.
@@ -167,8 +187,8 @@ def _polished(distances: Array, squares: Array, cosines: Array) -> Array:
     return best
 
 
-def _fit(camera: IdealCamera, points: Array, rays: Array) -> float:
-    """Median squared sine between rays and points; also finite where a poor candidate has points behind it."""
+def _fit(camera: IdealCamera, points: Floats, rays: Floats) -> float:
+    """Mean squared chord between unit rays and directions to the points; finite also for points behind the camera."""
     d = (points - camera.X0) @ camera.R
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     square = ((d - rays) ** 2).sum(axis=1)
@@ -176,10 +196,65 @@ def _fit(camera: IdealCamera, points: Array, rays: Array) -> float:
 
 
 def _distinct(poses: list[RefinedPose], same: float) -> list[RefinedPose]:
-    """Poses by square sum, of each bundle of nearly equal ones the best."""
+    """Poses in the order of their square sums, the best of each group of nearly equal ones."""
     kept: list[RefinedPose] = []
     for pose in sorted(poses, key=lambda candidate: candidate.square_sum):
         turns = [np.arccos(np.clip((np.trace(other.camera.R.T @ pose.camera.R) - 1) / 2, -1, 1)) for other in kept]
         if all(turn > same for turn in turns):
             kept.append(pose)
     return kept
+
+
+def refine_pose(camera: IdealCamera, points: Floats, xy: Floats, steps: int = _MAX_STEPS) -> RefinedPose:
+    """Damped Gauss-Newton on Eq. A1.
+
+    Args:
+        camera: start values; all points should lie in front of it.
+        points: (n, 3) object coordinates.
+        xy: (n, 2) reduced image coordinates.
+        steps: at most so many.
+
+    Returns:
+        The pose at the minimum reached; the start values themselves if a point lies behind the camera there.
+    """
+    best = RefinedPose(camera, _square_sum(camera, points, xy))
+    damping = _DAMPING
+    nothing = len(points) * (_EXACT * camera.c) ** 2
+    for _ in range(steps):
+        if best.square_sum < nothing or not np.isfinite(best.square_sum):
+            break
+        residuals, jacobian = _linearised(best.camera, points, xy)
+        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residuals
+        damped = normal + damping * np.diag(np.diag(normal))
+        step = np.asarray(np.linalg.lstsq(damped, gradient, rcond=None)[0], float)
+        turned: Floats = best.camera.R @ rotation_from_vector(step[3:])
+        candidate = IdealCamera(camera.c, best.camera.X0 + step[:3], turned)
+        square_sum = _square_sum(candidate, points, xy)
+        if square_sum < best.square_sum:
+            settled = square_sum > (1 - _ENOUGH) * best.square_sum
+            best, damping = RefinedPose(candidate, square_sum), damping / 10
+            if settled:
+                break
+        else:
+            damping *= 10
+            if damping > _TOO_DAMPED:
+                break
+    return best
+
+
+def _square_sum(camera: IdealCamera, points: Floats, xy: Floats) -> float:
+    if not camera.in_front(points).all():
+        return np.inf
+    return float(((camera.project(points) - xy) ** 2).sum())
+
+
+def _linearised(camera: IdealCamera, points: Floats, xy: Floats) -> tuple[Floats, Floats]:
+    """Residuals observed - computed (2 n,) and derivatives (2 n, 6) by X0 and by turns about the camera's axes."""
+    k = (points - camera.X0) @ camera.R
+    image = -camera.c * k[:, :2] / k[:, 2:]
+    by_k = np.zeros((len(k), 2, 3))
+    by_k[:, 0, 0] = by_k[:, 1, 1] = -camera.c / k[:, 2]
+    by_k[:, :, 2] = -image / k[:, 2:]
+    by_turn = np.cross(by_k, k[:, None, :])
+    jacobian = np.concatenate((-by_k @ camera.R.T, by_turn), axis=2)
+    return (xy - image).ravel(), jacobian.reshape(-1, 6)

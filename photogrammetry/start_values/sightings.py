@@ -1,35 +1,32 @@
-"""A network's image observations as the closed solutions want them: per image, ideal coordinates, each point once."""
+"""A network's image observations in the form that the closed solutions take: per image, reduced, each point once."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.camera_model import undistort
-from photogrammetry.ideal_camera import Array
-from photogrammetry.network import Network
-
-Integers = NDArray[np.intp]
+from photogrammetry.geometry.camera_model import undistort
+from photogrammetry.network.model import Network
+from rig.arrays import Flags, Floats, Integers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sightings:
-    """What each image saw.
+    """The points that each image shows, with their image coordinates.
 
     Attributes:
         camera: (m,) index of each image's camera.
         c: (cameras,) principal distances.
         points: m arrays of point indices, ascending.
-        xy: m arrays (n, 2) of ideal image coordinates: principal point and distortion taken off.
+        xy: m arrays (n, 2) of ideal image coordinates: principal point and distortion subtracted.
         sigma: m arrays (n,), standard deviations.
         n_points: number of points of the network.
     """
 
     camera: Integers
-    c: Array
+    c: Floats
     points: tuple[Integers, ...]
-    xy: tuple[Array, ...]
-    sigma: tuple[Array, ...]
+    xy: tuple[Floats, ...]
+    sigma: tuple[Floats, ...]
     n_points: int
 
     @property
@@ -41,33 +38,23 @@ class Sightings:
         """Principal distance of an image."""
         return float(self.c[self.camera[image]])
 
-    def with_c(self, c: Array) -> "Sightings":
+    def with_c(self, c: Floats) -> "Sightings":
         """The same sightings with other principal distances (cameras,)."""
         return replace(self, c=c)
 
-    def of_images(self, images: list[int]) -> "Sightings":
-        """The sightings of some images, in that order; cameras and points keep their numbers."""
-        return replace(
-            self,
-            camera=self.camera[images],
-            points=tuple(self.points[i] for i in images),
-            xy=tuple(self.xy[i] for i in images),
-            sigma=tuple(self.sigma[i] for i in images),
-        )
-
-    def common(self, first: int, second: int) -> tuple[Integers, Array, Array]:
+    def common(self, first: int, second: int) -> tuple[Integers, Floats, Floats]:
         """Point indices and coordinates in both images of the points that both saw."""
         points, i, j = np.intersect1d(self.points[first], self.points[second], assume_unique=True, return_indices=True)
         return points, self.xy[first][i], self.xy[second][j]
 
-    def seen(self) -> NDArray[np.bool_]:
+    def seen(self) -> Flags:
         """(m, points) which image saw which point."""
         out = np.zeros((self.n_images, self.n_points), bool)
         for image, points in enumerate(self.points):
             out[image, points] = True
         return out
 
-    def table(self, images: list[int], points: Integers) -> tuple[Array, NDArray[np.bool_], Array]:
+    def table(self, images: list[int], points: Integers) -> tuple[Floats, Flags, Floats]:
         """Coordinates (n, m, 2), existence (n, m) and sigmas (n, m) of some points in some images."""
         column = np.full(self.n_points, -1)
         column[points] = np.arange(len(points))
@@ -86,10 +73,10 @@ def reduce_observations(network: Network) -> Sightings:
     """Ideal coordinates of all observations with the network's interior orientations.
 
     Args:
-        network: its distortion parameters are taken as they stand; where they have no inverse they are left out.
+        network: its distortion parameters are used as given, and ignored at points where they have no inverse.
 
     Returns:
-        The sightings; of a point measured twice in an image the first measurement.
+        The sightings; if an image has two measurements of a point, the first.
     """
     seen = network.observations
     points, xy, sigma = [], [], []

@@ -1,1 +1,1 @@
-"""An emulated FireWire bus with AVT Marlin cameras, for Debian's unmodified libdc1394."""
+"""An emulated FireWire bus with AVT Marlin cameras, which Debian's unmodified libdc1394 drives."""

@@ -1,4 +1,4 @@
-"""The event loop of the bus process: everything on the bus happens in one thread, in order."""
+"""The event loop of the bus process: one thread does everything on the bus, in order."""
 
 import heapq
 import select
@@ -16,7 +16,7 @@ _CALL_S: Final = 10.0
 
 
 class Loop:
-    """Waits for sockets and for moments. All methods but `call` and `stop` belong to its own thread."""
+    """Waits for sockets and points in time. Other threads may only use `call` and `stop`."""
 
     def __init__(self) -> None:
         self._readers: dict[socket.socket, Callable[[], None]] = {}
@@ -30,23 +30,23 @@ class Loop:
         self.when_readable(self._wake, self._obey_calls)
 
     def when_readable(self, sock: socket.socket, action: Callable[[], None] | None) -> None:
-        """Do `action` whenever there is something to read; None: no longer."""
+        """Call `action` whenever `sock` has something to read; None: no longer."""
         _set(self._readers, sock, action)
 
     def when_writable(self, sock: socket.socket, action: Callable[[], None] | None) -> None:
-        """Do `action` whenever there is room to write; None: no longer."""
+        """Call `action` whenever `sock` has room to write; None: no longer."""
         _set(self._writers, sock, action)
 
     def at(self, time: HostNs, action: Callable[[], None]) -> None:
-        """Do `action` at `time`, as soon as possible if that is past."""
+        """Call `action` at `time`, or as soon as possible if that is past."""
         heapq.heappush(self._due, (time, next(self._order), action))
 
     def call(self, action: Callable[[], _Result]) -> _Result:
-        """From another thread: have the loop do `action`, and wait for its result.
+        """From another thread: have the loop call `action`, and wait for its result.
 
         Raises:
-            Exception: whatever `action` raised.
-            TimeoutError: the loop does not get round to it.
+            Exception: what `action` raised.
+            TimeoutError: the loop did not call it in time.
         """
         future: Future[_Result] = Future()
 
@@ -61,12 +61,12 @@ class Loop:
         return future.result(_CALL_S)
 
     def run(self) -> None:
-        """Until `stop`."""
+        """Run until `stop`."""
         while not self._stopping:
             # select() waits by the microsecond, unlike poll(): a frame arrives when it should.
             readable, writable, _ = select.select(self._readers, self._writers, (), self._patience_s())
             for action in [self._readers.get(sock) for sock in readable]:
-                if action is not None:  # an action before may have ended the wait for a later one
+                if action is not None:  # an earlier action may have ended the wait for a later one
                     action()
             for action in [self._writers.get(sock) for sock in writable]:
                 if action is not None:

@@ -1,1 +1,1 @@
-"""A GigE Vision camera in software: control protocol (GVCP), stream protocol (GVSP) and the sensor behind them."""
+"""A simulated GigE Vision camera: control protocol (GVCP), stream protocol (GVSP) and the sensor behind them."""

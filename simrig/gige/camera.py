@@ -1,32 +1,58 @@
-"""A whole simulated GigE Vision camera, put together from its parts."""
+"""A whole simulated GigE Vision camera: its configuration, and the camera put together from its parts."""
 
 import ipaddress
 import random
 import time
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
 
 from rig.clocks import HostNs
 from rig.errors import BadInputError
-from simrig.device_clock import DeviceClock
-from simrig.faults import OF_THE_CAMERA, Fault, FaultPlan
-from simrig.gige.camera_clock import CameraClock, PtpMaster
-from simrig.gige.config import CameraConfig
-from simrig.gige.control_server import ControlServer
-from simrig.gige.counters import Counters, GigeStatistics
-from simrig.gige.device import Device, Parts
-from simrig.gige.features import features
-from simrig.gige.genicam import describe
-from simrig.gige.link import Link
-from simrig.gige.register_table import all_registers
-from simrig.gige.registers import RegisterMap
-from simrig.gige.sensor import Sensor
-from simrig.gige.transmitter import Transmitter
-from simrig.gige.values import XML_ADDRESS, Identity
-from simrig.image_source import ImageSource, Painter, TestPattern
-from simrig.images.view import CameraView
-from simrig.pulse_train import PulseTrain
+from rig.settings.strict_toml import StrictModel
+from simrig.gige.control.control_server import ControlServer
+from simrig.gige.control.device import Device
+from simrig.gige.imaging.camera_clock import CameraClock, PtpMaster
+from simrig.gige.imaging.sensor import Sensor
+from simrig.gige.imaging.transmitter import Transmitter
+from simrig.gige.protocol.link import Link
+from simrig.gige.registers.genicam import describe
+from simrig.gige.registers.register_map import RegisterMap
+from simrig.gige.registers.register_table import MIN_WIDTH, XML_ADDRESS, Identity, all_registers
+from simrig.images.painter import Painter
+from simrig.world.faults import OF_THE_CAMERA, Fault, FaultPlan
+from simrig.world.pulses import DeviceClock, PulseTrain
 from simrig.world.scenario import Scenario, load_scenario
+from simrig.world.statistics import CameraStatistics, Counters
 
 _PTP_ERROR_NS = 300
+
+
+def _ipv4(text: str) -> str:
+    return str(ipaddress.IPv4Address(text))
+
+
+class CameraConfig(StrictModel):
+    """What a simulated camera is told when its process starts."""
+
+    name: str = Field(description="name of the camera in the scenario")
+    address: Annotated[str, AfterValidator(_ipv4)]
+    scenario: Path
+    rate_hz: float = Field(gt=0, le=10_000, description="rate of the hill's trigger pulses")
+    epoch: int = Field(description="host time of hill pulse 0, ns")
+    width: int = Field(640, ge=MIN_WIDTH, le=8192, multiple_of=4, description="width of the sensor, px")
+    height: int = Field(480, ge=2, le=8192, multiple_of=2)
+    test_pattern: bool = Field(False, description="show a plain pattern instead of the hill: costs nothing")
+    prerendered: int = Field(
+        0, ge=0, le=64, description="number of images that are rendered once; 0: render each frame"
+    )
+    link_mbit_s: float = Field(1000.0, ge=0, description="rate of the network cable; 0: as fast as possible")
+    first_block_id: int = Field(1, ge=1, lt=1 << 63, description="block id of the first frame after each start")
+    tick_hz: int = Field(1_000_000_000, ge=1000, le=10_000_000_000, description="ticks of the device clock per second")
+    resend: bool = Field(True, description="whether the camera can send lost packets again")
+    broadcast: str | None = Field(None, description="broadcast address for discovery, e.g. 127.255.255.255")
+    ptp_offset_ns: int = Field(description="time of the PTP master minus host time, ns")
 
 
 class Camera:
@@ -39,21 +65,20 @@ class Camera:
     def __init__(self, config: CameraConfig) -> None:
         scenario = load_scenario(config.scenario)
         index = scenario.camera_index(config.name)
-        self._counters = Counters()
-        self._faults = FaultPlan(f for f in scenario.faults_of(config.name) if f.kind not in OF_THE_CAMERA)
-        registers = _registers(config)
-        clock = _clock(config, scenario, index)
-        painter = _painter(config, scenario, index)
+        size = (config.width, config.height)
+        painter = Painter(
+            scenario, index, size, config.rate_hz, test_pattern=config.test_pattern, prerendered=config.prerendered
+        )
         train = PulseTrain(HostNs(config.epoch), config.rate_hz, scenario.pauses)
-        self._link = Link(config.address, config.link_mbit_s)
+        registers, clock = _registers(config), _clock(config, scenario, index)
+        self._faults = FaultPlan(f for f in scenario.faults_of(config.name) if f.kind not in OF_THE_CAMERA)
+        self._counters = Counters()
+        self._link = Link(config.address, config.link_mbit_s, self._counters)
         self._transmitter = Transmitter(self._link, self._counters)
         self._sensor = Sensor(
-            train, self._faults, painter, clock, registers, self._transmitter, self._link, self._counters,
-            config.first_block_id,
-        )  # fmt: skip
-        self._device = Device(
-            Parts(registers, clock, painter, self._link, self._transmitter, self._sensor, self._counters)
+            train, self._faults, painter, clock, registers, self._transmitter, self._counters, config.first_block_id
         )
+        self._device = Device(registers, clock, painter, self._transmitter, self._sensor)
         try:
             self._server = ControlServer(self._device, config.address, config.broadcast)
         except BadInputError:
@@ -61,20 +86,20 @@ class Camera:
             raise
 
     def start(self) -> None:
-        """Be there."""
+        """Start the threads; the camera answers from now on."""
         self._transmitter.start()
         self._sensor.start()
         self._server.start()
 
     def stop(self) -> None:
-        """Be gone."""
+        """Stop the threads and close the sockets."""
         self._server.stop()
         self._sensor.stop()
         self._transmitter.stop()
         self._link.close()
 
     def inject(self, fault: Fault) -> None:
-        """Let something go wrong.
+        """Add a fault.
 
         Raises:
             BadInputError: its pulses are past, or it is a fault of the process.
@@ -83,47 +108,26 @@ class Camera:
             raise BadInputError(f"fault {fault.kind} befalls the process: inject it into the SimulatedHill")
         self._faults.inject(fault)
 
-    def statistics(self) -> GigeStatistics:
+    def statistics(self) -> CameraStatistics:
         """What the camera did so far."""
-        counters = self._counters
-        return GigeStatistics(
-            counters.triggers,
-            counters.missed,
-            counters.overruns,
-            counters.frames,
-            self._link.packets,
-            self._link.bytes,
-            time.process_time(),
-            self._sensor.acquiring,
-            self._device.control.controller is not None,
-            dict(counters.last_packets.copy()),
-            counters.resend_requests,
-            counters.resent_packets,
-            self._sensor.block_id,
+        return self._counters.report(
+            cpu_s=time.process_time(),
+            acquiring=self._sensor.acquiring,
+            controlled=self._device.control.controller is not None,
         )
 
 
 def _registers(config: CameraConfig) -> RegisterMap:
-    """The camera's registers and its description."""
+    """The camera's registers and its GenICam description."""
     address = int(ipaddress.IPv4Address(config.address))
     sensor = (config.width, config.height)
     identity = Identity(f"SIM-{address & 0xFFFFFF:06X}", config.name, address, sensor, config.tick_hz, config.resend)
-    xml = describe(features(all_registers(identity, 0)))
+    xml = describe(all_registers(identity, 0))
     return RegisterMap(all_registers(identity, len(xml)), {XML_ADDRESS: xml})
 
 
 def _clock(config: CameraConfig, scenario: Scenario, index: int) -> CameraClock:
-    """The camera's clock; what PTP leaves over differs from camera to camera."""
+    """The camera's clock; the remaining error of PTP differs from camera to camera."""
     noise = random.Random(f"{scenario.seed}/{index}/ptp")  # noqa: S311  (no secret)
     master = PtpMaster(config.ptp_offset_ns, round(noise.uniform(-_PTP_ERROR_NS, _PTP_ERROR_NS)))
     return CameraClock(DeviceClock(scenario, index, HostNs(config.epoch)), master, config.tick_hz)
-
-
-def _painter(config: CameraConfig, scenario: Scenario, index: int) -> Painter:
-    width, height = config.width, config.height
-    source: ImageSource = (
-        TestPattern(width, height)
-        if config.test_pattern
-        else CameraView(scenario, index, width, height, config.rate_hz)
-    )
-    return Painter(source, (width, height), index if scenario.stamp else None, config.prerendered)

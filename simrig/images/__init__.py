@@ -1,1 +1,1 @@
-"""How the cameras see it: rendered images, true to a fiftieth of a pixel."""
+"""The images of the simulated hill: what each camera sees at a pulse, and who took it."""

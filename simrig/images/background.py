@@ -1,4 +1,4 @@
-"""What never moves: sky, forest, snow, take-off table and balls, rendered once per camera."""
+"""Renders what never moves (sky, forest, snow, take-off table, balls), once per camera."""
 
 import math
 from itertools import pairwise
@@ -7,30 +7,26 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simrig.images.blob import Blob
-from simrig.images.canvas import Canvas
-from simrig.images.stroke import stroke
-from simrig.world.hill_profile import HillProfile
+from rig.arrays import Floats
+from simrig.images.drawing import Blob, Canvas, Image, stroke
 from simrig.world.projection import Projection
-from simrig.world.scenario import BRIGHTEST, Scenario
-
-Array = NDArray[np.float64]
+from simrig.world.scenario import BRIGHTEST, REFERENCE_WIDTH, Scenario
 
 PLATE = 36.0  #: radiance of the black plates behind the balls
-PLATE_MARGIN_PX = 5.0  #: of plate around the image of a ball
+PLATE_MARGIN_PX = 5.0  #: width of the plate around the image of a ball
 _POLE = 92.0
 _NEAREST_M = 2.0
 _TABLE_END_M = -45.0
 
 
-def paint(scenario: Scenario, projection: Projection) -> NDArray[np.float32]:
+def paint(scenario: Scenario, projection: Projection) -> Image:
     """Radiance of the empty hill as this camera sees it, without noise; shape (h, w)."""
     rng = np.random.default_rng((scenario.seed, 77))  # the same forest for all cameras
     painter = _Painter(scenario, projection, rng)
     painter.paint_land_and_forest()
     painter.paint_table()
     image = painter.canvas.image()
-    image += _texture(image.shape, projection.width / 640, rng)
+    image += _texture(image.shape, projection.width / REFERENCE_WIDTH, rng)
     image = cv2.GaussianBlur(image, (0, 0), scenario.image.blur_sigma_px).astype(np.float32)
     _put_balls(image, scenario, projection)
     return np.clip(image, 0, BRIGHTEST)
@@ -40,8 +36,7 @@ class _Painter:
     """Paints polygons of the hill from far to near."""
 
     def __init__(self, scenario: Scenario, projection: Projection, rng: np.random.Generator) -> None:
-        self._scenario = scenario
-        self._profile = HillProfile(scenario.hill)
+        self._hill = scenario.hill
         self._projection = projection
         self._rng = rng
         self.canvas = Canvas(_sky(projection))
@@ -54,9 +49,9 @@ class _Painter:
 
     def paint_table(self) -> None:
         """The take-off table: a wedge of boards with two tracks and a dark line at the edge."""
-        half, foot = self._scenario.hill.table_width_m / 2, float(self._profile.ground(0.0))
+        half, foot = self._hill.table_width_m / 2, float(self._hill.ground(0.0))
         xs = np.linspace(_TABLE_END_M, 0.0, 16)
-        spans = [(a, b, float(self._profile.table(a)), float(self._profile.table(b))) for a, b in pairwise(xs)]
+        spans = [(a, b, float(self._hill.table(a)), float(self._hill.table(b))) for a, b in pairwise(xs)]
         near = -half if self._projection.X0[1] < 0 else half
         for a, b, za, zb in spans:
             self._fill([(a, near, za), (b, near, zb), (b, near, foot), (a, near, foot)], 98.0)
@@ -64,29 +59,29 @@ class _Painter:
         if self._projection.X0[0] > 0:
             self._fill([(0, -half, 0), (0, half, 0), (0, half, foot), (0, -half, foot)], 78.0)
             self._fill([(0, -half, 0), (0, half, 0), (0, half, -0.12), (0, -half, -0.12)], 45.0)
-        if self._projection.X0[2] > float(self._profile.table(self._projection.X0[0])):
+        if self._projection.X0[2] > float(self._hill.table(self._projection.X0[0])):
             for a, b, za, zb in spans:
                 self._fill([(a, -half, za), (b, -half, zb), (b, half, zb), (a, half, za)], 168.0)
                 for y in (-0.17, 0.17):
                     self._fill([(a, y - 0.06, za), (b, y - 0.06, zb), (b, y + 0.06, zb), (a, y + 0.06, za)], 128.0)
 
-    def _land(self) -> list[tuple[Array, float]]:
+    def _land(self) -> list[tuple[Floats, float]]:
         """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest."""
         xs, ys = np.arange(-60.0, 150.0, 3.0), np.arange(-27.0, 75.0, 3.0)
         quads = []
         for x in xs:
             for y in ys:
                 corners = np.array(
-                    [(u, v, self._profile.snow(u, v)) for u, v in ((x, y), (x + 3, y), (x + 3, y + 3), (x, y + 3))]
+                    [(u, v, self._hill.snow(u, v)) for u, v in ((x, y), (x + 3, y), (x + 3, y + 3), (x, y + 3))]
                 )
                 normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
                 light = float(normal @ (-0.45, -0.2, 0.87)) / float(np.linalg.norm(normal))
-                knoll = abs(y + 1.5) < self._scenario.hill.knoll_width_m / 2 and x >= 0
+                knoll = abs(y + 1.5) < self._hill.knoll_width_m / 2 and x >= 0
                 quads.append((corners, 106 + 62 * light + (9 if knoll else self._rng.normal(0, 2.0))))
         return quads
 
-    def _trees(self) -> list[list[tuple[Array, float]]]:
-        """Spruces in rows, the farther the mistier."""
+    def _trees(self) -> list[list[tuple[Floats, float]]]:
+        """Spruces in rows; the farther a row, the more mist lies over it."""
         trees = []
         for y, gap, mist in ((70.0, 2.0, 128.0), (52.0, 2.2, 116.0), (38.0, 2.6, 106.0), (26.0, 4.0, 98.0)):
             for x in np.arange(-60.0, 150.0, gap):
@@ -94,9 +89,9 @@ class _Painter:
                 trees.append(self._spruce(*where, self._rng.uniform(7, 15), mist + self._rng.normal(0, 4)))
         return trees
 
-    def _spruce(self, x: float, y: float, tall: float, grey: float) -> list[tuple[Array, float]]:
+    def _spruce(self, x: float, y: float, tall: float, grey: float) -> list[tuple[Floats, float]]:
         """A tree as four tiers of triangles that face the camera, each with snow on one flank."""
-        foot, right = np.array((x, y, self._profile.snow(x, y))), self._projection.R[:, 0]
+        foot, right = np.array((x, y, self._hill.snow(x, y))), self._projection.R[:, 0]
         up, tiers = np.array((0.0, 0.0, tall)), []
         for k in range(4):
             low, high, wide = 0.08 + 0.22 * k, min(1.0, 0.45 + 0.2 * k), 0.19 * tall * (1 - 0.2 * k)
@@ -119,7 +114,7 @@ def _sky(projection: Projection) -> NDArray[np.uint8]:
     return np.repeat(np.rint(rows).astype(np.uint8)[:, None], projection.width, axis=1)
 
 
-def _texture(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def _texture(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> Image:
     """Fine and coarse irregularities of snow and trees, grey values; shape (h, w)."""
     height, width = shape
     texture = np.zeros(shape, np.float32)
@@ -130,13 +125,13 @@ def _texture(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> 
     return texture
 
 
-def _put_balls(image: NDArray[np.float32], scenario: Scenario, projection: Projection) -> None:
+def _put_balls(image: Image, scenario: Scenario, projection: Projection) -> None:
     """Thin poles, then each ball on its plate, far ones first."""
-    blur, profile = scenario.image.blur_sigma_px, HillProfile(scenario.hill)
+    blur = scenario.image.blur_sigma_px
     seen = [(float(projection.distance(ball.X)), ball.X) for ball in scenario.balls]
     balls = sorted(((distance, X) for distance, X in seen if distance > _NEAREST_M), reverse=True)
     for _, (x, y, z) in balls:
-        top, foot = projection.pixels([(x, y, z), (x, y, min(profile.snow(x, y), z))])
+        top, foot = projection.pixels([(x, y, z), (x, y, min(scenario.hill.snow(x, y), z))])
         stroke(image, top, foot, 0.4, 0.4, _POLE)
     for distance, X in balls:  # noqa: N806
         x, y = projection.pixels(X)

@@ -1,7 +1,7 @@
-"""The signature in a simulated frame: which camera took it at which hill pulse.
+"""The stamp in a simulated frame: which camera took it at which hill pulse.
 
-It stands in the last 16 pixels of the last line, like the secure image signature of AVT's cameras, so that a test can
-read from the pixels alone whether a triplet mixes pulses. Bytes: magic "SVEV", camera index, pulse (8, big-endian),
+It stands in the last 16 pixels of the last line, like the secure image signature of AVT's cameras. So a test can read
+from the pixels alone whether a triplet mixes pulses. Bytes: magic "SVEV", camera index, pulse (8, big-endian),
 check (lowest 3 bytes of the CRC-32 of the 13 bytes before, big-endian).
 """
 
@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.pulse import HillPulse
+
 STAMP_BYTES = 16
 _MAGIC = b"SVEV"
 _BODY = struct.Struct(">4sBQ")
@@ -19,7 +21,7 @@ _BODY = struct.Struct(">4sBQ")
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """What a stamped frame says about itself.
+    """Content of a stamp.
 
     Attributes:
         camera: index of the camera in the scenario, 0 for the leftmost.
@@ -27,10 +29,10 @@ class Stamp:
     """
 
     camera: int
-    pulse: int
+    pulse: HillPulse
 
 
-def write(image: NDArray[np.uint8], camera: int, pulse: int) -> None:
+def write(image: NDArray[np.uint8], camera: int, pulse: HillPulse) -> None:
     """Stamp `image`, shape (h, w) with w >= 16, in place.
 
     Raises:

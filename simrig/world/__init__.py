@@ -1,1 +1,1 @@
-"""What there is to see: scenario, hill, flight, jumper, and the truth about them."""
+"""What happens on the simulated hill: scenario, jumper, trigger pulses, camera clocks, faults; and the truth of it."""

@@ -4,25 +4,23 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.arrays import Floats
 from simrig.world.keyframes import Curve
 
 GRAVITY = 9.82  #: m/s^2, Trondheim
 STEP_S = 0.01
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class Forces:
-    """What acts on the jumper.
+    """Forces on the jumper.
 
     Attributes:
         mass: kg.
-        density: of the air, kg/m^3.
-        drag_area: drag coefficient times area, m^2, over the time since take-off.
-        lift_area: likewise.
+        density: density of the air, kg/m^3.
+        drag_area: drag coefficient times area, m^2, by time since take-off.
+        lift_area: lift coefficient times area, likewise.
     """
 
     mass: float
@@ -30,16 +28,16 @@ class Forces:
     drag_area: Curve
     lift_area: Curve
 
-    def acceleration(self, time_s: float, velocity: Array) -> Array:
+    def acceleration(self, time_s: float, velocity: Floats) -> Floats:
         """Acceleration, m/s^2, shape (3,).
 
-        Drag acts against the velocity; lift acts at a right angle to it, upwards in its vertical plane, and so does no
-        work. Both are density / 2 * area * speed^2.
+        Drag acts against the velocity. Lift acts upwards in the vertical plane of the velocity, at a right angle to it,
+        and so does no work. Both are density / 2 * area * speed^2.
         """
         vx, vy, vz = velocity
         ground_speed = math.hypot(vx, vy)
         speed = math.hypot(ground_speed, vz)
-        pressure = self.density * speed / (2 * self.mass)  # times speed, which the vectors below bring along
+        pressure = self.density * speed / (2 * self.mass)  # the vectors below bring one more factor speed
         drag, lift = pressure * self.drag_area(time_s), pressure * self.lift_area(time_s)
         tilt = vz / ground_speed if ground_speed else 0.0
         return np.array(
@@ -55,10 +53,10 @@ class Flight:
         states: position and velocity, m and m/s, at multiples of `STEP_S` from take-off; shape (n, 6).
     """
 
-    states: Array
+    states: Floats
 
-    def position(self, time_s: float) -> Array:
-        """Position, m, shape (3,): cubic Hermite between the steps; straight on beyond the last one."""
+    def position(self, time_s: float) -> Floats:
+        """Position, m, shape (3,): cubic Hermite between the steps, straight line beyond the last step."""
         last = len(self.states) - 1
         i = min(max(int(time_s / STEP_S), 0), last - 1)
         u = time_s / STEP_S - i
@@ -70,7 +68,7 @@ class Flight:
         return np.asarray(here[:3] + u * (a + u * (3 * rise - 2 * a - b + u * (a + b - 2 * rise))))
 
 
-def fly(forces: Forces, position: Array, velocity: Array, duration_s: float) -> Flight:
+def fly(forces: Forces, position: Floats, velocity: Floats, duration_s: float) -> Flight:
     """Integrate the flight from `position`, m, with `velocity`, m/s, both of shape (3,), over `duration_s`."""
     steps = math.ceil(duration_s / STEP_S)
     states = np.empty((steps + 1, 6))
@@ -80,8 +78,8 @@ def fly(forces: Forces, position: Array, velocity: Array, duration_s: float) -> 
     return Flight(states)
 
 
-def _runge_kutta(forces: Forces, time_s: float, state: Array) -> Array:
-    def rate(late_s: float, there: Array) -> Array:
+def _runge_kutta(forces: Forces, time_s: float, state: Floats) -> Floats:
+    def rate(late_s: float, there: Floats) -> Floats:
         return np.concatenate((there[3:], forces.acceleration(time_s + late_s, there[3:])))
 
     half = STEP_S / 2

@@ -1,26 +1,24 @@
-"""One jump: where markers, skis and limbs are at any time.
+"""The jumps of a scenario: position and posture of the jumper at any time.
 
-The dynamic system of Fig. 6 has its origin O at the midpoint of P3 and P4 (the middles of the skis), its X' axis along
-the mean direction of the skis; P1 (helmet) and P2 (hip) lie in its X'Z' plane. O follows the integrated flight; for the
-first tenths of a second it still moves along the table while the legs stretch.
+The dynamic system of Fig. 6 has its origin O at the midpoint of P3 and P4 (the middles of the skis) and its X' axis
+along the mean direction of the skis; P1 (helmet) and P2 (hip) lie in its X'Z' plane. O follows the integrated flight.
+In the first tenths of a second, while the legs stretch, it lags behind that: the skis still follow the table.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.arrays import Floats
+from rig.pulse import HillPulse
 from simrig.world.flight import Flight, Forces, fly
-from simrig.world.hill_profile import HillProfile
 from simrig.world.keyframes import Curve, Keyframe
 from simrig.world.scenario import Jumper, Scenario, Variation
 
-Array = NDArray[np.float64]
-
-PRESENT_X_M = (-6.0, 26.0)  #: the jumper exists while O is in here; the cameras see less
+PRESENT_X_M = (-6.0, 26.0)  #: the jumper is drawn while O is in this range, which is wider than any camera's view
 FLIGHT_X_M = (0.0, 20.0)  #: the paper's "first 20 m of flight"
-_FLIGHT_S = 1.2  #: a little longer than 26 m take; after that it goes straight on
+_FLIGHT_S = 1.2  #: a little longer than 26 m take; beyond, the path is straight
 _STRETCH_S = 0.06  #: after this time the skis have taken over most of the body's upward speed
 _SKI_ABOVE_TRACK_M = 0.03
 _TABLE_ACCELERATION = 1.5  #: m/s^2 along the table: gravity less friction and air
@@ -36,12 +34,12 @@ class Pose:
         axes: X', Y', Z' of the dynamic system as rows; shape (3, 3).
     """
 
-    markers: Array
-    skis: Array
-    axes: Array
+    markers: Floats
+    skis: Floats
+    axes: Floats
 
     @property
-    def origin(self) -> Array:
+    def origin(self) -> Floats:
         """O of Fig. 6."""
         return np.asarray((self.markers[2] + self.markers[3]) / 2)
 
@@ -60,7 +58,7 @@ class Posture:
     yaw: Curve
     torso_length: float
 
-    def pose(self, time_s: float, origin: Array) -> Pose:
+    def pose(self, time_s: float, origin: Floats) -> Pose:
         """The pose with O at `origin`."""
         slope, yaw = math.radians(self.ski_slope(time_s)), math.radians(self.yaw(time_s))
         forward = np.array((math.cos(slope) * math.cos(yaw), math.cos(slope) * math.sin(yaw), math.sin(slope)))
@@ -83,18 +81,23 @@ class Jump:
     Attributes:
         number: counted from 0.
         takeoff_s: scene time at which O passes the edge.
+        start: O at that moment, m, shape (3,).
+        table_velocity: velocity along the table at that moment, m/s, shape (3,).
+        flight: path of the body's mass from then on.
+        push: velocity that the take-off adds, m/s, shape (3,).
+        posture: shape of the body.
     """
 
     number: int
     takeoff_s: float
-    start: Array
-    table_velocity: Array
+    start: Floats
+    table_velocity: Floats
     flight: Flight
-    push: Array
+    push: Floats
     posture: Posture
 
-    def origin(self, time_s: float) -> Array:
-        """O at `time_s` after take-off (negative: on the table)."""
+    def origin(self, time_s: float) -> Floats:
+        """O at `time_s` after take-off (negative: on the table), m, shape (3,)."""
         if time_s <= 0:
             along = time_s + _TABLE_ACCELERATION * time_s**2 / 2 / float(np.linalg.norm(self.table_velocity))
             return np.asarray(self.start + self.table_velocity * along)
@@ -104,20 +107,20 @@ class Jump:
         """The pose at `time_s` after take-off."""
         return self.posture.pose(time_s, self.origin(time_s))
 
-    def velocity(self, time_s: float, step_s: float = 1e-4) -> Array:
+    def velocity(self, time_s: float, step_s: float = 1e-4) -> Floats:
         """Velocity of O, m/s, by central difference."""
         return np.asarray((self.origin(time_s + step_s) - self.origin(time_s - step_s)) / (2 * step_s))
 
 
 class JumpSeries:
-    """All jumps of a scenario, each made when it is first asked for."""
+    """All jumps of a scenario; the latest one asked for is kept."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._latest: Jump | None = None
 
     def at(self, scene_s: float) -> tuple[Jump, float] | None:
-        """The jump that is to be seen at scene time `scene_s`, and the time since its take-off.
+        """The jump in sight at scene time `scene_s`, and the time since its take-off, s.
 
         None while nobody is in sight: O is outside `PRESENT_X_M`.
         """
@@ -128,8 +131,8 @@ class JumpSeries:
             return None
         return jump, time_s
 
-    def at_pulse(self, pulse: int, rate_hz: float) -> tuple[Jump, float] | None:
-        """What is to be seen at hill pulse `pulse`, whose scene time is pulse / rate."""
+    def at_pulse(self, pulse: HillPulse, rate_hz: float) -> tuple[Jump, float] | None:
+        """See `at`; the scene time of hill pulse `pulse` is pulse / rate."""
         return self.at(pulse / rate_hz)
 
     def _jump(self, number: int) -> Jump:
@@ -149,7 +152,7 @@ def _make_jump(scenario: Scenario, number: int) -> Jump:
     table_velocity = speed * np.array((math.cos(table), 0.0, math.sin(table)))
     velocity = speed * np.array((math.cos(angle), 0.0, math.sin(angle)))
     velocity[1] = by.side_m_s * draw[2]
-    start = np.array((0.0, 0.0, float(HillProfile(scenario.hill).table(0.0)) + _SKI_ABOVE_TRACK_M))
+    start = np.array((0.0, 0.0, float(scenario.hill.table(0.0)) + _SKI_ABOVE_TRACK_M))
     forces = Forces(
         jumper.mass_kg,
         jumper.air_density_kg_m3,
@@ -161,8 +164,8 @@ def _make_jump(scenario: Scenario, number: int) -> Jump:
     return Jump(number, takeoff_s, start, table_velocity, flight, velocity - table_velocity, _posture(jumper, by, draw))
 
 
-def _posture(jumper: Jumper, by: Variation, draw: Array) -> Posture:
-    """Posture curves; the variation sets in after take-off, where the track no longer guides the skis."""
+def _posture(jumper: Jumper, by: Variation, draw: Floats) -> Posture:
+    """Posture curves. The variation begins after take-off, where the track no longer guides the skis."""
 
     def varied(keyframes: tuple[Keyframe, ...], k: int) -> Curve:
         return Curve.through([(t, v + (by.posture_deg * draw[k] if t > 0 else 0.0)) for t, v in keyframes])
@@ -184,6 +187,6 @@ def _scaled(keyframes: tuple[Keyframe, ...], factor: float) -> list[Keyframe]:
     return [(time, value * factor) for time, value in keyframes]
 
 
-def _polar(forward: Array, up: Array, length: float, angle_deg: float) -> Array:
+def _polar(forward: Floats, up: Floats, length: float, angle_deg: float) -> Floats:
     angle = math.radians(angle_deg)
     return np.asarray(length * (math.cos(angle) * forward + math.sin(angle) * up))

@@ -1,20 +1,33 @@
-"""Quantities that change with time, given by a few keyframes.
+"""Quantities of the jumper that change with time: a few keyframes in the scenario file, a smooth curve through them.
 
-The curve through them is the piecewise cubic Hermite interpolant with Fritsch-Butland slopes: it never overshoots its
-keyframes, has a continuous derivative and stays constant before the first and after the last one.
+The curve is the piecewise cubic Hermite interpolant with Fritsch-Butland slopes: it never overshoots its keyframes, has
+a continuous derivative, and is constant before the first and after the last keyframe.
 """
 
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
 
 Keyframe = tuple[float, float]  #: time in s, value
 
 
+def _ascending(keyframes: tuple[Keyframe, ...]) -> tuple[Keyframe, ...]:
+    if any(late <= early for (early, _), (late, _) in pairwise(keyframes)):
+        raise ValueError("times of keyframes must ascend: put them in order, each time once")
+    return keyframes
+
+
+#: Keyframes as a scenario file holds them.
+Keyframes = Annotated[tuple[Keyframe, ...], Field(min_length=1), AfterValidator(_ascending)]
+
+
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A smooth curve through keyframes with ascending times.
+    """A smooth curve through keyframes.
 
     Attributes:
         times: s, strictly ascending.
@@ -28,7 +41,7 @@ class Curve:
 
     @classmethod
     def through(cls, keyframes: Sequence[Keyframe]) -> "Curve":
-        """The curve through `keyframes`."""
+        """The curve through `keyframes`, whose times ascend."""
         times = tuple(time for time, _ in keyframes)
         values = tuple(value for _, value in keyframes)
         secants = [(v1 - v0) / (t1 - t0) for (t0, v0), (t1, v1) in pairwise(keyframes)]

@@ -1,46 +1,42 @@
-"""The scenario: one seeded TOML file is the truth for everything that the simulated hill shows and does.
+"""The scenario: one seeded TOML file that decides everything that the simulated hill shows and does.
 
 Frame: origin at the take-off edge, X horizontal along the flight, Z up, Y to the left (right-handed); m, s, degrees.
 Times of the jumper count from the moment in which the middle of the skis passes the edge.
 """
 
-from itertools import pairwise
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from numpy.typing import ArrayLike
+from pydantic import ConfigDict, Field, model_validator
 
+from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.rigfile import read_toml, validate
-from simrig.faults import Fault
-from simrig.world.keyframes import Keyframe
-from simrig.world.projection import Projection, look_at
+from rig.settings.strict_toml import StrictModel, read_toml, validate
+from rig.viewing import look_at
+from simrig.world.faults import Fault
+from simrig.world.keyframes import Keyframes
+from simrig.world.projection import Projection
 
 REFERENCE_WIDTH = 640  #: px; principal distances in a scenario belong to images of this width
-#: Radiance of the brightest things, grey values at gain 1 above the black level: markers, balls and skis.
+#: Radiance of the brightest things (markers, balls, skis): grey values at gain 1, above the black level.
 BRIGHTEST = 225.0
 
 Vector = tuple[float, float, float]
 
 
-def _ascending(keyframes: tuple[Keyframe, ...]) -> tuple[Keyframe, ...]:
-    times = [time for time, _ in keyframes]
-    if any(late <= early for early, late in pairwise(times)):
-        raise ValueError("times of keyframes must ascend: put them in order, each time once")
-    return keyframes
+class _Finite(StrictModel):
+    model_config = ConfigDict(allow_inf_nan=False)
 
 
-Keyframes = Annotated[tuple[Keyframe, ...], Field(min_length=1), AfterValidator(_ascending)]
+class Hill(_Finite):
+    """Profile of the hill: take-off table, knoll, landing slope. The defaults are those of a K120 hill.
 
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Hill(_Strict):
-    """Profile of the hill (`simrig.world.hill_profile`); the defaults are those of a K120 hill."""
+    The table is straight. The knoll is the cubic of the FIS standards for the construction of jumping hills. It begins
+    below the edge with its own slope and meets the P point, where the landing slope is steepest, in height and slope.
+    """
 
     table_angle_deg: float = Field(11.0, ge=0, le=20, description="slope of the take-off table")
     table_height_m: float = Field(3.0, gt=0, description="from the knoll's foot up to the edge")
@@ -51,8 +47,28 @@ class Hill(_Strict):
     p_z_m: float = Field(-48.0, lt=0, description="height of the P point")
     p_angle_deg: float = Field(37.0, gt=0, le=45, description="slope at the P point")
 
+    def table(self, x: ArrayLike) -> Floats:
+        """Height of the table's surface above the edge, m, for x <= 0."""
+        return np.asarray(x, float) * -math.tan(math.radians(self.table_angle_deg))
 
-class Jumper(_Strict):
+    def ground(self, x: ArrayLike) -> Floats:
+        """Height of the snow on knoll and landing slope, m; level under the table, straight beyond the P point."""
+        x = np.asarray(x, float)
+        foot, steep = math.tan(math.radians(self.knoll_angle_deg)), math.tan(math.radians(self.p_angle_deg))
+        u = -self.p_z_m - self.table_height_m - self.p_x_m * foot
+        v = self.p_x_m * (steep - foot)
+        part = np.clip(x, 0.0, self.p_x_m) / self.p_x_m
+        knoll = -self.table_height_m - foot * self.p_x_m * part - (3 * u - v) * part**2 + (2 * u - v) * part**3
+        height: Floats = knoll - steep * np.maximum(x - self.p_x_m, 0.0)
+        return height
+
+    def snow(self, x: float, y: float) -> float:
+        """Height of the snow at any place, m: beside the knoll it rises to the left and falls gently to the right."""
+        beside = max(0.0, abs(y) - self.knoll_width_m / 2)
+        return float(self.ground(x)) + (0.12 if y > 0 else -0.05) * beside
+
+
+class Jumper(_Finite):
     """The jumper: flight by gravity, lift and drag, posture by keyframes [time_s, value]."""
 
     takeoff_speed_m_s: float = Field(26.0, gt=5, le=40)
@@ -73,19 +89,19 @@ class Jumper(_Strict):
     marker_radius_m: float = Field(0.05, gt=0.01, le=0.1)
 
 
-class Variation(_Strict):
-    """Standard deviations by which the jumps of one scenario differ; all zero: every jump is the same."""
+class Variation(_Finite):
+    """Standard deviations by which the jumps of one scenario differ. All zero: every jump is the same."""
 
     speed_m_s: float = Field(0.2, ge=0, le=2)
     takeoff_angle_deg: float = Field(0.25, ge=0, le=3)
-    lift: float = Field(0.05, ge=0, le=0.3, description="part of the lift and drag areas")
+    lift: float = Field(0.05, ge=0, le=0.3, description="fraction of the lift and drag areas")
     posture_deg: float = Field(1.0, ge=0, le=5, description="slope, leg and torso angles after take-off")
     side_m_s: float = Field(0.08, ge=0, le=1, description="sideways speed")
     yaw_deg: float = Field(0.8, ge=0, le=5)
 
 
-class ImageEffects(_Strict):
-    """From radiance to grey values: grey = black_level + gain * radiance + noise."""
+class ImageEffects(_Finite):
+    """How radiance becomes grey values: grey = black_level + gain * radiance + noise."""
 
     black_level: float = Field(8.0, ge=0, le=100)
     noise_sigma: float = Field(2.5, ge=0, le=20, description="grey values")
@@ -93,8 +109,8 @@ class ImageEffects(_Strict):
     snow_flakes: int = Field(60, ge=0, le=5000, description="in the image at any time")
 
 
-class SceneCamera(_Strict):
-    """One camera of the hill: where it stands, how it sees, what its clock says."""
+class SceneCamera(_Finite):
+    """One camera of the hill: its place, its optics, the error of its clock."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$")
     c: float = Field(gt=100, description="principal distance in px of a 640 px wide image")
@@ -123,19 +139,19 @@ class SceneCamera(_Strict):
             raise ValueError(f"camera {self.name} looks straight up or down: move X0 or look_at sideways, or give R")
         return self
 
-    def rotation(self) -> NDArray[np.float64]:
+    def rotation(self) -> Floats:
         """R, shape (3, 3), columns r1, r2, r3 of Eq. (A1)."""
         if self.look_at is None:
             return np.array(self.R, float)
         return look_at(self.X0, self.look_at, self.roll_deg)
 
     def projection(self, width: int, height: int) -> Projection:
-        """The camera with an image of `width` x `height` px: the same view, scaled to the width."""
+        """The camera with an image of `width` x `height` px: the field of view is the same at every width."""
         c = self.c * width / REFERENCE_WIDTH
         return Projection(np.array(self.X0, float), self.rotation(), c, width, height)
 
 
-class Ball(_Strict):
+class Ball(_Finite):
     """One signalised static point: a reflective handball on a black plate."""
 
     name: str = Field(min_length=1, max_length=16)
@@ -143,8 +159,8 @@ class Ball(_Strict):
     X: Vector
 
 
-class Scenario(_Strict):
-    """Everything about one simulated session on the hill."""
+class Scenario(_Finite):
+    """One simulated session on the hill."""
 
     name: str = Field(min_length=1, max_length=80)
     seed: int = Field(ge=0, le=2**32 - 1)
@@ -200,11 +216,11 @@ class Scenario(_Strict):
 def load_scenario(path: Path) -> Scenario:
     """Read and check a scenario file.
 
-    A key `base` names another scenario file, relative to this one: it says everything that this file does not. Tables
-    are merged key by key, lists replace each other.
+    The key `base` names another scenario file, relative to this one, for everything that this file leaves out. Tables
+    are merged key by key; a list of this file replaces that of the base.
 
     Raises:
-        BadInputError: the file is missing, broken or says something that is no scenario; names file, key and remedy.
+        BadInputError: the file is missing or no valid scenario; the message names file, key and remedy.
     """
     own = read_toml(path)
     base = own.pop("base", None)
@@ -219,9 +235,5 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    tables = {key: {**below[key], **value} for key, value in above.items() if _both_tables(below.get(key), value)}
-    return {**below, **above, **tables}
-
-
-def _both_tables(below: object, above: object) -> bool:
-    return isinstance(below, dict) and isinstance(above, dict)
+    both = [key for key, value in above.items() if isinstance(value, dict) and isinstance(below.get(key), dict)]
+    return {**below, **above, **{key: {**below[key], **above[key]} for key in both}}

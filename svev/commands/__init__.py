@@ -1,1 +1,1 @@
-"""The commands of `svev`, one module each."""
+"""The commands of `svev`: options, help texts and output; `svev.cli` lists them."""

@@ -1,24 +1,30 @@
 """`svev adjust`: adjust any photogrammetric network."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from photogrammetry.adjustment.result_extras import in_datum_of, joint_covariance, named_points, with_detectable
-from photogrammetry.adjustment.result_file import outcome_to_json
+from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.run import adjust as adjust_network
-from photogrammetry.adjustment.state import state_of
-from photogrammetry.adjustment.summary import summarise
-from photogrammetry.network import Network
-from photogrammetry.network_file import read_network
-from photogrammetry.protocol.adjusted import adjusted_sections
-from photogrammetry.protocol.document import Protocol
-from photogrammetry.protocol.page import write_protocol
+from photogrammetry.network.file import read_network
+from photogrammetry.network.model import Network
+from photogrammetry.reports.adjusted import adjusted_sections
+from photogrammetry.reports.document import Report
+from photogrammetry.reports.result_extras import in_datum_of, joint_covariance, named_points, with_detectable
+from photogrammetry.reports.result_file import outcome_to_json
+from photogrammetry.reports.summary import summarise
 from photogrammetry.start_values.search import complete
-from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver
-from svev.commands.weights import PaperOption, ReweightOption, with_weights
+from svev.commands.delivery import (
+    JsonOption,
+    OutputOption,
+    PaperOption,
+    ReportOption,
+    ReweightOption,
+    deliver,
+    with_weights,
+    written,
+)
 
 
 def adjust(
@@ -28,14 +34,14 @@ def adjust(
     paper: PaperOption = False,
     snoop: Annotated[
         bool,
-        typer.Option("--snoop", help="take the worst locatable gross error out, adjust again, until there is none"),
+        typer.Option("--snoop", help="take out the worst locatable gross error and adjust again, until there is none"),
     ] = False,
     detectable: Annotated[
-        bool, typer.Option("--detectable", help="give the smallest error of each observation that would be found")
+        bool, typer.Option("--detectable", help="add the smallest error of each observation that would be found")
     ] = False,
     covariance: Annotated[
         list[str] | None,
-        typer.Option("--covariance", help="give the joint covariance of the points so called (* and ?); repeatable"),
+        typer.Option("--covariance", help="add the joint covariance of points with this name (* and ?); repeatable"),
     ] = None,
     datum: Annotated[
         list[str] | None,
@@ -46,42 +52,32 @@ def adjust(
 ) -> None:
     """Adjust a network of images: bundle adjustment with covariance, tests and variance components.
 
-    Exit codes: 0 adjusted, 2 bad input, 3 not solvable (what is missing stands in the result), 4 not converged.
+    Exit codes: 0 adjusted, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged.
 
     Example: svev adjust network.json -o result.json
     """
     given = with_weights(read_network(network), reweight=reweight, paper=paper)
-    wishes = _Wishes(snoop, detectable, tuple(covariance or ()), tuple(datum or ()), report)
-    deliver(lambda: _adjusted(given, wishes), output, as_json=as_json)
+    named_points(given, datum or (), "--datum")  # before anything is computed
+    named_points(given, covariance or (), "--covariance")
+
+    def adjusted() -> tuple[dict[str, Any], list[str]]:
+        outcome = adjust_network(given, state_of(_started(given)), snoop=snoop)
+        if datum:
+            outcome = in_datum_of(outcome, datum)
+        lines = summarise(outcome)
+        lines += written(lambda: Report("Adjustment", adjusted_sections(outcome)), report)
+        result = outcome_to_json(outcome)
+        if detectable:
+            result = with_detectable(result, outcome.adjustment)
+        if covariance:
+            result["joint_covariance"] = joint_covariance(outcome.adjustment, covariance)
+        return result, lines
+
+    deliver(adjusted, output, as_json=as_json)
 
 
-@dataclass(frozen=True, slots=True)
-class _Wishes:
-    """The options that do not change the network."""
-
-    snoop: bool
-    detectable: bool
-    covariance: tuple[str, ...]
-    datum: tuple[str, ...]
-    report: Path | None
-
-
-def _adjusted(network: Network, wishes: _Wishes) -> tuple[dict[str, Any], list[str]]:
-    named_points(network, wishes.datum, "--datum")  # before anything is computed
-    named_points(network, wishes.covariance, "--covariance")
+def _started(network: Network) -> Network:
+    """The network with start values; unchanged if it gives all of them."""
     poses = all(image.position is not None and image.rotation is not None for image in network.images)
     points = all(point.xyz is not None for point in network.points)
-    started = network if poses and points else complete(network)
-    outcome = adjust_network(network, state_of(started), snoop=wishes.snoop)
-    if wishes.datum:
-        outcome = in_datum_of(outcome, wishes.datum)
-    lines = summarise(outcome)
-    if wishes.report is not None:
-        text, page = write_protocol(Protocol("Adjustment", adjusted_sections(outcome)), wishes.report)
-        lines.append(f"protocol in {text} and {page}")
-    result = outcome_to_json(outcome)
-    if wishes.detectable:
-        result = with_detectable(result, outcome.adjustment)
-    if wishes.covariance:
-        result["joint_covariance"] = joint_covariance(outcome.adjustment, wishes.covariance)
-    return result, lines
+    return network if poses and points else complete(network)

@@ -1,4 +1,4 @@
-"""`svev bench`: figures beside their baselines."""
+"""`svev bench`: measures the speed of the program, each figure beside a baseline."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,19 +12,20 @@ from svev import console
 
 def bench(
     suites: Annotated[list[str] | None, typer.Argument(help=f"which of {', '.join(SUITES)}; all if left out")] = None,
-    seconds: Annotated[float, typer.Option(min=1, max=600, help="length of each run")] = 20.0,
-    out: Annotated[Path, typer.Option(help="directory for results and for the logs, which are removed")] = Path(
+    seconds: Annotated[float, typer.Option(min=1, max=600, help="length of each run, seconds")] = 20.0,
+    out: Annotated[Path, typer.Option(help="folder for the results, and for logs that are removed again")] = Path(
         "bench/results"
     ),
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
-    """Measure speed, each figure side by side with its baseline in the same run.
+    """Measure how fast this computer records and computes; each figure stands beside a baseline of the same run.
 
-    paper, saturated, double: three GigE Vision cameras received, paired, composed, checksummed, published and written,
-    beside gst-launch-1.0 aravissrc ! fakesink and ! filesink for the same cameras. CPU-seconds per GB of image data;
-    the simulated cameras are not counted. parts: pairing, composing, checksum, and drawing on their own.
-    api: how fast the service answers while it records at 30 Hz, beside the same while idle.
-    adjustment: free networks with full covariance, beside scipy's least_squares on the same problem.
+    paper, saturated, double: record three simulated GigE Vision cameras; the baseline is gst-launch-1.0 (aravissrc to
+    fakesink and to filesink) with the same cameras. Figures are CPU-seconds per GB of image data, without the work of
+    the simulated cameras. firewire: the same on an emulated FireWire bus. parts: pairing, composing, checksum and
+    drawing, each alone. api: answer times of the service while it records at 30 Hz; the baseline is the idle service.
+    intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
+    covariance; the baseline is scipy's least_squares.
 
     Example: svev bench saturated --seconds 10
     """

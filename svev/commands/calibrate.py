@@ -5,12 +5,11 @@ from typing import Annotated, Any
 
 import typer
 
-from photogrammetry.network import Network
-from photogrammetry.network_file import read_network
+from photogrammetry.network.file import read_network
+from photogrammetry.network.model import Network
 from photogrammetry.procedures.calibration import calibrate as calibrate_network
-from photogrammetry.protocol.calibration import calibration_lines, calibration_protocol, calibration_to_json
-from photogrammetry.protocol.page import write_protocol
-from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver
+from photogrammetry.reports.procedures import calibration_lines, calibration_report, calibration_to_json
+from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver, written
 
 
 def calibrate(
@@ -21,9 +20,9 @@ def calibrate(
 ) -> None:
     """Calibrate cameras: free adjustment of a frame of unknown targets with self-calibration.
 
-    Exit codes: 0 calibrated, 2 bad input, 3 not solvable (what is missing stands in the result), 4 not converged.
+    Exit codes: 0 calibrated, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged.
 
-    Example: svev calibrate frame.json -o cameras.json --report protocol
+    Example: svev calibrate frame.json -o cameras.json --report calibration
     """
     given = read_network(network)
     deliver(lambda: _calibrated(given, report), output, as_json=as_json)
@@ -32,7 +31,5 @@ def calibrate(
 def _calibrated(network: Network, report: Path | None) -> tuple[dict[str, Any], list[str]]:
     calibration = calibrate_network(network)
     lines = calibration_lines(calibration)
-    if report is not None:
-        text, page = write_protocol(calibration_protocol(calibration), report)
-        lines.append(f"protocol in {text} and {page}")
+    lines += written(lambda: calibration_report(calibration), report)
     return calibration_to_json(calibration), lines

@@ -10,7 +10,6 @@ import typer
 
 from rig.errors import CameraError, SvevError
 from svev import console
-from svev.commands import ctl_output
 from svev.rest_client import RestClient, read_token
 
 _POLL_S: Final = 0.2
@@ -25,7 +24,9 @@ app = typer.Typer(
 
 
 Id = Annotated[str, typer.Argument(help="id of the recording, see svev ctl list")]
-Wait = Annotated[float, typer.Option("--wait", min=0, max=600, help="wait so long until it is done; 0: do not wait")]
+Wait = Annotated[
+    float, typer.Option("--wait", min=0, max=600, help="wait at most so long until it is done; 0: not at all")
+]
 Json = Annotated[bool, typer.Option("--json", help="print the service's answer as one JSON object")]
 Text = Annotated[str | None, typer.Option()]
 
@@ -35,7 +36,7 @@ def _target(
     context: typer.Context,
     url: Annotated[str, typer.Option(envvar="SVEV_URL", help="address of the service")] = "http://127.0.0.1:8000",
     token_file: Annotated[
-        Path | None, typer.Option(help="file that holds the token; the variable SVEV_TOKEN if left out")
+        Path | None, typer.Option(help="file that holds the token; without it, the variable SVEV_TOKEN is used")
     ] = None,
 ) -> None:
     """Operate a running service (svev serve): arm, record, stop, list."""
@@ -44,12 +45,11 @@ def _target(
 
 @app.command()
 def status(context: typer.Context, as_json: Json = False) -> None:
-    """Say what the service does.
+    """Show the state of the rig, its cameras, the disk and the recording in progress.
 
     Example: svev ctl status
     """
-    client: RestClient = context.obj
-    _show(client.call("GET", "/api/status"), ctl_output.status, as_json)
+    _show(_call(context, "GET", "/api/status"), _status_lines, as_json)
 
 
 @app.command()
@@ -58,9 +58,8 @@ def arm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -> N
 
     Example: svev ctl arm
     """
-    client: RestClient = context.obj
-    answer = client.call("POST", "/api/arm")
-    _show(_awaited(client, answer, "arming", wait_s), ctl_output.status, as_json)
+    answer = _call(context, "POST", "/api/arm")
+    _show(_awaited(context, answer, "arming", wait_s), _status_lines, as_json)
 
 
 @app.command()
@@ -69,16 +68,19 @@ def disarm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -
 
     Example: svev ctl disarm
     """
-    client: RestClient = context.obj
-    answer = client.call("POST", "/api/disarm")
-    _show(_awaited(client, answer, "disarming", wait_s), ctl_output.status, as_json)
+    answer = _call(context, "POST", "/api/disarm")
+    _show(_awaited(context, answer, "disarming", wait_s), _status_lines, as_json)
 
 
 @app.command()
 def start(
     context: typer.Context,
-    preroll: Annotated[float | None, typer.Option(min=0, help="begin so many seconds ago; all that is held")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0, help="end by itself; until stopped if left out")] = None,
+    preroll: Annotated[
+        float | None, typer.Option(min=0, help="begin so many seconds ago; all that are held if left out")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0, help="end after so many seconds; when stopped if left out")
+    ] = None,
     athlete: Text = None,
     bib: Text = None,
     gate: Text = None,
@@ -91,12 +93,9 @@ def start(
 
     Example: svev ctl start --athlete "Ola Nordmann" --bib 17 --seconds 10
     """
-    client: RestClient = context.obj
-    order = {
-        "preroll_s": preroll, "duration_s": seconds, "athlete": athlete, "bib": bib, "gate": gate, "wind": wind,
-        "notes": notes, "operator": operator,
-    }  # fmt: skip
-    _show(client.call("POST", "/api/recordings", _given(order)), ctl_output.recording, as_json)
+    session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
+    order = session | _given(preroll_s=preroll, duration_s=seconds)
+    _show(_call(context, "POST", "/api/recordings", order), _recording_line, as_json)
 
 
 @app.command()
@@ -111,44 +110,42 @@ def stop(
 
     Example: svev ctl stop
     """
-    client: RestClient = context.obj
     if not recording:
-        current = client.call("GET", "/api/status")["recording"]
+        current = _call(context, "GET", "/api/status")["recording"]
         if current is None:
             raise SvevError("no recording is in progress: see svev ctl list")
         recording = current["id"]
-    _show(client.call("POST", f"{_path(recording)}/stop"), ctl_output.recording, as_json)
+    _show(_call(context, "POST", f"{_path(recording)}/stop"), _recording_line, as_json)
 
 
 @app.command()
 def save(
     context: typer.Context,
-    seconds: Annotated[float | None, typer.Option(min=0, help="so many seconds; all that are held if left out")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0, help="the last so many seconds; all that are held if left out")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Save what has just happened: the last seconds that are held in memory.
+    """Save what has just happened: record the last seconds, which are held in memory.
 
     Example: svev ctl save --seconds 5
     """
-    client: RestClient = context.obj
-    order = _given({"preroll_s": seconds, "duration_s": 0})
-    recording = client.call("POST", "/api/recordings", order)
-    _show(client.call("POST", f"{_path(recording['id'])}/stop"), ctl_output.recording, as_json)
+    recording = _call(context, "POST", "/api/recordings", _given(preroll_s=seconds, duration_s=0))
+    _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), _recording_line, as_json)
 
 
 @app.command("list")
 def list_(
     context: typer.Context,
-    deleted: Annotated[bool, typer.Option("--deleted", help="those in the trash")] = False,
+    deleted: Annotated[bool, typer.Option("--deleted", help="list the recordings in the trash instead")] = False,
     as_json: Json = False,
 ) -> None:
     """List the recordings, newest first.
 
     Example: svev ctl list
     """
-    client: RestClient = context.obj
-    found = client.call("GET", f"/api/recordings?deleted={str(deleted).lower()}")
-    _show({"recordings": found}, ctl_output.recordings, as_json)
+    found = _call(context, "GET", f"/api/recordings?deleted={str(deleted).lower()}")
+    _show({"recordings": found}, _recordings_lines, as_json)
 
 
 @app.command()
@@ -167,9 +164,8 @@ def session(
 
     Example: svev ctl session 2026-02-14T10-15-30Z --bib 18
     """
-    client: RestClient = context.obj
-    change = {"athlete": athlete, "bib": bib, "gate": gate, "wind": wind, "notes": notes, "operator": operator}
-    _show(client.call("PATCH", _path(recording), _given(change)), ctl_output.recording, as_json)
+    change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
+    _show(_call(context, "PATCH", _path(recording), change), _recording_line, as_json)
 
 
 @app.command()
@@ -178,8 +174,7 @@ def delete(context: typer.Context, recording: Id, as_json: Json = False) -> None
 
     Example: svev ctl delete 2026-02-14T10-15-30Z
     """
-    client: RestClient = context.obj
-    _show(client.call("DELETE", _path(recording)), ctl_output.recording, as_json)
+    _show(_call(context, "DELETE", _path(recording)), _recording_line, as_json)
 
 
 @app.command()
@@ -188,8 +183,12 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
 
     Example: svev ctl restore 2026-02-14T10-15-30Z
     """
+    _show(_call(context, "POST", f"{_path(recording)}/restore"), _recording_line, as_json)
+
+
+def _call(context: typer.Context, method: str, path: str, body: dict[str, object] | None = None) -> Any:
     client: RestClient = context.obj
-    _show(client.call("POST", f"{_path(recording)}/restore"), ctl_output.recording, as_json)
+    return client.call(method, path, body)
 
 
 def _show(answer: Any, words: Callable[[Any], str], as_json: bool) -> None:
@@ -199,27 +198,58 @@ def _show(answer: Any, words: Callable[[Any], str], as_json: bool) -> None:
         console.say(words(answer))
 
 
-def _awaited(client: RestClient, answer: dict[str, Any], passing: str, wait_s: float) -> dict[str, Any]:
-    """The status when a passing state is over.
+def _awaited(context: typer.Context, answer: dict[str, Any], passing: str, wait_s: float) -> dict[str, Any]:
+    """Wait until the rig has left the state `passing`, and return the status then.
 
     Raises:
-        CameraError: it ended in a fault.
-        SvevError: it is not over in time.
+        CameraError: it went into the state fault.
+        SvevError: it is still in `passing` after `wait_s`.
     """
     deadline = time.monotonic() + wait_s
     while answer["state"] == passing and wait_s:
         if time.monotonic() > deadline:
             raise SvevError(f"still {passing} after {wait_s:g} s: {answer['statement']['text']}; see svev ctl status")
         time.sleep(_POLL_S)
-        answer = client.call("GET", "/api/status")
+        answer = _call(context, "GET", "/api/status")
     if answer["state"] == "fault":
         raise CameraError(f"{answer['statement']['text']}; {answer['statement']['advice']}")
     return answer
 
 
-def _given(fields: dict[str, Any]) -> dict[str, Any]:
+def _given(**fields: object) -> dict[str, object]:
     return {name: value for name, value in fields.items() if value is not None}
 
 
 def _path(recording: str) -> str:
     return f"/api/recordings/{urllib.parse.quote(recording, safe='')}"
+
+
+def _status_lines(answer: dict[str, Any]) -> str:
+    """The status, for people: state, cameras, disk, seconds held, recording in progress."""
+    lines = [f"{answer['state']:10} {_said(answer['statement'])}"]
+    for camera in answer["cameras"]:
+        lines.append(f"{camera['name']:10} {_said(camera['statement'])}")
+    disk = answer["disk"]
+    lines.append(f"disk       {disk['free_gb']:g} GB free, {disk['jumps_left']} jumps of {disk['jump_s']:g} s left")
+    if answer["preroll"]["seconds"]:
+        lines.append(f"held       the last {answer['preroll']['seconds']:.1f} s")
+    if answer["recording"] is not None:
+        lines.append(f"recording  {_recording_line(answer['recording'])}")
+    return "\n".join(lines)
+
+
+def _recording_line(answer: dict[str, Any]) -> str:
+    """One recording, for people."""
+    session = answer["session"]
+    who = " ".join(text for text in (session["bib"], session["athlete"]) if text)
+    size = f"{answer['duration_s']:.1f} s, {answer['bytes'] / 1e6:.1f} MB"
+    return f"{answer['id']}  {size:22} {_said(answer['verdict'])}" + (f"  [{who}]" if who else "")
+
+
+def _recordings_lines(answer: dict[str, Any]) -> str:
+    """Recordings, for people, one a line."""
+    return "\n".join(_recording_line(each) for each in answer["recordings"]) or "no recordings"
+
+
+def _said(statement: dict[str, Any]) -> str:
+    return f"{statement['text']} -> {statement['advice']}" if statement["advice"] else str(statement["text"])

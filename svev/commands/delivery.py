@@ -1,30 +1,50 @@
-"""What commands that adjust a network have in common: options of the outcome, result file, words, exit code."""
+"""What the commands of photogrammetry have in common: options, weights, result file, report, exit codes."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 
-from photogrammetry.adjustment.result_file import failure_to_json, write_result
-from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.model import Network, Reweight
+from photogrammetry.reports.document import Report, write_report
+from photogrammetry.reports.result_file import failure_to_json, write_result
+from rig.errors import BadInputError
 from svev import console
 
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")]
-ReportOption = Annotated[Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page")]
+ReportOption = Annotated[Path | None, typer.Option("--report", help="folder for the report, as text and as a page")]
 JsonOption = Annotated[bool, typer.Option("--json", help="end with one JSON object: the result without its lists")]
+ReweightOption = Annotated[
+    bool,
+    typer.Option(
+        "--reweight", help="estimate the weights of images and survey from the residuals, group by group (D.3)"
+    ),
+]
+PaperOption = Annotated[bool, typer.Option("--paper", help="estimate the weights by D5 as the paper prints it")]
 
-_NOT_SOLVABLE: Final = 3
-_NOT_CONVERGED: Final = 4
+#: Exit codes.
+NOT_SOLVABLE: Final = 3
+NOT_CONVERGED: Final = 4
 _LISTS: Final = ("observations", "points", "images")  # too long for a screen
 
 
+def written(make: Callable[[], Report], folder: Path | None) -> list[str]:
+    """Write a report, if `folder` is given; returns the line that says where it is."""
+    if folder is None:
+        return []
+    text, page = write_report(make(), folder)
+    return [f"report in {text} and {page}"]
+
+
 def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Path, *, as_json: bool) -> None:
-    """Compute a result, write it, and say how it went.
+    """Compute a result, write its file, and print lines for people.
 
     Args:
         compute: returns the result file's object and lines for people.
-        output: the result file; after a failure it says what is wrong, and holds no numbers.
+        output: the result file; after a failure it has the diagnosis and no numbers.
         as_json: end with one JSON object on standard output, the result without its lists.
 
     Raises:
@@ -34,10 +54,10 @@ def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Pat
     try:
         result, lines = compute()
     except NotSolvableError as error:
-        code, result = _NOT_SOLVABLE, failure_to_json(f"not solvable: {error}", error.defects)
+        code, result = NOT_SOLVABLE, failure_to_json(f"not solvable: {error}", error.defects)
         lines = ["not solvable", *(f"  {defect.message}" for defect in error.defects)]
     except NotConvergedError as error:
-        code, result, lines = _NOT_CONVERGED, failure_to_json(f"not converged: {error}"), [f"not converged: {error}"]
+        code, result, lines = NOT_CONVERGED, failure_to_json(f"not converged: {error}"), [f"not converged: {error}"]
     write_result(result, output)
     for line in lines:
         console.say(line, aside=as_json)
@@ -47,3 +67,16 @@ def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Pat
         console.say(f"result in {output}")
     if code:
         raise typer.Exit(code)
+
+
+def with_weights(network: Network, *, reweight: bool, paper: bool) -> Network:
+    """The network with the weights that the options ask for; without options those that its file asks for.
+
+    Raises:
+        BadInputError: both options are given.
+    """
+    if reweight and paper:
+        raise BadInputError("--reweight and --paper estimate the weights in two different ways: choose one")
+    if not (reweight or paper):
+        return network
+    return replace(network, reweight=Reweight.PAPER if paper else Reweight.HELMERT)

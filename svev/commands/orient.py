@@ -6,18 +6,25 @@ from typing import Annotated, Any
 
 import typer
 
-from photogrammetry.network import Network
-from photogrammetry.network_file import read_network
+from photogrammetry.network.file import read_network
+from photogrammetry.network.model import Network
 from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
 from photogrammetry.procedures.orientation import orient as orient_network
-from photogrammetry.protocol.orientation import orientation_lines, orientation_protocol, orientation_to_json
-from photogrammetry.protocol.page import write_protocol
-from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver
-from svev.commands.weights import PaperOption, ReweightOption, with_weights
+from photogrammetry.reports.procedures import orientation_lines, orientation_report, orientation_to_json
+from svev.commands.delivery import (
+    JsonOption,
+    OutputOption,
+    PaperOption,
+    ReportOption,
+    ReweightOption,
+    deliver,
+    with_weights,
+    written,
+)
 
 
 class Alternative(StrEnum):
-    """Which points tie the images."""
+    """Which tie points are used."""
 
     STATIC = "1"
     MOVING_TOO = "2"
@@ -28,12 +35,12 @@ def orient(
     output: OutputOption,
     calibration: Annotated[
         Path | None,
-        typer.Option("--calibration", help="result of a calibration; the network's own cameras if left out"),
+        typer.Option("--calibration", help="result file of svev calibrate; if left out, the network's own cameras"),
     ] = None,
     alternative: Annotated[
-        Alternative, typer.Option("--alternative", help="1: static tie points alone; 2: moving ones too")
+        Alternative, typer.Option("--alternative", help="1: static tie points only; 2: moving tie points too")
     ] = Alternative.MOVING_TOO,
-    moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names")] = "H*",
+    moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names (* and ?)")] = "H*",
     reweight: ReweightOption = False,
     paper: PaperOption = False,
     report: ReportOption = None,
@@ -41,9 +48,9 @@ def orient(
 ) -> None:
     """Estimate the cameras' poses from reference points, with a search for gross errors in three stages.
 
-    Exit codes: 0 oriented, 2 bad input, 3 not solvable (what is missing stands in the result), 4 not converged.
+    Exit codes: 0 oriented, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged.
 
-    Example: svev orient hill.json --calibration cameras.json -o poses.json --report protocol
+    Example: svev orient hill.json --calibration cameras.json -o poses.json --report orientation
     """
     given = read_network(network)
     if calibration is not None:
@@ -55,7 +62,5 @@ def orient(
 def _oriented(network: Network, alternative: int, moving: str, report: Path | None) -> tuple[dict[str, Any], list[str]]:
     orientation = orient_network(network, alternative, moving)
     lines = orientation_lines(orientation)
-    if report is not None:
-        text, page = write_protocol(orientation_protocol(orientation), report)
-        lines.append(f"protocol in {text} and {page}")
+    lines += written(lambda: orientation_report(orientation), report)
     return orientation_to_json(orientation), lines

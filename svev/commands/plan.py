@@ -1,23 +1,20 @@
-"""`svev plan`: how accurate a network will be, before it is built."""
+"""`svev plan`: predict how accurate a network will be."""
 
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
-from photogrammetry.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.planning.description import read_description
 from photogrammetry.planning.monte_carlo import SAMPLES, simulate
 from photogrammetry.planning.plan import plan_from
 from photogrammetry.planning.prediction import adjusted_plan, predict
-from photogrammetry.planning.protocol import plan_protocol
-from photogrammetry.planning.report import plan_to_json
-from photogrammetry.protocol.document import as_text
-from photogrammetry.protocol.page import write_protocol
+from photogrammetry.reports.document import as_text
+from photogrammetry.reports.plan import plan_report, plan_to_json
 from svev import console
+from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE, written
 
-_NOT_SOLVABLE: Final = 3
-_NOT_CONVERGED: Final = 4
 _SEED: Final = 2009
 
 
@@ -27,7 +24,7 @@ def plan(
         int, typer.Option(min=100, max=100_000, help="repetitions of the Monte-Carlo simulation")
     ] = SAMPLES,
     report: Annotated[
-        Path | None, typer.Option("--report", help="folder for the protocol, as text and as a page with drawings")
+        Path | None, typer.Option("--report", help="folder for the report, as text and as a page with drawings")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object instead of the tables")] = False,
 ) -> None:
@@ -45,15 +42,14 @@ def plan(
             simulated = simulate(planned, adjusted, samples=samples, seed=_SEED, done=done)
     except NotSolvableError as error:
         console.complain(f"not solvable: {error}")
-        raise typer.Exit(_NOT_SOLVABLE) from None
+        raise typer.Exit(NOT_SOLVABLE) from None
     except NotConvergedError as error:
         console.complain(f"not converged: {error}")
-        raise typer.Exit(_NOT_CONVERGED) from None
-    protocol = plan_protocol(planned, adjusted, predicted, simulated, samples)
+        raise typer.Exit(NOT_CONVERGED) from None
+    tables = plan_report(planned, adjusted, predicted, simulated, samples)
     if as_json:
         console.print_json(plan_to_json(planned, predicted, simulated, samples))
     else:
-        console.say(as_text(protocol))
-    if report is not None:
-        text, page = write_protocol(protocol, report)
-        console.say(f"protocol in {text} and {page}", aside=as_json)
+        console.say(as_text(tables))
+    for line in written(lambda: tables, report):
+        console.say(line, aside=as_json)

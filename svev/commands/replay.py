@@ -1,39 +1,40 @@
-"""`svev replay`: publishes a log as it was published live."""
+"""`svev replay`: publishes a log as it was published live, or serves it to workers."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from recorder.replay import ReplayOptions, ReplayReport, replay
+from recorder.publishing.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError, LogDamagedError
 from rig.topics import DEFAULT_PUBLISH
 from svev import console
-from svev.commands.truncation import truncated
+from svev.commands.logs import AlsoJson, LogPath, truncated
 
 _INTERRUPTED = 130
 _SLOWEST, _FASTEST = 0.1, 10.0
 
 
 def replay_command(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="the log, a .mcap file", show_default=False)],
-    speed: Annotated[str, typer.Option(metavar="1|max|X", help="1: as it was; 0.1 to 10; max: no waiting")] = "1",
-    reliable: Annotated[bool, typer.Option("--reliable", help="serve over PUSH; nothing is lost")] = False,
+    log: LogPath,
+    speed: Annotated[
+        str, typer.Option(metavar="1|max|X", help="1: as recorded; 0.1 to 10: slower or faster; max: no waiting")
+    ] = "1",
+    reliable: Annotated[bool, typer.Option("--reliable", help="serve over PUSH: no message is lost")] = False,
     bind: Annotated[str, typer.Option(metavar="ADDRESS", help="ZeroMQ address to bind")] = DEFAULT_PUBLISH,
     loop: Annotated[bool, typer.Option("--loop", help="begin again at the end, until interrupted")] = False,
     first: Annotated[int | None, typer.Option("--from", metavar="N", min=1, help="first pulse")] = None,
     last: Annotated[int | None, typer.Option("--to", metavar="N", min=1, help="last pulse")] = None,
     wait: Annotated[float, typer.Option(metavar="S", min=0, help="seconds to wait for the first listener")] = 10.0,
-    as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
+    as_json: AlsoJson = False,
 ) -> None:
     """Send the triplets, events and health of a log over ZeroMQ, exactly as in live operation.
 
-    Without --reliable the socket is a PUB: subscribers that are too slow miss messages, as they do live; if nobody
-    subscribes in time, the log is published all the same. With --reliable it is a PUSH: workers connect a PULL
-    socket, the log waits for them however slow they are, and each message goes to one of them.
+    Without --reliable the socket is a PUB: subscribers that are too slow miss messages, as in live operation; if nobody
+    subscribes in time, the log is published without subscribers. With --reliable it is a PUSH: workers connect a PULL
+    socket, svev waits for them however slow they are, and each message goes to one of them.
 
     Exit codes: 0; 2 no such log, truncated, address in use, no such pulses, or no worker came; 3 the log was not
-    closed or is damaged; 130 interrupted. What can be read is sent all the same.
+    closed or is damaged; 130 interrupted. What can be read is sent in any case.
 
     Example: svev replay recordings/jump.mcap --speed 0.5 --loop
     """

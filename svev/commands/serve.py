@@ -1,36 +1,43 @@
-"""`svev serve`: the service with its panel."""
+"""`svev serve`: runs the service with its control panel."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from svev.service.composition import ServiceSettings
-from svev.service.composition import serve as run_service
-from webpanel.access import Access
+from svev.serving.composition import ServiceSettings
+from svev.serving.composition import serve as run_service
+from webpanel.door.access import Access
 
 
 def serve(
     rig: Annotated[Path, typer.Option(help="rig file, e.g. config/rigs/sim.toml")],
-    host: Annotated[str, typer.Option(help="address to listen on; other than loopback needs a token")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port to listen on; 0: any that is free")] = 8000,
+    host: Annotated[
+        str, typer.Option(help="address at which the panel answers; any but this computer's own needs a token")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="port of the panel; 0: any that is free")] = 8000,
     data: Annotated[
         Path | None, typer.Option(help="folder for recordings, made if missing; the rig file's if left out")
     ] = None,
     token_file: Annotated[
-        Path | None, typer.Option(help="file that holds the token; the variable SVEV_TOKEN if left out")
+        Path | None, typer.Option(help="file with the token; the environment variable SVEV_TOKEN if left out")
     ] = None,
     allow_host: Annotated[
-        list[str] | None, typer.Option(help="a name by which others call this computer, e.g. hillpc.local; repeatable")
+        list[str] | None,
+        typer.Option(help="a name by which other computers call this one, e.g. hillpc.local; repeatable"),
     ] = None,
     preroll: Annotated[
-        float | None, typer.Option(min=0, max=600, help="seconds kept while armed; the rig file's if left out")
+        float | None,
+        typer.Option(min=0, max=600, help="seconds held in memory while armed; the rig file's if left out"),
     ] = None,
 ) -> None:
-    """Run the rig as a service, with the control panel and its REST API. Ctrl-C ends it, and finishes a recording.
+    """Run the rig as a service: arm and record from the control panel, a web page, or with svev ctl.
 
-    Exit codes: 0 ended by a signal, 2 bad input, or another service uses the port or the folder, 6 something did not
-    come to an end.
+    Open the address that is printed in a browser on this computer. Ctrl-C ends the service; a recording in progress is
+    finished first.
+
+    Exit codes: 0 ended by a signal, 2 bad input, or another service uses the port or the folder, 6 a process did not
+    end in time.
 
     Example: svev serve --rig config/rigs/sim.toml
     """

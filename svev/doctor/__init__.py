@@ -1,1 +1,1 @@
-"""`svev doctor`: looks at everything that a recording stands on, before the recording."""
+"""`svev doctor`: examines what a recording needs (computer, network, disk, cameras) before the recording."""

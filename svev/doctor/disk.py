@@ -1,4 +1,4 @@
-"""Can the recording directory be written, how fast, and how much fits?"""
+"""Examines the disk: can the folder of the recordings be written, how fast, and how much fits on it?"""
 
 import errno
 import mmap
@@ -10,29 +10,29 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from recorder.direct_io import set_direct
-from rig.settings import RigSettings
+from rig.disk import free_bytes, set_direct
+from rig.settings.model import RigSettings
+from service.recordings.storage import bytes_per_s, room_for
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 
 _MB = 1_000_000
 _GB = 1_000_000_000
 _BLOCK = 8 << 20
 _TRIAL = 256 << 20
-_LONGEST_S = 4.0  # a slow disk is judged by what it took in this time
-_HEADROOM = 1.5  # speed wanted over speed needed: disks stall
+_LONGEST_S = 4.0  # a slow disk is judged by what it wrote in this time
+_HEADROOM = 1.5  # speed wanted over speed needed, because disks stall
 _ENOUGH_MIN = 10.0
-_JUMP_S = 10.0  # a jump with what comes before and after it
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What writing and reading back showed.
+    """Results of writing to the disk and reading back.
 
     Attributes:
         direct: whether the file system takes direct I/O.
         write_bps: bytes written per second.
         read_bps: bytes read back per second.
-        same: whether what was read is what was written.
+        same: whether the bytes read back are those that were written.
     """
 
     direct: bool
@@ -41,13 +41,8 @@ class Trial:
     same: bool
 
 
-def rate_needed(rig: RigSettings) -> float:
-    """Bytes per second of the rig's recording."""
-    return sum(camera.frame_bytes for camera in rig.cameras) * rig.trigger.rate_hz
-
-
 def existing_part(directory: Path) -> Path:
-    """The directory itself, or the nearest one above it that exists: a recording makes the rest."""
+    """The directory itself, or the nearest parent that exists: a recording makes the missing part."""
     path = directory.absolute()
     while not path.exists() and path != path.parent:
         path = path.parent
@@ -55,13 +50,12 @@ def existing_part(directory: Path) -> Path:
 
 
 def look_at_disk(rig: RigSettings, directory: Path) -> Iterator[Finding]:
-    """A file of up to 256 MB is written to the recording directory, read back and removed."""
+    """Write a file of up to 256 MB into the folder of the recordings, read it back and remove it."""
     place = existing_part(directory)
     try:
         with _unnamed_file(place) as fd:
             yield passed(Topic.DISK, f"{directory} can be written")
-            disk = os.fstatvfs(fd)
-            free = disk.f_bavail * disk.f_frsize
+            free = free_bytes(fd) or 0
             yield look_at_room(rig, directory, free)
             if free < 2 * _TRIAL:
                 return
@@ -76,18 +70,20 @@ def look_at_disk(rig: RigSettings, directory: Path) -> Iterator[Finding]:
 
 def look_at_room(rig: RigSettings, directory: Path, free: int) -> Finding:
     """How long a recording fits into `free` bytes, with the reserve kept."""
-    usable = max(0.0, free - rig.recorder.reserve_gb * _GB)
-    minutes = usable / rate_needed(rig) / 60
-    jumps = int(minutes * 60 / _JUMP_S)
-    what = f"{free / _GB:.1f} GB free in {directory}: {minutes:.0f} min of recording, {jumps} jumps of {_JUMP_S:.0f} s"
+    room = room_for(rig, free)
+    minutes = room.seconds / 60
+    what = (
+        f"{free / _GB:.1f} GB free in {directory}: {minutes:.0f} min of recording, "
+        f"{room.jumps} jumps of {rig.recorder.jump_s:g} s"
+    )
     remedy = "remove old recordings, or choose another disk with recorder.directory or --out"
-    if jumps < 1:
+    if room.jumps < 1:
         return failure(Topic.DISK, what, remedy)
     return passed(Topic.DISK, what) if minutes >= _ENOUGH_MIN else warning(Topic.DISK, what, remedy)
 
 
 def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Finding]:
-    """What the trial means for this rig."""
+    """Judge the results of a trial by what this rig needs."""
     if not trial.same:
         yield failure(
             Topic.DISK,
@@ -100,7 +96,7 @@ def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Fin
             f"the file system of {directory} has no direct I/O: recording costs several times the processor time",
             "record to ext4 or xfs on a local disk",
         )
-    needed = rate_needed(rig)
+    needed = bytes_per_s(rig)
     writes, reads = trial.write_bps / _MB, trial.read_bps / _MB
     what = f"the disk writes {writes:.0f} and reads {reads:.0f} MB/s, {needed / _MB:.0f} MB/s are needed"
     remedy = "record to a faster disk (NVMe), or lower trigger.rate_hz or the regions"
@@ -119,7 +115,7 @@ def try_disk(fd: int, size: int = _TRIAL) -> Trial:
         OSError: the disk refuses.
     """
     with mmap.mmap(-1, _BLOCK) as pattern, mmap.mmap(-1, _BLOCK) as back:
-        pattern.write(os.urandom(_BLOCK))  # nothing that a file system could compress
+        pattern.write(os.urandom(_BLOCK))  # random bytes, which no file system can compress
         direct = _take_direct(fd, pattern)
         begin = time.monotonic()
         written = 0
@@ -139,7 +135,7 @@ def try_disk(fd: int, size: int = _TRIAL) -> Trial:
 
 @contextmanager
 def _unnamed_file(directory: Path) -> Iterator[int]:
-    """A file without a name: it is gone however this program ends."""
+    """A file without a name, which disappears however this program ends."""
     fd, name = tempfile.mkstemp(prefix=".svev-doctor-", dir=directory)
     Path(name).unlink()
     try:
@@ -149,7 +145,7 @@ def _unnamed_file(directory: Path) -> Iterator[int]:
 
 
 def _take_direct(fd: int, block: mmap.mmap) -> bool:
-    """Switch direct I/O on; whether the file system takes it (some refuse only the first write)."""
+    """Switch direct I/O on, and say whether the file system supports it (some refuse only the first write)."""
     if not set_direct(fd, wanted=True):
         return False
     try:

@@ -1,24 +1,24 @@
-"""Every probe there is, each with a time limit; a probe that fails is a finding itself."""
+"""The list of all probes of the doctor, and how one is run: within a time limit, its failure being a finding."""
 
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.settings import RigSettings
-from svev.doctor import cameras, disk, firewire, machine, memory, network, software
+from rig.settings.model import RigSettings
+from svev.doctor import disk, firewire, gige_cameras, machine, network
 from svev.doctor.finding import Finding, Topic, failure
 
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """Something to look at.
+    """One examination.
 
     Attributes:
-        name: for people.
-        topic: of its findings.
-        look: gives the findings.
-        limit_s: a probe that takes longer has failed.
+        name: what is examined, for people.
+        topic: topic of the finding if the probe itself fails.
+        look: examines and gives the findings.
+        limit_s: time limit, s; a probe that takes longer has failed.
     """
 
     name: str
@@ -28,50 +28,50 @@ class Probe:
 
 
 def probes(rig: RigSettings, directory: Path) -> list[Probe]:
-    """Everything that is looked at for `rig` when it records to `directory`, in the order it is shown."""
+    """All probes for a rig that records into `directory`, in the order in which findings are shown."""
     return [
-        Probe("Python", Topic.SOFTWARE, software.look_at_python),
-        Probe("packages", Topic.SOFTWARE, software.look_at_packages, limit_s=30.0),
-        Probe("camera libraries", Topic.SOFTWARE, lambda: software.look_at_camera_libraries(rig), limit_s=10.0),
-        Probe("memory", Topic.MEMORY, lambda: memory.look_at_memory(rig)),
-        Probe("shared memory", Topic.MEMORY, lambda: memory.look_at_shared_memory(rig)),
-        Probe("huge pages", Topic.MEMORY, memory.look_at_huge_pages),
+        Probe("Python", Topic.SOFTWARE, machine.look_at_python),
+        Probe("packages", Topic.SOFTWARE, machine.look_at_packages, limit_s=30.0),
+        Probe("camera libraries", Topic.SOFTWARE, lambda: machine.look_at_camera_libraries(rig), limit_s=10.0),
+        Probe("memory", Topic.MEMORY, lambda: machine.look_at_memory(rig)),
+        Probe("shared memory", Topic.MEMORY, lambda: machine.look_at_shared_memory(rig)),
+        Probe("huge pages", Topic.MEMORY, machine.look_at_huge_pages),
         Probe("disk", Topic.DISK, lambda: disk.look_at_disk(rig, directory), limit_s=30.0),
         Probe("packet sockets", Topic.NETWORK, lambda: network.look_at_packet_sockets(rig)),
         Probe("socket buffers", Topic.NETWORK, lambda: network.look_at_socket_buffers(rig)),
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),
         Probe("publication", Topic.NETWORK, lambda: network.look_at_publication(rig)),
-        Probe("cameras", Topic.CAMERAS, lambda: cameras.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
+        Probe("cameras", Topic.CAMERAS, lambda: gige_cameras.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
-        Probe("discovery", Topic.CAMERAS, lambda: cameras.look_for_cameras(rig), limit_s=10.0),
+        Probe("discovery", Topic.CAMERAS, lambda: gige_cameras.look_for_cameras(rig), limit_s=10.0),
         Probe("clock", Topic.TIME, machine.look_at_clock),
         Probe("processor", Topic.PROCESSOR, machine.look_at_processor),
     ]
 
 
 def firewire_probes(rig: RigSettings) -> list[Probe]:
-    """The FireWire cameras of a rig alone, and tried."""
+    """The probes of `svev doctor --bus firewire`, which sets up each FireWire camera and takes frames."""
     limit_s = firewire.trial_limit_s(rig) + 15
     return [
-        Probe("camera libraries", Topic.SOFTWARE, lambda: software.look_at_camera_libraries(rig), limit_s=10.0),
+        Probe("camera libraries", Topic.SOFTWARE, lambda: machine.look_at_camera_libraries(rig), limit_s=10.0),
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.try_firewire(rig), limit_s=limit_s),
     ]
 
 
 def run_probe(probe: Probe) -> list[Finding]:
-    """The findings of one probe; never raises, never takes longer than its limit."""
+    """Run one probe; never raises, never takes longer than the limit of the probe."""
     findings: list[Finding] = []
 
     def look() -> None:
         try:
             findings.extend(probe.look())
-        except Exception as error:  # noqa: BLE001 - whatever stops a probe is what the doctor has found
+        except Exception as error:  # noqa: BLE001 - whatever stops a probe is a finding
             reason = f"{type(error).__name__}: {error}"
             findings.append(
                 failure(probe.topic, f"{probe.name} cannot be examined: {reason}", "report it with this line")
             )
 
-    # A thread, because some probes hang in the kernel or in a library, where nothing else can interrupt them.
+    # In a thread, because a probe may hang in the kernel or in a library, where nothing can interrupt it.
     worker = threading.Thread(target=look, name=f"doctor: {probe.name}", daemon=True)
     worker.start()
     worker.join(probe.limit_s)

@@ -1,11 +1,11 @@
-"""One finding of the doctor."""
+"""A finding of the doctor: PASS, WARN or FAIL, what was found, and what to do about it."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Level(StrEnum):
-    """How bad it is."""
+    """Verdict of a finding."""
 
     PASS = "PASS"  # noqa: S105 - a verdict
     WARN = "WARN"  #: recording works, but something may be lost or slow
@@ -26,13 +26,13 @@ class Topic(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at.
+    """One finding.
 
     Attributes:
-        level: how bad it is.
-        topic: what it is about.
+        level: verdict.
+        topic: what the finding is about.
         what: what was found, one line.
-        remedy: what to do about it; empty exactly when the level is PASS.
+        remedy: what to do about it; empty if the level is PASS, and only then.
     """
 
     level: Level
@@ -42,15 +42,15 @@ class Finding:
 
 
 def passed(topic: Topic, what: str) -> Finding:
-    """All is well."""
+    """A finding that all is well."""
     return Finding(Level.PASS, topic, what)
 
 
 def warning(topic: Topic, what: str, remedy: str) -> Finding:
-    """Recording works, but something may be lost or slow."""
+    """A finding that recording works, but something may be lost or slow."""
     return Finding(Level.WARN, topic, what, remedy)
 
 
 def failure(topic: Topic, what: str, remedy: str) -> Finding:
-    """Recording will not work."""
+    """A finding that recording will not work."""
     return Finding(Level.FAIL, topic, what, remedy)

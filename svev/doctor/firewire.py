@@ -1,21 +1,21 @@
-"""FireWire cameras: asked in a process of their own, which a card that hangs cannot hold up.
+"""Examines FireWire cameras, in a child process, so that a card that hangs does not hang the doctor.
 
-The same process sees the emulated bus of a simulated rig, if it is started with the right environment.
+The child sees the emulated bus of a simulated rig, if it is started with the right environment.
 """
 
-import json
-import subprocess
-import sys
+import tempfile
+import time
 from collections.abc import Iterator, Mapping
-from os import environ
-from typing import Final
+from typing import IO, Final
 
 from rig.clocks import host_now
-from rig.settings import RigSettings
-from svev.doctor.finding import Finding, Level, Topic, failure, passed
-from svev.simulation import environment, simulated_hill
+from rig.settings.model import RigSettings
+from rig.transport.process_table import Child, ProcessSpec
+from service.processes.simulation import hill_environment
+from svev.doctor.finding import Finding, Topic, failure, passed
+from svev.doctor.firewire_process import Examination, Found
 
-#: A look, and a trial of each camera, take at most so long.
+#: Time limits, s: of the examination without trial, and of the trial of each camera.
 LOOK_S: Final = 15.0
 TRIAL_S: Final = 15.0
 
@@ -26,7 +26,7 @@ def has_firewire(rig: RigSettings) -> bool:
 
 
 def look_at_firewire(rig: RigSettings) -> Iterator[Finding]:
-    """Are the cameras there? Changes nothing in them."""
+    """Are the FireWire cameras of the rig connected? Changes none of their settings."""
     if not has_firewire(rig):
         return
     if rig.simulation is not None:
@@ -42,30 +42,50 @@ def try_firewire(rig: RigSettings) -> Iterator[Finding]:
         remedy = 'name a rig file whose cameras have backend = "iidc", e.g. --rig config/rigs/hill-iidc.toml'
         yield failure(Topic.CAMERAS, f'the rig "{rig.name}" has no FireWire camera', remedy)
         return
-    with simulated_hill(rig, host_now()) as hill:
-        yield from _ask(rig, environment(hill), trial=True)
+    with hill_environment(rig, host_now()) as variables:
+        yield from _ask(rig, variables, trial=True)
 
 
 def trial_limit_s(rig: RigSettings) -> float:
-    """A trial of all cameras takes at most so long, with an emulated bus to be started."""
+    """Time limit of the trial of all cameras, with the start of an emulated bus, s."""
     return LOOK_S + TRIAL_S * len(rig.cameras)
 
 
 def _ask(rig: RigSettings, variables: Mapping[str, str], *, trial: bool) -> Iterator[Finding]:
-    command = [sys.executable, "-m", "svev.doctor.firewire_process", *(["--trial"] if trial else [])]
     limit_s = trial_limit_s(rig) if trial else LOOK_S
-    try:
-        done = subprocess.run(
-            command, input=rig.model_dump_json(), capture_output=True, text=True, check=False, timeout=limit_s,
-            env={**environ, **variables},
+    with tempfile.TemporaryFile() as output:
+        config = Examination(rig=rig, trial=trial)
+        child = Child(
+            ProcessSpec(
+                "FireWire examination", "svev.doctor.firewire_process", config, environment=variables, reports=Found,
+                output=output,
+            )
         )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        remedy = "plug the FireWire card's cables out and in, and look at `dmesg`"
-        yield failure(Topic.CAMERAS, f"the FireWire bus did not answer within {limit_s:g} s", remedy)
-        return
-    for line in done.stdout.splitlines():
-        finding = json.loads(line)
-        yield Finding(Level(finding["level"]), Topic(finding["topic"]), finding["what"], finding["remedy"])
-    if done.returncode != 0:
-        last = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
-        yield failure(Topic.CAMERAS, f"FireWire cannot be examined: {last}", "report it with this line")
+        try:
+            findings = _findings(child, time.monotonic() + limit_s)
+        finally:
+            child.kill()
+        if findings is None:
+            remedy = "plug the FireWire card's cables out and in, and look at `dmesg`"
+            yield failure(Topic.CAMERAS, f"the FireWire bus did not answer within {limit_s:g} s", remedy)
+            return
+        yield from findings
+        if child.ending() != "exit code 0":
+            yield failure(
+                Topic.CAMERAS, f"FireWire cannot be examined: {_last_line(output)}", "report it with this line"
+            )
+
+
+def _findings(child: Child, deadline: float) -> list[Finding] | None:
+    """All findings of the child; None if it has not ended at the deadline."""
+    findings = []
+    while (found := child.control.next(deadline - time.monotonic())) is not None:
+        findings.append(found.finding)
+    ended = child.control.ended and child.wait(max(0.0, deadline - time.monotonic()))
+    return findings if ended else None
+
+
+def _last_line(output: IO[bytes]) -> str:
+    output.seek(0)
+    lines = output.read().decode("utf-8", "replace").strip().splitlines()
+    return lines[-1] if lines else "no reason given"

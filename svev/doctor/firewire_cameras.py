@@ -1,26 +1,26 @@
-"""What can be seen of FireWire cameras without changing anything in them."""
+"""Examines FireWire cameras without changing their settings: connection, bandwidth, exposure, signature."""
 
 from collections.abc import Iterator
 
 from capture.iidc.avt import AvtRegisters
 from capture.iidc.bandwidth import UNITS_PER_BUS, check_bandwidth, need
 from capture.iidc.bus import Bus, guid_text, why_no_camera
+from capture.iidc.configuration import READOUT_NS
 from capture.iidc.device import Device
-from capture.iidc.exposure import READOUT_NS
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, CameraError
-from rig.settings import CameraSettings, RigSettings
+from rig.settings.model import CameraSettings, RigSettings
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 
 
 def told(message: str) -> Finding:
-    """What an error of ours says: the thing, a colon, what to do."""
+    """The finding FAIL of an error message of ours, which is "what is wrong: what to do"."""
     what, _, remedy = message.removeprefix("camera ").partition(": ")
     return failure(Topic.CAMERAS, what, remedy or "see docs/firewire.md")
 
 
 def look_at_cameras(rig: RigSettings) -> Iterator[tuple[Finding, CameraSettings | None]]:
-    """Findings, each with the camera that it finds ready to be tried, if it does."""
+    """Findings; with a finding that a camera is ready to be tried comes the camera, else None."""
     cameras = [camera for camera in rig.cameras if camera.backend == "iidc"]
     yield _look_at_bandwidth(rig, cameras), None
     for camera in cameras:
@@ -78,7 +78,7 @@ def _look_at_bandwidth(rig: RigSettings, cameras: list[CameraSettings]) -> Findi
 
 
 def _look_at_exposure(camera: CameraSettings, rig: RigSettings) -> Finding:
-    """A camera that is still sending its last frame may be too busy for the next pulse."""
+    """Is the exposure short enough? A camera that still exposes or sends a frame misses the next pulse."""
     period_ms = rig.trigger.period_ns / 1e6
     exposure_ns = camera.exposure_us * NS_PER_US
     busy_ms = (exposure_ns + READOUT_NS + need(camera, rig.trigger.rate_hz).transport_ns) / 1e6

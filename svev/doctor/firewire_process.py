@@ -1,30 +1,45 @@
-"""Child process of the doctor: looks at FireWire cameras.
+"""Child process of the doctor that examines FireWire cameras and reports what it finds."""
 
-The rig comes on standard input; one finding goes on each line of standard output.
-"""
-
-import json
-import sys
-from dataclasses import asdict
-
-from rig.settings import RigSettings
+from rig.settings.model import RigSettings
+from rig.transport.child import begin
+from rig.transport.messages import Message, Quit
+from svev.doctor.finding import Finding
 from svev.doctor.firewire_cameras import look_at_cameras
 from svev.doctor.firewire_trial import try_camera
 
 
+class Examination(Message):
+    """Configuration of the process.
+
+    Attributes:
+        rig: the rig.
+        trial: whether to try every camera that is connected and not in use.
+    """
+
+    rig: RigSettings
+    trial: bool
+
+
+class Found(Message):
+    """One finding."""
+
+    finding: Finding
+
+
 def main() -> None:
-    """Look, and with `--trial` try every camera that is there and free."""
-    rig = RigSettings.model_validate_json(sys.stdin.read())
+    """Look at the cameras, and try them."""
+    child = begin(Examination, Quit, grace_s=0.0)
+    rig = child.config.rig
     ready = []
     for finding, camera in look_at_cameras(rig):
-        print(json.dumps(asdict(finding)), flush=True)  # noqa: T201 - standard output is the channel to the doctor
+        child.control.send(Found(finding=finding))
         if camera is not None:
             ready.append(camera)
-    if "--trial" not in sys.argv[1:]:
+    if not child.config.trial:
         return
     for camera in ready:
         for finding in try_camera(camera, rig.trigger.rate_hz):
-            print(json.dumps(asdict(finding)), flush=True)  # noqa: T201
+            child.control.send(Found(finding=finding))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Tries one FireWire camera: set up as for a recording, two seconds of frames, a bus reset.
+"""Tries one FireWire camera: sets it up as for a recording, takes frames for two seconds, resets the bus.
 
-Answers on the first day with real cameras what the emulated bus cannot prove: docs/firewire.md lists it.
+On the first day with real cameras this answers what the emulated bus cannot show; docs/firewire.md has the list.
 """
 
 from collections.abc import Iterator
@@ -8,14 +8,14 @@ from contextlib import closing
 from typing import Final
 
 from capture.iidc.bus import Bus
+from capture.iidc.camera import IidcCamera
+from capture.iidc.configuration import READOUT_NS
 from capture.iidc.device import Device
-from capture.iidc.exposure import READOUT_NS
-from capture.iidc.iidc_camera import IidcCamera
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, host_now
 from rig.errors import BadInputError, CameraError
-from rig.ring import CameraRing
-from rig.settings import CameraSettings
+from rig.settings.model import CameraSettings
+from rig.transport.ring import CameraRing
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 from svev.doctor.firewire_cameras import told
 
@@ -24,11 +24,13 @@ _AFTER_RESET_NS: Final = NS_PER_S
 _SLOTS: Final = 8
 _RATE_SHARE: Final = 0.02
 _DELAY_NS: Final = 1_000_000
+#: A busy computer takes frames late: the trial is repeated before a delay is called wrong.
+_DELAY_TRIALS: Final = 3
 _MANUAL: Final = "see docs/firewire.md, the first day with real cameras"
 
 
 def try_camera(settings: CameraSettings, rate_hz: float) -> Iterator[Finding]:
-    """Findings on one camera. Its settings are as for a recording afterwards, and it is switched off."""
+    """Try one camera; afterwards it is set up as for a recording, and switched off."""
     name = settings.name
     with closing(CameraRing.create(name, settings.frame_bytes, _SLOTS)) as ring:
         try:
@@ -40,6 +42,8 @@ def try_camera(settings: CameraSettings, rate_hz: float) -> Iterator[Finding]:
                     yield _nothing_came(name, len(arrivals))
                     return
                 yield from _judge(settings, camera, arrivals, rate_hz)
+                if camera.byte_order is not None:
+                    yield _judge_delay(settings, camera, ring, [arrival for arrival in arrivals if arrival.whole])
                 yield _try_bus_reset(settings, camera, ring)
         except (CameraError, BadInputError) as error:
             yield told(str(error))
@@ -85,7 +89,6 @@ def _judge(settings: CameraSettings, camera: IidcCamera, arrivals: list[Arrival]
         return
     yield passed(Topic.CAMERAS, f"{name} signs its frames, {camera.byte_order.name.lower()} end of each word first")
     yield _judge_triggers(name, triggers, taken)
-    yield _judge_delay(settings, camera, whole)
 
 
 def _judge_rate(name: str, rate_hz: float, wanted_hz: float) -> Finding:
@@ -106,18 +109,21 @@ def _judge_triggers(name: str, triggers: int, frames: int) -> Finding:
     return passed(Topic.CAMERAS, f"{name}: trigger and frame counter run together")
 
 
-def _judge_delay(settings: CameraSettings, camera: IidcCamera, whole: list[Arrival]) -> Finding:
-    """The time in the signature should be the beginning of the exposure."""
-    latch = camera.latch()
-    latency_ns = min(arrival.host_time - latch.host - (arrival.device_time - latch.device) for arrival in whole)
-    measured_ns = latency_ns - camera.transport_ns
+def _judge_delay(settings: CameraSettings, camera: IidcCamera, ring: CameraRing, whole: list[Arrival]) -> Finding:
+    """Is the time in the signature the beginning of the exposure, as it should be?"""
     expected_ns = round(settings.exposure_us * NS_PER_US) + READOUT_NS
-    what = (
-        f"{settings.name}: first packet {measured_ns / 1e6:.2f} ms after the signed time, "
-        f"{expected_ns / 1e6:.2f} ms expected from the exposure"
-    )
-    if settings.iidc.trigger_mode == 1 or abs(measured_ns - expected_ns) < _DELAY_NS:
-        return passed(Topic.CAMERAS, what)
+    for trial in range(_DELAY_TRIALS):
+        if trial:
+            whole = [arrival for arrival in _collect(camera, ring, _TRIAL_NS) if arrival.whole] or whole
+        latch = camera.latch()
+        latency_ns = min(arrival.host_time - latch.host - (arrival.device_time - latch.device) for arrival in whole)
+        measured_ns = latency_ns - camera.transport_ns
+        what = (
+            f"{settings.name}: first packet {measured_ns / 1e6:.2f} ms after the signed time, "
+            f"{expected_ns / 1e6:.2f} ms expected from the exposure"
+        )
+        if settings.iidc.trigger_mode == 1 or abs(measured_ns - expected_ns) < _DELAY_NS:
+            return passed(Topic.CAMERAS, what)
     return warning(Topic.CAMERAS, what, _MANUAL)
 
 

@@ -1,18 +1,26 @@
-"""Does the clock tell the right time, and does the processor run at full speed?"""
+"""Examines the computer: clock, processor, memory for the buffers, installed software."""
 
 import ctypes
+import importlib
+import mmap
 import os
-from collections.abc import Iterator
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from importlib import metadata
 from pathlib import Path
 
-from svev.doctor.finding import Finding, Topic, passed, warning
+from rig.settings.model import RigSettings
+from svev.doctor.finding import Finding, Topic, failure, passed, warning
 
 _UNSYNCHRONIZED = 0x0040  # STA_UNSYNC, sys/timex.h
 _FAST = {"performance", "schedutil", "ondemand"}
 
 
 class _Timex(ctypes.Structure):
-    """The first fields of `struct timex` (adjtimex(2)); the rest is room for the others."""
+    """The first fields of `struct timex` (adjtimex(2)); `rest` is room for the other fields."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),
@@ -26,7 +34,7 @@ class _Timex(ctypes.Structure):
 
 
 def look_at_clock() -> Iterator[Finding]:
-    """Pulses are numbered by a clock that nothing steps; the network time only dates them."""
+    """Is the clock synchronized? It only dates recordings; pulses are paired by a clock that never jumps."""
     clock = _Timex()
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.adjtimex(ctypes.byref(clock)) < 0:
@@ -42,7 +50,7 @@ def look_at_clock() -> Iterator[Finding]:
 
 
 def look_at_processor() -> Iterator[Finding]:
-    """A processor that saves power wakes up late."""
+    """Are there enough cores, and do they wake up fast, which they do not in power-saving modes?"""
     policies = sorted(Path("/sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor"))
     governors = {policy.read_text().strip() for policy in policies}
     cores = len(os.sched_getaffinity(0))
@@ -57,3 +65,159 @@ def look_at_processor() -> Iterator[Finding]:
         yield passed(Topic.PROCESSOR, f"{cores} cores, governor: {told}")
     if cores < 2:
         yield warning(Topic.PROCESSOR, "one core for all cameras", "use a machine with at least two cores")
+
+
+_HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
+_MB = 1_000_000
+_CAUTION = 0.5  # share of the available memory above which to warn, because other programs need memory, too
+
+
+def memory_needed(rig: RigSettings) -> int:
+    """Bytes of the cameras' rings and of the triplets that wait for the disk."""
+    per_pulse = sum(camera.frame_bytes for camera in rig.cameras)
+    return round(per_pulse * rig.trigger.rate_hz * (rig.recorder.ring_s + rig.recorder.triplets_s))
+
+
+def look_at_memory(rig: RigSettings) -> Iterator[Finding]:
+    """Do the rings and the triplet buffers fit into the available memory?"""
+    needed, free = memory_needed(rig), _available()
+    what = f"buffers need {needed / _MB:.0f} MB, {free / _MB:.0f} MB are available"
+    if needed > free:
+        yield failure(Topic.MEMORY, what, "end other programs, or lower recorder.ring_s and recorder.triplets_s")
+    elif needed > _CAUTION * free:
+        yield warning(Topic.MEMORY, what, "end other programs, or lower recorder.ring_s and recorder.triplets_s")
+    else:
+        yield passed(Topic.MEMORY, what)
+
+
+def look_at_shared_memory(rig: RigSettings) -> Iterator[Finding]:
+    """Can the ring of a camera be made: an anonymous file in memory (memfd), mapped and written at both ends?"""
+    size = round(rig.cameras[0].frame_bytes * rig.trigger.rate_hz * rig.recorder.ring_s)
+    try:
+        fd = os.memfd_create("svev-doctor", os.MFD_CLOEXEC)
+        try:
+            os.ftruncate(fd, size)
+            with mmap.mmap(fd, size) as memory:
+                memory[0] = memory[-1] = 1
+        finally:
+            os.close(fd)
+    except OSError as error:
+        yield failure(
+            Topic.MEMORY,
+            f"no shared memory of {size / _MB:.0f} MB for a camera's ring: {error.strerror}",
+            "raise the memory limit of this login or container (ulimit -v, systemd MemoryMax)",
+        )
+        return
+    yield passed(Topic.MEMORY, f"shared memory for a camera's ring, {size / _MB:.0f} MB")
+
+
+def look_at_huge_pages() -> Iterator[Finding]:
+    """Are huge pages on? They save a third of the processor time from camera to disk."""
+    yield _look_at_huge_pages("triplets", _HUGE_PAGES / "enabled", "madvise", {"always", "madvise"})
+    rings = {"always", "within_size", "advise", "force"}
+    yield _look_at_huge_pages("the cameras' rings", _HUGE_PAGES / "shmem_enabled", "advise", rings)
+
+
+def _look_at_huge_pages(user: str, path: Path, advised: str, good: set[str]) -> Finding:
+    # The kernel lists all choices, with the one in force in brackets.
+    chosen = re.search(r"\[(\w+)\]", path.read_text()) if path.exists() else None
+    if chosen is None:
+        return warning(
+            Topic.MEMORY, f"this kernel has no huge pages for {user}", "use a kernel with transparent huge pages"
+        )
+    what = f"huge pages for {user}: {chosen[1]}"
+    if chosen[1] in good:
+        return passed(Topic.MEMORY, what)
+    return warning(Topic.MEMORY, what, f"run: echo {advised} | sudo tee {path}")
+
+
+def _available() -> int:
+    """Memory that programs can still get, bytes."""
+    match = re.search(r"^MemAvailable:\s+(\d+) kB", Path("/proc/meminfo").read_text(), re.MULTILINE)
+    if match is None:
+        raise OSError("/proc/meminfo does not tell what memory is available")
+    return int(match[1]) * 1024
+
+
+#: A module of each Python package.
+_PACKAGES = {
+    "numpy": "numpy",
+    "opencv-python-headless": "cv2",
+    "pyzmq": "zmq",
+    "mcap": "mcap.reader",
+    "mcap-protobuf-support": "mcap_protobuf.decoder",
+    "foxglove-schemas-protobuf": "foxglove_schemas_protobuf.RawImage_pb2",
+    "isal": "isal.isal_zlib",
+    "pydantic": "pydantic",
+}
+_DISTRIBUTION_PREFIX = "/usr"
+_LIBDC1394 = "libdc1394.so.25"
+_DPKG_S = 5.0
+
+
+def look_at_python() -> Iterator[Finding]:
+    """Is this the Python of the distribution? Any other one does not find Aravis."""
+    version = ".".join(map(str, sys.version_info[:3]))
+    if sys.base_prefix == _DISTRIBUTION_PREFIX:
+        yield passed(Topic.SOFTWARE, f"Python {version} of the distribution")
+    else:
+        yield failure(
+            Topic.SOFTWARE,
+            f"Python {version} in {sys.base_prefix} is not the distribution's, so it does not find Aravis",
+            "make the environment with: /usr/bin/python3 -m venv --system-site-packages .venv",
+        )
+
+
+def look_at_packages() -> Iterator[Finding]:
+    """Can every Python package that Svev needs be loaded?"""
+    found = []
+    for package, module in _PACKAGES.items():
+        try:
+            importlib.import_module(module)
+            found.append(f"{package} {metadata.version(package)}")
+        except ImportError as error:
+            yield failure(
+                Topic.SOFTWARE,
+                f"{package} cannot be loaded: {error}",
+                "run `make setup`, or install svev's wheel again",
+            )
+    yield passed(Topic.SOFTWARE, ", ".join(found))
+
+
+def look_at_camera_libraries(rig: RigSettings) -> Iterator[Finding]:
+    """Can Aravis (GigE Vision) and libdc1394 (FireWire) be loaded? One that the rig does not use may be missing."""
+    backends = {camera.backend for camera in rig.cameras}
+    yield _look_at_library("Aravis", "gir1.2-aravis-0.8", _load_aravis, needed="aravis" in backends)
+    yield _look_at_library("libdc1394", "libdc1394-25", _load_libdc1394, needed="iidc" in backends)
+
+
+def _look_at_library(name: str, package: str, load: Callable[[], None], *, needed: bool) -> Finding:
+    try:
+        load()
+    except (ImportError, ValueError, OSError) as error:
+        judge = failure if needed else warning
+        return judge(
+            Topic.SOFTWARE, f"{name} cannot be loaded: {error}", f"run: sudo apt-get install {package} python3-gi"
+        )
+    return passed(Topic.SOFTWARE, f"{name} {_debian_version(package)}")
+
+
+def _load_aravis() -> None:
+    import gi  # noqa: PLC0415 - this probe finds out whether it can be imported
+
+    gi.require_version("Aravis", "0.8")
+    from gi.repository import Aravis  # noqa: PLC0415, F401
+
+
+def _load_libdc1394() -> None:
+    ctypes.CDLL(_LIBDC1394)
+
+
+def _debian_version(package: str) -> str:
+    """Version of a Debian package; the libraries themselves do not tell theirs."""
+    dpkg = shutil.which("dpkg-query")
+    if dpkg is None:
+        return "(not from a Debian package)"
+    command = [dpkg, "--show", "--showformat=${Version}", package]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=_DPKG_S, check=False)
+    return done.stdout or "(not from a Debian package)"

@@ -1,30 +1,89 @@
-"""Can the packets of the cameras be received, and the triplets be published?"""
+"""Examines the network: can the packets of GigE Vision cameras be received, and triplets be published?"""
 
+import fcntl
+import socket
+import struct
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
-from ipaddress import IPv4Address
+from contextlib import suppress
+from dataclasses import dataclass
+from ipaddress import IPv4Address, IPv4Network
 from pathlib import Path
 
 import zmq
 
-from capture.receive_socket import SOCKET_BUFFER_BYTES, STALL_FRAMES, prefers_plain_socket
-from recorder.zmq_address import bind
+from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, STALL_FRAMES, prefers_plain_socket
+from recorder.publishing.publisher import bind
 from rig.errors import BadInputError
-from rig.settings import CameraSettings, RigSettings
+from rig.settings.model import CameraSettings, RigSettings
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
-from svev.doctor.interfaces import Interface, interface_to
+
+_SIOCGIFADDR, _SIOCGIFNETMASK, _SIOCGIFMTU = 0x8915, 0x891B, 0x8921  # linux/sockios.h
+_REQUEST = struct.Struct("16s24s")  # struct ifreq: name, then a sockaddr or a number
+_ANY_PORT = 9  # "connecting" a datagram socket sends nothing
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """One network interface.
+
+    Attributes:
+        mtu: size of the largest packet, IP header included, bytes.
+        speed_mbps: speed of the link; None: it has none (loopback, virtual).
+        network: addresses that can be reached without a router.
+    """
+
+    name: str
+    mtu: int
+    speed_mbps: int | None
+    network: IPv4Network
+
+
+def interface_to(address: str) -> Interface | None:
+    """The interface through which packets to `address` (IPv4) leave; None if there is no route."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((address, _ANY_PORT))
+        except OSError:
+            return None
+        own = IPv4Address(probe.getsockname()[0])
+        for _, name in socket.if_nameindex():
+            with suppress(OSError):  # interfaces without an address
+                here = IPv4Address(_ask(probe, _SIOCGIFADDR, name)[4:8])
+                mask = IPv4Address(_ask(probe, _SIOCGIFNETMASK, name)[4:8])
+                network = IPv4Network(f"{here}/{mask}", strict=False)
+                if here == own or (network.is_loopback and own in network):
+                    mtu = int.from_bytes(_ask(probe, _SIOCGIFMTU, name)[:4], sys.byteorder)
+                    return Interface(name, mtu, _speed(name), network)
+    return None
+
+
+def _ask(probe: socket.socket, request: int, name: str) -> bytes:
+    """The answer of netdevice(7), without the interface name at its beginning."""
+    return fcntl.ioctl(probe, request, _REQUEST.pack(name.encode(), b""))[16:]
+
+
+def _speed(name: str) -> int | None:
+    """Speed of the link, Mbit/s; None if the interface has none: no such file, not readable, or -1 in it."""
+    try:
+        speed = int(Path(f"/sys/class/net/{name}/speed").read_text())
+    except OSError:
+        return None
+    return speed if speed > 0 else None
+
 
 _CAP_NET_RAW = 13  # linux/capability.h
-_FULL = 0.9  # a link that is fuller than this has no room for packets that are sent again
+_FULL = 0.9  # share of a link's speed above which packets cannot be sent again
 
 
 def gige_cameras(rig: RigSettings) -> list[CameraSettings]:
-    """The cameras whose frames come by network."""
+    """The cameras of a rig that send their frames over the network."""
     return [camera for camera in rig.cameras if camera.backend == "aravis"]
 
 
 def look_at_packet_sockets(rig: RigSettings) -> Iterator[Finding]:
-    """Packet sockets make fast cameras several times cheaper; the kernel gives them to the privileged."""
+    """May we use packet sockets? They save most of the processor time for fast cameras, but need a privilege."""
     cameras = gige_cameras(rig)
     plain = [camera for camera in cameras if _prefers_plain_socket(rig, camera)]
     if not cameras:
@@ -43,15 +102,15 @@ def look_at_packet_sockets(rig: RigSettings) -> Iterator[Finding]:
 
 
 def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
-    """Buffers of plain sockets: too small ones lose packets, above all those of the first frame."""
+    """Are the buffers of plain sockets large enough? Too small ones lose packets, above all of the first frame."""
     plain = [
         camera for camera in gige_cameras(rig) if _prefers_plain_socket(rig, camera) or not _may_use_packet_sockets()
     ]
     if not plain:
         return
     largest = max(camera.frame_bytes for camera in plain)
-    # The large buffer is asked for when the first packet is already there, so the first frame has to fit into the
-    # default one; the kernel counts its own overhead in, about as much again.
+    # Aravis asks for the large buffer only after the first packet, so the first frame has to fit into the default one.
+    # The kernel counts its own overhead in, about as much again.
     wanted = {"rmem_max": min(SOCKET_BUFFER_BYTES, STALL_FRAMES * largest), "rmem_default": 2 * largest}
     for name, least in wanted.items():
         value = int(Path(f"/proc/sys/net/core/{name}").read_text())
@@ -64,7 +123,7 @@ def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
 
 
 def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
-    """The way to each camera: packet size, subnet, and whether the link carries all that comes over it."""
+    """Does the network port of each camera suit it: packet size, subnet, speed for all cameras behind it?"""
     behind: dict[Interface, list[CameraSettings]] = defaultdict(list)
     for camera in gige_cameras(rig):
         try:
@@ -83,7 +142,7 @@ def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
 
 
 def judge_interface(rig: RigSettings, interface: Interface, cameras: list[CameraSettings]) -> Finding:
-    """Whether `interface` is fit for the cameras behind it."""
+    """Judge an interface by the needs of the cameras behind it."""
     names = ", ".join(camera.name for camera in cameras)
     link = f", {interface.speed_mbps} Mbit/s" if interface.speed_mbps else ""
     what = f"{names} by {interface.name}: MTU {interface.mtu}{link}"
@@ -111,7 +170,7 @@ def judge_interface(rig: RigSettings, interface: Interface, cameras: list[Camera
 
 
 def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
-    """The address at which triplets are published is free."""
+    """Is the address free at which triplets are published?"""
     address = rig.network.publish
     with zmq.Context() as context, context.socket(zmq.PUB) as publisher:
         try:

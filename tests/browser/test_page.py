@@ -6,19 +6,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
+from rig.errors import StateForbidsError
 from rig.frame import FrameStatus
+from rig.status import Recording, RecordingOrder, State
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, serving
-from webpanel.access import Access
-from webpanel.models import Recording, RecordingOrder, State
-from webpanel.rig_service import StateForbidsError
+from webpanel.door.access import Access
 
 AXE = Path(__file__).with_name("npm") / "node_modules" / "axe-core" / "axe.min.js"
 TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
@@ -117,6 +118,18 @@ def test_names_of_athletes_are_text_and_nothing_else(panel: Panel, jumps: None, 
     expect(page.locator("#recordings-list li")).to_have_count(1)
 
 
+def test_the_focus_stays_on_a_recording_when_the_list_is_drawn_anew(
+    panel: Panel, client: httpx.Client, jumps: None, open_page: Open
+) -> None:
+    page = open_page(panel.url)
+    enter(page, panel, "recordings")
+    link = page.get_by_role("link", name=re.compile("^17 "))
+    link.focus()
+    client.patch("/api/recordings/jump-1", json={"bib": "18"}).raise_for_status()
+    link = page.get_by_role("link", name=re.compile("^18 "))
+    expect(link).to_be_focused()
+
+
 def test_session_fields_carry_over_and_the_next_jumper_clears_who(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
@@ -194,6 +207,19 @@ def test_a_narrow_phone_scrolls_down_only_and_takes_gloves(
         enter(page, panel, view)
         assert page.evaluate("document.documentElement.scrollWidth") == 360, view
         assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX), view
+
+
+def test_the_rig_view_has_cameras_and_processes_also_when_it_is_opened_first(panel: Panel, open_page: Open) -> None:
+    def late(route: Route) -> None:
+        """The status comes after the rig file."""
+        expect(page.locator("#rig-name")).to_have_text("memory")
+        route.continue_()
+
+    page = open_page("about:blank")
+    page.route("**/api/events", late)
+    page.goto(f"{panel.url}/#/rig")
+    expect(page.locator("#rig-facts")).to_contain_text("K1")
+    expect(page.locator("#rig-facts")).to_contain_text("recorder")
 
 
 def _grave(page: Page) -> list[str]:

@@ -3,12 +3,13 @@
 import re
 import shutil
 import subprocess
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 from pydantic import BaseModel
 
-from webpanel import models
+from rig import status as models
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"
@@ -66,7 +67,7 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
     norwegian = (PAGE / "i18n" / "nb-statements.js").read_text()
     translated = dict(re.findall(r"^  (\w+): \[(.*)\],$", norwegian, re.MULTILINE))
     stated = set()
-    for path in [*(ROOT / "svev" / "service").rglob("*.py"), *(ROOT / "webpanel").rglob("*.py")]:
+    for path in [*(ROOT / "service").rglob("*.py"), *(ROOT / "webpanel").rglob("*.py")]:
         text = path.read_text()
         stated |= set(re.findall(r'\bcode="(\w+)"', text))
         stated |= set(re.findall(r'_working\("(\w+)"', text))
@@ -74,7 +75,7 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
         stated |= set(
             re.findall(r'(?:ProblemError\(|_unauthorized\(|_refuse\(|problem\()\s*(?:[\w.]+, )?"(\w+)"', text)
         )
-    verdicts = (ROOT / "webpanel" / "recording_view.py").read_text()
+    verdicts = (ROOT / "service" / "recordings" / "archive.py").read_text()
     stated |= {f"verdict_{word}" for word in re.findall(r'Level\.\w+, "(\w+)", ', verdicts)}
     assert len(stated) > 20
     assert stated <= set(translated)
@@ -84,7 +85,7 @@ def _types() -> dict[str, list[str]]:
     """Properties by name of the typedef."""
     types: dict[str, list[str]] = {}
     name = ""
-    for line in (PAGE / "types.js").read_text().splitlines():
+    for line in (PAGE / "shared" / "types.js").read_text().splitlines():
         if found := re.search(r"@typedef \{object\} (\w+)", line):
             name = found[1]
             types[name] = []
@@ -97,6 +98,24 @@ def _types() -> dict[str, list[str]]:
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
     model: type[BaseModel] = getattr(models, name)
     assert _types()[name] == list(model.model_fields)
+
+
+def test_modules_import_each_other_one_way() -> None:
+    """Views see what is shared, never each other; only what is around them (`frame`, `main.js`) sees several."""
+    sees = {
+        "": {"frame", "i18n", "live", "recordings", "shared", "system"},
+        "frame": {"frame", "i18n", "live", "recordings", "shared"},
+        **{view: {view, "i18n", "shared"} for view in ("live", "recordings", "system")},
+        "shared": {"i18n", "shared"},
+        "i18n": {"i18n", "shared"},
+    }
+    imports: dict[str, set[str]] = {}
+    for module in MODULES:
+        name = module.relative_to(PAGE).as_posix()
+        found = re.findall(r'^import .* from "(.+)";$', module.read_text(), re.MULTILINE)
+        imports[name] = {(module.parent / target).resolve().relative_to(PAGE).as_posix() for target in found}
+        assert {target.rpartition("/")[0] for target in imports[name]} <= sees[name.rpartition("/")[0]], name
+    tuple(TopologicalSorter(imports).static_order())  # raises CycleError
 
 
 @pytest.mark.parametrize("path", EVERYTHING, ids=lambda path: path.name)

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from recorder.info import info
-from recorder.verify import verify
+from recorder.checking.verify import verify
+from recorder.reading.info import info
 from rig.clocks import host_now
-from rig.rigfile import CONFIG
-from simrig.simulated_hill import SimulatedHill
+from rig.settings.file import CONFIG
+from simrig.programs.simulated_hill import SimulatedHill
 from tests.browser.conftest import Open
 from tests.capture.rigs import write_rig
+from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
-from tests.svev.service.serving import Serving, serving
 
 RATE_HZ = 30.0
 
@@ -138,6 +138,7 @@ def test_a_deleted_jump_comes_back(training: Serving, open_page: Open) -> None:
     page.get_by_role("link", name=re.compile("^3 ")).click()
     for undo in (True, False):
         press(page, "Delete")
+        expect(page.locator("#recordings-empty")).to_be_visible()
         expect(page.locator("#recordings-empty")).to_have_text("No jumps recorded yet.")
         assert training.get("/api/recordings") == []
         if undo:
@@ -146,6 +147,7 @@ def test_a_deleted_jump_comes_back(training: Serving, open_page: Open) -> None:
     page.get_by_role("button", name="Close").first.click()
     page.goto(f"{training.url}/#/trash")
     press(page, "Restore")
+    expect(page.locator("#recordings-empty")).to_be_visible()
     expect(page.locator("#recordings-empty")).to_have_text("The trash is empty.")
     (back,) = training.get("/api/recordings")
     assert back["session"]["bib"] == "3"

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rig.rigfile import CONFIG, load_rig
-from rig.settings import RigSettings
+from rig.settings.file import CONFIG, load_rig
+from rig.settings.model import RigSettings
 from tests.support.loopback import Loopback
 
 _FIREWIRE_IN_MIXED = 2
@@ -22,29 +22,37 @@ def write_rig(
     scenario: str = "",
     rate_hz: float = 30.0,
     names: Sequence[str] = ("K1", "K2", "K3"),
+    log: Path | None = None,
     **network: Any,
 ) -> Path:
     """Write a rig file and its scenario.
 
     Args:
         directory: where.
-        backend: "sim", "aravis", "iidc", or "mixed": two FireWire cameras, then GigE Vision ones.
+        backend: "sim", "aravis", "iidc", "replay", or "mixed": two FireWire cameras, then GigE Vision ones.
         loopback: addresses of the simulated cameras and of the publication.
         faults: faults of the scenario, as in its TOML.
         scenario: more TOML for the top of the scenario.
         rate_hz: of the pulses.
         names: cameras of the scenario.
+        log: what back end "replay" replays.
         network: more keys of the [network] table.
     """
     tables = "".join("\n[[faults]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in f.items()) for f in faults or [])
     (directory / "scenario.toml").write_text(f'base = "{SCENARIO}"\nname = "test"\n{scenario}\n{tables}\n')
-    lines = ['name = "test rig"', "[trigger]", f"rate_hz = {rate_hz}", "[simulation]", 'scenario = "scenario.toml"']
+    lines = ['name = "test rig"', "[trigger]", f"rate_hz = {rate_hz}"]
+    lines += ["[simulation]", 'scenario = "scenario.toml"'] if backend != "replay" else []
     lines += [
         "[network]",
         f'publish = "{loopback.endpoint()}"',
         *(f"{k} = {json.dumps(v)}" for k, v in network.items()),
     ]
-    addresses = {"sim": [""] * len(names), "aravis": loopback.cameras(len(names)), "iidc": guids(len(names))}
+    addresses = {
+        "sim": [""] * len(names),
+        "aravis": loopback.cameras(len(names)),
+        "iidc": guids(len(names)),
+        "replay": [str(log)] * len(names),
+    }
     for index, name in enumerate(names):
         kind = backend if backend != "mixed" else "iidc" if index < _FIREWIRE_IN_MIXED else "aravis"
         lines += ["[[cameras]]", f'name = "{name}"', f'backend = "{kind}"']
@@ -55,7 +63,7 @@ def write_rig(
 
 
 def guids(count: int) -> list[str]:
-    """GUIDs of emulated FireWire cameras. Every bus is a world of its own, so they may be the same in all tests."""
+    """GUIDs of emulated FireWire cameras. Every test has a bus of its own, so all tests may use the same GUIDs."""
     return [f"000a4701011b{number:04x}" for number in range(1, count + 1)]
 
 

@@ -1,4 +1,4 @@
-"""One suite over every camera back end: what the grabber and the pairing rely on."""
+"""What the grabber and the pairing rely on, tested with every camera back end."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -8,25 +8,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from capture.aravis_camera import AravisCamera
-from capture.iidc.iidc_camera import IidcCamera
+from capture.aravis.camera import AravisCamera
+from capture.iidc.camera import IidcCamera
+from capture.replay.camera import ReplayCamera
+from capture.replay.timeline import Timeline
 from capture.seam import Arrival, Camera
-from capture.sim_camera import SimCamera
+from capture.sim.camera import SimCamera
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
-from rig.ring import CameraRing
-from rig.settings import RigSettings
-from simrig.faults import Fault
+from rig.settings.model import RigSettings
+from rig.transport.ring import CameraRing
+from service.processes.replayed_log import ReplayedLog
+from service.processes.simulation import simulated_hill
 from simrig.images import stamp
-from simrig.simulated_hill import SimulatedHill
-from svev.sim_scene import SimScene
-from svev.simulation import simulated_hill
+from simrig.programs.scene import SimScene
+from simrig.programs.simulated_hill import SimulatedHill
+from simrig.world.faults import Fault
 from tests.capture.iidc.emulated import visible
+from tests.capture.replay.hill_log import write_fault, write_hill_log
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 
-BACKENDS = ["sim", "aravis", "iidc"]
+BACKENDS = ["sim", "aravis", "iidc", "replay"]
 PERIOD_NS = 33_333_333
+_LOGGED_PULSES = 240
 
 
 class Bench:
@@ -37,6 +42,7 @@ class Bench:
         self.epoch = host_now()
         self.ring = CameraRing.create("K2", rig.cameras[0].frame_bytes, slots)
         self.hill: SimulatedHill | None = None
+        self.timeline: Timeline | None = None
         self._scene: SimScene | None = None
 
     def open(self) -> Camera:
@@ -46,18 +52,23 @@ class Bench:
             return AravisCamera(settings, self.rig.network, self.ring, self.rig.trigger.period_ns)
         if settings.backend == "iidc":
             return IidcCamera(settings, self.ring, self.rig.trigger.rate_hz)
+        if self.timeline is not None:
+            return ReplayCamera(settings, self.ring, self.timeline)
         self._scene = self._scene or SimScene(self.rig, 0, self.epoch)
         return SimCamera(settings, self.ring, self._scene)
 
     def inject(self, kind: str, **fields: Any) -> None:
         """Let a fault befall the next pulse of the open camera."""
+        if self.timeline is not None:
+            write_fault(self.timeline, kind, fields)
+            return
         fault = Fault.model_validate({"kind": kind, "camera": "K2", **fields})
         target = self.hill or self._scene
         assert target is not None
         target.inject(fault)
 
     def stamp_of(self, arrival: Arrival) -> int:
-        """Hill pulse that the frame's own pixels name."""
+        """Hill pulse that the stamp in the frame names."""
         shape = (self.rig.cameras[0].region.height, self.rig.cameras[0].region.width)
         found = stamp.read(self.ring.frame(arrival.slot).reshape(shape))
         assert found is not None
@@ -68,13 +79,43 @@ class Bench:
 OpenBench = Callable[..., Bench]
 
 
+@pytest.fixture(scope="module")
+def hill_log(tmp_path_factory: pytest.TempPathFactory) -> Callable[[RigSettings, int], Path]:
+    """Logs of one camera of the simulated hill; the same one is made once."""
+    made: dict[str, Path] = {}
+
+    def make(simulated: RigSettings, pulses: int) -> Path:
+        assert simulated.simulation is not None
+        key = simulated.simulation.scenario.read_text()
+        if key not in made:
+            made[key] = tmp_path_factory.mktemp("log") / "hill.mcap"
+            write_hill_log(made[key], simulated, pulses)
+        return made[key]
+
+    return make
+
+
 @pytest.fixture(params=BACKENDS)
-def bench(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) -> Iterator[OpenBench]:
+def bench(
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    loopback: Loopback,
+    hill_log: Callable[[RigSettings, int], Path],
+) -> Iterator[OpenBench]:
     with ExitStack() as stack:
 
         def open_bench(slots: int = 16, **options: Any) -> Bench:
+            replayed = request.param == "replay"
+            if replayed:
+                simulated = make_rig(tmp_path, "sim", loopback, names=["K2"], **options)
+                options = {"log": hill_log(simulated, 2 if "scenario" in options else _LOGGED_PULSES)}
             made = Bench(make_rig(tmp_path, request.param, loopback, names=["K2"], **options), slots)
             stack.callback(made.ring.close)
+            if replayed:
+                log = ReplayedLog(made.rig, 0)
+                stack.callback(log.close)
+                made.epoch = host_now()
+                made.timeline = Timeline(log, made.epoch)
             made.hill = stack.enter_context(simulated_hill(made.rig, made.epoch))
             if request.param == "iidc" and made.hill is not None:
                 stack.enter_context(visible(made.hill))
@@ -95,14 +136,14 @@ def _open(bench: Bench) -> Iterator[Camera]:
 
 @contextmanager
 def _warm(bench: Bench) -> Iterator[Camera]:
-    """A camera whose first frames have passed: those may be lost while its stream is being set up."""
+    """An open camera that has delivered its first frames; frames may be lost while its stream is set up."""
     with _open(bench) as camera:
         _collect(bench, camera, 3)
         yield camera
 
 
 def _collect(bench: Bench, camera: Camera, count: int) -> list[tuple[Arrival, int | None]]:
-    """The next `count` arrivals, each with the pulse in its pixels; slots are given back at once."""
+    """The next `count` arrivals, each with the hill pulse of its stamp; slots are given back at once."""
     collected: list[tuple[Arrival, int | None]] = []
     deadline = host_now() + 20_000_000_000
     while len(collected) < count:
@@ -141,14 +182,14 @@ def test_latch_ties_the_device_clock_to_the_host(bench: OpenBench) -> None:
 
 
 def test_without_pulses_receive_comes_back_empty(bench: OpenBench) -> None:
-    made = bench(scenario="pauses = [[0, 100000]]")
+    made = bench(scenario="pauses = [[1, 100000]]")
     with _open(made) as camera:
         before = host_now()
         assert camera.receive(0.1) is None
         assert host_now() - before < 1_000_000_000
 
 
-#: Fault, its fields, how far the ids go on across it.
+#: Fault, its fields, difference of the ids before and after it.
 FAULTS: list[tuple[str, dict[str, Any], int]] = [
     ("missed_pulse", {}, 1),
     ("lost_frame", {}, 2),
@@ -156,7 +197,7 @@ FAULTS: list[tuple[str, dict[str, Any], int]] = [
     ("lost_leader", {"resend": False}, 2),
     ("lost_packets", {"packets": [3, 4], "resend": False}, 2),
 ]
-#: A FireWire camera has no word about damage. What a lost packet does there: `tests/capture/iidc`.
+#: FireWire does not report damage. What a lost packet does there: `tests/capture/iidc`.
 FAULTS_ON_FIREWIRE = [fault for fault in FAULTS if fault[0] not in {"damaged_frame", "lost_packets"}]
 
 
@@ -184,7 +225,7 @@ def test_a_fault_costs_one_frame_and_the_ids_tell_why(
     assert abs(np.diff(times)[gap] - 2 * PERIOD_NS) < 200_000
 
 
-@pytest.mark.parametrize("bench", ["sim", "aravis"], indirect=True)  # FireWire sends nothing again
+@pytest.mark.parametrize("bench", ["sim", "aravis"], indirect=True)  # FireWire resends no packets
 def test_packets_that_are_sent_again_cost_nothing(bench: OpenBench) -> None:
     made = bench()
     with _warm(made) as camera:

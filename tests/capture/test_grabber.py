@@ -1,4 +1,4 @@
-"""The grabber's loop with an in-process camera: epochs, records in order, failures said once, a full ring."""
+"""The grabber's loop with an in-process camera: epochs, order of records, failures reported once, a full ring."""
 
 import os
 import socket
@@ -12,13 +12,14 @@ import pytest
 
 from capture.grabber import Grabber
 from capture.seam import Camera
-from capture.sim_camera import SimCamera
+from capture.sim.camera import SimCamera
 from rig.clocks import host_now
 from rig.errors import CameraNotFoundError
 from rig.frame import Record, RecordKind
-from rig.ring import CameraRing
-from simrig.faults import Fault, FaultKind
-from svev.sim_scene import SimScene
+from rig.transport.ring import CameraRing
+from service.processes.backends import camera_opener
+from simrig.programs.scene import SimScene
+from simrig.world.faults import Fault, FaultKind
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
@@ -59,7 +60,7 @@ class Station:
                 self.ring.release(record.slot)
 
     def await_records(self, kind: RecordKind, count: int, *, release: bool = True) -> None:
-        """Read until so many records of a kind have come."""
+        """Read until `count` records of a kind have come."""
 
         def enough() -> bool:
             self.take(release=release)
@@ -108,6 +109,23 @@ def test_a_silent_camera_is_set_up_from_scratch_when_the_recorder_asks(
     assert max(record.epoch for record in station.records) == 2
 
 
+def test_a_simulated_camera_stays_away_as_long_as_the_scenario_says(
+    tmp_path: Path, loopback: Loopback, ring: CameraRing
+) -> None:
+    """The fault comes every 150 pulses, so that the camera meets one however late it is ready."""
+    faults = [{"kind": "restart", "camera": "K2", "at_pulse": at, "duration_s": 3.0} for at in range(45, 2000, 150)]
+    rig = make_rig(tmp_path, "sim", loopback, faults=faults)
+    opener = camera_opener(rig, 1, ring, host_now())
+    with Station(lambda _: opener(), ring) as station:
+        station.await_records(RecordKind.CONNECTED, 2)
+        taken = sum(record.kind is RecordKind.FRAME for record in station.records)
+        station.await_records(RecordKind.FRAME, taken + 3)
+    frames = [record for record in station.records if record.kind is RecordKind.FRAME]
+    before = max(record.device_time for record in frames if record.epoch == 1)
+    after = min(record.device_time for record in frames if record.epoch == 2)
+    assert after - before > 3_000_000_000
+
+
 def test_a_camera_that_delivers_is_left_alone_when_the_recorder_asks_too_late(
     tmp_path: Path, loopback: Loopback, ring: CameraRing
 ) -> None:
@@ -119,7 +137,7 @@ def test_a_camera_that_delivers_is_left_alone_when_the_recorder_asks_too_late(
 
 
 class NoticingCamera(SimCamera):
-    """Has something to tell after its first frame, once."""
+    """Reports a message once, after its first frame."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)

@@ -1,15 +1,16 @@
-"""The same adjustment without blocks, elimination and scaling: what the fast one is checked against."""
+"""The adjustment with dense matrices, without blocks, elimination and scaling: reference for the fast one."""
 
 import numpy as np
 
-from photogrammetry.adjustment.problem import Equations, Problem
-from photogrammetry.adjustment.relations import relation_residuals
-from photogrammetry.adjustment.state import Floats, State
-from photogrammetry.camera_model import residuals
+from photogrammetry.adjustment.equations.problem import Equations, Problem
+from photogrammetry.adjustment.equations.relations import relation_residuals
+from photogrammetry.adjustment.equations.unknowns import State
+from photogrammetry.geometry.camera_model import residuals
+from rig.arrays import Floats
 
 
 def flat_residuals(problem: Problem, state: State) -> Floats:
-    """All residuals in units of their sigmas: image x, y by turns, then the others."""
+    """All residuals in units of their sigmas: image points (x, y, x, y, ...), then relations."""
     pose = state.rotation[problem.image], state.position[problem.image]
     v = residuals(problem.lens(state), *pose, state.xyz[problem.point], problem.xy) / problem.sigma
     w = relation_residuals(problem.relations, state) / problem.relation_sigma

@@ -1,18 +1,18 @@
-"""Reads numbers back from drawings: by the ticks of a chart, by the scale bar of a drawing to scale."""
+"""Reads numbers back from drawings, by the ticks of a chart or the scale bar of a drawing to scale."""
 
 import re
 from collections.abc import Callable
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rig.arrays import Floats
 
 SVG = "{http://www.w3.org/2000/svg}"
-Floats = NDArray[np.float64]
 
 
 def parsed(svg: str) -> ET.Element:
-    """The drawing; not well-formed fails."""
+    """The drawing as a tree; fails if it is not well-formed."""
     assert "nan" not in svg
     return ET.fromstring(svg)  # noqa: S314 - our own drawing
 

@@ -1,13 +1,12 @@
-"""Networks of the paper with known truth, as the adjustment gets them: no poses, no tie points."""
+"""Networks of the paper with known truth; poses and tie points are not given to the adjustment."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.network import (
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.network.model import (
     Camera,
     Datum,
     DatumType,
@@ -19,7 +18,9 @@ from photogrammetry.network import (
     Point,
     Role,
 )
-from tests.photogrammetry.scenes import flight_points, frame_points, hill_cameras, lab_cameras, look_at, observe
+from rig.arrays import Flags, Floats
+from rig.viewing import look_at
+from tests.photogrammetry.scenes import flight_points, frame_points, hill_cameras, lab_cameras, observe
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,10 +29,10 @@ class Case:
 
     network: Network
     cameras: list[IdealCamera]  # one per image
-    xyz: Array
+    xyz: Floats
 
     def with_c(self, factors: Sequence[float]) -> "Case":
-        """The same with the principal distances of the network's cameras wrong by these factors."""
+        """The same case with the given principal distances wrong by these factors."""
         cameras = tuple(
             replace(camera, interior=np.array([camera.interior[0] * factor, *camera.interior[1:]]))
             for camera, factor in zip(self.network.cameras, factors, strict=True)
@@ -43,7 +44,7 @@ def camera(name: str, c: float, estimate: tuple[str, ...]) -> Camera:
     return Camera(name, np.array([c, *[0.0] * 9]), size=(640, 480), estimate=estimate)
 
 
-def observations(xy: Array, sigma: float, seen: NDArray[np.bool_] | None = None) -> ImageObservations:
+def observations(xy: Floats, sigma: float, seen: Flags | None = None) -> ImageObservations:
     """From (n, m, 2) coordinates of n points in m images."""
     n, m = xy.shape[:2]
     points, images = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
@@ -126,7 +127,7 @@ def sheet(rng: np.random.Generator, images: int = 12, sigma: float = 0.1) -> Cas
     for i in range(images):
         angle = 2 * np.pi * i / images
         centre = np.array([0.5 + 1.2 * np.cos(angle), 0.5 + 1.2 * np.sin(angle), 1.5])
-        cameras.append(IdealCamera(c, centre, look_at(centre, np.array([0.5, 0.5, 0.0]), (i % 4) * np.pi / 2)))
+        cameras.append(IdealCamera(c, centre, look_at(centre, np.array([0.5, 0.5, 0.0]), -90.0 * (i % 4))))
     ideal = observe(cameras, xyz, rng, 0.0)
     a1 = -1e-8  # 20 px at the corners of the sheet
     xy = ideal * (1 + a1 * (ideal**2).sum(axis=-1, keepdims=True)) + rng.normal(0, sigma, ideal.shape)

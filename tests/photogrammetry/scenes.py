@@ -4,20 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogrammetry.ideal_camera import Array, IdealCamera
-from photogrammetry.rotation import rotation_from_vector
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from rig.arrays import Floats
+from rig.viewing import look_at
 
 SIGMA_PX = 0.33
 HALF_SKI_M = 2.63 / 2
-
-
-def look_at(centre: Array, target: Array, roll: float = 0.0) -> Array:
-    """Rotation whose -r3 points from the centre to the target, r2 upwards before the roll about r3."""
-    r3 = centre - target
-    r3 = r3 / np.linalg.norm(r3)
-    r1 = np.cross((0.0, 0.0, 1.0), r3)
-    r1 /= np.linalg.norm(r1)
-    return np.column_stack((r1, np.cross(r3, r1), r3)) @ rotation_from_vector(np.array((0.0, 0.0, roll)))
 
 
 def hill_cameras(rng: np.random.Generator) -> list[IdealCamera]:
@@ -30,11 +22,11 @@ def hill_cameras(rng: np.random.Generator) -> list[IdealCamera]:
         direction = np.array([np.sin(angle), -np.cos(angle), height])
         centre = target + distance * direction / np.linalg.norm(direction)
         aim = target + rng.uniform(-0.5, 0.5, 3)
-        cameras.append(IdealCamera(c, centre, look_at(centre, aim, rng.uniform(-0.05, 0.05))))
+        cameras.append(IdealCamera(c, centre, look_at(centre, aim, -np.degrees(rng.uniform(-0.05, 0.05)))))
     return cameras
 
 
-def flight_points(rng: np.random.Generator, n: int) -> Array:
+def flight_points(rng: np.random.Generator, n: int) -> Floats:
     """Points on a jumper in the first 20 m of flight."""
     return rng.uniform((0.0, -1.5, -5.0), (20.0, 1.5, 2.0), (n, 3))
 
@@ -43,10 +35,10 @@ def flight_points(rng: np.random.Generator, n: int) -> Array:
 class Ski:
     """A ski as a line C8 and the stretch of X that it covers."""
 
-    parameters: Array  # alpha, beta, gamma, delta
+    parameters: Floats  # alpha, beta, gamma, delta
     x: float
 
-    def points(self, n: int) -> Array:
+    def points(self, n: int) -> Floats:
         alpha, beta, gamma, delta = self.parameters
         half = HALF_SKI_M / np.sqrt(1 + alpha**2 + beta**2)
         x = np.linspace(self.x - half, self.x + half, n)
@@ -71,16 +63,16 @@ def lab_cameras(rng: np.random.Generator) -> list[IdealCamera]:
             direction = np.array([np.sin(angle), -np.cos(angle), rng.uniform(-0.1, 0.6)])
             centre = distance * direction / np.linalg.norm(direction)
             aim = rng.uniform(-0.03, 0.03, 3)
-            cameras.append(IdealCamera(c, centre, look_at(centre, aim, roll + rng.uniform(-0.1, 0.1))))
+            cameras.append(IdealCamera(c, centre, look_at(centre, aim, -np.degrees(roll + rng.uniform(-0.1, 0.1)))))
     return cameras
 
 
-def frame_points(rng: np.random.Generator, n: int = 60) -> Array:
+def frame_points(rng: np.random.Generator, n: int = 60) -> Floats:
     """Targets in the laboratory frame, 0.5 m x 0.5 m x 0.3 m."""
     return rng.uniform((-0.25, -0.15, -0.25), (0.25, 0.15, 0.25), (n, 3))
 
 
-def observe(cameras: list[IdealCamera], points: Array, rng: np.random.Generator, sigma: float = SIGMA_PX) -> Array:
+def observe(cameras: list[IdealCamera], points: Floats, rng: np.random.Generator, sigma: float = SIGMA_PX) -> Floats:
     """(n, m, 2) image coordinates with noise."""
     xy = np.stack([camera.project(points) for camera in cameras], axis=1)
     return np.asarray(xy + rng.normal(0.0, sigma, xy.shape) if sigma else xy)

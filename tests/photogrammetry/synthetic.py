@@ -1,6 +1,6 @@
 """Seeded synthetic networks with known truth: the paper's laboratory frame, hill and rods.
 
-The paper does not print its geometry; it follows from its text: principal distances of Table 1, 640 x 480 px, all
+The paper does not print its coordinates; these follow from its text: principal distances of Table 1, 640 x 480 px, all
 cameras on the same side of the flight, at distances that let each view cover its first 20 m. Lengths are in metres.
 """
 
@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogrammetry.adjustment.problem import build_problem
-from photogrammetry.adjustment.state import Floats, State, state_of, with_state
-from photogrammetry.adjustment.unknowns import number_unknowns
-from photogrammetry.camera_model import INTERIOR, camera_coordinates, image_point
-from photogrammetry.network import (
+from photogrammetry.adjustment.equations.problem import build_problem
+from photogrammetry.adjustment.equations.unknowns import State, number_unknowns, state_of
+from photogrammetry.geometry.camera_model import INTERIOR, camera_coordinates, image_point
+from photogrammetry.network.model import (
     Camera,
     Datum,
     DatumType,
@@ -27,6 +25,8 @@ from photogrammetry.network import (
     Point,
     Role,
 )
+from rig.arrays import Floats
+from rig.viewing import look_at
 
 SIZE = (640, 480)
 SIGMA_PX = 0.33
@@ -42,15 +42,17 @@ class Synthetic:
     truth: State
 
 
-def looking_at(position: ArrayLike, target: ArrayLike, roll: float = 0.0) -> Floats:
-    """Rotation of a camera that looks from `position` to `target`, rolled about its axis (rad)."""
-    back = np.asarray(position, dtype=float) - np.asarray(target, dtype=float)
-    back /= np.linalg.norm(back)
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    up = np.cross(back, right)
-    turned = np.cos(roll) * right + np.sin(roll) * up
-    return np.column_stack([turned, np.cross(back, turned), back])
+def with_state(network: Network, state: State) -> Network:
+    """The network with the values of a state, for instance as start values of another adjustment."""
+    return replace(
+        network,
+        cameras=tuple(replace(c, interior=v) for c, v in zip(network.cameras, state.interior, strict=True)),
+        images=tuple(
+            replace(image, position=x, rotation=r)
+            for image, x, r in zip(network.images, state.position, state.rotation, strict=True)
+        ),
+        points=tuple(replace(point, xyz=x) for point, x in zip(network.points, state.xyz, strict=True)),
+    )
 
 
 def camera(name: str, c: float, estimate: Sequence[str] = (), a1: float = 0.0, x0: float = 0.0) -> Camera:
@@ -61,7 +63,7 @@ def camera(name: str, c: float, estimate: Sequence[str] = (), a1: float = 0.0, x
 
 
 def observed(network: Network, sigma: float = SIGMA_PX) -> Network:
-    """The network with an exact observation of every point wherever it falls into an image."""
+    """The network with an exact observation of every point in every image that shows it."""
     rows, xys = [], []
     for i, image in enumerate(network.images):
         lens = network.cameras[image.camera].lens()
@@ -116,7 +118,7 @@ def disturbed(network: Network, rng: np.random.Generator, length: float, angle: 
 
 
 def synthetic(exact: Network, seed: int, length: float, noise: float = 1.0) -> Synthetic:
-    """Noise on the observations, disturbed start values in the network where no observation is meant."""
+    """A network with noisy observations and disturbed start values of all unknowns."""
     rng = np.random.default_rng(seed)
     truth = state_of(exact)
     noisy = with_noise(exact, rng, noise)
@@ -152,7 +154,7 @@ def lab_frame(seed: int = 1, points: int = 60, noise: float = 1.0) -> Synthetic:
         height = distance * (0.2, 0.6, -0.3)[(turn + which) % 3]
         reach = np.sqrt(distance**2 - height**2)
         position = np.array([reach * np.sin(azimuth), -reach * np.cos(azimuth), height])
-        rotation = looking_at(position, (0.0, 0.0, 0.0), roll=(0.0, np.pi / 2, np.pi)[turn])
+        rotation = look_at(position, (0.0, 0.0, 0.0), (0.0, -90.0, -180.0)[turn])
         images.append(Image(f"lab-{i + 1:02d}", which, position, rotation))
     places = rng.uniform(-0.5, 0.5, (points, 3)) * (0.5, 0.5, 0.3)
     network = Network(
@@ -171,9 +173,7 @@ def hill_images() -> tuple[Image, ...]:
     """Three cameras on the same side of the first 20 m of flight."""
     target = (10.0, 0.0, -2.0)
     places = ((-12.0, -38.0, 4.0), (22.0, -42.0, 8.0), (40.0, -72.0, 10.0))
-    return tuple(
-        Image(f"hill-{i + 1}", i, np.array(place), looking_at(place, target)) for i, place in enumerate(places)
-    )
+    return tuple(Image(f"hill-{i + 1}", i, np.array(place), look_at(place, target)) for i, place in enumerate(places))
 
 
 def flight(count: int = 17) -> Floats:
@@ -237,5 +237,5 @@ def rods(seed: int = 1, noise: float = 1.0) -> Synthetic:
 
 
 def square_sum(network: Network, state: State) -> float:
-    """What the adjustment minimises, in units of the a-priori variances."""
+    """The square sum that the adjustment minimises, in units of the a-priori variances."""
     return build_problem(network).square_sum(state)

@@ -1,4 +1,4 @@
-"""Small logs for tests: what is written is known, so that what is read can be compared."""
+"""SmallRecord logs for tests: what is written is known, so that what is read can be compared."""
 
 import time
 from collections.abc import Sequence
@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.log_writer import LogWriter
-from recorder.triplet_buffers import TripletBuffers
+from recorder.log.triplet_buffers import TripletBuffers
+from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import DeviceNs, UtcNs
+from rig.events import Event, Level
 from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
-from tests.support.waiting import wait_until
 
 OK, LOST, MISSED, DAMAGED, ABSENT = FrameStatus
 ALL_OK = (OK, OK, OK)
@@ -25,6 +26,7 @@ READY_NS = 5_000_000
 SESSION = {"athlete": "Anna Berg", "bib": "17"}
 RIG = {"name": "test", "cameras": "K1, K2, K3"}
 RIG_TOML = b'name = "test"\n'
+DESCRIPTION = LogDescription(SESSION, RIG, RIG_TOML)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ def make_tag(
         else:
             camera = CameraTag(f"K{place + 1}", columns, status)
         cameras.append(camera)
-    return TripletTag(pulse, pulse_time, "morning", "r1", shape, tuple(cameras))
+    return TripletTag(PulseNumber(pulse), pulse_time, "morning", "r1", shape, tuple(cameras))
 
 
 def make_image(tag: TripletTag) -> NDArray[np.uint8]:
@@ -64,16 +66,14 @@ def make_image(tag: TripletTag) -> NDArray[np.uint8]:
     return image
 
 
-def open_writer(path: Path, buffers: TripletBuffers, **more: object) -> LogWriter:
+def open_writer(path: Path, buffers: TripletBuffers, description: LogDescription = DESCRIPTION) -> LogWriter:
     """A writer with session, rig and rig file of the tests."""
-    arguments = {"session": SESSION, "rig": RIG, "rig_toml": RIG_TOML, "buffers": buffers} | more
-    return LogWriter(path, buffers.shape, **arguments)  # type: ignore[arg-type]
+    return LogWriter(path, description, buffers)
 
 
 def acquire(buffers: TripletBuffers) -> int:
     """A free slot, as soon as there is one."""
-    wait_until(lambda: buffers.free_count > 0, "a slot is free", poll_s=0.0005)
-    slot = buffers.acquire()
+    slot = buffers.acquire(timeout_s=10.0)
     assert slot is not None
     return slot
 
@@ -82,12 +82,12 @@ def write_pulse(log: LogWriter, buffers: TripletBuffers, tag: TripletTag) -> Wri
     """Write one pulse as the recorder does; only its tag if no camera delivered."""
     log_time = UtcNs(tag.time + READY_NS)
     if all(camera.status is not OK for camera in tag.cameras):
-        log.write_tag_only(tag, pulse_time=tag.time, log_time=log_time)
+        log.write_pulse(tag, None, log_time)
         return Written(tag, None, log_time)
     image = make_image(tag)
     slot = acquire(buffers)
     buffers.pixels(slot)[:] = image
-    log.write_triplet(slot, tag, pulse_time=tag.time, log_time=log_time)
+    log.write_pulse(tag, slot, log_time)
     return Written(tag, image, log_time)
 
 
@@ -98,11 +98,11 @@ def write_log(
     buffers = TripletBuffers(shape, 4)
     now = UtcNs(time.time_ns())
     with open_writer(path, buffers) as log:
-        log.write_event("info", "recorder", "recording started", START)
+        log.write_event(Event(START, Level.INFO, "recorder", "recording started"))
         written = [
             write_pulse(log, buffers, make_tag(pulse, statuses, shape)) for pulse, statuses in enumerate(pulses, 1)
         ]
-        log.write_health({"free_triplets": 4}, now)
-        log.write_event("info", "recorder", "recording stopped", now)
+        log.write_health(b'{"free_triplets":4}', now)
+        log.write_event(Event(now, Level.INFO, "recorder", "recording stopped"))
     buffers.close()
     return written

@@ -13,7 +13,8 @@ import numpy as np
 
 from rig.clocks import HostNs
 from rig.frame import FrameStatus
-from rig.preview import PreviewSlot
+from rig.pulse import RigPulse
+from rig.transport.preview import PreviewSlot
 
 KINDS = tuple(FrameStatus)
 _PAUSE_S = 2e-4
@@ -27,7 +28,9 @@ def _main(fd: int) -> None:
     while not select.select([sys.stdin], [], [], number % 4 * _PAUSE_S)[0]:
         number += 1
         pixels.fill(number % 251)
-        slot.write(number, HostNs(number), (KINDS[number % len(KINDS)],) * slot.cameras, pixels, HostNs(number))
+        slot.write(
+            RigPulse(number), HostNs(number), (KINDS[number % len(KINDS)],) * slot.cameras, pixels, HostNs(number)
+        )
         if number == 1:
             print("first", flush=True)  # noqa: T201
     print(number, flush=True)  # noqa: T201

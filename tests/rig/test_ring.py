@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.frame import NO_SLOT, Record, RecordKind
-from rig.ring import CameraRing
+from rig.transport.ring import CameraRing
 
 
 def _record(slot: int = NO_SLOT, frame_id: int = 0) -> Record:
@@ -72,7 +72,7 @@ def test_a_new_grabber_takes_over_what_the_dead_one_held_but_not_what_is_queued(
 def test_another_process_sees_pixels_and_records() -> None:
     ring = CameraRing.create("K1", 640, 4)
     program = f"""
-from rig.ring import CameraRing
+from rig.transport.ring import CameraRing
 from tests.rig.test_ring import _record
 ring = CameraRing({ring.fd})
 slot = ring.take_slot()

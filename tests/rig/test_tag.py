@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from rig.clocks import DeviceNs, UtcNs
 from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
 from rig.tag import TAG_SCHEMA, CameraTag, TripletTag
+from rig.transport import wire
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 VALIDATOR = jsonschema.Draft202012Validator(TAG_SCHEMA)
@@ -26,7 +28,7 @@ cameras = st.builds(
 )
 tags = st.builds(
     TripletTag,
-    st.integers(1, 2**53),
+    st.integers(1, 2**53).map(PulseNumber),
     INT64.map(UtcNs),
     st.text(),
     st.text(),
@@ -53,7 +55,7 @@ def test_a_tag_is_complete_when_every_frame_came(tag: TripletTag) -> None:
 def test_the_contract_is_kept_to_the_letter() -> None:
     ok = CameraTag("K1", (0, 640), FrameStatus.OK, 7, 9, DeviceNs(2**62 + 1), UtcNs(1_795_216_434_399_239_001), 1.5)
     gone = CameraTag("K2", (640, 1280), FrameStatus.MISSED)
-    tag = TripletTag(1234, UtcNs(1_795_216_434_399_239_000), "training", "r1", (480, 1280), (ok, gone))
+    tag = TripletTag(PulseNumber(1234), UtcNs(1_795_216_434_399_239_000), "training", "r1", (480, 1280), (ok, gone))
     assert json.loads(tag.encode()) == {
         "pulse": 1234,
         "time_ns": "1795216434399239000",
@@ -76,28 +78,29 @@ def test_the_contract_is_kept_to_the_letter() -> None:
 
 
 def test_the_schema_refuses_numbers_that_javascript_would_round() -> None:
-    tag = TripletTag(1, UtcNs(5), "", "", (480, 640), (CameraTag("K1", (0, 640), FrameStatus.ABSENT),)).to_json()
+    tag = TripletTag(PulseNumber(1), UtcNs(5), "", "", (480, 640), (CameraTag("K1", (0, 640), FrameStatus.ABSENT),))
     with pytest.raises(jsonschema.ValidationError):
-        VALIDATOR.validate({**tag, "time_ns": 5})
+        VALIDATOR.validate({**wire.to_builtins(tag), "time_ns": 5})
 
 
 def test_the_schema_refuses_an_unknown_status() -> None:
-    tag = TripletTag(1, UtcNs(5), "", "", (480, 640), (CameraTag("K1", (0, 640), FrameStatus.ABSENT),)).to_json()
+    tag = TripletTag(PulseNumber(1), UtcNs(5), "", "", (480, 640), (CameraTag("K1", (0, 640), FrameStatus.ABSENT),))
+    plain = wire.to_builtins(tag)
     with pytest.raises(jsonschema.ValidationError):
-        VALIDATOR.validate({**tag, "cameras": [{**tag["cameras"][0], "status": "gone"}]})
+        VALIDATOR.validate({**plain, "cameras": [{**plain["cameras"][0], "status": "gone"}]})
 
 
 @pytest.mark.parametrize("text", [b"", b"{}", b"[]", b'{"pulse": 1}', b"\xff"])
 def test_what_is_no_tag_is_refused(text: bytes) -> None:
-    with pytest.raises((ValueError, KeyError, TypeError)):
+    with pytest.raises(ValueError, match=r"."):
         TripletTag.decode(text)
 
 
 def test_pixels_of_a_signature_are_marked_only_where_there_are_any() -> None:
     plain = CameraTag("K1", (0, 640), FrameStatus.OK, 1, 1, DeviceNs(5), UtcNs(6), 0.0)
     signed = CameraTag("K2", (640, 1280), FrameStatus.OK, 1, 1, DeviceNs(5), UtcNs(6), 0.0, (479, 640, 12))
-    tag = TripletTag(1, UtcNs(5), "", "", (480, 1280), (plain, signed))
-    data = tag.to_json()
+    tag = TripletTag(PulseNumber(1), UtcNs(5), "", "", (480, 1280), (plain, signed))
+    data = wire.to_builtins(tag)
     VALIDATOR.validate(data)
     assert [camera.get("stamped_pixels") for camera in data["cameras"]] == [None, [479, 640, 12]]
     assert "stamped_pixels" not in data["cameras"][0]

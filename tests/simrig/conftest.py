@@ -1,6 +1,6 @@
 import pytest
 
-from rig.rigfile import CONFIG
+from rig.settings.file import CONFIG
 from simrig.world.scenario import Scenario, load_scenario
 
 

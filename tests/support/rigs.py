@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rig.rigfile import CONFIG, load_rig
-from rig.settings import RigSettings
+from rig.settings.file import CONFIG, load_rig
+from rig.settings.model import RigSettings
 from tests.support.loopback import Loopback
 
 SIM = load_rig(CONFIG / "rigs" / "sim.toml")

@@ -1,4 +1,4 @@
-"""`svev calibrate`: result file, protocol, its use by `svev orient`, exit codes."""
+"""`svev calibrate`: result file, report, its use by `svev orient`, exit codes."""
 
 import json
 from dataclasses import replace
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogrammetry.network import Network
-from photogrammetry.network_writer import write_network
+from photogrammetry.network.model import Network
 from svev.cli import main
+from tests.photogrammetry.network_writer import write_network
 from tests.photogrammetry.synthetic import hill, lab_frame
 
 

@@ -7,7 +7,7 @@ import pytest
 import typer.main
 from typer.core import TyperGroup
 
-from rig.rigfile import rig_schema
+from rig.settings.file import rig_schema
 from svev import cli
 
 

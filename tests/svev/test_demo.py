@@ -1,4 +1,4 @@
-"""`svev demo` from the command line: everything that it promises is there and true."""
+"""`svev demo` from the command line: it makes all files that its help names, and their content is true."""
 
 import json
 import subprocess

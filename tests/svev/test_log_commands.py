@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from recorder.log_items import Chunk
-from recorder.log_reader import LogReader
+from recorder.reading.log_reader import Chunk, LogReader
 from svev.cli import main
 from tests.recorder.logs import ALL_OK, LOST, OK, write_log
 from tests.support.loopback import Loopback

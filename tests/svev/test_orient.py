@@ -1,4 +1,4 @@
-"""`svev orient`: result file, protocol, calibration, exit codes."""
+"""`svev orient`: result file, report, calibration, exit codes."""
 
 import json
 from collections.abc import Callable
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from photogrammetry.network import Network, Role
-from photogrammetry.network_writer import network_to_json, write_network
+from photogrammetry.network.model import Network, Role
 from svev.cli import main
+from tests.photogrammetry.network_writer import network_to_json, write_network
 from tests.photogrammetry.synthetic import hill
 
 Run = Callable[..., tuple[int, dict[str, Any]]]
@@ -45,7 +45,7 @@ def _culprit() -> Network:
     return replace(network, points=tuple(points))
 
 
-def test_result_and_protocol_name_the_culprit(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_result_and_report_name_the_culprit(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, result = run(_culprit(), "--report", str(tmp_path / "report"))
     assert code == 0
     assert result["format"] == "svev-adjustment/1"

@@ -10,14 +10,6 @@ import pytest
 from tests.support.waiting import wait_until
 from tests.systemd.booted import CHECKOUT, Booted, booted
 
-_ASK = """
-import json, sys, urllib.request
-method, path, body = sys.argv[1:]
-request = urllib.request.Request("http://127.0.0.1:8000" + path, body.encode() or None, method=method)
-request.add_header("Content-Type", "application/json")
-sys.stdout.write(urllib.request.urlopen(request, timeout=20).read().decode())
-"""
-
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> Path:
@@ -44,21 +36,21 @@ def systemd(prefix: Path) -> Iterator[Booted]:
         yield system
 
 
-def _ask(system: Booted, method: str, path: str, body: str = "") -> dict[str, object]:
-    answer = json.loads(system.run("python3", "-c", _ASK, method, path, body))
+def _ctl(system: Booted, *arguments: str) -> dict[str, object]:
+    answer = json.loads(system.run("/opt/prefix/bin/svev", "ctl", *arguments, "--json"))
     assert isinstance(answer, dict)
     return answer
 
 
 def _await_state(system: Booted, state: str) -> None:
-    wait_until(lambda: _ask(system, "GET", "/api/status")["state"] == state, f"the state is {state}", 30)
+    wait_until(lambda: _ctl(system, "status")["state"] == state, f"the state is {state}", 30)
 
 
 def test_stopping_the_unit_finishes_the_recording(systemd: Booted) -> None:
     assert "svev" in systemd.run("ps", "-o", "user=", "-p", systemd.show("MainPID"))
-    _ask(systemd, "POST", "/api/arm")
+    _ctl(systemd, "arm")
     _await_state(systemd, "armed")
-    recording = _ask(systemd, "POST", "/api/recordings", '{"athlete": "Ola", "bib": "17"}')
+    recording = _ctl(systemd, "start", "--athlete", "Ola", "--bib", "17")
     _await_state(systemd, "recording")
     assert "recording" in systemd.show("StatusText").lower()
 
@@ -78,7 +70,7 @@ def test_a_service_that_hangs_is_started_again(systemd: Booted) -> None:
     wait_until(lambda: systemd.show("NRestarts") == "1", "the watchdog has fired", 60)
     wait_until(lambda: systemd.show("ActiveState") == "active", "the service is ready again", 30)
     assert systemd.show("MainPID") != first
-    assert _ask(systemd, "GET", "/api/status")["state"] == "idle"
+    assert _ctl(systemd, "status")["state"] == "idle"
 
 
 def test_a_wrong_rig_file_is_not_tried_again(prefix: Path) -> None:

@@ -1,9 +1,9 @@
-"""Cameras on one clock at 30 Hz, and records made by hand."""
+"""Passes hand-made records to a pairer: cameras on one clock at 30 Hz."""
 
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import Record, RecordKind
 from tests.triggering.simulation import MS, US
-from triggering.pairing import ClosedPulse, Pairer
+from triggering.pairing.pairer import ClosedPulse, Pairer
 
 PERIOD = NS_PER_S // 30
 HOLD = 3 * PERIOD + 60 * MS
@@ -11,7 +11,7 @@ START = HostNs(1_000 * NS_PER_S)
 
 
 class Feed:
-    """A pairer and what it has decided; times are given in pulses, fractions of them included."""
+    """A pairer and its decisions; times are given in pulses, and may be fractions."""
 
     def __init__(self, cameras: int = 3, *, latches: bool = True, hold_ns: int = HOLD) -> None:
         self.pairer = Pairer(cameras, PERIOD, hold_ns=hold_ns)

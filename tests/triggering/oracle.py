@@ -1,7 +1,7 @@
-"""The iron rules, checked against the truth.
+"""Checks the pairing of simulated cameras against the truth, by three rules.
 
-1. No triplet mixes pulses. 2. Every pulse that any camera saw has exactly one tag. 3. The cause is right: exactly,
-wherever there is one cause; in its number, where several causes meet in one gap of a camera.
+1. No triplet mixes pulses. 2. Every pulse that any camera saw has exactly one tag. 3. The cause of every missing frame
+is right; where frames of one gap are missing for several causes, the number of each cause is right.
 """
 
 from collections import Counter
@@ -16,7 +16,7 @@ DAMAGED, ABSENT = FrameStatus.DAMAGED, FrameStatus.ABSENT
 
 
 def check(run: Run, *, causes: bool = True) -> None:
-    """All of the rules."""
+    """Check all three rules."""
     pulses = check_no_pulse_is_mixed(run)
     check_every_pulse_has_one_tag(run, pulses)
     if causes:
@@ -25,7 +25,7 @@ def check(run: Run, *, causes: bool = True) -> None:
 
 
 def check_no_pulse_is_mixed(run: Run) -> list[int | None]:
-    """Rule 1, and that numbers, times, offsets and cargo are in order.
+    """Check rule 1, and that numbers, times, offsets and cargo are consistent.
 
     Returns:
         The true pulse of each decided one, None where no frame came.
@@ -47,7 +47,7 @@ def check_no_pulse_is_mixed(run: Run) -> list[int | None]:
 
 
 def check_every_pulse_has_one_tag(run: Run, pulses: list[int | None]) -> None:
-    """Rule 2: delivered pulses, and between them those that nobody delivered but somebody took."""
+    """Check rule 2, for delivered pulses and for those between them that some camera took but none delivered."""
     hill = run.hill
     delivered = [pulse for pulse in pulses if pulse is not None]
     assert all(before < after for before, after in pairwise(delivered)), "a pulse has two tags, or out of order"
@@ -59,7 +59,7 @@ def check_every_pulse_has_one_tag(run: Run, pulses: list[int | None]) -> None:
         paused = any(pulse in hill.scenario.pauses for pulse in range(before + 1, after + 1))
         assert paused or inserted <= after - before - 1, "a pulse was invented"
         if presumed:
-            continue  # a frame taken before a pause may be proven only after it, and then counts there
+            continue  # a frame taken before a pause may be proven only after the pause, and then counts there
         between = range(before + 1, after)
         taken = sum(any(fate in (LOST, DAMAGED) for fate in hill.fates[pulse]) for pulse in between)
         assert not paused or inserted <= taken, "a pause was filled"
@@ -95,7 +95,7 @@ def nearest(run: Run, camera: int, pulses: range) -> FrameStatus | None:
 
 
 def undelivered(pulses: list[int | None]) -> Iterator[tuple[int, int, int]]:
-    """Two pulses delivered one after the other, and how many without a frame were inserted between them."""
+    """Pairs of successive delivered pulses, and how many pulses without a frame were inserted between them."""
     before, count = None, 0
     for pulse in pulses:
         if pulse is None:
@@ -107,7 +107,7 @@ def undelivered(pulses: list[int | None]) -> Iterator[tuple[int, int, int]]:
 
 
 def check_causes(run: Run, pulses: list[int | None], camera: int) -> None:
-    """Rule 3, gap by gap of one camera."""
+    """Check rule 3 for one camera, gap by gap."""
     statuses: list[FrameStatus] = []
     last = -1
     for pulse, closed in zip(pulses, run.closed, strict=True):
@@ -122,18 +122,18 @@ def check_causes(run: Run, pulses: list[int | None], camera: int) -> None:
 
 
 def check_gap(run: Run, camera: int, gap: range, statuses: list[FrameStatus]) -> None:
-    """One gap: `statuses` were decided for the pulses between two frames of a camera."""
+    """Check one gap: `statuses` were decided for the pulses between two frames of a camera."""
     hill, is_first = run.hill, gap.start == 0
     truth = [hill.fates[pulse][camera] for pulse in gap]
     presumed = run.pairer.counters[camera].presumed > 0
     if ABSENT in truth:
-        # Its last pulses are presumed lost if at their deadline the others had not shown yet that it is gone.
+        # Its last pulses count as lost if the other cameras had not shown by their deadline that it was gone.
         allowed = {ABSENT, DAMAGED, LOST} if presumed else {ABSENT, DAMAGED}
         assert set(statuses) <= allowed, f"camera {camera} was away, not {statuses}"
         return
     reconnected = any(outage.camera == camera for outage in hill.scenario.outages)
     if is_first and (hill.scenario.first_id != 1 or reconnected):
-        # Ids that did not begin at 1, or not now, prove nothing before the first frame.
+        # Ids that did not begin at 1, or began earlier, prove nothing before the first frame.
         assert reconnected or set(statuses) <= {ABSENT, DAMAGED}
         return
     if ABSENT in statuses:
@@ -150,7 +150,7 @@ def check_gap(run: Run, camera: int, gap: range, statuses: list[FrameStatus]) ->
         return
     untagged = len(truth) - len(statuses)
     if is_first:
-        # Before the first tag there may have been pulses that nobody delivered; what they were cannot be told.
+        # Pulses before the first tag that no camera delivered are not known.
         assert all(0 <= expected[status] - decided[status] <= untagged for status in FrameStatus), where
         return
     # All cameras missed the pulses without a tag.

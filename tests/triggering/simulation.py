@@ -1,4 +1,4 @@
-"""Pulses, cameras with clocks of their own, transport and faults, all in memory; and the truth beside it.
+"""Simulates pulses, cameras with their own clocks, transport and faults, in memory, and keeps the truth.
 
 Every frame's `slot` is a key into the truth, which the pairing never reads.
 """
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record, RecordKind
-from triggering.pairing import ClosedPulse, OpenPulse, Pairer
+from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
 
 MS = 1_000_000
 US = 1_000
@@ -32,7 +32,7 @@ class Outage:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that may go wrong, and how often. Times are in ns unless named otherwise."""
+    """What goes wrong, and how often. Times are in ns unless the name says otherwise."""
 
     seed: int = 0
     cameras: int = 3
@@ -45,7 +45,9 @@ class Scenario:
     lost: float = 0.0
     damaged: float = 0.0
     pauses: dict[int, float] = field(default_factory=dict)  # pulse -> seconds before it
-    faults: dict[tuple[int, int], FrameStatus] = field(default_factory=dict)  # (pulse, camera) -> its fate
+    faults: dict[tuple[int, int], FrameStatus] = field(
+        default_factory=dict
+    )  # (pulse, camera) -> what becomes of the frame
     outages: tuple[Outage, ...] = ()
     first_id: int = 1
     modulus: int = 65535
@@ -54,8 +56,8 @@ class Scenario:
     latch_every_s: float = 2.0
     loaded_latches: float = 0.3
     trigger_counts: bool = False
-    damage_tells_time: bool = False  # as on FireWire: about when a damaged frame was triggered
-    batch_ns: int = 0  # the recorder wakes only so often and then takes camera after camera
+    damage_tells_time: bool = False  # as on FireWire: a damaged frame has an approximate trigger time
+    batch_ns: int = 0  # the recorder wakes at this interval and then reads camera after camera
     hold_periods: float = 3.0
 
     @property
@@ -65,13 +67,13 @@ class Scenario:
 
     @property
     def hold_ns(self) -> int:
-        """Time that a pulse waits."""
+        """How long a pulse waits for its frames."""
         return round(self.hold_periods * self.period_ns) + 60 * MS
 
 
 @dataclass
 class Hill:
-    """The truth of a scenario, and the records that come of it.
+    """The truth of a scenario, and the records that follow from it.
 
     Attributes:
         times: time of each pulse.
@@ -107,7 +109,7 @@ def _pulse_times(scenario: Scenario, start: HostNs, rng: random.Random) -> Itera
 
 
 class _Camera:
-    """One camera of the hill: makes its records."""
+    """Makes the records of one camera."""
 
     def __init__(self, hill: Hill, camera: int, rng: random.Random) -> None:
         self.hill, self.camera, self.rng = hill, camera, rng
@@ -130,7 +132,7 @@ class _Camera:
             self.see(pulse, time, outage)
         for outage in pending:
             self.back(outage)
-        return sorted(self.records, key=lambda entry: entry[0])  # clock readings slip in between the frames
+        return sorted(self.records, key=lambda entry: entry[0])  # clock readings between the frames
 
     def connect(self, host: HostNs) -> None:
         self.epoch += 1
@@ -149,7 +151,7 @@ class _Camera:
         told = HostNs(round(begin + outage.told_after_s * NS_PER_S))
         for _, _, record in self.records:
             if record.host_time > begin and record.slot in self.hill.pulse_of:
-                # What was on the way is gone with the camera.
+                # Frames on the way are lost with the camera.
                 self.hill.fates[self.hill.pulse_of.pop(record.slot)][self.camera] = FrameStatus.ABSENT
         self.records = [entry for entry in self.records if entry[0] <= begin]
         self.put(told, Record(RecordKind.DISCONNECTED, self.epoch, told))
@@ -191,7 +193,7 @@ class _Camera:
         arrival = max(self.last_arrival, HostNs(time + self.rng.randint(*self.scenario.latency_ns) + retention))
         self.last_arrival = arrival
         if fate is FrameStatus.DAMAGED:
-            # ids and times of a damaged frame are left-overs of another one
+            # ids and times of a damaged frame are those of an earlier one
             record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, DeviceNs(123))
             if self.scenario.damage_tells_time:
                 about = self.device(time + self.rng.randint(-MS // 5, MS // 5))
@@ -219,7 +221,7 @@ class _Camera:
 
 @dataclass
 class Run:
-    """A hill, seen through a pairer.
+    """A hill whose records went through a pairer.
 
     Attributes:
         closed: the decided pulses.
@@ -276,7 +278,7 @@ class Run:
 
 
 def _load(pulse: OpenPulse, record: Record) -> None:
-    """What the recorder does: it keeps its own things in the pulse's cargo."""
+    """Keep the frame's slot in the cargo of the pulse, as the recorder does."""
     if pulse.cargo is None:
         pulse.cargo = []
     assert isinstance(pulse.cargo, list)
@@ -286,7 +288,7 @@ def _load(pulse: OpenPulse, record: Record) -> None:
 def _batches(
     events: list[tuple[HostNs, int, Record]], batch_ns: int
 ) -> Iterator[tuple[HostNs, list[tuple[int, Record]]]]:
-    """Events as the recorder finds them when it wakes."""
+    """The events in the order in which the recorder reads them when it wakes."""
     index = 0
     while index < len(events):
         now = HostNs(events[index][0] + batch_ns)

@@ -1,4 +1,4 @@
-"""The clock against a true one, of which the latches see only so much."""
+"""The estimated device clock against a true one that latches read with errors."""
 
 import random
 
@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
-from triggering.device_clock import DeviceClock
+from triggering.timeline.device_clock import DeviceClock
 
 MS = 1_000_000
 START = 5_000 * NS_PER_S
 
 
 class TrueClock:
-    """A device clock with offset and drift, and a link that makes readings late by an unknown share."""
+    """A device clock with offset and drift, and a link that delays readings by an unknown share of the round trip."""
 
     def __init__(self, *, offset: int = 0, ppm: float = 0.0, seed: int = 0) -> None:
         self.offset, self.rate, self.rng = offset, 1 + ppm * 1e-6, random.Random(seed)
@@ -22,7 +22,7 @@ class TrueClock:
         return DeviceNs(self.offset + round((host - START) * self.rate))
 
     def latch(self, host: int, round_trip_ns: int, error: float | None = None) -> ClockLatch:
-        """A reading whose true time is off the middle of the round trip by `error` halves of it."""
+        """A reading whose true time differs from the middle of the round trip by `error` times half the round trip."""
         share = self.rng.uniform(-1, 1) if error is None else error
         return ClockLatch(self.device(host + share * round_trip_ns / 2), HostNs(host), round_trip_ns)
 
@@ -95,7 +95,7 @@ def test_latches_overrule_the_frames() -> None:
 
 
 def test_a_better_fit_does_not_move_a_clock_that_the_frames_had_right() -> None:
-    """Before the drift is known, the frames follow it; the latch that tells the drift must not add it once more."""
+    """Before the drift is known, the trim follows it; the latch that shows the drift must not add it again."""
     true, clock = TrueClock(ppm=100.0), DeviceClock()
     true.burst(clock, START, [40_000] * 8)
     for frame in range(400):
@@ -124,7 +124,9 @@ def test_a_misread_register_is_ignored() -> None:
     true, clock = TrueClock(), DeviceClock()
     true.burst(clock, START, [100_000] * 4)
     good = true.latch(START + NS_PER_S, 100_000)
-    clock.latch(ClockLatch(DeviceNs(good.device + 2**32), good.host, good.round_trip_ns))  # high word too new
+    clock.latch(
+        ClockLatch(DeviceNs(good.device + 2**32), good.host, good.round_trip_ns)
+    )  # the high word was read too late
     assert abs(clock.to_host(good.device) - good.host) < 400_000
     clock.latch(ClockLatch(DeviceNs(good.device - 2**33), good.host, good.round_trip_ns))  # does not agree with it
     assert abs(clock.to_host(good.device) - good.host) < 400_000
@@ -160,7 +162,7 @@ def test_state_does_not_grow() -> None:
 def test_the_truth_is_within_the_uncertainty(
     seed: int, ppm: float, offset: int, load: float, pushes: list[int]
 ) -> None:
-    """Whatever the load, and (twice the uncertainty) whatever the frames say."""
+    """Under any load, and, with twice the uncertainty, whatever frames trim."""
     true, clock, rng = TrueClock(offset=offset, ppm=ppm, seed=seed), DeviceClock(), random.Random(seed)
     pushed = DeviceClock()
     for second in range(0, 24, 2):

@@ -1,4 +1,4 @@
-"""Hours of pulses: nothing shifts, nothing grows."""
+"""Hours of pulses: no frame is paired with another pulse, and no memory grows."""
 
 import pickle
 import random
@@ -6,7 +6,7 @@ from collections import Counter
 
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record, RecordKind
-from triggering.pairing import ClosedPulse, Pairer
+from triggering.pairing.pairer import ClosedPulse, Pairer
 
 PULSES = 200_000
 PERIOD = NS_PER_S // 30
@@ -69,13 +69,13 @@ def test_200_000_pulses() -> None:
         hours.pulse(pulse)
         if pulse % 20_000 == 10_000:
             sizes.append(len(pickle.dumps(hours.pairer)))
-            assert hours.pairer.health()["open"] < 10
+            assert hours.pairer.health().open < 10
     for tag in hours.pairer.advance(HostNs(10**18)):
         hours.check(tag)
     truth, decided = hours.truth, hours.decided
     assert decided[FrameStatus.OK] == truth[FrameStatus.OK]
     assert decided[FrameStatus.LOST] == truth[FrameStatus.LOST]
-    # Pulses that nobody saw have no tag; with 1 % missed that is one in a million.
+    # Pulses that no camera saw have no tag; with 1 % missed that is one in a million.
     assert 0 <= truth[FrameStatus.MISSED] - decided[FrameStatus.MISSED] <= 3 * 3
     assert decided[FrameStatus.ABSENT] == decided[FrameStatus.DAMAGED] == 0
     assert max(sizes[1:]) < 1.2 * sizes[1], "the state grows"

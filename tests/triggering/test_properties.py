@@ -1,4 +1,4 @@
-"""The iron rules under every mixture of faults."""
+"""Property tests: the rules of `oracle` hold under every mixture of faults."""
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -32,7 +32,7 @@ common = {
 def test_any_faults(scenario: Scenario) -> None:
     run = Run(Hill(scenario))
     check(run)
-    # Only a camera that failed so often in a row that it went by as silent is not waited for.
+    # Pulses wait for every camera except one that failed so often in a row that it counts as silent.
     assert run.silent or run.unplaced == []
 
 
@@ -42,7 +42,7 @@ def test_any_faults(scenario: Scenario) -> None:
     st.dictionaries(st.integers(5, 155), st.floats(6.0, 300.0), min_size=1, max_size=4),
 )
 def test_pauses_of_the_pulse_train(scenario: Scenario, pauses: dict[int, float]) -> None:
-    """It goes on at any phase."""
+    """After the pause the train goes on at any phase."""
     period_s = scenario.period_ns / 1e9
     for pulse, periods in pauses.items():
         scenario.pauses[pulse] = periods * period_s
@@ -61,7 +61,7 @@ def test_pauses_of_the_pulse_train(scenario: Scenario, pauses: dict[int, float])
     ),
 )
 def test_cameras_go_and_come_back(scenario: Scenario, away: list[tuple[float, float, float | None]]) -> None:
-    """With another clock and ids from 1; or without a word, as after a pulled cable."""
+    """The camera comes back with another clock and ids from 1, or without a report, as after a pulled cable."""
     length_s = scenario.pulses / scenario.rate_hz
     outages = tuple(
         Outage(

@@ -1,4 +1,4 @@
-"""Records made by hand: traps that the simulated cameras do not set, and what the recorder relies on."""
+"""Pairing of hand-made records: cases that the simulated cameras do not produce, and what the recorder relies on."""
 
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ from rig.frame import Record, RecordKind
 from tests.triggering.feed import HOLD, PERIOD, START, Feed
 from tests.triggering.oracle import ABSENT, DAMAGED, LOST, MISSED, OK
 from tests.triggering.simulation import MS, US
-from triggering.pairing import Pairer
+from triggering.pairing.pairer import Pairer
 
 
 def test_an_id_gone_wild_does_not_fill_a_pause() -> None:
@@ -42,7 +42,7 @@ def test_a_camera_three_pulses_behind_the_others_is_overdue_but_still_waited_for
                 feed.frame(camera, pulse, pulse + 1)
         now = HostNs(feed.time_of(pulse) + 5 * MS)
         feed.advance(now)
-        # The tenth pulse, number 9, is the last one that it delivers: with number 12 it is three behind.
+        # Pulse 9 is the last one that the camera delivers: at pulse 12 it is three behind.
         assert feed.pairer.overdue(now) == ((1,) if 12 <= pulse <= 14 else ())
     assert [tag.outcomes[1].status for tag in feed.closed[10:15]] == [LOST] * 5
 
@@ -97,7 +97,7 @@ def test_of_several_pulses_in_a_row_as_many_are_overruns_as_the_camera_counted()
 @pytest.mark.parametrize("late_by", [3 * MS, 40 * MS])
 @pytest.mark.parametrize("damaged_pulse", [1, 2])
 def test_a_damaged_frame_that_tells_its_trigger_time_is_placed_by_it(damaged_pulse: int, late_by: int) -> None:
-    """FireWire hands a torn frame over only when the next one begins or even ends."""
+    """FireWire delivers a torn frame only when the next one begins or ends."""
     feed = Feed()
     feed.all_cameras(0, [1, 1, 1])
     for pulse in (1, 2):
@@ -178,7 +178,7 @@ def test_with_a_short_hold_silence_is_noticed_from_what_was_decided_before() -> 
 
 
 def test_frames_that_others_may_still_deliver_prove_no_pulse_in_a_pause() -> None:
-    """One camera lost two frames after a pause; the second one's pulse is not known yet when the first is decided."""
+    """A camera lost two frames after a pause; the second pulse is not known yet when the first is decided."""
     feed = Feed()
     feed.all_cameras(0, [1, 1, 1])
     feed.frame(0, 12.5, 4)
@@ -190,7 +190,7 @@ def test_frames_that_others_may_still_deliver_prove_no_pulse_in_a_pause() -> Non
         feed.frame(camera, 12.5, 4)
     feed.advance(feed.time_of(12.7))
     assert [tag.outcomes[0].status for tag in feed.closed] == [OK, LOST, LOST, OK]
-    assert feed.pairer.health()["proven_by_ids"] == 0
+    assert feed.pairer.health().proven_by_ids == 0
 
 
 def test_ids_that_begin_anew_without_notice_are_reported() -> None:
@@ -240,7 +240,7 @@ def test_a_device_clock_that_is_set_anew_without_notice() -> None:
     feed, behind = Feed(), -400 * NS_PER_S
     for pulse in range(5):
         feed.all_cameras(pulse, [pulse + 1] * 3)
-    for pulse in range(5, 8):  # its frames cannot be placed, so they are as good as damaged
+    for pulse in range(5, 8):  # its frames have no trigger time, so they count as damaged
         feed.frame(1, pulse, pulse + 1, clock=behind)
         feed.all_cameras(pulse, [pulse + 1, None, pulse + 1])
     for index in range(2):
@@ -314,7 +314,7 @@ def test_a_camera_that_was_never_there_is_absent_and_not_waited_for() -> None:
     assert pairer.frame(0, record) is not None
     (tag,) = pairer.advance(HostNs(START + 30 * MS))
     assert [outcome.status for outcome in tag.outcomes] == [OK, ABSENT]
-    pairer.disconnected(1, START)  # a grabber that could not even connect says so; that changes nothing
+    pairer.disconnected(1, START)  # a grabber that never connected reports that too, which changes nothing
     assert pairer.counters[1].outcomes[ABSENT] == 1
 
 
@@ -333,8 +333,8 @@ def test_clocks_that_drift_apart_raise_the_alarm_long_before_pulses_mix() -> Non
             feed.frame(camera, pulse, pulse + 1, clock=9 * MS if camera == 2 else 0, after=20 * MS)
         feed.advance(feed.time_of(pulse) + 21 * MS)
     health = feed.pairer.health()
-    assert health["alarm"]
-    assert health["spread_max_us"] > 8000
+    assert health.alarm
+    assert health.spread_max_us > 8000
     assert all(tag.complete for tag in feed.closed)
 
 
@@ -344,7 +344,7 @@ def test_frames_that_no_longer_find_each_other_raise_the_alarm() -> None:
         for camera in range(3):
             feed.frame(camera, pulse, pulse + 1, clock=-13 * MS if camera == 2 else 0)
         feed.advance(feed.time_of(pulse) + 6 * MS)
-    assert feed.pairer.health()["alarm"]
+    assert feed.pairer.health().alarm
     assert not any(tag.complete for tag in feed.closed)
 
 

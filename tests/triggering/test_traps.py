@@ -1,4 +1,4 @@
-"""One example for each trap that real cameras have shown, on the simulated cameras."""
+"""One example for each trap that real cameras have shown, with simulated cameras."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from tests.triggering.simulation import MS, Hill, Outage, Run, Scenario
 
 
 def run(**scenario: object) -> Run:
-    """A run in which the iron rules hold."""
+    """A run that keeps the rules of `oracle`."""
     done = Run(Hill(replace(Scenario(pulses=40), **scenario)))  # type: ignore[arg-type]
     check(done)
     return done
@@ -30,11 +30,11 @@ def test_without_faults_every_pulse_is_complete() -> None:
     assert [tag.complete for tag in done.closed] == [True] * 40
     assert done.unplaced == []
     assert max(abs(o.offset_ns or 0) for tag in done.closed for o in tag.outcomes) < MS
-    assert not done.pairer.health()["alarm"]
+    assert not done.pairer.health().alarm
 
 
 def test_one_camera_misses_the_very_first_pulse() -> None:
-    """Counting from the first frame after arming would be one period off for ever."""
+    """Counting from the first frame after arming would pair every frame with the wrong pulse."""
     done = run(faults={(0, 1): MISSED})
     assert statuses(done, 0) == [OK, MISSED, OK]
     assert sum(tag.complete for tag in done.closed) == 39
@@ -62,7 +62,7 @@ def test_a_hole_in_the_ids_is_a_lost_frame() -> None:
 
 
 def test_a_damaged_frame_is_told_by_its_arrival_alone() -> None:
-    """A buffer whose leader was lost carries id and time of its previous use; the simulation does likewise."""
+    """A buffer whose leader was lost has id and time of its previous use, in the simulation too."""
     assert statuses(run(faults={(20, 0): DAMAGED}), 20) == [DAMAGED, OK, OK]
 
 
@@ -79,7 +79,7 @@ def test_a_damaged_arrival_goes_to_the_pulse_that_it_fits_best(fates: tuple[Fram
 
 
 def test_how_late_damaged_frames_come_is_learned() -> None:
-    """Held back for three periods: told from the next pulses' only by experience."""
+    """Held back for three periods, they cannot be told from those of the next pulses until the delay is learned."""
     experience = {(pulse, 0): DAMAGED for pulse in range(8, 200, 8)}
     ambiguous = {(210, 0): DAMAGED, (211, 0): MISSED, (212, 0): MISSED}
     done = run(
@@ -117,7 +117,7 @@ def test_a_pulse_that_all_cameras_lost_has_a_tag() -> None:
     assert [outcome.status for outcome in tag.outcomes] == [LOST] * 3
     assert tag.cargo is None
     assert abs(tag.time - done.hill.times[20]) < MS
-    assert done.pairer.health()["proven_by_ids"] == 1
+    assert done.pairer.health().proven_by_ids == 1
 
 
 def test_a_pulse_that_only_one_camera_saw_and_lost_has_a_tag() -> None:
@@ -195,14 +195,14 @@ def test_the_rate_may_be_off() -> None:
     for error in (-0.05, 0.05):
         done = run(rate_error=error, pulses=400, faults={(300, camera): LOST for camera in range(3)})
         assert len(done.closed) == 400
-        assert done.pairer.health()["period_us"] == pytest.approx(1e6 / 30 * (1 + error), rel=1e-3)
+        assert done.pairer.health().period_us == pytest.approx(1e6 / 30 * (1 + error), rel=1e-3)
 
 
 def test_between_latches_the_frames_keep_the_clocks_together() -> None:
     """90 s without a latch: the clocks drift 18 ms apart, the tolerance is 10 ms."""
     done = run(pulses=2700, drift_ppm=(100.0, 0.0, -100.0), latch_every_s=1e6)
     assert all(tag.complete for tag in done.closed)
-    assert done.pairer.health()["spread_max_us"] < 1000
+    assert done.pairer.health().spread_max_us < 1000
 
 
 def test_the_recorder_stalls_and_then_takes_camera_after_camera() -> None:

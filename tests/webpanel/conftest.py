@@ -9,7 +9,7 @@ import pytest
 from tests.support.loopback import Loopback
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel, serving
-from webpanel.access import Access
+from webpanel.door.access import Access
 
 
 @pytest.fixture

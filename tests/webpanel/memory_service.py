@@ -7,14 +7,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 
-from recorder.catalogue import Catalogue
-from recorder.log_writer import LogWriter
-from recorder.triplet_buffers import TripletBuffers
+from recorder.catalogue.folder import Catalogue
+from recorder.log.triplet_buffers import TripletBuffers
+from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import UtcNs
+from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.frame import FrameStatus
-from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
-from webpanel.models import (
+from rig.pulse import RigPulse
+from rig.status import (  # fmt: skip
     CameraState,
     CameraStatus,
     Counts,
@@ -35,9 +37,10 @@ from webpanel.models import (
     State,
     Statement,
     Status,
-)  # fmt: skip
-from webpanel.recording_view import to_recording
-from webpanel.rig_service import Metric, Preview, Quantity, StateForbidsError, UnknownRecordingError
+)
+from service.recordings.archive import Archive, as_recording
+from service.seam import Preview
+from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
 
 SHAPE = (120, 480)
 COLUMNS = ((0, 160), (160, 320), (320, 480))
@@ -45,8 +48,8 @@ CAMERAS = ("K1", "K2", "K3")
 KEPT_EVENTS = 1000
 
 
-class MemoryService:
-    """See `webpanel.rig_service.RigService`.
+class MemoryService(Archive):
+    """See `service.seam.RigService`.
 
     Attributes:
         catalogue: the recordings, real logs in a real folder.
@@ -58,6 +61,7 @@ class MemoryService:
 
     def __init__(self, folder: Path) -> None:
         self.catalogue = Catalogue(folder)
+        super().__init__(self.catalogue)
         self.state = State.IDLE
         self.well = True
         self.broken: Exception | None = None
@@ -133,11 +137,11 @@ class MemoryService:
         with self._lock:
             current = self._recording
             if current is None or current.id != recording_id:
-                return to_recording(self.catalogue.entry(recording_id))
+                return as_recording(self.catalogue.entry(recording_id))
             self._recording, self._last = None, recording_id
             write_recording(self.catalogue.directory, recording_id, session=current.session.model_dump())
             self._become(State.ARMED)
-            return to_recording(self.catalogue.entry(recording_id))
+            return as_recording(self.catalogue.entry(recording_id))
 
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:
         fields = change.model_dump(exclude_none=True)
@@ -146,19 +150,19 @@ class MemoryService:
                 session = self._recording.session.model_copy(update=fields)
                 self._recording = self._recording.model_copy(update={"session": session})
                 return self._recording
-        return to_recording(self.catalogue.change_session(recording_id, fields))
+        return as_recording(self.catalogue.change_session(recording_id, fields))
 
     def delete_recording(self, recording_id: str) -> Recording:
         if self._recording is not None and self._recording.id == recording_id:
             raise StateForbidsError("the recording is under way: stop it first")
-        return to_recording(self.catalogue.delete(recording_id))
+        return as_recording(self.catalogue.delete(recording_id))
 
     def restore_recording(self, recording_id: str) -> Recording:
         if self._recording is not None and self._recording.id == recording_id:
             raise UnknownRecordingError(f"no recording {recording_id} in the trash: see the list of deleted recordings")
-        return to_recording(self.catalogue.restore(recording_id))
+        return as_recording(self.catalogue.restore(recording_id))
 
-    def preview(self, newer_than: int, timeout_s: float) -> Preview | None:
+    def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
         self.preview_calls += 1
         deadline = time.monotonic() + timeout_s
         while self.state not in {State.ARMED, State.RECORDING} or self._pulse() == newer_than:
@@ -185,11 +189,14 @@ class MemoryService:
         return DoctorReport(worst="PASS", findings=(finding,))
 
     def metrics(self) -> list[Metric]:
-        latency = {"0.01": 3.0, "0.1": 9.0, "+Inf": 10.0}
+        frames = CounterMetricFamily("svev_frames", "Whole frames.", labels=("camera",))
+        for camera, count in (("K1", 10), ('K"2\n', 11)):
+            frames.add_metric((camera,), count)
+        latency = [("0.01", 3.0), ("0.1", 9.0), ("+Inf", 10.0)]
         return [
-            Metric("svev_frames_total", "Whole frames.", Quantity.COUNTER, "camera", {"K1": 10, 'K"2\n': 11}),
-            Metric("svev_disk_free_bytes", "Free.", Quantity.GAUGE, "", {"": 1e11}),
-            Metric("svev_latency_seconds", "Latency.", Quantity.HISTOGRAM, "", latency, total=0.7),
+            frames,
+            GaugeMetricFamily("svev_disk_free_bytes", "Free.", 1e11),
+            HistogramMetricFamily("svev_latency_seconds", "Latency.", latency, 0.7),
         ]
 
     def healthy(self) -> bool:
@@ -209,8 +216,8 @@ class MemoryService:
         self._since = datetime.now(UTC)
         self.say(f"now {state.value}")
 
-    def _pulse(self) -> int:
-        return int((time.monotonic() - self._armed_at) * 30) + 1
+    def _pulse(self) -> RigPulse:
+        return RigPulse(int((time.monotonic() - self._armed_at) * 30) + 1)
 
     @staticmethod
     def _camera(name: str, columns: tuple[int, int], armed: bool) -> CameraStatus:
@@ -232,7 +239,7 @@ def write_recording(
     path = folder / f"{recording_id}.mcap"
     buffers = TripletBuffers(SHAPE, 4)
     start = time.time_ns() - len(pulses) * PERIOD_NS
-    with LogWriter(path, SHAPE, session=session or {}, rig=RIG, rig_toml=RIG_TOML, buffers=buffers) as log:
+    with LogWriter(path, LogDescription(session or {}, RIG, RIG_TOML), buffers) as log:
         for pulse, statuses in enumerate(pulses, 1):
             write_pulse(log, buffers, make_tag(pulse, statuses, SHAPE, UtcNs(start + pulse * PERIOD_NS)))
     buffers.close()

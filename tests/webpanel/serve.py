@@ -8,8 +8,8 @@ from pathlib import Path
 from rig.frame import FrameStatus
 from tests.recorder.logs import ALL_OK
 from tests.webpanel.memory_service import MemoryService, write_recording
-from webpanel.access import Access
 from webpanel.app import create_app
+from webpanel.door.access import Access
 from webpanel.server import make_server
 
 
@@ -24,7 +24,7 @@ def main() -> None:
         service = MemoryService(Path(folder))
         write_recording(Path(folder), "jump-1", (ALL_OK,) * 30, {"athlete": "Anna Berg", "bib": "17"})
         write_recording(Path(folder), "jump-2", ((FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK), *(ALL_OK,) * 29))
-        make_server(create_app(service, service.catalogue, access)).run(sockets=[listener])
+        make_server(create_app(service, access)).run(sockets=[listener])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The panel over a real socket, on a thread of the test."""
+"""The panel over a real socket, on a thread of the test; and what every refusal must be."""
 
 import socket
 import threading
@@ -10,8 +10,9 @@ import httpx
 
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
-from webpanel.access import Access
 from webpanel.app import create_app
+from webpanel.door.access import Access
+from webpanel.problems import Problem
 from webpanel.server import PanelServer, make_server
 
 
@@ -41,7 +42,7 @@ class Panel:
 @contextmanager
 def serving(service: MemoryService, access: Access) -> Iterator[Panel]:
     """Serve meanwhile."""
-    server = make_server(create_app(service, service.catalogue, access))
+    server = make_server(create_app(service, access))
     listener = socket.create_server((access.host, 0))
     port = listener.getsockname()[1]
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="panel")
@@ -55,6 +56,19 @@ def serving(service: MemoryService, access: Access) -> Iterator[Panel]:
         listener.close()
     assert not thread.is_alive()
     wait_until(lambda: not _workers(), "the server's worker threads have ended", 20)
+
+
+def refused(answer: httpx.Response, status: int) -> Problem:
+    """Check that an answer is a problem of this status, and return it."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = Problem.model_validate(answer.json())
+    assert problem.status == status
+    assert problem.title
+    assert problem.code
+    assert problem.detail
+    assert "\n" not in problem.detail
+    return problem
 
 
 def _workers() -> list[threading.Thread]:

@@ -9,11 +9,11 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from recorder.verify import Verdict, VerifyReport, verify
+from recorder.checking.verify import Verdict, VerifyReport, verify
+from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
 from tests.support.waiting import wait_until
-from tests.svev.service.serving import Serving, serving
 
 PULSES = 180
 #: Simulated cameras may fail where other programs keep the computer busy; three times in a row would be our fault.

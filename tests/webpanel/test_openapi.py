@@ -11,7 +11,7 @@ import pytest
 from tests.support.loopback import Loopback
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import serving
-from webpanel.access import Access
+from webpanel.door.access import Access
 
 #: The calls of the contract, and those that the page needs beyond it.
 CALLS = {

@@ -32,7 +32,7 @@ def test_what_has_not_changed_is_not_sent_again(client: httpx.Client) -> None:
     assert (again.status_code, again.content) == (304, b"")
 
 
-NO_FILES = ["/i18n", "/i18n/", "/css/", "/none.js", "/index.html/x", "/docs_page/index.html"]
+NO_FILES = ["/i18n", "/i18n/", "/live/", "/none.js", "/index.html/x", "/docs_page/index.html"]
 
 
 def test_there_are_no_lists_of_files(client: httpx.Client) -> None:

@@ -8,9 +8,9 @@ import pytest
 
 from rig.frame import FrameStatus
 from tests.recorder.logs import ALL_OK
+from tests.service.serving import serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
-from tests.svev.service.serving import serving
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel
 
@@ -34,7 +34,7 @@ def schemathesis(url: str, folder: Path, *options: str) -> str:
 def test_the_api_is_as_it_is_described(
     panel: Panel, service: MemoryService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("webpanel.preview._WAIT_S", 0.01)  # a disarmed rig has no picture to wait for
+    monkeypatch.setattr("webpanel.routes.preview._WAIT_S", 0.01)  # a disarmed rig has no picture to wait for
     for number in range(3):
         write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
     service.arm()

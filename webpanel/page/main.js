@@ -1,36 +1,34 @@
-/** Puts the page together. Each part draws itself; what they know stands in store.js, and events.js brings the news. */
+/** Puts the page together. Each part draws itself from what store.js holds; connection.js keeps that up to date. */
 
-import { startActions } from "./actions.js";
-import { call, Problem } from "./api.js";
-import { startBanner } from "./banner.js";
-import { startCameras } from "./cameras.js";
-import * as doctor from "./doctor.js";
-import { connect, connectNow } from "./events.js";
-import { startLanguage } from "./i18n.js";
-import { startKeys } from "./keys.js";
-import { startLog } from "./log.js";
-import { startLogin } from "./login.js";
-import { startLook } from "./look.js";
-import { startPreview } from "./preview.js";
-import * as recording from "./recording.js";
-import * as recordings from "./recordings.js";
-import * as rig from "./rig.js";
-import { startRouter } from "./router.js";
-import * as scrubber from "./scrubber.js";
-import { startSession } from "./session.js";
-import { startSettings } from "./settings.js";
-import { startState } from "./state.js";
-import { update } from "./store.js";
-import { startVitals } from "./vitals.js";
+import { drawKeys, startKeys } from "./frame/keys.js";
+import { startLogin } from "./frame/login.js";
+import { startSettings } from "./frame/settings.js";
+import { startLanguage } from "./i18n/i18n.js";
+import { startActions } from "./live/actions.js";
+import { startHealth } from "./live/health.js";
+import { startPreview } from "./live/preview.js";
+import { startSession } from "./live/session.js";
+import { startState } from "./live/state.js";
+import * as recording from "./recordings/recording.js";
+import * as recordings from "./recordings/recordings.js";
+import * as scrubber from "./recordings/scrubber.js";
+import { call, Problem } from "./shared/api.js";
+import { connect, connectNow, startBanner } from "./shared/connection.js";
+import { startRouter } from "./shared/router.js";
+import { update } from "./shared/store.js";
+import * as doctor from "./system/doctor.js";
+import { startLog } from "./system/log.js";
+import * as rig from "./system/rig.js";
 
-/** Draw everything anew, in the language that is in use now. */
+/** Draw every part anew, after the language was changed. */
 function redraw() {
   update({});
   for (const part of [recordings, recording, doctor, rig]) part.draw();
   scrubber.drawWords();
+  drawKeys();
 }
 
-/** @param {import("./router.js").Place} place */
+/** @param {import("./shared/router.js").Place} place */
 function entered({ view, id }) {
   scrubber.clearScrubber();
   if (view === "recordings") recordings.enterRecordings();
@@ -50,13 +48,11 @@ async function begin() {
   }
 }
 
-startLook();
-startLanguage();
-for (const start of [startState, startSession, startActions, startPreview, startCameras, startVitals, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, recordings.startRecordings, scrubber.startScrubber, recording.startRecording, startKeys]) start();
 startSettings(redraw);
+startLanguage();
+for (const start of [startState, startSession, startActions, startPreview, startHealth, startBanner, startLog]) start();
+for (const start of [doctor.startDoctor, recordings.startRecordings, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
 startLogin(() => location.reload());
 startRouter(entered);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));
 void begin();
-

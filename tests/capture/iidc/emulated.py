@@ -17,10 +17,10 @@ from typing import Any
 
 from capture.iidc import dma
 from capture.iidc.library import SONAME
-from rig.ring import CameraRing
-from rig.settings import CameraSettings
-from simrig.firewire.build import shim
-from simrig.simulated_hill import SimulatedHill
+from rig.settings.model import CameraSettings
+from rig.transport.ring import CameraRing
+from simrig.firewire.host.build import shim
+from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import SCENARIO
 
 GUIDS = {f"K{number}": f"000a4701011b000{number}" for number in (1, 2, 3)}
@@ -43,7 +43,7 @@ def interpose() -> None:
 
 @contextmanager
 def visible(hill: SimulatedHill) -> Iterator[SimulatedHill]:
-    """This process sees the hill's FireWire bus within."""
+    """Within the context, this process sees the hill's FireWire bus."""
     os.environ[_VARIABLE] = hill.environment[_VARIABLE]
     try:
         yield hill
@@ -61,7 +61,7 @@ def emulated_bus(*names: str, rate_hz: float = 30.0, **options: Any) -> Iterator
 
 @contextmanager
 def camera_ring(settings: CameraSettings, slots: int = 16) -> Iterator[CameraRing]:
-    """Where frames go."""
+    """A ring for the frames of one camera."""
     ring = CameraRing.create(settings.name, settings.frame_bytes, slots)
     try:
         yield ring

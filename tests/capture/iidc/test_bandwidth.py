@@ -4,7 +4,7 @@ import pytest
 
 from capture.iidc.bandwidth import UNITS_PER_BUS, check_bandwidth, need
 from rig.errors import BadInputError
-from rig.settings import CameraSettings, RigSettings
+from rig.settings.model import CameraSettings, RigSettings
 
 GUID = "000a4701011b000"
 

@@ -1,4 +1,4 @@
-"""The back end against the unmodified libdc1394 on the emulated bus: what the conformance suite does not ask."""
+"""The back end with the unmodified libdc1394 on the emulated bus: what the conformance suite does not test."""
 
 import ctypes
 import re
@@ -12,17 +12,18 @@ from typing import Any
 import pytest
 
 from capture.iidc.bus import Bus
+from capture.iidc.camera import IidcCamera
 from capture.iidc.device import Device
-from capture.iidc.iidc_camera import IidcCamera
 from capture.iidc.library import SONAME
 from capture.iidc.structures import Feature
 from capture.seam import Arrival
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
-from rig.ring import CameraRing
-from rig.settings import CameraSettings
-from simrig.faults import Fault, FaultKind
+from rig.pulse import HillPulse
+from rig.settings.model import CameraSettings
+from rig.transport.ring import CameraRing
 from simrig.images import stamp
+from simrig.world.faults import Fault, FaultKind
 from tests.capture.iidc.emulated import GUIDS, camera_ring, emulated_bus, settings
 
 PERIOD_NS = 33_333_333
@@ -60,7 +61,7 @@ def collect(camera: IidcCamera, ring: CameraRing, count: int) -> list[Arrival]:
 
 @contextmanager
 def register_access(name: str = "K1") -> Iterator[Device]:
-    """The camera's registers, beside the back end."""
+    """The camera's registers, read past the back end."""
     with Bus() as bus, Device(bus, bus.find(int(GUIDS[name], 16))) as device:
         yield device
 
@@ -169,7 +170,7 @@ def test_a_lost_packet_never_passes_as_a_picture(packet: int) -> None:
     whole = [arrival for arrival in after if arrival.whole]
     damaged = [arrival for arrival in after if not arrival.whole]
     steps = {b.frame_id - a.frame_id for a, b in zip([before[-1], *whole], whole, strict=False)}
-    if packet == 1:  # the whole frame is skipped: nothing of it is ever seen
+    if packet == 1:  # the whole frame is skipped
         assert (len(damaged), steps) == (0, {1, 2})
     else:
         assert (len(damaged), steps) == (1, {1, 3})
@@ -271,7 +272,7 @@ def test_a_stall_longer_than_the_ring_loses_frames_but_mixes_none() -> None:
     camera = settings()
     with emulated_bus() as hill, running(camera) as (made, ring):
         first = collect(made, ring, 2)[-1]
-        stalled_until = hill.train.time(hill.train.next_index(host_now()) + 80)  # the ring holds 64
+        stalled_until = hill.train.time(HillPulse(hill.train.next_index(host_now()) + 80))  # the ring holds 64
         wait_until_host(stalled_until)
         arrivals = collect(made, ring, 70)
         last = stamp.read(ring.frame(arrivals[-1].slot).reshape(480, 640))
@@ -285,7 +286,7 @@ def test_a_stall_longer_than_the_ring_loses_frames_but_mixes_none() -> None:
 
 
 def wait_until_host(host: int) -> None:
-    """Let time pass while nobody takes frames: this *is* the stall."""
+    """Let time pass while nothing fetches frames: this is the stall under test, not a wait for something."""
     while (remaining := host - host_now()) > 0:
         time.sleep(remaining / 1e9)
 

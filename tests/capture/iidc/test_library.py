@@ -1,4 +1,4 @@
-"""Four ways not to find a camera, and libdc1394's words in our log."""
+"""Reasons why a camera is not found, and libdc1394's messages in our log."""
 
 import logging
 import re
@@ -35,12 +35,12 @@ def test_without_a_firewire_port(tmp_path: Path) -> None:
 def test_without_the_right_to_the_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number in (0, 1):
         (tmp_path / f"fw{number}").touch()
-    monkeypatch.setattr("os.access", lambda path, _: path.name == "fw0")  # root may everything
+    monkeypatch.setattr("os.access", lambda path, _: path.name == "fw0")  # root may open every file
     assert f"no right to use the FireWire devices {tmp_path}/fw1: run: sudo usermod" in why_no_camera(tmp_path)
 
 
 def test_with_a_port_and_no_camera(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The card itself belongs to root alone on many systems, and nobody needs it."""
+    """On many systems only root may open the card itself, which svev does not need."""
     (tmp_path / "fw0").touch()
     card = tmp_path / "sysfs" / "fw0"
     card.mkdir(parents=True)

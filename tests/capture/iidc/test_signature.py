@@ -5,7 +5,7 @@ import struct
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from capture.iidc.cycle_time import WRAP_NS
+from capture.iidc.clock import WRAP_NS
 from capture.iidc.signature import SIGNATURE_BYTES, ByteOrder, SignatureReader
 
 DELAY_NS = 20_000_000
@@ -31,7 +31,7 @@ counts = st.integers(1, 1 << 24)
 def test_a_signature_is_read_whatever_its_order_and_however_long_the_frame_waited(
     trigger: int, order: ByteOrder, frames: int, overruns: int, delay: int, stalls: int
 ) -> None:
-    """The kernel's time of a packet that waited is wrong by a multiple of 8 s; the trigger time must not be."""
+    """The kernel's time of a packet that waited long is wrong by a multiple of 8 s; the trigger time is right."""
     reader = SignatureReader(DELAY_NS, order)
     found = reader.read(stamp(order, trigger, frames, frames + overruns), trigger + delay + stalls * 8_000_000_000)
     assert found is not None

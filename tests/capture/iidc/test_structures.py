@@ -1,4 +1,4 @@
-"""Our structures and numbers against the installed headers, by a C program that the compiler makes from them."""
+"""Compares our structures and constants with the installed headers, by a compiled C program."""
 
 import ctypes
 import subprocess
@@ -9,15 +9,7 @@ import pytest
 
 from capture.iidc import structures
 from capture.iidc.library import _ARGUMENTS, _OTHERS, SONAME
-from capture.iidc.structures import (
-    Camera,
-    CameraId,
-    CameraList,
-    Framerates,
-    TriggerSources,
-    VideoFrame,
-    VideoModes,
-)
+from capture.iidc.structures import Camera, CameraId, CameraList, Framerates, TriggerSources, VideoFrame, VideoModes
 from tests.capture.iidc.emulated import GCC
 
 STRUCTURES: dict[str, type[ctypes.Structure]] = {
@@ -30,7 +22,7 @@ STRUCTURES: dict[str, type[ctypes.Structure]] = {
     "dc1394trigger_sources_t": TriggerSources,
 }
 
-#: What the headers call our numbers.
+#: Names of our constants in the headers.
 NUMBERS: dict[str, int] = {
     "DC1394_SUCCESS": structures.Code.SUCCESS,
     "DC1394_FUNCTION_NOT_SUPPORTED": structures.Code.FUNCTION_NOT_SUPPORTED,

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from rig.rigfile import CONFIG
-from simrig.simulated_hill import SimulatedHill
+from rig.settings.file import CONFIG
+from simrig.programs.simulated_hill import SimulatedHill
 
 TRAINING = CONFIG / "scenarios" / "training.toml"
 ROOT = Path(__file__).parents[3]

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from rig.clocks import NS_PER_US, HostNs, UtcAnchor
-from simrig.device_clock import DeviceClock
-from simrig.firewire.cycle_timer import CycleTimer
+from simrig.firewire.isochronous import CycleTimer
+from simrig.world.pulses import DeviceClock
 from simrig.world.scenario import Scenario
 from tests.simrig.firewire.conftest import GUIDS, RefusedError, StartHill, StartProgram
 

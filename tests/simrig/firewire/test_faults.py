@@ -8,8 +8,8 @@ import pytest
 
 from rig.clocks import host_now
 from rig.errors import BadInputError
-from simrig.faults import Fault, FaultKind
-from simrig.simulated_hill import SimulatedHill
+from simrig.programs.simulated_hill import SimulatedHill
+from simrig.world.faults import Fault, FaultKind
 from tests.simrig.firewire.conftest import GUIDS, Program, RefusedError, StartHill, StartProgram
 from tests.support.waiting import wait_until
 

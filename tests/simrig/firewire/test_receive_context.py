@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from rig.clocks import HostNs
-from simrig.firewire.abi import PAGE
-from simrig.firewire.config_rom import camera_rom, crc16, host_rom
-from simrig.firewire.receive_context import ReceiveContext, buffers
-from simrig.firewire.transmission import Transmission
+from rig.pulse import HillPulse
+from simrig.firewire.camera.config_rom import camera_rom, crc16, host_rom
+from simrig.firewire.host.abi import PAGE
+from simrig.firewire.host.receive_context import ReceiveContext, buffers
+from simrig.firewire.isochronous import Transmission
 
 PACKETS, SIZE, START = 24, 32, HostNs(1_000_000_000)
 WAIT, INTERRUPT = 1 << 17, 1 << 16
@@ -19,7 +20,7 @@ WAIT, INTERRUPT = 1 << 17, 1 << 16
 def frame(fill: int, lost: frozenset[int] = frozenset(), packets: int = PACKETS) -> Transmission:
     data = np.full(packets * SIZE, fill, np.uint8)
     data[::SIZE] = np.arange(packets) % 256
-    return Transmission(3, data, SIZE, packets, 8000 * 9 + 7990, START, lost, fill)
+    return Transmission(3, data, SIZE, packets, 8000 * 9 + 7990, START, lost, HillPulse(fill))
 
 
 class Receiver:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from rig.errors import BadInputError
-from simrig.firewire import build, wire
-from simrig.firewire.abi import Ioctl
+from simrig.firewire.host import build, wire
+from simrig.firewire.host.abi import Ioctl
 from tests.simrig.firewire.conftest import Program, StartHill, StartProgram
 
 #: How the kernel's header makes the code of an ioctl: direction, size of the argument, '#', number.

@@ -7,11 +7,9 @@ from typing import Any
 import pytest
 
 from rig.clocks import HostNs, host_now
-from rig.rigfile import CONFIG
-from simrig.device_clock import DeviceClock
-from simrig.gige.camera import Camera
-from simrig.gige.config import CameraConfig
-from simrig.pulse_train import PulseTrain
+from rig.settings.file import CONFIG
+from simrig.gige.camera import Camera, CameraConfig
+from simrig.world.pulses import DeviceClock, PulseTrain
 from simrig.world.scenario import load_scenario
 from tests.support.loopback import Loopback
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Self
 
-from simrig.gige.gvcp import PORT, Command
+from simrig.gige.protocol.gvcp import PORT, Command
 
 CCP = 0x0A00
 PENDING_ACK = Command.PENDING + 1

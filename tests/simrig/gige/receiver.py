@@ -11,6 +11,7 @@ import gi
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.pulse import HillPulse
 from simrig.images import stamp
 
 gi.require_version("Aravis", "0.8")
@@ -32,7 +33,7 @@ class Received:
     image: NDArray[np.uint8]
 
     @property
-    def pulse(self) -> int:
+    def pulse(self) -> HillPulse:
         """Hill pulse that stands in the pixels."""
         read = stamp.read(self.image)
         assert read is not None, "the frame carries no stamp"

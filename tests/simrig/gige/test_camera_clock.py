@@ -3,10 +3,11 @@
 import pytest
 
 from rig.clocks import NS_PER_S, HostNs
-from rig.rigfile import CONFIG
-from simrig.device_clock import DeviceClock
-from simrig.gige.camera_clock import PTP_SETTLE_NS, CameraClock, PtpMaster
-from simrig.gige.values import PtpStatus
+from rig.pulse import HillPulse
+from rig.settings.file import CONFIG
+from simrig.gige.imaging.camera_clock import PTP_SETTLE_NS, CameraClock, PtpMaster
+from simrig.gige.registers.register_table import PtpStatus
+from simrig.world.pulses import DeviceClock
 from simrig.world.scenario import load_scenario
 
 EPOCH = HostNs(5 * NS_PER_S)
@@ -25,7 +26,7 @@ def test_the_free_clock_is_the_scenarios(free: DeviceClock) -> None:
     later = HostNs(EPOCH + 100 * NS_PER_S)
     assert clock.ticks(later) == free.at(later)
     assert clock.ticks(later) - clock.ticks(EPOCH) == 100 * NS_PER_S + 5_000_000
-    assert clock.exposure_ticks(later, 3) == free.at_pulse(later, 3) != free.at(later)
+    assert clock.exposure_ticks(later, HillPulse(3)) == free.at_pulse(later, HillPulse(3)) != free.at(later)
 
 
 def test_ticks_of_another_length(free: DeviceClock) -> None:

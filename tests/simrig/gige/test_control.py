@@ -8,7 +8,7 @@ import gi
 import pytest
 
 from rig.clocks import HostNs, host_now
-from simrig.gige.gvcp import PORT, Command, Status
+from simrig.gige.protocol.gvcp import PORT, Command, Status
 from tests.simrig.gige.conftest import MakeCamera, SimulatedCamera
 from tests.simrig.gige.raw_client import CCP, PENDING_ACK, GvcpClient
 from tests.simrig.gige.receiver import Receiver

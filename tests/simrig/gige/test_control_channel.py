@@ -3,8 +3,8 @@
 import pytest
 
 from rig.clocks import HostNs
-from simrig.gige.control_channel import CONTROL, EXCLUSIVE, ControlChannel
-from simrig.gige.registers import RegisterError
+from simrig.gige.control.control_channel import CONTROL, EXCLUSIVE, ControlChannel
+from simrig.gige.registers.register_map import RegisterError
 
 ANNA, BERT = ("127.0.0.1", 1000), ("127.0.0.1", 2000)
 

@@ -6,7 +6,8 @@ from itertools import pairwise
 import pytest
 
 from rig.errors import BadInputError
-from simrig.faults import Fault, FaultKind
+from rig.pulse import HillPulse
+from simrig.world.faults import Fault, FaultKind
 from tests.simrig.gige.conftest import MakeCamera, SimulatedCamera
 from tests.simrig.gige.receiver import Received, Receiver
 from tests.support.waiting import wait_until
@@ -119,8 +120,8 @@ def test_slow_link_delays_and_then_recovers(make_camera: MakeCamera) -> None:
     assert [frame.status for frame in frames] == ["success"] * 60
     statistics = simulated.camera.statistics()
     delay = {p: sent - simulated.train.time(p) for p, sent in statistics.last_packets.items()}
-    assert delay[before + 30] > 1_000_000 + 20 * 2_000_000, "every frame came 2 ms later than the one before"
-    assert delay[before + 30] > 5 * delay[before + 58], "and then the link caught up"
+    assert delay[HillPulse(before + 30)] > 1_000_000 + 20 * 2_000_000, "every frame came 2 ms later than the one before"
+    assert delay[HillPulse(before + 30)] > 5 * delay[HillPulse(before + 58)], "and then the link caught up"
 
 
 def test_a_frame_under_way_does_not_hold_up_the_end(make_camera: MakeCamera) -> None:

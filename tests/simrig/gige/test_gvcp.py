@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simrig.gige.gvcp import (
+from simrig.gige.protocol.gvcp import (
     MAX_MEMORY_BYTES,
     Action,
     Command,

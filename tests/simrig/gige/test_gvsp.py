@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from simrig.gige.gvcp import Status
-from simrig.gige.gvsp import FrameFormat, PacketTable, unavailable
+from simrig.gige.protocol.gvcp import Status
+from simrig.gige.protocol.gvsp import FrameFormat, PacketTable, unavailable
 
 
 @pytest.fixture

@@ -5,10 +5,9 @@ from itertools import pairwise
 
 import pytest
 
-from simrig.gige.gvcp import Status
-from simrig.gige.register_table import all_registers
-from simrig.gige.registers import Kind, Register, RegisterError, RegisterMap
-from simrig.gige.values import FIRE_TEST_PACKET, XML_ADDRESS, Identity
+from simrig.gige.protocol.gvcp import Status
+from simrig.gige.registers.register_map import Kind, Register, RegisterError, RegisterMap
+from simrig.gige.registers.register_table import FIRE_TEST_PACKET, XML_ADDRESS, Identity, all_registers
 
 
 @pytest.fixture

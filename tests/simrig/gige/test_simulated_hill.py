@@ -3,17 +3,20 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
+from typing import IO
 
 import pytest
 
 from rig.errors import BadInputError, ProcessDiedError
-from simrig.faults import Fault, FaultKind
-from simrig.simulated_hill import SimulatedHill
+from simrig.programs.simulated_hill import SimulatedHill
+from simrig.world.faults import Fault, FaultKind
 from tests.simrig.gige.conftest import TRAINING
 from tests.simrig.gige.raw_client import CCP, GvcpClient
 from tests.simrig.gige.receiver import Receiver
@@ -26,7 +29,7 @@ ROOT = Path(__file__).parents[3]
 
 def hill(loopback: Loopback, count: int = 1, scenario: Path = TRAINING, **options: object) -> SimulatedHill:
     addresses = {f"K{index + 1}": address for index, address in enumerate(loopback.cameras(count))}
-    return SimulatedHill(scenario, addresses, 100.0, size=(320, 240), test_pattern=True, **options)  # type: ignore[arg-type]
+    return SimulatedHill(scenario, addresses, 100.0, width=320, height=240, test_pattern=True, **options)  # type: ignore[arg-type]
 
 
 def gone(pid: int) -> bool:
@@ -157,7 +160,7 @@ def test_an_address_of_another_machine(loopback: Loopback) -> None:
     [
         ({"K9": "127.0.0.11"}, {}, 'no camera "K9"'),
         ({"K1": "camera"}, {}, "address"),
-        ({"K1": "127.0.0.11"}, {"size": (641, 480)}, "width"),
+        ({"K1": "127.0.0.11"}, {"width": 641}, "width"),
         ({"K1": "127.0.0.11"}, {"first_block_id": 0}, "first_block_id"),
     ],
 )
@@ -177,7 +180,7 @@ def test_a_camera_that_dies_by_itself_is_noticed(loopback: Loopback) -> None:
 PARENT = """
 import json, sys
 from pathlib import Path
-from simrig.simulated_hill import SimulatedHill
+from simrig.programs.simulated_hill import SimulatedHill
 
 scenario, *addresses = sys.argv[1:]
 with SimulatedHill(Path(scenario), dict(zip(("K1", "K2"), addresses)), 30.0, test_pattern=True) as hill:
@@ -199,28 +202,61 @@ def test_no_orphan_when_the_parent_is_killed(loopback: Loopback) -> None:
     wait_until(lambda: all(gone(pid) for pid in pids), "the cameras are gone, the frozen one too")
 
 
+@contextmanager
+def camera_program(*lines: str) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
+    """The program of a camera, told these lines on its control channel, and the answers that come from there."""
+    ours, theirs = socket.socketpair()
+    with ours, ours.makefile("r") as answers:
+        with theirs:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "simrig.programs.gige_camera", "K1", str(theirs.fileno())], cwd=ROOT,
+                pass_fds=(theirs.fileno(),), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            )  # fmt: skip
+        ours.settimeout(20)
+        ours.sendall("".join(f"{line}\n" for line in lines).encode())
+        with process:
+            try:
+                yield process, answers
+            finally:
+                process.kill()
+
+
 def test_the_process_answers_nonsense_with_an_error_and_goes_on(loopback: Loopback) -> None:
     config = {
         "name": "K1", "address": loopback.cameras(1)[0], "scenario": str(TRAINING), "rate_hz": 30, "epoch": 0,
         "ptp_offset_ns": 0, "test_pattern": True,
     }  # fmt: skip
-    lines = [json.dumps(config), "nonsense", "[]", '{"command": "dance"}', '{"command": "inject", "fault": {}}',
-             '{"command": "stop"}']  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-m", "simrig.gige"], input="\n".join(lines) + "\n", capture_output=True, text=True, cwd=ROOT,
-        timeout=20, check=False,
-    )  # fmt: skip
-    answers = [json.loads(line) for line in done.stdout.splitlines()]
-    assert "pid" in answers[0]
-    assert ["error" in answer for answer in answers[1:]] == [True, True, True, True, False]
-    assert (done.returncode, done.stderr) == (0, "")
+    nonsense = ("nonsense", "[]", '{"type": "Dance"}', '{"type": "Inject", "fault": {}}')
+    with camera_program(json.dumps({"type": "GigeCamera", "config": config})) as (process, answers):
+        told = [json.loads(answers.readline())["type"]]
+        with socket.socket(fileno=os.dup(answers.fileno())) as ours:
+            for line in nonsense:
+                ours.sendall(f"{line}\n".encode())
+                told.append(json.loads(answers.readline())["type"])
+            ours.sendall(b'{"type": "Quit"}\n')
+        assert told == ["Done", "Refused", "Refused", "Refused", "Refused"]
+        assert answers.read() == ""
+        assert process.communicate(timeout=20)[0] == ""
+        assert process.returncode == 0
 
 
 def test_a_configuration_that_is_wrong_ends_the_process_with_2() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "simrig.gige"], input='{"adress": 1}\n', capture_output=True, text=True, cwd=ROOT,
-        timeout=20, check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert 'key "name" is missing; add it' in json.loads(done.stdout)["error"]
-    assert done.stderr == ""
+    with camera_program('{"type": "GigeCamera", "config": {"adress": 1}}') as (process, _):
+        said = process.communicate(timeout=20)[0]
+    assert process.returncode == 2
+    assert "K1: the configuration is wrong" in said
+    assert "name" in said
+    assert "Traceback" not in said
+
+
+def test_a_scenario_that_cannot_be_read_ends_the_process_with_2(loopback: Loopback) -> None:
+    config = {
+        "name": "K1", "address": loopback.cameras(1)[0], "scenario": "missing.toml", "rate_hz": 30, "epoch": 0,
+        "ptp_offset_ns": 0,
+    }  # fmt: skip
+    with camera_program(json.dumps({"type": "GigeCamera", "config": config})) as (process, answers):
+        refused = json.loads(answers.readline())
+        assert process.communicate(timeout=20)[0] == ""
+    assert process.returncode == 2
+    assert refused["type"] == "Refused"
+    assert "missing.toml: no such file" in refused["reason"]

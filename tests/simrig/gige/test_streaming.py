@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rig.clocks import HostNs
-from rig.rigfile import CONFIG
-from simrig.gige.gvcp import Command
+from rig.settings.file import CONFIG
+from simrig.gige.protocol.gvcp import Command
 from simrig.images import stamp
 from simrig.images.view import CameraView
-from simrig.pulse_train import PULSE_WIDTH_NS
+from simrig.world.pulses import PULSE_WIDTH_NS
 from simrig.world.scenario import load_scenario
 from tests.simrig.gige.conftest import TRAINING, MakeCamera
 from tests.simrig.gige.raw_client import GvcpClient

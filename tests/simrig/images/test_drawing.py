@@ -7,10 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from simrig.images.blob import Blob
-from simrig.images.canvas import Canvas
-from simrig.images.snowfall import Snowfall
-from simrig.images.stroke import stroke
+from simrig.images.drawing import Blob, Canvas, stroke
+from simrig.images.view import Snowfall
 from tests.simrig.images.measuring import centroid
 
 PLACES = st.tuples(st.floats(18, 30), st.floats(18, 30))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rig.pulse import HillPulse
 from simrig.images import stamp
 from simrig.images.background import PLATE_MARGIN_PX
 from simrig.images.view import CameraView
@@ -23,13 +24,13 @@ def blank() -> NDArray[np.uint8]:
 
 def image(view: CameraView, pulse: int) -> NDArray[np.uint8]:
     out = blank()
-    view.render_into(out, pulse)
+    view.render_into(out, HillPulse(pulse))
     return out
 
 
 @pytest.fixture(scope="module")
 def known(calm: Scenario) -> dict[str, Any]:
-    return truth(calm, range(round(1.9 * RATE_HZ)), RATE_HZ, SIZE)
+    return truth(calm, map(HillPulse, range(round(1.9 * RATE_HZ))), RATE_HZ, SIZE)
 
 
 @pytest.fixture(scope="module", params=CAMERAS, ids=lambda k: f"K{k + 1}")
@@ -105,7 +106,7 @@ def test_noise_has_the_scenarios_sigma_on_background_and_jumper(
     difference = image(noisy, pulse).astype(float) - image(view, pulse)
     typical = 1.4826 * np.median(np.abs(difference - np.median(difference)))  # snow flakes are outliers
     assert typical == pytest.approx(training.image.noise_sigma, rel=0.2)
-    spots = truth(training, [pulse], RATE_HZ, SIZE)["pulses"][0]["images"][f"K{camera + 1}"]
+    spots = truth(training, [HillPulse(pulse)], RATE_HZ, SIZE)["pulses"][0]["images"][f"K{camera + 1}"]
     x, y = np.mean([spots["P1"], spots["P2"]], axis=0).astype(int)
     body = difference[y - 6 : y + 7, x - 6 : x + 7]
     assert 1.4826 * np.median(np.abs(body)) == pytest.approx(training.image.noise_sigma, rel=0.5)
@@ -132,14 +133,14 @@ def test_successive_images_differ(noisy: CameraView) -> None:
 
 def test_every_image_is_stamped_unless_the_scenario_says_no(noisy: CameraView, calm: Scenario, camera: int) -> None:
     for pulse in (0, 45, 123_456_789):
-        assert stamp.read(image(noisy, pulse)) == stamp.Stamp(camera, pulse)
+        assert stamp.read(image(noisy, pulse)) == stamp.Stamp(camera, HillPulse(pulse))
     bare = CameraView(calm.model_copy(update={"stamp": False}), camera, *SIZE, RATE_HZ)
     assert stamp.read(image(bare, 7)) is None
 
 
 def test_a_block_of_a_triplet_is_rendered_in_place(noisy: CameraView) -> None:
     triplet = np.full((480, 1920), 7, np.uint8)
-    noisy.render_into(triplet[:, 640:1280], 55)
+    noisy.render_into(triplet[:, 640:1280], HillPulse(55))
     assert np.array_equal(triplet[:, 640:1280], image(noisy, 55))
     assert (triplet[:, :640] == 7).all()
     assert (triplet[:, 1280:] == 7).all()
@@ -158,11 +159,11 @@ def test_only_the_jumper_moves(view: CameraView, camera: int, known: dict[str, A
 def test_other_image_sizes_show_the_same_view(calm: Scenario, size: tuple[int, int]) -> None:
     view, pulse = CameraView(calm, 0, *size, RATE_HZ), round(1.4 * RATE_HZ)
     out = np.zeros(size[::-1], np.uint8)
-    view.render_into(out, pulse)
-    spot = truth(calm, [pulse], RATE_HZ, size)["pulses"][0]["images"]["K1"]["P1"]
+    view.render_into(out, HillPulse(pulse))
+    spot = truth(calm, [HillPulse(pulse)], RATE_HZ, size)["pulses"][0]["images"]["K1"]["P1"]
     if size[0] >= 640 and spot is not None:
         assert centroid(out, spot, 4.2 * size[0] / 640) == pytest.approx(spot, abs=0.02)
-    assert stamp.read(out) == stamp.Stamp(0, pulse)
+    assert stamp.read(out) == stamp.Stamp(0, HillPulse(pulse))
 
 
 def test_a_camera_that_looks_away_shows_no_jumper(calm: Scenario) -> None:

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simrig.world.flight import GRAVITY, STEP_S, Flight, Forces, fly
-from simrig.world.hill_profile import HillProfile
 from simrig.world.keyframes import Curve
 from simrig.world.scenario import Hill
 
@@ -65,7 +64,7 @@ def test_halving_the_step_changes_nothing_to_speak_of(monkeypatch: pytest.Monkey
 
 def test_the_knoll_reaches_the_p_point_in_height_and_slope() -> None:
     hill = Hill()
-    ground = HillProfile(hill).ground
+    ground = hill.ground
     assert float(ground(0.0)) == pytest.approx(-hill.table_height_m)
     assert float(ground(hill.p_x_m)) == pytest.approx(hill.p_z_m)
     for x, angle in ((0.0, hill.knoll_angle_deg), (hill.p_x_m, hill.p_angle_deg)):
@@ -74,4 +73,4 @@ def test_the_knoll_reaches_the_p_point_in_height_and_slope() -> None:
 
 
 def test_the_knoll_gets_steeper_all_the_way_to_the_p_point() -> None:
-    assert (np.diff(HillProfile(Hill()).ground(np.linspace(0, 80, 200)), 2) < 0).all()
+    assert (np.diff(Hill().ground(np.linspace(0, 80, 200)), 2) < 0).all()

@@ -5,7 +5,7 @@ import pytest
 
 from simrig.world.jumper import FLIGHT_X_M, Jump, JumpSeries
 from simrig.world.scenario import Scenario, Variation
-from simrig.world.stick_model import angles, ski_line
+from simrig.world.truth import angles, ski_line
 
 TIMES = np.arange(-0.15, 0.8, 0.05)
 

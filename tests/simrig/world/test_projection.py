@@ -5,7 +5,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from simrig.world.projection import Projection, look_at
+from rig.viewing import look_at
+from simrig.world.projection import Projection
 
 COORDINATES = st.floats(-80, 80)
 POINTS = st.tuples(COORDINATES, COORDINATES, COORDINATES)

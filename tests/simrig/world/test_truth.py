@@ -4,6 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rig.pulse import HillPulse
 from simrig.world.scenario import Scenario
 from simrig.world.truth import truth
 
@@ -12,7 +13,7 @@ RATE_HZ = 30.0
 
 @pytest.fixture(scope="module")
 def known(training: Scenario) -> dict[str, Any]:
-    return truth(training, range(150), RATE_HZ)
+    return truth(training, map(HillPulse, range(150)), RATE_HZ)
 
 
 def test_the_truth_survives_json(known: dict[str, Any]) -> None:
@@ -72,7 +73,7 @@ def test_balls_have_their_roles_and_places(known: dict[str, Any], training: Scen
 
 
 def test_every_jump_of_the_session_is_in_sight_of_every_camera(training: Scenario) -> None:
-    known = truth(training, range(0, 1200, 3), RATE_HZ)
+    known = truth(training, map(HillPulse, range(0, 1200, 3)), RATE_HZ)
     flying = [pulse for pulse in known["pulses"] if pulse.get("in_flight")]
     assert {pulse["jump"] for pulse in flying} == set(range(10))
     for pulse in flying:

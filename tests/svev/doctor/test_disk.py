@@ -76,6 +76,9 @@ def test_room_is_told_in_minutes_and_jumps() -> None:
     # 3 cameras x 640 x 480 x 30 Hz = 27.648 MB/s; 1 GB is the reserve
     finding = disk.look_at_room(SIM, Path("disk"), 1_000_000_000 + 27_648_000 * 600)
     assert finding.what == "17.6 GB free in disk: 10 min of recording, 60 jumps of 10 s"
+    longer = SIM.model_copy(update={"recorder": SIM.recorder.model_copy(update={"jump_s": 25.0})})
+    finding = disk.look_at_room(longer, Path("disk"), 1_000_000_000 + 27_648_000 * 600)
+    assert finding.what == "17.6 GB free in disk: 10 min of recording, 24 jumps of 25 s"
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rig.rigfile import load_rig
+from rig.settings.file import load_rig
 from svev import cli
-from svev.doctor import examination, machine, memory, software
+from svev.doctor import examination, machine
 from svev.doctor.examination import Probe, run_probe
 from svev.doctor.finding import Finding, Level, Topic, passed
 from tests.support.loopback import Loopback
@@ -54,16 +54,16 @@ def test_every_probe_gives_findings_with_a_remedy_unless_all_is_well(tmp_path: P
 
 
 def test_another_python_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [finding.level for finding in software.look_at_python()] == [Level.PASS]
+    assert [finding.level for finding in machine.look_at_python()] == [Level.PASS]
     monkeypatch.setattr(sys, "base_prefix", "/opt/python")
-    (finding,) = software.look_at_python()
+    (finding,) = machine.look_at_python()
     assert finding.level is Level.FAIL
     assert "/usr/bin/python3 -m venv --system-site-packages" in finding.remedy
 
 
 def test_a_package_that_does_not_load_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "isal.isal_zlib", None)
-    missing, others = software.look_at_packages()
+    missing, others = machine.look_at_packages()
     assert missing.level is Level.FAIL
     assert missing.what.startswith("isal cannot be loaded")
     assert "numpy" in others.what
@@ -71,18 +71,18 @@ def test_a_package_that_does_not_load_is_named(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_library_that_the_rig_needs_fails_and_another_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(software, "_LIBDC1394", "libdc1394.so.0")
+    monkeypatch.setattr(machine, "_LIBDC1394", "libdc1394.so.0")
     iidc = SIM.model_copy(
         update={"cameras": tuple(camera.model_copy(update={"backend": "iidc"}) for camera in SIM.cameras)}
     )
-    assert [finding.level for finding in software.look_at_camera_libraries(SIM)] == [Level.PASS, Level.WARN]
-    assert [finding.level for finding in software.look_at_camera_libraries(iidc)] == [Level.PASS, Level.FAIL]
+    assert [finding.level for finding in machine.look_at_camera_libraries(SIM)] == [Level.PASS, Level.WARN]
+    assert [finding.level for finding in machine.look_at_camera_libraries(iidc)] == [Level.PASS, Level.FAIL]
 
 
 def test_buffers_that_do_not_fit_fail() -> None:
     buffered = SIM.recorder.model_copy(update={"ring_s": 2.0, "triplets_s": 1.0})
-    assert memory.memory_needed(SIM.model_copy(update={"recorder": buffered})) == 3 * 640 * 480 * 30 * 3
-    assert [finding.level for finding in memory.look_at_memory(SIM)] == [Level.PASS]
+    assert machine.memory_needed(SIM.model_copy(update={"recorder": buffered})) == 3 * 640 * 480 * 30 * 3
+    assert [finding.level for finding in machine.look_at_memory(SIM)] == [Level.PASS]
     huge = SIM.cameras[0].region.model_copy(update={"width": 16384, "height": 16384})
     camera = SIM.cameras[0].model_copy(update={"region": huge})
     large = SIM.model_copy(
@@ -91,7 +91,7 @@ def test_buffers_that_do_not_fit_fail() -> None:
             "trigger": SIM.trigger.model_copy(update={"rate_hz": 1000.0}),
         }
     )
-    (finding,) = memory.look_at_memory(large)
+    (finding,) = machine.look_at_memory(large)
     assert finding.level is Level.FAIL
 
 

@@ -1,4 +1,4 @@
-"""The doctor's look at FireWire cameras, and its trial of them, on the emulated bus."""
+"""The doctor examines and tries FireWire cameras on the emulated bus."""
 
 import json
 from collections.abc import Iterator
@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rig.rigfile import CONFIG, load_rig
-from rig.settings import RigSettings
-from simrig.faults import Fault, FaultKind
-from simrig.simulated_hill import SimulatedHill
+from rig.pulse import HillPulse
+from rig.settings.file import CONFIG, load_rig
+from rig.settings.model import RigSettings
+from simrig.programs.simulated_hill import SimulatedHill
+from simrig.world.faults import Fault, FaultKind
 from svev import cli
 from svev.doctor import firewire, firewire_cameras
 from svev.doctor.finding import Finding, Level
@@ -114,7 +115,7 @@ def test_lost_packets_and_overruns_are_found() -> None:
     """Faults come at every tenth pulse: some of them fall into the two seconds."""
     rig = one_camera()
     with bus(rig) as hill:
-        now = hill.train.next_index(hill.train.time(0))
+        now = hill.train.next_index(hill.train.time(HillPulse(0)))
         for pulse in range(now + 10, now + 2000, 20):
             hill.inject(Fault(kind=FaultKind.OVERRUN, camera="K1", at_pulse=pulse))
             hill.inject(Fault(kind=FaultKind.LOST_PACKETS, camera="K1", at_pulse=pulse + 10, packets=(50,)))
@@ -153,6 +154,20 @@ def test_the_command_refuses_a_rig_without_firewire() -> None:
     done = CliRunner().invoke(cli.command_line(), ["doctor", "--bus", "firewire", "--rig", str(rig)])
     assert done.exit_code == 3
     assert "has no FireWire camera" in done.stdout
+
+
+def test_a_bus_that_hangs_does_not_hang_the_doctor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(firewire, "LOOK_S", 0.05)
+    ((level, what, remedy),) = worst(list(firewire._ask(one_camera(), {}, trial=False)))
+    assert (level, what) == (Level.FAIL, "the FireWire bus did not answer within 0.05 s")
+    assert "cables out and in" in remedy
+
+
+def test_an_examination_that_fails_is_reported_by_the_last_line_that_it_wrote() -> None:
+    ((level, what, _),) = worst(list(firewire._ask(one_camera(), {"PYTHONHOME": "/nowhere"}, trial=False)))
+    assert level is Level.FAIL
+    assert what.startswith("FireWire cannot be examined: ")
+    assert "no reason given" not in what
 
 
 @pytest.mark.hardware

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import zmq
 
-from rig.rigfile import CONFIG, load_rig
-from rig.settings import RigSettings
+from rig.settings.file import CONFIG, load_rig
+from rig.settings.model import RigSettings
 from svev.doctor import network
 from svev.doctor.finding import Level
-from svev.doctor.interfaces import Interface, interface_to
+from svev.doctor.network import Interface, interface_to
 from tests.support.loopback import Loopback
 from tests.support.rigs import SIM, rig_with, write_rig
 
@@ -21,7 +21,7 @@ PORT = Interface("eth1", mtu=9000, speed_mbps=1000, network=IPv4Network("192.168
 
 
 def _fast(rig: RigSettings) -> RigSettings:
-    """The rig with pulses so fast that plain sockets would not do."""
+    """The rig with a pulse rate at which plain sockets are too slow."""
     return rig.model_copy(update={"trigger": rig.trigger.model_copy(update={"rate_hz": 500.0})})
 
 
@@ -109,7 +109,7 @@ def test_slow_cameras_need_no_packet_sockets(tmp_path: Path, loopback: Loopback)
 
 def test_without_the_right_packet_sockets_are_a_warning(tmp_path: Path, loopback: Loopback) -> None:
     program = (
-        "from pathlib import Path\nfrom rig.rigfile import load_rig\n"
+        "from pathlib import Path\nfrom rig.settings.file import load_rig\n"
         "from svev.doctor.network import look_at_packet_sockets\n"
         "from tests.svev.doctor.test_network import _fast\n"
         f"for finding in look_at_packet_sockets(_fast(load_rig(Path({str(write_rig(tmp_path, loopback))!r})))):\n"

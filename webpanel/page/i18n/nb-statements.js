@@ -1,6 +1,6 @@
 /**
- * What the service states and refuses, by code: text, and advice. The English stands in the service; a test looks
- * that every code is here. `{name}` is filled in from the statement's values.
+ * Statements and refusals of the service by code: text, and advice. The English ones are in the service; a test checks
+ * that every code is here. `{name}` is filled in from the values of the statement.
  *
  * @type {Record<string, [string, string?]>}
  */
@@ -51,7 +51,6 @@ export const statements = {
   request_timeout: ["kallet kom ikke fram i tide: sjekk forbindelsen, og prøv igjen"],
   range_not_satisfiable: ["filen er kortere enn det: last den ned på nytt"],
   unknown_camera: ["det finnes ikke noe kamera med dette navnet: last siden på nytt"],
-  too_many_downloads: ["for mange nedlastinger samtidig: vent til en av dem er ferdig"],
   svev: ["det gikk ikke: se i loggen hva som skjedde, og prøv igjen"],
   internal_error: ["en feil i svev selv: prøv igjen; det som skjedde, står i tjenestens logg"],
   login_required: ["logg inn med nøkkelen"],

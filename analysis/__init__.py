@@ -1,0 +1,1 @@
+"""From triplets to the jumper: what the images of a recording show."""

@@ -1,0 +1,1 @@
+"""Image measurement: where something moves, overviews of a recording."""

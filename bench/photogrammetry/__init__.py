@@ -1,0 +1,1 @@
+"""What adjustment, intersection and planning cost, beside scipy."""

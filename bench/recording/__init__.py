@@ -1,0 +1,1 @@
+"""What recording costs: beside GStreamer, part by part, on FireWire."""

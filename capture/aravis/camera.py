@@ -1,0 +1,243 @@
+"""GigE Vision cameras through Aravis 0.8, frames straight into the shared ring.
+
+Aravis writes the packets' payload to the address that it is given, so the recorder can read a frame the moment it is
+whole. Only a few empty buffers stand in Aravis's queue at a time, and free slots are taken lowest first: the same few
+slots are used over and over and stay in the processor's cache.
+
+The ids of a buffer whose status is not SUCCESS mean nothing: they may be those of its previous use.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import gi
+
+from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
+from capture.seam import Arrival
+from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
+from rig.errors import CameraError, CameraNotFoundError
+from rig.settings.model import CameraSettings, NetworkSettings
+from rig.transport.ring import CameraRing
+
+gi.require_version("Aravis", "0.8")
+from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
+
+# Aravis looks for GigE Vision cameras only: looking on USB too opens sockets and timers for the life of the process.
+for _interface in ("USB3Vision", "Fake"):
+    Aravis.disable_interface(_interface)
+
+# GigE Vision bootstrap registers (GigE Vision 2.0, section 28)
+_TIMESTAMP_FREQUENCY_HIGH, _TIMESTAMP_FREQUENCY_LOW = 0x093C, 0x0940
+_TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
+_TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
+
+_IDS_16_BIT = 65535
+_RETENTION_US = 50_000  # enough to ask for lost packets several times and to receive them
+# How many empty buffers stand in Aravis's queue: half a second of frames, but no more than stay in the cache.
+_QUEUE_S = 0.5
+_QUEUE_BYTES = 24 << 20
+_QUEUE_LEAST = 8
+
+
+class AravisCamera:
+    """One GigE Vision camera, triggered by its input line.
+
+    Raises:
+        CameraNotFoundError: nobody answers at the address.
+        CameraError: the camera is in use, lacks a feature, or has another frame size.
+    """
+
+    def __init__(self, settings: CameraSettings, network: NetworkSettings, ring: CameraRing, period_ns: int) -> None:
+        self._name, self._address, self._ring = settings.name, settings.address, ring
+        self._lost = False
+        self._plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
+        self._buffers: dict[int, int] = {}
+        self._of_slot: list[Aravis.Buffer] = []
+        self._in_aravis = 0
+        wanted = min(round(_QUEUE_S * NS_PER_S / period_ns), _QUEUE_BYTES // settings.frame_bytes)
+        self._depth = min(ring.slots, max(_QUEUE_LEAST, wanted))
+        try:
+            self._camera = Aravis.Camera.new(settings.address)
+        except GLib.Error as error:
+            raise _opening_error(settings, error) from None
+        try:
+            self._device = self._camera.get_device()
+            self._device.connect("control-lost", self._on_control_lost)
+            self._configure(settings, network)
+            self._tick_hz = self._timestamp_frequency()
+            self._stream = self._open_stream(network)
+        except GLib.Error as error:
+            self.close()
+            raise CameraError(
+                f"camera {self._name} at {self._address} refuses its settings: {error.message}; "
+                "check the rig file against the camera's manual"
+            ) from None
+        except CameraError:
+            self.close()
+            raise
+
+    @property
+    def description(self) -> str:
+        """Vendor, model, serial number and packet size."""
+        camera = self._camera
+        return (
+            f"{camera.get_vendor_name()} {camera.get_model_name()} serial {camera.get_device_serial_number()} "
+            f"at {self._address}, {camera.gv_get_packet_size()}-byte packets"
+        )
+
+    def start(self) -> None:
+        """See `capture.seam.Camera.start`."""
+        self._top_up()
+        try:
+            self._camera.start_acquisition()
+        except GLib.Error as error:
+            raise CameraError(f"camera {self._name} does not start: {error.message}; check its power") from None
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """See `capture.seam.Camera.receive`."""
+        if self._lost:
+            raise CameraError(f"camera {self._name} at {self._address} lost control; check power and cable")
+        self._top_up()
+        buffer = self._stream.timeout_pop_buffer(round(timeout_s * 1e6))
+        if buffer is None:
+            return None
+        now = host_now()
+        self._in_aravis -= 1
+        slot = self._buffers[hash(buffer)]
+        if buffer.get_status() != Aravis.BufferStatus.SUCCESS:
+            self._ring.return_slot(slot)
+            return Arrival(whole=False, host_time=now)
+        return Arrival(
+            True, now, slot, buffer.get_frame_id(), self._id_modulus, DeviceNs(buffer.get_timestamp())
+        )  # fmt: skip
+
+    def latch(self) -> ClockLatch:
+        """Read both clocks; the round trip is that of the register write that latches the device clock."""
+        try:
+            before = host_now()
+            self._device.write_register(_TIMESTAMP_CONTROL, _LATCH)
+            after = host_now()
+            ticks = self._read(_TIMESTAMP_HIGH) << 32 | self._read(_TIMESTAMP_LOW)
+        except GLib.Error as error:
+            raise CameraError(f"camera {self._name} does not tell its time: {error.message}") from None
+        device = DeviceNs(ticks * NS_PER_S // self._tick_hz)
+        return ClockLatch(device, HostNs((before + after) // 2), after - before)
+
+    def counters(self) -> Mapping[str, int]:
+        """Aravis's own counters of the stream, and the temperature if the camera has a sensor."""
+        stream = self._stream
+        counted = {
+            "underruns": stream.get_info_uint64_by_name("n_underruns"),
+            "resent_packets": stream.get_info_uint64_by_name("n_resent_packets"),
+            "missing_packets": stream.get_info_uint64_by_name("n_missing_packets"),
+        }
+        try:
+            if self._device.is_feature_available("DeviceTemperature"):
+                celsius = self._device.get_float_feature_value("DeviceTemperature")
+                counted["temperature_mdeg"] = max(0, round(celsius * 1000))
+        except GLib.Error as error:
+            raise CameraError(f"camera {self._name} does not answer: {error.message}") from None
+        return counted
+
+    def notices(self) -> Sequence[str]:
+        """None: Aravis reports nothing that is not counted."""
+        return ()
+
+    def close(self) -> None:
+        """Stop, leave control (or the next opening would wait for the heartbeat), and drop all Aravis objects."""
+        try:
+            self._camera.stop_acquisition()
+            self._device.leave_control()
+        except (AttributeError, GLib.Error):
+            # The camera was never fully opened, or it is dead: then its heartbeat runs out by itself.
+            pass
+        for name in ("_stream", "_device", "_camera"):
+            self.__dict__.pop(name, None)
+        self._buffers.clear()
+        self._of_slot.clear()
+        self._ring.reclaim()
+
+    def _on_control_lost(self, _device: object) -> None:
+        self._lost = True
+
+    def _configure(self, settings: CameraSettings, network: NetworkSettings) -> None:
+        """Set everything that must be set before the stream is made, in the order that cameras accept."""
+        camera, region = self._camera, settings.region
+        camera.set_region(region.x, region.y, region.width, region.height)
+        camera.set_pixel_format_from_string(settings.pixel_format)
+        camera.gv_set_packet_size(network.packet_size)
+        if self._plain_socket:
+            camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
+        camera.set_trigger(settings.trigger_input)
+        edge = {"rising": "RisingEdge", "falling": "FallingEdge"}[settings.trigger_edge]
+        self._device.set_string_feature_value("TriggerActivation", edge)
+        camera.set_exposure_mode(Aravis.ExposureMode.TIMED)
+        camera.set_exposure_time(settings.exposure_us)
+        if camera.is_gain_available():
+            camera.set_gain(settings.gain_db)
+        self._id_modulus = _IDS_16_BIT
+        if self._device.is_feature_available("GevGVSPExtendedIDMode"):
+            self._device.set_string_feature_value("GevGVSPExtendedIDMode", "On")
+            self._id_modulus = 0
+        payload = camera.get_payload()
+        if payload != self._ring.frame_bytes:
+            raise CameraError(
+                f"camera {self._name} sends {payload} bytes per frame, the rig file's region makes "
+                f"{self._ring.frame_bytes}: correct region and pixel_format of {self._name}"
+            )
+
+    def _open_stream(self, network: NetworkSettings) -> "Aravis.Stream":
+        stream = self._camera.create_stream(None, None)
+        if stream is None:
+            raise CameraError(f"camera {self._name}: no stream can be opened; check the network interface")
+        resend = Aravis.GvStreamPacketResend.ALWAYS if network.resend else Aravis.GvStreamPacketResend.NEVER
+        # A packet socket hands packets over in blocks of up to 5 ms: a shorter timeout asks for packets that have
+        # come already. A whole frame waits behind a damaged one for `frame-retention`.
+        packet_timeout_us = 3_000 if self._plain_socket else 8_000
+        for name, value in {
+            "packet-resend": resend,
+            "packet-timeout": packet_timeout_us,
+            "initial-packet-timeout": packet_timeout_us // 3,
+            "frame-retention": _RETENTION_US,
+            "packet-request-ratio": 1.0,  # a stall may lose most of a frame's packets: ask for all of them
+            "socket-buffer": Aravis.GvStreamSocketBuffer.FIXED,
+            "socket-buffer-size": SOCKET_BUFFER_BYTES,
+        }.items():
+            stream.set_property(name, value)
+        for slot in range(self._ring.slots):
+            buffer = Aravis.Buffer.new(self._ring.frame_bytes, self._ring.slot_address(slot))
+            self._buffers[hash(buffer)] = slot  # the hash is the address of the C object, which does not change
+            self._of_slot.append(buffer)
+        return stream
+
+    def _top_up(self) -> None:
+        """Fill Aravis's queue of empty buffers, as far as the recorder leaves slots free."""
+        while self._in_aravis < self._depth:
+            slot = self._ring.take_slot()
+            if slot is None:
+                return
+            self._stream.push_buffer(self._of_slot[slot])
+            self._in_aravis += 1
+
+    def _read(self, register: int) -> int:
+        return int(self._device.read_register(register))
+
+    def _timestamp_frequency(self) -> int:
+        frequency = self._read(_TIMESTAMP_FREQUENCY_HIGH) << 32 | self._read(_TIMESTAMP_FREQUENCY_LOW)
+        if frequency == 0:
+            raise CameraError(
+                f"camera {self._name} has no clock (timestamp frequency 0), so its frames cannot be tied to pulses: "
+                "use another camera or its newest firmware"
+            )
+        return frequency
+
+
+def _opening_error(settings: CameraSettings, error: GLib.Error) -> CameraError | CameraNotFoundError:
+    if "denied" in error.message or "control" in error.message.lower():
+        return CameraError(
+            f"camera {settings.name} at {settings.address} is controlled by another program: close that program, "
+            f"or wait 3 s for its heartbeat to run out ({error.message})"
+        )
+    return CameraNotFoundError(
+        f"camera {settings.name} at {settings.address} does not answer: check power, cable and address, "
+        f"then run: svev doctor ({error.message})"
+    )

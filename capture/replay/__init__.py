@@ -1,0 +1,1 @@
+"""Cameras that play a recorded log into the rig."""

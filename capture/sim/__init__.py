@@ -1,0 +1,1 @@
+"""Cameras inside the process, for tests and demonstrations."""

@@ -1,0 +1,1 @@
+"""The observation equations of a network: unknowns, residuals and derivatives."""

@@ -1,0 +1,1 @@
+"""The search for gross errors: hypotheses, suspicion, trial adjustments (snooping), robust solution, wording."""

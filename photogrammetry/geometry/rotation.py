@@ -1,0 +1,80 @@
+"""Rotations as 3x3 matrices with local increments: R' = R exp([d]x), d about the camera's own axes.
+
+The columns of R are the camera's axes r1, r2, r3 in the object system (paper, appendix A). Local increments have no
+singular attitude (gimbal lock). `sigma_angles` of results are the standard deviations of d.
+"""
+
+import numpy as np
+
+from rig.arrays import Floats, Numbers
+
+_SMALL = 1e-4  # rad; below it the power series are exact to the last bit
+
+
+def skew(vectors: Numbers) -> Numbers:
+    """Cross-product matrices (..., 3, 3) of vectors a (..., 3): [a]x b = a x b; complex numbers pass through."""
+    vectors = np.asarray(vectors)
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    matrices = np.zeros((*vectors.shape, 3), dtype=vectors.dtype)
+    matrices[..., 0, 1], matrices[..., 0, 2], matrices[..., 1, 2] = -z, y, -x
+    matrices[..., 1, 0], matrices[..., 2, 0], matrices[..., 2, 1] = z, -y, x
+    return matrices
+
+
+def rotation_from_vector(vectors: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
+    vectors = np.asarray(vectors, dtype=float)
+    square = np.sum(vectors * vectors, axis=-1)[..., None, None]
+    angle = np.sqrt(square)
+    small = angle < _SMALL
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
+    second = np.where(small, 0.5 - square / 24.0, 2.0 * (np.sin(safe / 2.0) / safe) ** 2)
+    cross = skew(vectors)
+    rotation: Floats = np.eye(3) + first * cross + second * (cross @ cross)
+    return rotation
+
+
+def vector_from_rotation(rotations: Floats) -> Floats:
+    """Rotation vectors (..., 3), rad, of length 0..pi: the inverse of `rotation_from_vector`."""
+    # From the row of 4 q q^T with the largest diagonal element: accurate at every angle, pi included.
+    r = np.asarray(rotations, dtype=float)
+    diagonal = np.diagonal(r, axis1=-2, axis2=-1)
+    trace = diagonal.sum(axis=-1)
+    squares = np.concatenate([trace[..., None], diagonal], axis=-1)
+    off = np.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1)
+    outer = r + np.swapaxes(r, -1, -2)
+    full = np.empty((*trace.shape, 4, 4))  # 4 q q^T
+    full[..., 0, 0] = 1.0 + trace
+    full[..., 0, 1:] = full[..., 1:, 0] = off
+    full[..., 1:, 1:] = outer + (1.0 - trace)[..., None, None] * np.eye(3)
+    pick = np.argmax(squares, axis=-1)
+    quaternion = np.take_along_axis(full, pick[..., None, None], axis=-2)[..., 0, :]
+    quaternion = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    quaternion = np.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)
+    sine = np.linalg.norm(quaternion[..., 1:], axis=-1)
+    angle = 2.0 * np.arctan2(sine, quaternion[..., 0])
+    factor = np.where(sine < _SMALL, 2.0 / np.maximum(quaternion[..., 0], 0.5), angle / np.where(sine > 0.0, sine, 1.0))
+    vector: Floats = factor[..., None] * quaternion[..., 1:]
+    return vector
+
+
+def increment_jacobian(vector: Floats) -> Floats:
+    """Derivative (3, 3) of log(R exp([d]x)) by d at d = 0 (inverse right Jacobian), for vector (3,) = log(R)."""
+    angle = float(np.linalg.norm(vector))
+    cross = skew(vector)
+    second = 1.0 / 12.0
+    if angle >= _SMALL:
+        second = 1.0 / angle**2 - (1.0 + np.cos(angle)) / (2.0 * angle * np.sin(angle))
+    jacobian: Floats = np.eye(3) + 0.5 * cross + second * (cross @ cross)
+    return jacobian
+
+
+def nearest_rotation(matrix: Floats) -> Floats:
+    """The rotations (..., 3, 3) nearest to matrices with positive determinant (Frobenius norm)."""
+    left, _, right = np.linalg.svd(matrix)
+    sign = np.linalg.det(left @ right)
+    left = left.copy()
+    left[..., :, 2] *= sign[..., None]
+    nearest: Floats = left @ right
+    return nearest

@@ -1,1 +1,0 @@
-"""Protocols of adjustments, as text and as one self-contained HTML page."""

@@ -1,0 +1,166 @@
+"""A report as data (sections of paragraphs, tables and drawings), as plain text, and as one HTML page.
+
+The page needs no other file. It is made for light and dark screens, phones and paper.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from itertools import groupby
+from pathlib import Path
+
+_LIGHT = (
+    "--paper:#fff;--ink:#1c2227;--soft:#5d6871;--faint:#dde2e6;--fill:#f3f5f7;"
+    "--blue:#1a66b0;--red:#c2321f;--green:#23803c;--amber:#b26a00"
+)
+_DARK = (
+    "--paper:#15191d;--ink:#e6eaed;--soft:#9ba7b1;--faint:#333b43;--fill:#1e242a;"
+    "--blue:#6cb2f5;--red:#ff8070;--green:#63c583;--amber:#e5ab45"
+)
+_STYLE = f"""
+:root{{color-scheme:light dark;{_LIGHT}}}
+@media screen and (prefers-color-scheme:dark){{:root{{{_DARK}}}}}
+*{{box-sizing:border-box}}
+body{{font:16px/1.5 system-ui,sans-serif;background:var(--paper);color:var(--ink);max-width:62rem;margin:auto;\
+padding:1rem;overflow-wrap:break-word}}
+h1{{font-size:1.6rem;line-height:1.2;margin:.5rem 0 1.5rem}}
+h2{{font-size:1.2rem;margin:2.2rem 0 .6rem;padding-bottom:.2rem;border-bottom:2px solid var(--faint)}}
+p{{margin:.4rem 0}}
+.table{{overflow-x:auto;margin:.8rem 0;background:\
+linear-gradient(90deg,var(--paper) 50%,transparent) 0 0/2rem 100% no-repeat local,\
+linear-gradient(-90deg,var(--paper) 50%,transparent) 100% 0/2rem 100% no-repeat local,\
+linear-gradient(90deg,var(--faint),transparent) 0 0/.8rem 100% no-repeat,\
+linear-gradient(-90deg,var(--faint),transparent) 100% 0/.8rem 100% no-repeat}}
+table{{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}}
+th,td{{padding:.2rem .7rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--faint)}}
+th{{color:var(--soft);font-weight:600}}
+th:first-child,td:first-child{{text-align:left;padding-left:0}}
+@media(max-width:40rem){{table{{font-size:.8rem}}th,td{{padding:.2rem .35rem}}}}
+.drawings{{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1.2rem;margin:1rem 0}}
+figure{{margin:0;min-width:0;break-inside:avoid}}
+figcaption{{color:var(--soft);font-size:.85rem;line-height:1.35;margin-top:.3rem}}
+svg{{display:block;width:100%;height:auto;background:var(--fill);border-radius:.3rem;fill:currentColor;stroke:none}}
+svg text{{font:10px system-ui,sans-serif;fill:var(--soft)}}
+svg line,svg polyline,svg ellipse,svg circle[fill=none]{{stroke:currentColor}}
+{"".join(f".{name}{{color:var(--{name})}}" for name in ("ink", "soft", "faint", "blue", "red", "green", "amber"))}
+@media print{{:root{{font-size:10pt}}body{{font-size:10pt;max-width:none;padding:0}}table{{font-size:.75rem}}\
+th,td{{padding:.1rem .4rem}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
+h2{{break-after:avoid}}.drawings{{grid-template-columns:1fr 1fr}}svg{{border:1px solid var(--faint)}}}}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table; its numbers are formatted already.
+
+    Attributes:
+        head: names of the columns.
+        rows: each with as many cells as the head.
+    """
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A drawing for the page.
+
+    Attributes:
+        caption: what it shows.
+        svg: the drawing.
+        text: lines that replace it in plain text; most drawings have none.
+    """
+
+    caption: str
+    svg: str
+    text: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section of a report."""
+
+    title: str
+    parts: tuple[str | Table | Drawing, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A whole report."""
+
+    title: str
+    sections: tuple[Section, ...]
+
+
+def as_text(report: Report) -> str:
+    """The report as plain text."""
+    lines = [report.title, "=" * len(report.title)]
+    for section in report.sections:
+        if all(isinstance(part, Drawing) and not part.text for part in section.parts):
+            continue
+        lines += ["", section.title, "-" * len(section.title)]
+        for part in section.parts:
+            if isinstance(part, str):
+                lines.append(part)
+            else:
+                lines += _text_table(part) if isinstance(part, Table) else part.text
+    return "\n".join(lines) + "\n"
+
+
+def _text_table(table: Table) -> list[str]:
+    rows = [table.head, *table.rows]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(table.head))]
+    return ["  " + "  ".join(_padded(row, widths)).rstrip() for row in rows]
+
+
+def _padded(row: Sequence[str], widths: Sequence[int]) -> list[str]:
+    first = row[0].ljust(widths[0])
+    return [first, *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+
+
+def write_report(report: Report, folder: Path) -> tuple[Path, Path]:
+    """Write `protocol.txt` and `protocol.html` into a folder, which is created if it does not exist.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    text, page = folder / "protocol.txt", folder / "protocol.html"
+    text.write_text(as_text(report), encoding="utf-8")
+    page.write_text(as_html(report), encoding="utf-8")
+    return text, page
+
+
+def as_html(report: Report) -> str:
+    """The report as one page."""
+    body = [
+        f"<h1>{escape(report.title)}</h1>",
+        *(line for section in report.sections for line in _section(section)),
+    ]
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(report.title)}</title><style>{_STYLE}</style>"
+    )
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(body) + "\n</body></html>\n"
+
+
+def _section(section: Section) -> list[str]:
+    """The lines of a section; successive drawings form a grid."""
+    lines = [f"<h2>{escape(section.title)}</h2>"]
+    for drawn, parts in groupby(section.parts, lambda part: isinstance(part, Drawing)):
+        lines += ['<div class="drawings">'] if drawn else []
+        lines += [_part(part) for part in parts]
+        lines += ["</div>"] if drawn else []
+    return lines
+
+
+def _part(part: str | Table | Drawing) -> str:
+    if isinstance(part, str):
+        return f"<p>{escape(part)}</p>"
+    if isinstance(part, Drawing):
+        return f"<figure>{part.svg}<figcaption>{escape(part.caption)}</figcaption></figure>"
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in part.head)
+    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in part.rows)
+    # a wide table scrolls within its box, also by keyboard; a shade at its edge shows that there is more
+    return f'<div class="table" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'

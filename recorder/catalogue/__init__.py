@@ -1,0 +1,1 @@
+"""The recordings of a folder: list, session fields, trash."""

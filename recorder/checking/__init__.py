@@ -1,0 +1,1 @@
+"""Checks a log from the first to the last byte."""

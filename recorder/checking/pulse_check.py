@@ -1,0 +1,136 @@
+"""Checks the messages of a log: tags against each other, images against their tags, events, health."""
+
+import json
+from collections.abc import Callable
+
+from google.protobuf.message import DecodeError
+
+from recorder.reading.log_reader import Chunk, Message
+from recorder.reading.triplets import ImageView, pixels, view_image
+from rig.clocks import UtcNs
+from rig.events import Event
+from rig.frame import FrameStatus
+from rig.tag import TripletTag
+from rig.topics import EVENTS, HEALTH, TAG, TRIPLET
+from triggering.ledger import Ledger
+
+_EVENTS_MAX = 1000
+
+
+class PulseCheck:
+    """Checks chunk after chunk, in the order of the log; only chunks without a flaw.
+
+    Args:
+        report: called with each finding.
+
+    Attributes:
+        ledger: what became of every pulse.
+        events: the events, the first thousand.
+    """
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self.ledger = Ledger()
+        self.events: list[Event] = []
+        self._report = report
+        self._cameras: tuple[tuple[str, tuple[int, int]], ...] | None = None
+        self._without_image: dict[int, TripletTag] = {}
+
+    def take(self, chunk: Chunk) -> None:
+        """Check a chunk's messages. A tag must stand before its image, in the same chunk or an earlier one."""
+        for message in chunk.messages:
+            match message.topic:
+                case TAG.name:
+                    self._tag(message)
+                case TRIPLET.name:
+                    self._image(message)
+                case EVENTS.name:
+                    self._event(message)
+                case HEALTH.name:
+                    self._health(message)
+
+    def finish(self) -> None:
+        """Report what can be known only at the end of the log: images that never came, pulses out of order."""
+        for pulse, tag in self._without_image.items():
+            if any(camera.status is FrameStatus.OK for camera in tag.cameras):
+                self._report(f"pulse {pulse}: its tag says that frames came, but there is no image")
+        for pulse in self.ledger.out_of_order:
+            self._report(f"pulse {pulse}: tagged a second time, or out of order")
+
+    def _tag(self, message: Message) -> None:
+        try:
+            data = bytes(message.data or b"")
+            tag = TripletTag.decode(data)
+            says_complete = json.loads(data)["complete"]
+        except (ValueError, KeyError, TypeError) as error:
+            self._report(f"pulse {message.sequence}: its tag cannot be read ({error!r})")
+            return
+        if flaw := self._tag_flaw(tag, message, says_complete):
+            self._report(f"pulse {tag.pulse}: {flaw}")
+        self.ledger.add(tag)
+        self._without_image[tag.pulse] = tag
+
+    def _tag_flaw(self, tag: TripletTag, message: Message, says_complete: object) -> str:
+        cameras = tuple((camera.name, camera.columns) for camera in tag.cameras)
+        self._cameras = self._cameras or cameras
+        earlier = self.ledger.last_time
+        blocks = [camera.columns for camera in tag.cameras]
+        flaws = (
+            (tag.pulse != message.sequence, f"its tag stands in the message of pulse {message.sequence}"),
+            (tag.time != message.publish_time, "the time in its tag is not that of its message"),
+            (says_complete is not tag.complete, 'its tag says "complete", its cameras say otherwise'),
+            (cameras != self._cameras, "its tag names other cameras or columns than the first tag of the log"),
+            (
+                not _side_by_side(blocks, tag.shape[1]),
+                "its cameras' columns do not lie side by side over the whole width",
+            ),
+            (earlier is not None and tag.time <= earlier, "it is not later than the pulse before it"),
+        )
+        return next((text for wrong, text in flaws if wrong), "")
+
+    def _image(self, message: Message) -> None:
+        tag = self._without_image.pop(message.sequence, None)
+        try:
+            image = view_image(message.data or memoryview(b""))
+        except ValueError as error:
+            self._report(f"pulse {message.sequence}: its image cannot be read ({error})")
+            return
+        flaw = "it has an image, but no tag before it" if tag is None else _image_flaw(image, tag, message.publish_time)
+        if flaw:
+            self._report(f"pulse {message.sequence}: {flaw}")
+
+    def _event(self, message: Message) -> None:
+        try:
+            event = Event.from_protobuf(message.data or b"")
+        except (DecodeError, ValueError, KeyError) as error:
+            self._report(f"event {message.sequence}: cannot be read ({error})")
+            return
+        if len(self.events) < _EVENTS_MAX:
+            self.events.append(event)
+
+    def _health(self, message: Message) -> None:
+        try:
+            json.loads(bytes(message.data or b""))
+        except ValueError as error:
+            self._report(f"health record {message.sequence}: cannot be read ({error})")
+
+
+def _side_by_side(columns: list[tuple[int, int]], width: int) -> bool:
+    """Whether the blocks of columns, (first, end), cover the width once, left to right."""
+    ends = [0, *(end for _, end in columns)]
+    return ends[-1] == width and all(first == end < last for end, (first, last) in zip(ends, columns, strict=False))
+
+
+def _image_flaw(image: ImageView, tag: TripletTag, publish_time: UtcNs) -> str:
+    if (image.rows, image.columns) != tag.shape:
+        return f"its image is {image.rows} x {image.columns}, its tag says {tag.shape[0]} x {tag.shape[1]}"
+    try:
+        everything = pixels(image)
+    except ValueError as error:
+        return str(error)
+    if image.time != tag.time or image.time != publish_time:
+        return "the time in its image is not that of its tag"
+    for camera in tag.cameras:
+        first, end = camera.columns
+        if camera.status is not FrameStatus.OK and everything[:, first:end].any():
+            return f"{camera.name} is {camera.status.value}, but its block of the image is not black"
+    return ""

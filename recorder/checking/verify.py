@@ -1,0 +1,148 @@
+"""Checks a log from the first to the last byte and says, pulse by pulse, what is missing."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from recorder.checking.pulse_check import PulseCheck
+from recorder.checking.structure_check import StructureCheck
+from recorder.reading.info import known_lost
+from recorder.reading.log_reader import Chunk, Item, LogReader
+from recorder.reading.records import Damage
+from rig.events import Event
+from rig.transport import wire
+from triggering.ledger import Ledger, numbers
+
+_PULSES_MAX = 10_000
+_FINDINGS_MAX = 500
+
+
+class Findings:
+    """What a check found wrong, one sentence each; keeps the first 500.
+
+    Attributes:
+        total: number of findings, kept or not.
+    """
+
+    def __init__(self) -> None:
+        self.total = 0
+        self._kept: list[str] = []
+
+    def add(self, text: str) -> None:
+        """Note one finding."""
+        self.total += 1
+        if len(self._kept) < _FINDINGS_MAX:
+            self._kept.append(text)
+
+    def lines(self) -> tuple[str, ...]:
+        """The findings that were kept; if there are more, the last line says how many."""
+        more = self.total - len(self._kept)
+        return (*self._kept, f"and {more} more") if more else tuple(self._kept)
+
+
+class Verdict(StrEnum):
+    """The result of `verify` in one word."""
+
+    CLEAN = "clean"  #: every pulse complete, everything consistent
+    PARTIAL = "partial"  #: consistent; some pulses lack frames, and their tags say which and why
+    DAMAGED = "damaged"  #: not closed, unreadable in part, or inconsistent
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyReport:
+    """What `verify` found.
+
+    Attributes:
+        path: the log.
+        bytes: size of the file.
+        closed: the log was closed properly.
+        truncated: the log ends in the middle of a record.
+        ledger: what became of every pulse.
+        findings: what is wrong with the log itself, one sentence each.
+        known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
+        events: events in the log, the first thousand.
+    """
+
+    path: Path
+    bytes: int
+    closed: bool
+    truncated: bool
+    ledger: Ledger
+    findings: tuple[str, ...]
+    events: tuple[Event, ...]
+    known_lost: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """DAMAGED if the log is not sound, otherwise CLEAN if every pulse is complete, otherwise PARTIAL."""
+        if self.findings or not self.closed or not set(self.ledger.missing) <= set(self.known_lost):
+            return Verdict.DAMAGED
+        whole = self.ledger.complete == self.ledger.pulses and not self.ledger.missing
+        return Verdict.CLEAN if whole else Verdict.PARTIAL
+
+    @property
+    def damaged(self) -> bool:
+        """Whether the log is not sound."""
+        return self.verdict is Verdict.DAMAGED
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as one JSON object."""
+        return {
+            "log": str(self.path),
+            "verdict": self.verdict.value,
+            "closed": self.closed,
+            "truncated": self.truncated,
+            **self.ledger.counts().model_dump(),
+            "bytes": self.bytes,
+            "missing_pulses": numbers(self.ledger.missing, _PULSES_MAX),
+            "incomplete_pulses": [pulse.to_json() for pulse in self.ledger.incomplete[:_PULSES_MAX]],
+            "findings": list(self.findings),
+            "events": [wire.to_builtins(event) for event in self.events],
+        }
+
+
+def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyReport:
+    """Read and check everything: checksums, indexes, summary, tags against images, pulses without gaps.
+
+    Args:
+        path: the log.
+        progress: called with the number of bytes read so far.
+
+    Raises:
+        BadInputError: no such file, no MCAP log, or not one of ours.
+    """
+    findings = Findings()
+    with LogReader(path) as reader:
+        pulses, structure = PulseCheck(findings.add), StructureCheck(reader, findings.add)
+        for item in reader.items():
+            if text := _flaw(item):
+                findings.add(text)
+            elif isinstance(item, Chunk):
+                pulses.take(item)
+            structure.take(item)
+            if progress is not None:
+                progress(item.offset + item.length)
+        pulses.finish()
+        structure.finish()
+        if not reader.closed:
+            findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
+        return VerifyReport(
+            path, reader.size, reader.closed, reader.truncated, pulses.ledger, findings.lines(), tuple(pulses.events),
+            known_lost(reader),
+        )  # fmt: skip
+
+
+def _flaw(item: Item) -> str:
+    """What is wrong with an item of the log, empty if nothing."""
+    match item:
+        case Damage(torn=True):
+            return f"the last {item.length} bytes, from byte {item.offset} on, are an unfinished record"
+        case Damage():
+            return f"{item.length} bytes from byte {item.offset} on: {item.text}"
+        case Chunk(flaw=flaw) if flaw:
+            pulses = sorted({message.sequence for message in item.messages})
+            about = f" (pulse {pulses[0]}?)" if pulses else ""
+            return f"chunk at byte {item.offset}{about}: {flaw}"
+    return ""

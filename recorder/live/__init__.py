@@ -1,0 +1,1 @@
+"""The recorder process while it runs: cameras' rings in, triplets, pre-roll and recordings out."""

@@ -1,0 +1,280 @@
+"""Makes triplets of the cameras' frames: copies each frame once, into its column block of its pulse's triplet.
+
+The assembler copies a frame as soon as it arrives, while the frame is still in the processor's cache, and frees the
+camera's slot at once. If the disk is behind and no triplet buffer is free, frames wait in the cameras' rings.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from msgspec import UNSET
+from numpy.typing import NDArray
+
+from recorder.log.triplet_buffers import TripletBuffers
+from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
+from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
+from rig.settings.model import RigSettings
+from rig.tag import CameraTag
+from rig.transport.messages import CameraChanged, CameraNews
+from rig.transport.ring import CameraRing
+from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
+
+#: A pulse waits for its frames: exposure, transport, Aravis's retention of damaged frames, and some periods.
+_HOLD_PERIODS: Final = 4
+_HOLD_NS: Final = 130_000_000
+#: A grabber needs less than this from handing a slot over to queueing the record that names it.
+_STRANDED_NS: Final = NS_PER_S
+
+
+def hold_ns(period_ns: int) -> int:
+    """The longest time from a pulse to the decision what became of it, ns."""
+    return _HOLD_NS + _HOLD_PERIODS * period_ns
+
+
+def least_buffers(period_ns: int) -> int:
+    """Least number of triplet buffers: with fewer, pulses that wait for a dead camera could hold all of them."""
+    return 2 * (hold_ns(period_ns) // period_ns + 1)
+
+
+#: Kinds of records that only a connected camera makes.
+_STREAMING: Final = (RecordKind.FRAME, RecordKind.DAMAGED, RecordKind.LATCH)
+
+
+class _Composition:
+    """The triplet of a pulse while its frames are copied together: the cargo of its `OpenPulse`.
+
+    Attributes:
+        slot: triplet buffer; None as long as no buffer is free.
+        pending: camera and record of the frames that wait for the buffer in their rings.
+    """
+
+    __slots__ = ("pending", "slot")
+
+    def __init__(self) -> None:
+        self.slot: int | None = None
+        self.pending: list[tuple[int, Record]] = []
+
+
+@dataclass(frozen=True, slots=True)
+class Triplet:
+    """A decided pulse with its pixels.
+
+    Attributes:
+        pulse: what became of the pulse in every camera.
+        slot: triplet buffer, which the caller releases; blocks of missing frames are black. None if no frame came.
+    """
+
+    pulse: ClosedPulse
+    slot: int | None
+
+
+class Assembler:
+    """Reads the rings, pairs frames by pulse, composes the triplets.
+
+    Args:
+        rig: the rig.
+        rings: one per camera, in the rig's order.
+        buffers: memory in which the triplets are composed.
+
+    Attributes:
+        rig: as given.
+        buffers: as given.
+        pairer: decides which frame belongs to which pulse.
+        hold_ns: the longest time from a pulse to its decision, ns.
+        connected: for each camera, whether it is connected.
+    """
+
+    def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], buffers: TripletBuffers) -> None:
+        self.rig, self.buffers, self._rings = rig, buffers, rings
+        self._names = [camera.name for camera in rig.cameras]
+        self._columns = rig.columns()
+        self._shapes = [(camera.region.height, camera.region.width) for camera in rig.cameras]
+        self._blocks: dict[int, list[NDArray[np.uint8]]] = {}
+        self._waiting: list[_Composition] = []
+        self._decided: deque[ClosedPulse] = deque()
+        self._changes: list[CameraChanged] = []
+        self._asked = [False] * len(rings)
+        self._heard = [False] * len(rings)
+        # A recorder that died may have left slots that no record names, which nobody would ever free. A grabber may
+        # just be about to queue the record of such a slot, so the slot is freed only if none has come until then.
+        self._stranded = [ring.queued_slots() - ring.unread_slots() for ring in rings]
+        self._stranded_at = HostNs(host_now() + _STRANDED_NS)
+        period = rig.trigger.period_ns
+        self.hold_ns = hold_ns(period)
+        self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns)
+        self.connected = [False] * len(rings)
+
+    def pump(self, now: HostNs) -> list[Triplet]:
+        """Read the records that the grabbers have queued, and copy their frames.
+
+        Args:
+            now: present time of the host's clock.
+
+        Returns:
+            The pulses that are now decided, in order.
+        """
+        self._serve_waiting()
+        for camera in range(len(self._rings)):
+            self._read(camera)
+        # A camera whose frame waits for a buffer has unread records. The pairer must not see a later time than that
+        # frame's, or it would take the unread frames for missing ones.
+        waiting = [record.host_time for part in self._waiting for _, record in part.pending]
+        self._decided.extend(self.pairer.advance(min(waiting, default=now)))
+        self._ask_silent_cameras(now)
+        self._free_stranded_slots(now)
+        return list(self._ready())
+
+    def _ready(self) -> Iterator[Triplet]:
+        """The decided pulses up to the first one of which a frame is not copied yet."""
+        while self._decided:
+            part = self._decided[0].cargo
+            if isinstance(part, _Composition) and part.pending:
+                return
+            pulse = self._decided.popleft()
+            slot = part.slot if isinstance(part, _Composition) else None
+            if slot is not None:
+                self._blacken(pulse, slot)
+            yield Triplet(pulse, slot)
+
+    @property
+    def backlog(self) -> bool:
+        """Whether a frame waits for a free triplet buffer; no doorbell rings when the disk frees one."""
+        return bool(self._waiting)
+
+    def changes(self) -> list[CameraChanged]:
+        """What cameras have become since the last call: connected, silent, gone."""
+        changes, self._changes = self._changes, []
+        return changes
+
+    def disconnected(self, camera: int, reason: str, time: HostNs) -> None:
+        """Note that a camera is gone: its grabber says so, or the grabber process died without a record of it."""
+        self.pairer.disconnected(camera, time)
+        self.connected[camera] = False
+        self._changes.append(CameraChanged(camera=camera, news=CameraNews.GONE, text=reason))
+
+    def camera_tags(self, pulse: ClosedPulse, anchor: UtcAnchor) -> tuple[CameraTag, ...]:
+        """The cameras' parts of a pulse's tag.
+
+        Args:
+            pulse: a decided pulse.
+            anchor: the recording's relation of host time to UTC.
+        """
+        return tuple(self._camera_tags(pulse, anchor))
+
+    def _camera_tags(self, pulse: ClosedPulse, anchor: UtcAnchor) -> Iterator[CameraTag]:
+        for name, columns, outcome in zip(self._names, self._columns, pulse.outcomes, strict=True):
+            record = outcome.record
+            if outcome.status is not FrameStatus.OK or record is None:
+                yield CameraTag(name, columns, outcome.status)
+                continue
+            triggers = None if record.trigger_count < 0 else record.trigger_count
+            offset = None if outcome.offset_ns is None else outcome.offset_ns / NS_PER_US
+            host = anchor.utc(record.host_time)
+            pixels = StampedPixels.from_value(record.value)
+            stamped = UNSET if pixels is None else (pixels.row, columns[0] + pixels.column, pixels.count)
+            yield CameraTag(
+                name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset, stamped
+            )  # fmt: skip
+
+    def _read(self, camera: int) -> None:
+        """Read the records of one camera, up to a frame that has to wait for a buffer."""
+        ring = self._rings[camera]
+        while not self._is_waiting(camera) and (record := ring.get()) is not None:
+            if not self._heard[camera]:
+                self._hear_first(camera, record)
+            if record.kind is not RecordKind.FRAME:
+                self._note(camera, record)
+                continue
+            self._stranded[camera].discard(record.slot)
+            if (pulse := self.pairer.frame(camera, record)) is None:
+                ring.release(record.slot)
+            else:
+                self._place(camera, record, pulse)
+
+    def _hear_first(self, camera: int, record: Record) -> None:
+        """If the first record is of a streaming camera, this recorder has replaced one that crashed."""
+        self._heard[camera] = record.kind in (*_STREAMING, RecordKind.CONNECTED, RecordKind.DISCONNECTED)
+        if record.kind in _STREAMING:
+            self._join(camera, record, "streaming since before the recorder was started")
+
+    def _join(self, camera: int, record: Record, text: str) -> None:
+        self.pairer.connected(camera, record.epoch, record.host_time)
+        self.connected[camera] = True
+        self._changes.append(CameraChanged(camera=camera, news=CameraNews.CONNECTED, text=text))
+
+    def _is_waiting(self, camera: int) -> bool:
+        return any(camera == waiting for part in self._waiting for waiting, _ in part.pending)
+
+    def _note(self, camera: int, record: Record) -> None:
+        """Handle a record that is not of a whole frame."""
+        match record.kind:
+            case RecordKind.DAMAGED:
+                self.pairer.damaged(camera, record)
+            case RecordKind.LATCH:
+                self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
+            case RecordKind.CONNECTED:
+                self._join(camera, record, record.text)
+            case RecordKind.DISCONNECTED:
+                self.disconnected(camera, record.text, record.host_time)
+            case RecordKind.NOTICE:
+                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, text=record.text))
+
+    def _place(self, camera: int, record: Record, pulse: OpenPulse) -> None:
+        """Copy a frame into its triplet, or let it wait in its ring until a buffer is free."""
+        part = pulse.cargo
+        if not isinstance(part, _Composition):
+            part = pulse.cargo = _Composition()
+            part.slot = self.buffers.acquire()
+        if part.slot is not None:
+            self._copy(camera, record, part.slot)
+            return
+        part.pending.append((camera, record))
+        if part not in self._waiting:
+            self._waiting.append(part)
+
+    def _serve_waiting(self) -> None:
+        """Give buffers that have become free to the pulses that wait for one, first come, first served."""
+        while self._waiting and (slot := self.buffers.acquire()) is not None:
+            part = self._waiting.pop(0)
+            part.slot = slot
+            for camera, record in part.pending:
+                self._copy(camera, record, slot)
+            part.pending.clear()
+
+    def _copy(self, camera: int, record: Record, slot: int) -> None:
+        frame = self._rings[camera].frame(record.slot).reshape(self._shapes[camera])
+        np.copyto(self._blocks_of(slot)[camera], frame)
+        self._rings[camera].release(record.slot)
+
+    def _blocks_of(self, slot: int) -> list[NDArray[np.uint8]]:
+        """Views of the cameras' column blocks of one buffer, made once."""
+        if slot not in self._blocks:
+            pixels = self.buffers.pixels(slot)
+            self._blocks[slot] = [pixels[:, first:end] for first, end in self._columns]
+        return self._blocks[slot]
+
+    def _blacken(self, pulse: ClosedPulse, slot: int) -> None:
+        for block, outcome in zip(self._blocks_of(slot), pulse.outcomes, strict=True):
+            if outcome.status is not FrameStatus.OK:
+                block.fill(0)
+
+    def _free_stranded_slots(self, now: HostNs) -> None:
+        """Free the slots that a recorder which died had in hand, as soon as it is certain which ones these are."""
+        if now < self._stranded_at:
+            return
+        for ring, slots in zip(self._rings, self._stranded, strict=True):
+            while slots:
+                ring.release(slots.pop())
+
+    def _ask_silent_cameras(self, now: HostNs) -> None:
+        """Once per silence, ask the grabber to connect its camera again."""
+        silent = {*self.pairer.silent(), *self.pairer.overdue(now)}
+        for camera, ring in enumerate(self._rings):
+            if camera in silent and not self._asked[camera]:
+                ring.request_reconnect()
+                text = "three pulses behind the other cameras; looking after it"
+                self._changes.append(CameraChanged(camera=camera, news=CameraNews.SILENT, text=text))
+            self._asked[camera] = camera in silent

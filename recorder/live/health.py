@@ -1,0 +1,91 @@
+"""Measures the state of the recorder: makes the health record of every second."""
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import accumulate
+from pathlib import Path
+from statistics import median
+from typing import Any, Final
+
+from rig.clocks import NS_PER_S, NS_PER_US
+from rig.disk import free_bytes
+from rig.health import CameraHealth, DiskHealth, Health, Latency
+from rig.settings.model import RigSettings
+from rig.transport.ring import CameraRing
+from triggering.pairing.pairer import ClosedPulse
+
+_LATE_PULSES: Final = 30
+#: Upper bounds, s. Fixed, so that figures of different days and machines can be added up.
+_BUCKETS_S: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+
+
+class LatencyHistogram:
+    """Counts, in fixed buckets, how long triplets take from their last frame in memory to disk and subscribers."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * (len(_BUCKETS_S) + 1)
+        self._sum_s = 0.0
+
+    def add(self, latency_ns: int) -> None:
+        """Count one triplet."""
+        seconds = latency_ns / NS_PER_S
+        place = sum(seconds > bound for bound in _BUCKETS_S)
+        self._counts[place] += 1
+        self._sum_s += seconds
+
+    def figures(self) -> Latency:
+        """Counts up to each bound, cumulative, as Prometheus wants them."""
+        names = [*(f"{bound:g}" for bound in _BUCKETS_S), "+Inf"]
+        buckets = dict(zip(names, accumulate(self._counts), strict=True))
+        return Latency(buckets, round(self._sum_s, 6), sum(self._counts))
+
+
+class HealthMonitor:
+    """Collects measurements while pulses come, and makes a record of them once a second.
+
+    Args:
+        rig: the rig.
+        rings: one per camera.
+        directory: folder of the recordings.
+
+    Attributes:
+        latency: times from a triplet's last frame in memory until the triplet is handed on.
+    """
+
+    def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], directory: Path) -> None:
+        self._names, self._rings, self._directory = [camera.name for camera in rig.cameras], rings, directory
+        self._frames_before = [ring.counters()["frames"] for ring in rings]
+        self._offsets: list[deque[int]] = [deque(maxlen=_LATE_PULSES) for _ in rings]
+        self.latency = LatencyHistogram()
+
+    def pulse(self, pulse: ClosedPulse) -> None:
+        """Note the cameras' trigger offsets of a decided pulse."""
+        for kept, outcome in zip(self._offsets, pulse.outcomes, strict=True):
+            if outcome.offset_ns is not None:
+                kept.append(outcome.offset_ns)
+
+    def record(self, connected: Sequence[bool], **others: Any) -> Health:
+        """The record for the second that ends now.
+
+        Args:
+            connected: for each camera, whether it is connected.
+            others: the fields of `rig.health.Health` that other objects measure.
+        """
+        cameras = tuple(self._camera(index, is_there) for index, is_there in enumerate(connected))
+        disk = DiskHealth(free_bytes(self._directory))
+        return Health(cameras=cameras, disk=disk, latency=self.latency.figures(), **others)
+
+    def _camera(self, index: int, connected: bool) -> CameraHealth:
+        counters = self._rings[index].counters()
+        # A grabber that was started again counts from zero.
+        rate = max(0, counters["frames"] - self._frames_before[index])
+        self._frames_before[index] = counters["frames"]
+        offsets, millidegrees = self._offsets[index], counters["temperature_mdeg"]
+        return CameraHealth(
+            name=self._names[index],
+            connected=connected,
+            frames_per_s=rate,
+            clock_offset_us=round(median(offsets) / NS_PER_US, 3) if offsets and connected else None,
+            temperature_c=millidegrees / 1000 if millidegrees else None,
+            **counters,
+        )

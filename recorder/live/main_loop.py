@@ -1,0 +1,166 @@
+"""The main loop of the recorder process: reads the rings, obeys commands, writes and publishes, reports.
+
+The commands are `rig.transport.messages.RecorderCommand`, the reports `RecorderReport`.
+"""
+
+import os
+import select
+from collections.abc import Callable
+from typing import Final
+
+from recorder.live.assembler import Assembler, Triplet, least_buffers
+from recorder.live.health import HealthMonitor
+from recorder.live.preroll import Preroll, preroll_triplets
+from recorder.live.recordings import Recordings
+from recorder.log.mcap_layout import SlotLayout
+from recorder.log.triplet_buffers import TripletBuffers
+from recorder.publishing.publisher import Publisher
+from rig.clocks import NS_PER_S, HostNs, host_now
+from rig.errors import SvevError
+from rig.events import Event
+from rig.transport import wire
+from rig.transport.channel import ControlChannel
+from rig.transport.messages import (
+    CameraChanged,
+    GrabberDied,
+    Quit,
+    RecorderCommand,
+    RecorderConfig,
+    RecorderFailed,
+    RecorderHealth,
+    RecorderReady,
+    RecorderReport,
+    RecorderWarm,
+    StartRecording,
+    StopRecording,
+    TellEvent,
+)
+from rig.transport.preview import PreviewSlot
+from rig.transport.ring import CameraRing
+
+_REPORT_EVERY_NS: Final = NS_PER_S // 5
+_PRESSING_NS: Final = NS_PER_S // 1000
+_WARM_PULSES: Final = 3
+
+
+class RecorderLoop:
+    """Owns the triplet buffers, the assembler, the publisher and the recordings.
+
+    Args:
+        config: first message of the service process.
+        control: channel to the service process.
+    """
+
+    def __init__(self, config: RecorderConfig, control: ControlChannel[RecorderCommand]) -> None:
+        rig = config.rig
+        rings = [CameraRing(fd) for fd in config.rings]
+        self._rig, self._doorbell, self._control = rig, config.doorbell, control
+        self._preview = None if config.options.preview is None else PreviewSlot(config.options.preview)
+        in_flight = max(least_buffers(rig.trigger.period_ns), round(rig.recorder.triplets_s * rig.trigger.rate_hz))
+        held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape).slot_bytes)
+        self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held)
+        self._assembler = Assembler(rig, rings, self._buffers)
+        self._publisher = Publisher(rig.network.publish, rig.network.publish_ipc, queue=in_flight // 4)
+        self._preroll = Preroll(self._buffers, config.options.preroll_s, held)
+        self._health = HealthMonitor(rig, rings, config.options.directory)
+        self._recordings = Recordings(self._assembler, self._preroll, self._publisher, self._health.latency, self._tell)
+        self._quit = False
+        self._warm = 0
+        now = host_now()
+        self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
+
+    def run(self, terminated: Callable[[], bool]) -> None:
+        """Work until told to quit or until the service process is gone; then finish the recording.
+
+        Args:
+            terminated: whether the process got SIGTERM.
+        """
+        if self._preview is not None:
+            self._preview.take_over()
+        self._tell(RecorderReady())
+        poll = select.poll()
+        poll.register(self._doorbell, select.POLLIN)
+        poll.register(self._control, select.POLLIN)
+        while not self._quit and not terminated():
+            ready = {fd for fd, _ in poll.poll(self._sleep_ms(host_now()))}
+            if self._doorbell in ready:
+                os.eventfd_read(self._doorbell)
+            if self._control.fileno() in ready:
+                for command in self._control.receive(0):
+                    self._obey(command)
+                self._quit = self._quit or self._control.ended
+            self._step(host_now())
+        self._recordings.wind_up("the service process is gone" if self._control.ended else "told to quit")
+        self._publisher.close()
+        self._buffers.close()
+
+    def _step(self, now: HostNs) -> None:
+        for triplet in self._assembler.pump(now):
+            self._take_in(triplet, now)
+        for change in self._assembler.changes():
+            self._camera_changed(change)
+        self._recordings.work(now)
+        if now >= self._next_report:
+            self._next_report = HostNs(now + _REPORT_EVERY_NS)
+            self._recordings.progress()
+        if now >= self._next_health:
+            self._next_health = HostNs(now + NS_PER_S)
+            self._tell_health(now)
+
+    def _take_in(self, triplet: Triplet, now: HostNs) -> None:
+        """Measure a decided pulse, show it as preview if one is due, and pass it on to the recordings."""
+        self._health.pulse(triplet.pulse)
+        if self._preview is not None and self._preview.due(now):
+            pixels = None if triplet.slot is None else self._buffers.pixels(triplet.slot)
+            statuses = [outcome.status for outcome in triplet.pulse.outcomes]
+            self._preview.write(triplet.pulse.number, triplet.pulse.time, statuses, pixels, now)
+        if not self._recordings.running:  # whole triplets show that all cameras see the same pulses
+            self._warm = self._warm + 1 if triplet.pulse.complete else 0
+            if self._warm == _WARM_PULSES:
+                self._tell(RecorderWarm())
+        self._recordings.take(triplet)
+
+    def _obey(self, command: RecorderCommand) -> None:
+        match command:
+            case StartRecording():
+                try:
+                    self._recordings.start(command)
+                except SvevError as error:
+                    self._tell(RecorderFailed.of(error))
+            case StopRecording():
+                self._recordings.stop()
+            case GrabberDied():
+                self._assembler.disconnected(command.camera, command.reason, host_now())
+            case TellEvent():
+                self._recordings.happened(command.event)
+            case Quit():
+                self._quit = True
+
+    def _camera_changed(self, change: CameraChanged) -> None:
+        self._tell(change)
+        name = self._rig.cameras[change.camera].name
+        self._recordings.happened(Event.now(change.news.level, name, f"{change.news}: {change.text}"))
+
+    def _tell_health(self, now: HostNs) -> None:
+        """Report, publish and write the health record of the last second."""
+        health = self._health.record(
+            self._assembler.connected,
+            pairing=self._assembler.pairer.health(),
+            free_triplets=self._buffers.free_count,
+            unpublished=self._publisher.dropped,
+            preroll=self._preroll.health(now),
+            recording=self._recordings.statistics(),
+        )
+        self._control.send(RecorderHealth(health=health), or_drop=True)
+        self._recordings.health(wire.encode(health))
+
+    def _sleep_ms(self, now: HostNs) -> float:
+        deadlines = [self._next_report, self._next_health]
+        if (undecided := self._assembler.pairer.next_deadline()) is not None:
+            deadlines.append(undecided)
+        if self._assembler.backlog or self._recordings.pressing:
+            deadlines.append(HostNs(now + _PRESSING_NS))
+        return max(0.0, (min(deadlines) - now) / 1e6)
+
+    def _tell(self, report: RecorderReport) -> None:
+        self._control.send(report)

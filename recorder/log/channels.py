@@ -1,0 +1,64 @@
+"""Schemas and channels of a log, made from the table of topics."""
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from mcap.records import Channel, Schema
+from mcap_protobuf.schema import build_file_descriptor_set
+
+from recorder.log.mcap_layout import (
+    EVENTS_CHANNEL,
+    FIRST_CALIBRATION_CHANNEL,
+    HEALTH_CHANNEL,
+    TAG_CHANNEL,
+    TRIPLET_CHANNEL,
+)
+from rig.health import HEALTH_SCHEMA
+from rig.tag import TAG_SCHEMA
+from rig.topics import EVENTS, HEALTH, TAG, TRIPLET, Topic
+
+CALIBRATION_TOPIC = "/calibration/"
+
+
+def schemas_and_channels(calibrated: Iterable[str] = ()) -> tuple[list[Schema], list[Channel]]:
+    """Everything a log declares before its first message.
+
+    Args:
+        calibrated: names of the cameras that get a channel `/calibration/<camera>`.
+    """
+    schemas = [
+        _protobuf(1, RawImage),
+        _json(2, TAG, TAG_SCHEMA),
+        _protobuf(3, Log),
+        _json(4, HEALTH, HEALTH_SCHEMA),
+    ]
+    channels = [
+        Channel(id_, topic.name, topic.encoding, {}, schema)
+        for id_, topic, schema in (
+            (TRIPLET_CHANNEL, TRIPLET, 1),
+            (TAG_CHANNEL, TAG, 2),
+            (EVENTS_CHANNEL, EVENTS, 3),
+            (HEALTH_CHANNEL, HEALTH, 4),
+        )
+    ]
+    cameras = list(calibrated)
+    if cameras:
+        schemas.append(_protobuf(5, CameraCalibration))
+    channels += [
+        Channel(FIRST_CALIBRATION_CHANNEL + place, CALIBRATION_TOPIC + camera, "protobuf", {}, 5)
+        for place, camera in enumerate(cameras)
+    ]
+    return schemas, channels
+
+
+def _protobuf(id_: int, message: Any) -> Schema:
+    data = build_file_descriptor_set(message).SerializeToString()
+    return Schema(id=id_, name=message.DESCRIPTOR.full_name, encoding="protobuf", data=data)
+
+
+def _json(id_: int, topic: Topic, schema: dict[str, Any]) -> Schema:
+    return Schema(id=id_, name=topic.schema, encoding="jsonschema", data=json.dumps(schema).encode())

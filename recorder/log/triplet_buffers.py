@@ -1,0 +1,106 @@
+"""Memory for triplets: slots laid out like the bytes of the log, with a count of holders; allocated once."""
+
+import mmap
+import threading
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recorder.log.mcap_layout import PAGE, SlotLayout, round_up
+
+_HUGE_PAGE = 2 * 1024 * 1024
+
+
+class TripletBuffers:
+    """A fixed number of slots in private, prefaulted memory on huge pages.
+
+    Each slot holds one triplet, with room before and after the pixels for the records of the log (`SlotLayout`), so
+    that it goes to the disk without a copy. A slot has a count of holders: `acquire` makes the first one, `hold` adds
+    one, `release` takes one away; a slot without holders is free. Any thread may call any method.
+
+    Attributes:
+        shape: rows and columns of the triplet.
+        count: number of slots.
+        layout: where pixels and log records stand in a slot.
+    """
+
+    def __init__(self, shape: tuple[int, int], count: int):
+        self.shape = shape
+        self.count = count
+        self.layout = SlotLayout(shape)
+        slot_bytes = self.layout.slot_bytes
+        memory = mmap.mmap(
+            -1, round_up(count * slot_bytes, _HUGE_PAGE) + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+        )
+        if hasattr(mmap, "MADV_HUGEPAGE"):
+            memory.madvise(mmap.MADV_HUGEPAGE)
+        everything = np.frombuffer(memory, np.uint8)
+        # Huge pages start at multiples of their size; from there on every slot starts on a (small) page.
+        first = -int(everything.ctypes.data) % _HUGE_PAGE
+        everything[first : first + count * slot_bytes : PAGE] = 0  # touched now, not while recording
+        self._slots = [everything[first + slot * slot_bytes : first + (slot + 1) * slot_bytes] for slot in range(count)]
+        self._bytes = [slot.data for slot in self._slots]
+        self._pixels = [slot[self.layout.pixels : self.layout.end].reshape(shape) for slot in self._slots]
+        self._freed = threading.Condition()
+        self._holders = [0] * count
+        self._free = deque(range(count))
+
+    @property
+    def free_count(self) -> int:
+        """Slots that nobody holds."""
+        return len(self._free)
+
+    def acquire(self, timeout_s: float = 0.0) -> int | None:
+        """A free slot, held once by the caller; None if there is none within `timeout_s`.
+
+        Its pixels are those of an earlier triplet.
+        """
+        with self._freed:
+            if not self._free and not (timeout_s and self._freed.wait_for(lambda: self._free, timeout_s)):
+                return None
+            # Take the slot that has been free longest: one that has just gone to the disk costs more to write again.
+            slot = self._free.popleft()
+            self._holders[slot] = 1
+            return slot
+
+    def hold(self, slot: int) -> None:
+        """Add a holder to a slot that is held already.
+
+        Raises:
+            ValueError: nobody holds it.
+        """
+        with self._freed:
+            if self._holders[slot] < 1:
+                raise ValueError(f"slot {slot} is free: acquire one first")
+            self._holders[slot] += 1
+
+    def release(self, slot: int) -> None:
+        """Take one holder away; the last one frees the slot.
+
+        Raises:
+            ValueError: nobody holds it.
+        """
+        with self._freed:
+            if self._holders[slot] < 1:
+                raise ValueError(f"slot {slot} is free: it was released once too often")
+            self._holders[slot] -= 1
+            if not self._holders[slot]:
+                self._free.append(slot)
+                self._freed.notify()
+
+    def pixels(self, slot: int) -> NDArray[np.uint8]:
+        """The slot's pixels in place, (rows, columns), uint8, C-contiguous; always the same view."""
+        return self._pixels[slot]
+
+    def memory(self, slot: int) -> memoryview:
+        """All bytes of the slot, page-aligned; always the same view."""
+        return self._bytes[slot]
+
+    def close(self) -> None:
+        """Release the memory; the system gets it back when nobody holds a view on it any more."""
+        with self._freed:
+            self._free.clear()
+        self._bytes.clear()
+        self._pixels.clear()
+        self._slots.clear()

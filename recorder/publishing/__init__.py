@@ -1,0 +1,1 @@
+"""Publishes triplets over ZeroMQ, live and from a log."""

@@ -1,0 +1,133 @@
+"""Says in a moment what a log holds: reads its tags and events, no pixels."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from recorder.log.session_changes import session_changes
+from recorder.reading.log_reader import Chunk, LogReader
+from recorder.reading.records import Damage
+from recorder.reading.triplets import tag_of
+from rig.tag import TripletTag
+from rig.topics import RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG
+from triggering.ledger import Ledger, runs_from_text
+
+
+@dataclass(frozen=True, slots=True)
+class LogInfo:
+    """What a log holds.
+
+    Attributes:
+        path: the log.
+        bytes: size of the file.
+        closed: the recorder closed the log properly.
+        truncated: the log ends in the middle of a record.
+        damaged_bytes: bytes that could not be read.
+        torn_bytes: how many of them are an unfinished record at the end; every log that was not closed may have one.
+        ledger: what became of every pulse.
+        first: tag of the first pulse, None if there is no pulse.
+        session: fields of the last session record, with the changes that were made after the recording.
+        rig: fields of the last rig record.
+        known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
+        messages: number of messages per topic.
+        library: the program that wrote the log.
+    """
+
+    path: Path
+    bytes: int
+    closed: bool
+    truncated: bool
+    damaged_bytes: int
+    torn_bytes: int
+    ledger: Ledger
+    first: TripletTag | None
+    session: dict[str, str]
+    rig: dict[str, str]
+    known_lost: tuple[tuple[int, int], ...]
+    messages: dict[str, int]
+    library: str
+
+    @property
+    def recording(self) -> str:
+        """Id of the recording, empty if there is no pulse."""
+        return self.first.recording if self.first else ""
+
+    @property
+    def shape(self) -> tuple[int, int] | None:
+        """Rows and columns of the triplets, None if there is no pulse."""
+        return self.first.shape if self.first else None
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the cameras, left to right."""
+        return tuple(camera.name for camera in self.first.cameras) if self.first else ()
+
+    @property
+    def missing_pulses(self) -> int:
+        """Number of pulses without a tag."""
+        return sum(last - first + 1 for first, last in self.ledger.missing)
+
+    def to_json(self) -> dict[str, Any]:
+        """The information as one JSON object."""
+        ledger = self.ledger
+        return {
+            "log": str(self.path),
+            "closed": self.closed,
+            "truncated": self.truncated,
+            "damaged_bytes": self.damaged_bytes,
+            **ledger.counts().model_dump(),
+            "missing_pulses": self.missing_pulses,
+            "bytes": self.bytes,
+            "recording": self.recording,
+            "start_ns": None if ledger.first_time is None else str(ledger.first_time),
+            "duration_s": round(ledger.duration_s, 6),
+            "rate_hz": None if ledger.rate_hz is None else round(ledger.rate_hz, 4),
+            "offset_us": ledger.spread_us(),
+            "shape": None if self.shape is None else list(self.shape),
+            "cameras": list(self.cameras),
+            "session": self.session,
+            "rig": self.rig,
+            "messages": self.messages,
+            "library": self.library,
+        }
+
+
+def info(path: Path, *, original: bool = False) -> LogInfo:
+    """Read what a log says about itself, and count its pulses by their tags.
+
+    The time this takes depends on the number of pulses, not on the size of the log. Nothing is checked: `verify` does
+    that.
+
+    Args:
+        path: the log.
+        original: give the session as the log has it, without the changes in the file beside it.
+
+    Raises:
+        BadInputError: no such file, no MCAP log, not one of ours, or the file of session changes is broken.
+    """
+    ledger, first = Ledger(), None
+    messages: dict[str, int] = {}
+    damaged = torn = 0
+    with LogReader(path, skim=True) as reader:
+        for item in reader.items(only=(TAG.name,)):
+            if isinstance(item, Damage):
+                damaged += item.length
+                torn += item.length if item.torn else 0
+            elif isinstance(item, Chunk):
+                damaged += item.length if item.flaw else 0
+                for message in item.messages:
+                    messages[message.topic] = messages.get(message.topic, 0) + 1
+                    tag = tag_of(message)
+                    if tag is not None:
+                        first = first or tag
+                        ledger.add(tag)
+        session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
+        return LogInfo(
+            path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
+            reader.metadata.get(RIG_METADATA, {}), known_lost(reader), messages, reader.library,
+        )  # fmt: skip
+
+
+def known_lost(reader: LogReader) -> tuple[tuple[int, int], ...]:
+    """Runs of pulses of which a log, read to its end, says that they were lost when it was recovered."""
+    return tuple(runs_from_text(reader.metadata.get(RECOVERY_METADATA, {}).get("lost_pulses", "")))

@@ -1,0 +1,307 @@
+"""Reads a log from front to back in constant memory, also one that is cut off, damaged or still being written."""
+
+import struct
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from isal.isal_zlib import crc32
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Header, Metadata
+
+from recorder.log.channels import schemas_and_channels
+from recorder.log.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, RECORD
+from recorder.reading.records import CHUNK_HEAD, Damage, FileWindow, RawRecord, is_closed, walk
+from rig.clocks import UtcNs
+from rig.errors import BadInputError
+from rig.topics import PROFILE, TRIPLET
+
+#: What the `mcap` library raises on bytes that are not the record that it is asked to read.
+UNREADABLE = (struct.error, ValueError, OverflowError, McapError)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message as it stands in the log.
+
+    Attributes:
+        topic: name of its channel.
+        channel: id of its channel.
+        sequence: pulse number on the channels of tags and images; a count on the others.
+        log_time: when the message was ready, UTC.
+        publish_time: time of its pulse or event, UTC.
+        position: where the message record starts in the chunk's records.
+        offset: where its data starts in the file.
+        length: bytes of the data.
+        data: the data, valid until the next item is read; None if it was not asked for.
+    """
+
+    topic: str
+    channel: int
+    sequence: int
+    log_time: UtcNs
+    publish_time: UtcNs
+    position: int
+    offset: int
+    length: int
+    data: memoryview | None
+
+
+@dataclass(frozen=True, slots=True)
+class SmallRecord:
+    """A record that is no chunk; `body` is what follows opcode and length, `offset` where it stands in the file."""
+
+    opcode: int
+    offset: int
+    body: bytes
+
+    @property
+    def length(self) -> int:
+        """Bytes of the whole record."""
+        return RECORD.size + len(self.body)
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A chunk and the messages in it.
+
+    Attributes:
+        offset: where the chunk record starts in the file.
+        length: bytes of the chunk record.
+        start_time, end_time: first and last log time in it, as its head says.
+        size: bytes of the records in it.
+        messages: its messages, as far as they could be read.
+        declarations: schemas and channels that it declares (svev declares them before the first chunk).
+        flaw: why its content cannot be trusted, empty if it can.
+    """
+
+    offset: int
+    length: int
+    start_time: UtcNs
+    end_time: UtcNs
+    size: int
+    messages: tuple[Message, ...]
+    declarations: tuple[SmallRecord, ...]
+    flaw: str
+
+    @property
+    def images(self) -> dict[int, Message]:
+        """The image messages in it, by pulse."""
+        return {message.sequence: message for message in self.messages if message.topic == TRIPLET.name}
+
+
+Item = Chunk | SmallRecord | Damage
+
+
+class ForeignFileError(BadInputError):
+    """The file is not a log of svev, not even a damaged one."""
+
+
+class LogReader:
+    """One log, open for reading.
+
+    Attributes:
+        path: the log.
+        size: bytes of the file when it was opened.
+        closed: the log was closed properly: it ends in a footer.
+        truncated: the log ends in the middle of a record; known only when it has been read to its end.
+        library: the program that wrote it, empty if `salvage`.
+        metadata: fields of the metadata records by name, the last of each, as far as the log has been read.
+        attachments: contents by name, as far as the log has been read.
+    """
+
+    def __init__(self, path: Path, *, skim: bool = False, salvage: bool = False) -> None:
+        """Open the log and check its header.
+
+        Args:
+            path: the log.
+            skim: the caller will read only small parts of it.
+            salvage: read it even if its beginning is destroyed: check no header, and assume the channels that all our
+                logs declare there.
+
+        Raises:
+            BadInputError: no such file, no MCAP log, or not one of ours.
+        """
+        self.path = path
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.truncated = False
+        self._assumed = {channel.id: channel.topic for channel in schemas_and_channels()[1]} if salvage else {}
+        self._topics = dict(self._assumed)
+        self._window = FileWindow(path, direct=not skim)
+        self.size = self._window.size
+        try:
+            self.library = "" if salvage else self._check_header()
+            self.closed = is_closed(self._window)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> "LogReader":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def items(self, only: Collection[str] | None = None) -> Iterator[Item]:
+        """Everything in the log but padding, in the order of the file.
+
+        Args:
+            only: read the data of messages on these topics alone, and check no checksums; None: read and check all.
+
+        Raises:
+            BadInputError: the disk cannot read the file.
+        """
+        for record in walk(self._window):
+            if isinstance(record, Damage):
+                self.truncated = self.truncated or record.torn
+                yield record
+            elif record.opcode == Opcode.CHUNK:
+                yield self._chunk(record, only)
+            elif record.opcode != PADDING_OPCODE:
+                yield self._small(record)
+
+    def sound_chunks(self, only: Collection[str] | None = None) -> Iterator[Chunk]:
+        """The chunks without a flaw; `only` as for `items`."""
+        return (item for item in self.items(only) if isinstance(item, Chunk) and not item.flaw)
+
+    def messages(self, *topics: str) -> Iterator[Message]:
+        """The messages on these topics, from chunks without a flaw."""
+        return (message for chunk in self.sound_chunks() for message in chunk.messages if message.topic in topics)
+
+    def chunk(self, offset: int, length: int) -> Chunk:
+        """A chunk that `items` has handed out before, once more: with the data of all its messages, and checked."""
+        return self._chunk(RawRecord(Opcode.CHUNK, offset, length), None)
+
+    def read(self, offset: int, length: int) -> memoryview:
+        """Bytes of the file, valid until anything else is read."""
+        return self._window.read(offset, length)
+
+    def close(self) -> None:
+        """Close the file; a second call does nothing."""
+        self._window.close()
+
+    def _check_header(self) -> str:
+        if self.size == 0:
+            raise BadInputError(f"{self.path}: is empty; name a log of svev")
+        if bytes(self._window.read(0, len(MAGIC))) != MAGIC:
+            raise ForeignFileError(f"{self.path}: is not an MCAP log; name a log of svev")
+        head = self._window.read(len(MAGIC), RECORD.size)
+        opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
+        body = bytes(self._window.read(len(MAGIC) + RECORD.size, length)) if length <= 1 << 16 else b""
+        try:
+            header = Header.read(stream(body))
+        except UNREADABLE:
+            header = None
+        if opcode != Opcode.HEADER or len(body) < length or header is None:
+            raise BadInputError(f"{self.path}: is cut off or damaged before it says what it is; nothing can be read")
+        if header.profile != PROFILE:
+            raise ForeignFileError(
+                f'{self.path}: is an MCAP log, but not written by svev (profile "{header.profile}"); name a log of svev'
+            )
+        return str(header.library)
+
+    def _small(self, record: RawRecord) -> SmallRecord | Damage:
+        body = bytes(self._window.read(record.offset + RECORD.size, record.length - RECORD.size))
+        try:
+            match record.opcode:
+                case Opcode.CHANNEL:
+                    channel = Channel.read(stream(body))
+                    self._topics[channel.id] = self._assumed.get(channel.id, channel.topic)
+                case Opcode.METADATA:
+                    metadata = Metadata.read(stream(body))
+                    self.metadata[metadata.name] = metadata.metadata
+                case Opcode.ATTACHMENT:
+                    attachment = Attachment.read(stream(body))
+                    if crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+                        return Damage(
+                            record.offset, record.length, f"checksum of attachment {attachment.name} is wrong"
+                        )
+                    self.attachments[attachment.name] = attachment.data
+        except UNREADABLE as error:
+            name = Opcode(record.opcode).name.lower()
+            return Damage(record.offset, record.length, f"unreadable {name} record: {error}")
+        return SmallRecord(record.opcode, record.offset, body)
+
+    def _chunk(self, record: RawRecord, only: Collection[str] | None) -> Chunk:
+        begin = record.offset + RECORD.size
+        end = record.offset + record.length
+        if only is None:  # one read brings the whole chunk into the window; all reads below find it there
+            self._window.read(record.offset, record.length)
+        start_time, end_time, size, crc, name_bytes = CHUNK_HEAD.unpack(self._window.read(begin, CHUNK_HEAD.size))
+        first = begin + CHUNK_HEAD.size + name_bytes + 8
+        messages: list[Message] = []
+        declarations: list[SmallRecord] = []
+        if name_bytes:
+            flaw = "it is compressed; rewrite the log with `mcap decompress`"
+        else:
+            wrong = only is None and crc and crc32(self._window.read(first, end - first)) != crc
+            trouble = self._content(first, end, only, messages, declarations)
+            flaw = "its checksum is wrong" if wrong else trouble
+        return Chunk(
+            record.offset, record.length, UtcNs(start_time), UtcNs(end_time), size,
+            tuple(messages), tuple(declarations), flaw,
+        )  # fmt: skip
+
+    def _content(
+        self,
+        first: int,
+        end: int,
+        only: Collection[str] | None,
+        messages: list[Message],
+        declarations: list[SmallRecord],
+    ) -> str:
+        """Read the records of a chunk into the two lists.
+
+        Returns:
+            What is wrong with them, empty if nothing.
+        """
+        position = first
+        while position < end:
+            head = bytes(self._window.read(position, min(MESSAGE.size, end - position)))
+            opcode, length = RECORD.unpack(head[: RECORD.size]) if len(head) >= RECORD.size else (0, end)
+            following = position + RECORD.size + length
+            if following > end:
+                return "its records overrun its end"
+            if opcode == Opcode.MESSAGE:
+                message = self._message(head, position, first, following, only)
+                if isinstance(message, str):
+                    return message
+                messages.append(message)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                declaration = self._small(RawRecord(opcode, position, following - position))
+                if not isinstance(declaration, SmallRecord):
+                    return f"a declaration in it is an {declaration.text}"
+                declarations.append(declaration)
+            position = following
+        return ""
+
+    def _message(
+        self, head: bytes, position: int, first: int, following: int, only: Collection[str] | None
+    ) -> Message | str:
+        """The message at `position`, or what is wrong with it."""
+        if following - position < MESSAGE.size:
+            return "a message in it is too short"
+        _, _, channel, sequence, log_time, publish_time = MESSAGE.unpack(head)
+        if channel not in self._topics:
+            return "a message in it is of a channel that is not declared"
+        topic = self._topics[channel]
+        offset = position + MESSAGE.size
+        data: memoryview | None = None
+        if only is None:
+            data = self._window.read(offset, following - offset)
+        elif topic in only:  # copied, because the window moves on before the chunk is complete
+            data = memoryview(bytes(self._window.read(offset, following - offset)))
+        return Message(
+            topic, channel, sequence, UtcNs(log_time), UtcNs(publish_time), position - first,
+            offset, following - offset, data,
+        )  # fmt: skip
+
+
+def stream(body: bytes) -> Any:
+    """A record's body as a stream, from which the `mcap` library's record classes read."""
+    return ReadDataStream(BytesIO(body))

@@ -1,0 +1,162 @@
+"""Reads the triplets of a log: tag and image of every pulse in order, or single ones; copies no pixels."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from google.protobuf.message import DecodeError
+from numpy.typing import NDArray
+
+from recorder.reading.log_reader import LogReader, Message
+from rig.clocks import UtcNs
+from rig.tag import TripletTag
+from rig.topics import TAG
+
+_DATA_KEY = RawImage.DATA_FIELD_NUMBER << 3 | 2
+
+
+def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
+    """Every pulse of a log: its tag, and its image, (rows, columns), uint8, valid until the next one is taken.
+
+    The block of a camera that is not ok is black; the whole image of a pulse without any frame is black. Pulses in
+    damaged parts of the log are left out.
+
+    Raises:
+        BadInputError: no such file, no MCAP log, or not one of ours.
+        ValueError: a chunk is sound, but what it holds is no tag or no image.
+    """
+    with LogReader(path) as reader:
+        for chunk in reader.sound_chunks():
+            images = {pulse: image.data for pulse, image in chunk.images.items()}
+            for message in chunk.messages:
+                if message.topic == TAG.name and message.data is not None:
+                    tag = TripletTag.decode(message.data)
+                    data = images.get(tag.pulse)
+                    yield tag, np.zeros(tag.shape, np.uint8) if data is None else pixels(view_image(data))
+
+
+@dataclass(frozen=True, slots=True)
+class StoredTriplet:
+    """Where the image message of a pulse stands in the file: `length` bytes from `offset` on."""
+
+    tag: TripletTag
+    offset: int
+    length: int
+
+    def image(self, reader: LogReader) -> NDArray[np.uint8]:
+        """The pixels, (rows, columns), uint8, valid until anything else is read.
+
+        Raises:
+            ValueError: the message is no image, or not one of ours.
+        """
+        return pixels(view_image(reader.read(self.offset, self.length)))
+
+
+def stored_triplets(reader: LogReader) -> list[StoredTriplet]:
+    """All pulses of a log that have an image; reads no pixels."""
+    found = []
+    for chunk in reader.sound_chunks(only=(TAG.name,)):
+        tags = {m.sequence: tag for m in chunk.messages if (tag := tag_of(m)) is not None}
+        found += [StoredTriplet(tags[pulse], m.offset, m.length) for pulse, m in chunk.images.items() if pulse in tags]
+    return found
+
+
+def tag_of(message: Message) -> TripletTag | None:
+    """The tag in a message; None for other messages, and for a damaged tag (which `verify` reports)."""
+    return None if message.topic != TAG.name or message.data is None else decoded_tag(message.data)
+
+
+def decoded_tag(data: bytes | memoryview) -> TripletTag | None:
+    """The tag that these bytes encode, None if they encode none."""
+    try:
+        return TripletTag.decode(data)
+    except ValueError:
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class ImageView:
+    """A serialized `foxglove.RawImage`.
+
+    Attributes:
+        time: time stamp, UTC.
+        rows, columns: size in px.
+        step: bytes from row to row.
+        encoding: of the pixels; ours are "mono8".
+        pixels: the pixels in place, no copy; as many bytes as the message says, or as it has left.
+    """
+
+    time: UtcNs
+    rows: int
+    columns: int
+    step: int
+    encoding: str
+    pixels: memoryview
+
+
+def view_image(message: memoryview) -> ImageView:
+    """Read an image message without copying its pixels.
+
+    Raises:
+        ValueError: the bytes are no `foxglove.RawImage`.
+    """
+    position, others, pixels = 0, bytearray(), memoryview(b"")
+    while position < len(message):
+        field = position
+        key, position = _varint(message, position)
+        length, position = _field_length(message, position, key & 7)
+        if key == _DATA_KEY:
+            pixels = message[position : position + length]
+        else:
+            others += message[field : position + length]
+        position += length
+    # Only the pixels are large: the library reads a copy of all other fields.
+    try:
+        image = RawImage.FromString(bytes(others))
+    except DecodeError as error:
+        raise ValueError(f"no foxglove.RawImage: {error}") from None
+    time = UtcNs(image.timestamp.ToNanoseconds())
+    return ImageView(time, image.height, image.width, image.step, image.encoding, pixels)
+
+
+def pixels(image: ImageView) -> NDArray[np.uint8]:
+    """The pixels of a mono8 image in place, (rows, columns), uint8.
+
+    Raises:
+        ValueError: the image has another encoding, gaps between its rows, or not as many pixels as it says.
+    """
+    if image.encoding != "mono8" or image.step != image.columns:
+        raise ValueError(f'the image is "{image.encoding}" with {image.step} bytes per row, not mono8 without gaps')
+    if len(image.pixels) != image.rows * image.columns:
+        raise ValueError(f"the image has {len(image.pixels)} pixels instead of {image.rows * image.columns}")
+    return np.frombuffer(image.pixels, np.uint8).reshape(image.rows, image.columns)
+
+
+def _field_length(message: memoryview, position: int, wire_type: int) -> tuple[int, int]:
+    """Length of a field's content, and the position where the content starts."""
+    match wire_type:
+        case 0:
+            return _varint(message, position)[1] - position, position
+        case 1:
+            return 8, position
+        case 2:
+            return _varint(message, position)
+        case 5:
+            return 4, position
+        case _:
+            raise ValueError(f"no foxglove.RawImage: unknown wire type {wire_type}")
+
+
+def _varint(message: memoryview, position: int) -> tuple[int, int]:
+    """Protobuf's variable-length integer at `position`, and the position after it."""
+    number = 0
+    for place in range(10):
+        if position + place >= len(message):
+            break
+        byte = message[position + place]
+        number |= (byte & 0x7F) << 7 * place
+        if byte < 0x80:
+            return number, position + place + 1
+    raise ValueError("no foxglove.RawImage: it ends in the middle of a number")

@@ -1,0 +1,1 @@
+"""Makes a whole log of an unfinished or damaged one."""

@@ -1,0 +1,267 @@
+"""Writes one log: MCAP, profile `svev`, a chunk per triplet, readable up to its last second after a crash."""
+
+import importlib.metadata
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap.records import Attachment, Header, Metadata
+
+from recorder.log.channels import schemas_and_channels
+from recorder.log.index import LogIndex
+from recorder.log.mcap_layout import (
+    EVENTS_CHANNEL,
+    FIRST_CALIBRATION_CHANNEL,
+    HEALTH_CHANNEL,
+    MAGIC,
+    TAG_CHANNEL,
+    chunk_of_one,
+    join_pages,
+    records,
+)
+from recorder.log.triplet_buffers import TripletBuffers
+from recorder.writing.append_file import AppendFile, storage_error
+from recorder.writing.write_thread import WriteThread
+from rig.clocks import UtcNs
+from rig.errors import StorageError
+from rig.events import Event, Level
+from rig.health import WritingHealth
+from rig.tag import TripletTag
+from rig.topics import CALIBRATION_ATTACHMENT, EVENTS, HEALTH, PROFILE, RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA
+
+CLOSE_TIMEOUT_S = 60.0
+_CHANNELS = {EVENTS.name: EVENTS_CHANNEL, HEALTH.name: HEALTH_CHANNEL}
+
+
+@dataclass(frozen=True, slots=True)
+class LogDescription:
+    """What a log says of the recording before its first message.
+
+    Attributes:
+        session: athlete, bib, gate, wind, notes, operator.
+        rig: what a reader should know about the rig without its file: name, cameras, rate.
+        rig_toml: the rig file.
+        calibration_json: the calibration file, where known.
+        calibrations: serialized `foxglove.CameraCalibration` by camera name, where known.
+    """
+
+    session: Mapping[str, str]
+    rig: Mapping[str, str]
+    rig_toml: bytes
+    calibration_json: bytes | None = None
+    calibrations: Mapping[str, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class LogSummary:
+    """What became of a log that is closed.
+
+    Attributes:
+        bytes: size of the file.
+        unwritten: chunks that were handed over and did not reach the disk (after a storage error).
+    """
+
+    bytes: int
+    unwritten: int
+
+
+class LogWriter:
+    """Writes one log file, in a thread of its own; one other thread may call the methods.
+
+    Attributes:
+        path: the file.
+        summary: what became of the log, None until `close` has been called.
+    """
+
+    def __init__(self, path: Path, description: LogDescription, buffers: TripletBuffers):
+        """Create the file and write the description, durably.
+
+        Args:
+            path: must not exist.
+            description: what the log says before its first message.
+            buffers: `write_pulse` gets their slots.
+
+        Raises:
+            BadInputError: the file exists, or cannot be made there.
+            StorageError: the disk refuses.
+        """
+        self.path = path
+        self.summary: LogSummary | None = None
+        self._buffers = buffers
+        self._metadata = {SESSION_METADATA: dict(description.session), RIG_METADATA: dict(description.rig)}
+        self._written_metadata: dict[str, dict[str, str]] = {}
+        self._sequences = dict.fromkeys(_CHANNELS, 0)
+        schemas, channels = schemas_and_channels(description.calibrations)
+        self._index = LogIndex(schemas, channels)
+        self._file = AppendFile(path)
+        try:
+            self._write_opening(records(*schemas, *channels), description)
+        except BaseException as error:
+            self._file.discard()
+            if isinstance(error, OSError):
+                raise storage_error(path, error) from error
+            raise
+        self._thread = WriteThread(self._file, self._index, buffers.release)
+        self._write_first_messages(description.calibrations)
+
+    def __enter__(self) -> "LogWriter":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def write_pulse(self, tag: TripletTag, slot: int | None, log_time: UtcNs, encoded: bytes | None = None) -> None:
+        """Queue a pulse: its tag, and its image if there is one.
+
+        Takes over the caller's hold on the slot, also if it raises.
+
+        Args:
+            tag: what became of the pulse.
+            slot: of `buffers`, with the pixels; nobody may change them any more. None: write the tag alone.
+            log_time: when the triplet was ready, UTC.
+            encoded: `tag.encode()`, if the caller has it already.
+
+        Raises:
+            StorageError: writing has ended; the message says why and what to do.
+            ValueError: the tag is too long.
+        """
+        if slot is None:
+            self._write_small(TAG_CHANNEL, tag.pulse, encoded or tag.encode(), tag.time, log_time)
+            return
+        try:
+            self._check()
+            pages, plan = self._buffers.layout.complete(
+                self._buffers.memory(slot), encoded or tag.encode(), tag.pulse, tag.time, log_time
+            )
+        except BaseException:
+            self._buffers.release(slot)
+            raise
+        self._thread.submit(pages, plan, slot)
+
+    def write_event(self, event: Event) -> None:
+        """Queue an event; in the file within a second.
+
+        Raises:
+            StorageError: writing has ended; the message says why and what to do.
+        """
+        self.write_message(EVENTS.name, event.to_protobuf(), event.time, event.time)
+
+    def write_health(self, health: bytes, time_utc: UtcNs) -> None:
+        """Queue an encoded health record; in the file within a second.
+
+        Raises:
+            StorageError: writing has ended; the message says why and what to do.
+        """
+        self.write_message(HEALTH.name, health, time_utc, time_utc)
+
+    def write_message(self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
+        """Queue the data of an event or a health record as it stands in a log.
+
+        Raises:
+            StorageError: writing has ended; the message says why and what to do.
+            KeyError: the topic is neither that of events nor that of health records.
+        """
+        self._sequences[topic] += 1
+        self._write_small(_CHANNELS[topic], self._sequences[topic], data, publish_time, log_time)
+
+    def set_metadata(self, name: str, fields: Mapping[str, str]) -> None:
+        """Add or replace a metadata record; it is written when the log is closed, unless the file says the same."""
+        self._metadata[name] = dict(fields)
+
+    def statistics(self) -> WritingHealth:
+        """How writing goes since the log was opened."""
+        return self._thread.statistics()
+
+    def free_bytes(self) -> int | None:
+        """Room left on the disk, in bytes; None if the disk does not say. Only while the log is open."""
+        return self._file.free_bytes()
+
+    def close(self) -> LogSummary:
+        """Write what waits and the summary section, and make all of it durable.
+
+        After an error the log is closed all the same if the disk takes the rest: `summary` says how much it holds. A
+        second call only returns the summary.
+
+        Raises:
+            StorageError: something that was handed over is not in the file, or the file is not closed.
+        """
+        if self.summary is None:
+            self._thread.stop(CLOSE_TIMEOUT_S)
+            error = self._thread.error
+            try:
+                self._file.finish(self._closing_bytes())
+            except OSError as reason:
+                error = error or storage_error(self.path, reason)
+                self._cut()
+            self._file.close()
+            self.summary = LogSummary(self._file.size, self._thread.unwritten)
+            if error is not None:
+                raise error
+        return self.summary
+
+    def abandon(self) -> LogSummary | None:
+        """Close after an error that has been reported already; None if even closing failed."""
+        try:
+            return self.close()
+        except StorageError:
+            return self.summary
+
+    def _check(self) -> None:
+        if self.summary is not None:
+            raise StorageError(f"{self.path}: the log is closed; open another one")
+        if self._thread.error is not None:
+            raise StorageError(*self._thread.error.args) from self._thread.error.__cause__
+
+    def _write_small(self, channel: int, sequence: int, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
+        self._check()
+        self._thread.submit(*chunk_of_one(channel, sequence, data, publish_time, log_time))
+
+    def _write_opening(self, declarations: bytes, description: LogDescription) -> None:
+        """Write everything before the first message at once, and make it durable."""
+        now = time.time_ns()
+        out = MAGIC + records(Header(PROFILE, _library())) + declarations
+        out += self._changed_metadata(len(out))
+        attachments = [Attachment(now, now, RIG_ATTACHMENT, "application/toml", description.rig_toml)]
+        if (calibration := description.calibration_json) is not None:
+            attachments.append(Attachment(now, now, CALIBRATION_ATTACHMENT, "application/json", calibration))
+        for attachment in attachments:
+            record = records(attachment)
+            self._index.add_attachment(attachment, len(out), len(record))
+            out += record
+        with join_pages([out]) as pages:
+            self._file.append(pages)
+        self._file.sync_entry()
+
+    def _changed_metadata(self, position: int) -> bytes:
+        """The metadata records that differ from those in the file, as bytes to be written at `position`."""
+        out = b""
+        for name, fields in self._metadata.items():
+            if self._written_metadata.get(name) != fields:
+                record = records(Metadata(name, fields))
+                self._index.add_metadata(name, position + len(out), len(record))
+                self._written_metadata[name] = dict(fields)
+                out += record
+        return out
+
+    def _write_first_messages(self, calibrations: Mapping[str, bytes]) -> None:
+        now = UtcNs(time.time_ns())
+        for channel, data in enumerate(calibrations.values(), FIRST_CALIBRATION_CHANNEL):
+            self._write_small(channel, 1, data, now, now)
+        if not self._file.direct:
+            text = "the file system takes no direct I/O: writing costs more"
+            self.write_event(Event(now, Level.WARNING, "recorder", text))
+
+    def _closing_bytes(self) -> bytes:
+        metadata = self._changed_metadata(self._file.size)
+        return metadata + self._index.closing_bytes(self._file.size + len(metadata))
+
+    def _cut(self) -> None:
+        try:
+            self._file.cut()
+        except OSError as error:
+            raise storage_error(self.path, error) from error
+
+
+def _library() -> str:
+    return f"svev {importlib.metadata.version('svev')}"

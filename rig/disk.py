@@ -1,0 +1,43 @@
+"""What the disk below a file or directory offers: free room, direct I/O (past the page cache)."""
+
+import errno
+import fcntl
+import os
+from pathlib import Path
+
+
+def free_bytes(place: Path | int) -> int | None:
+    """Bytes that we may still write on the disk of a directory or an open file.
+
+    The blocks that a file system keeps for root do not count.
+
+    Args:
+        place: the directory, or the descriptor of the file.
+
+    Returns:
+        The bytes; None while the directory is not there (an unplugged disk, say).
+    """
+    try:
+        disk = os.statvfs(place)
+    except OSError:
+        return None
+    return disk.f_bavail * disk.f_frsize
+
+
+def set_direct(descriptor: int, *, wanted: bool) -> bool:
+    """Switch direct I/O of an open file on or off.
+
+    Returns:
+        Whether it is on now; a file system without it says no.
+
+    Raises:
+        OSError: the switch failed for another reason.
+    """
+    flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
+    try:
+        fcntl.fcntl(descriptor, fcntl.F_SETFL, flags | os.O_DIRECT if wanted else flags & ~os.O_DIRECT)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+        return False
+    return wanted

@@ -1,0 +1,1 @@
+"""The rig file: its model, and reading it strictly."""

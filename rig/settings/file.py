@@ -1,0 +1,32 @@
+"""Reads a rig file; every error message names file, key and remedy."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rig.settings.model import RigSettings
+from rig.settings.strict_toml import read_toml, validate
+
+#: Folder of the rig files and scenarios that are part of the program, in a checkout and when installed.
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+
+
+def load_rig(path: Path) -> RigSettings:
+    """Read and check a rig file, and make the paths of scenario and calibration in it absolute.
+
+    Raises:
+        BadInputError: the file is missing, is not TOML, or does not describe a rig.
+    """
+    rig = validate(RigSettings, read_toml(path), path)
+    absolute: dict[str, Any] = {}
+    if rig.simulation is not None:
+        scenario = (path.parent / rig.simulation.scenario).resolve()
+        absolute["simulation"] = rig.simulation.model_copy(update={"scenario": scenario})
+    if rig.calibration is not None:
+        absolute["calibration"] = (path.parent / rig.calibration).resolve()
+    return rig.model_copy(update=absolute)
+
+
+def rig_schema() -> str:
+    """JSON schema of the rig file."""
+    return json.dumps(RigSettings.model_json_schema(), indent=2) + "\n"

@@ -1,0 +1,204 @@
+"""The settings of a rig: cameras from left to right, trigger, recorder, network, simulation.
+
+`rig.settings.file` reads them from a rig file. The field descriptions stand in the JSON schema (`svev schema`).
+"""
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rig.settings.strict_toml import StrictModel
+from rig.topics import DEFAULT_PUBLISH
+
+Backend = Literal["aravis", "iidc", "sim", "replay"]
+
+
+class Region(StrictModel):
+    """The part of the sensor that is read out, in px."""
+
+    x: int = Field(0, ge=0, description="first column")
+    y: int = Field(0, ge=0, description="first row")
+    width: int = Field(640, gt=0, le=16384)
+    height: int = Field(480, gt=0, le=16384)
+
+
+class IidcSettings(StrictModel):
+    """Settings that only FireWire cameras have."""
+
+    bus: int = Field(0, ge=0, le=15, description="which FireWire bus: cameras on one card share its bandwidth")
+    iso_speed: Literal[100, 200, 400, 800] = Field(400, description="Mbit/s; 800 needs IEEE 1394b throughout")
+    trigger_mode: Literal[0, 1] = Field(0, description="0: the edge triggers, exposure_us long; 1: the level exposes")
+    signature: bool = Field(True, description="let AVT cameras sign their frames: times, lost and torn frames")
+    dma_frames: int = Field(64, ge=64, le=512, description="frames that the kernel holds while the grabber is busy")
+    gain_step_db: float = Field(0.0354, gt=0, le=10, description="gain_db of one step of the gain register (Marlin)")
+    shutter_offset_us: float = Field(
+        30.0, ge=0, le=10_000, description="added to every exposure by the camera (Marlin F-080B: 30, F-080-30fps: 17)"
+    )
+
+
+class CameraSettings(StrictModel):
+    """One camera. The order of the cameras in the file is their order in the triplet, from left to right."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$", description="short name, e.g. K1")
+    backend: Backend
+    address: str = Field(
+        "",
+        description="aravis: IP address; iidc: GUID (hexadecimal); replay: path of a log, "
+        "relative to the working directory, the same for all cameras; name says which camera of it",
+    )
+    region: Region = Region()
+    pixel_format: Literal["Mono8"] = "Mono8"
+    exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
+    gain_db: float = Field(0.0, ge=0, le=60)
+    trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
+    trigger_edge: Literal["rising", "falling"] = "rising"
+    iidc: IidcSettings = IidcSettings()
+
+    @property
+    def frame_bytes(self) -> int:
+        """Bytes of one frame."""
+        return self.region.width * self.region.height
+
+    @model_validator(mode="after")
+    def _address_where_needed(self) -> "CameraSettings":
+        if self.backend != "sim" and not self.address:
+            raise ValueError(f'backend "{self.backend}" needs an address: add address = "..."')
+        return self
+
+    @model_validator(mode="after")
+    def _firewire_keys_make_sense(self) -> "CameraSettings":
+        if self.backend != "iidc":
+            if "iidc" in self.model_fields_set:
+                raise ValueError(f'iidc = ... is for backend "iidc" only, this one is "{self.backend}": remove it')
+            return self
+        if not re.fullmatch(r"(0x)?[0-9A-Fa-f]{16}", self.address):
+            raise ValueError(
+                f'address "{self.address}" is no GUID: give the 16 hexadecimal digits of the camera\'s label, '
+                "or of svev doctor --bus firewire"
+            )
+        if not re.fullmatch(r"Line[0-3]", self.trigger_input):
+            raise ValueError(
+                f'trigger_input "{self.trigger_input}" is no input of a FireWire camera: use "Line0" to "Line3"'
+            )
+        return self
+
+
+class TriggerSettings(StrictModel):
+    """The trigger pulses that expose all cameras at the same instant."""
+
+    source: Literal["external"] = Field("external", description="who makes the pulses; external: not svev")
+    rate_hz: float = Field(30.0, gt=0, le=1000, description="pulses per second")
+    settle_s: float = Field(5.0, gt=0, le=120, description="wait at most this long for the first pulses")
+
+    @property
+    def period_ns(self) -> int:
+        """Nominal time between two pulses, ns."""
+        return round(1e9 / self.rate_hz)
+
+
+class RecorderSettings(StrictModel):
+    """Where recordings are written and how much is buffered on the way."""
+
+    directory: Path = Field(Path("recordings"), description="relative to the working directory")
+    ring_s: float = Field(2.0, gt=0, le=60, description="each camera's ring in shared memory, seconds of frames")
+    triplets_s: float = Field(2.0, gt=0, le=60, description="triplets waiting for the disk, seconds")
+    preroll_s: float = Field(
+        5.0,
+        ge=0,
+        le=600,
+        description="svev serve: seconds held in memory while armed, to record the past",
+    )
+    preroll_limit_mb: float = Field(1024.0, ge=0, description="memory for that at most, 10^6 bytes")
+    jump_s: float = Field(10.0, gt=0, le=3600, description="length of a jump, for how many more fit on the disk")
+    reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
+
+
+class NetworkSettings(StrictModel):
+    """How frames are received and triplets published."""
+
+    publish: str = Field(DEFAULT_PUBLISH, pattern=r"^(tcp|ipc)://.+", description="ZeroMQ PUB address")
+    publish_ipc: str | None = Field(
+        None, pattern=r"^ipc://.+", description="a second ZeroMQ address, for workers on this machine"
+    )
+    packet_size: int = Field(
+        9000,
+        ge=576,
+        le=65500,
+        description="GigE Vision packet size in bytes, IP header included; at most the MTU",
+    )
+    packet_socket: Literal["auto", "off"] = Field(
+        "auto",
+        description="auto: receive through a packet socket where permitted (CAP_NET_RAW) and the camera is fast or "
+        "net.core.rmem_max small; off: always through plain sockets",
+    )
+    resend: bool = Field(True, description="ask the camera again for lost packets")
+
+
+class SimulationSettings(StrictModel):
+    """Simulated cameras instead of real ones, for tests and demonstrations."""
+
+    scenario: Path = Field(description="scenario file of the simulated hill, relative to the rig file")
+
+
+class RigSettings(StrictModel):
+    """One rig: everything that a recording needs to know."""
+
+    name: str = Field(min_length=1, max_length=80)
+    cameras: Annotated[tuple[CameraSettings, ...], Field(min_length=1, max_length=8)]
+    trigger: TriggerSettings = TriggerSettings()
+    recorder: RecorderSettings = RecorderSettings()
+    network: NetworkSettings = NetworkSettings()
+    simulation: SimulationSettings | None = None
+    calibration: Path | None = Field(
+        None,
+        description="result file of svev calibrate or svev orient, relative to the rig file: its cameras' interior "
+        "orientations are written into every log",
+    )
+
+    @model_validator(mode="after")
+    def _cameras_fit_together(self) -> "RigSettings":
+        names = [camera.name for camera in self.cameras]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise ValueError(f"camera name {', '.join(sorted(twice))} is used twice: give each camera its own name")
+        own = [camera for camera in self.cameras if camera.address and camera.backend != "replay"]
+        addresses = [(camera.backend, camera.address.lower().removeprefix("0x")) for camera in own]
+        if doubled := {address for address in addresses if addresses.count(address) > 1}:
+            raise ValueError(
+                f"address {', '.join(a for _, a in sorted(doubled))} is used twice: give each camera its own address"
+            )
+        if len({camera.region.height for camera in self.cameras}) > 1:
+            raise ValueError("cameras differ in region.height: frames stand side by side, so make the heights equal")
+        if self.simulation is None and any(camera.backend == "sim" for camera in self.cameras):
+            raise ValueError('backend "sim" needs a [simulation] table: add scenario = "../scenarios/training.toml"')
+        return self
+
+    @model_validator(mode="after")
+    def _replayed_cameras_share_a_log(self) -> "RigSettings":
+        replayed = [camera for camera in self.cameras if camera.backend == "replay"]
+        if replayed and len(replayed) < len(self.cameras):
+            other = next(camera for camera in self.cameras if camera.backend != "replay")
+            raise ValueError(
+                f'camera {other.name} has backend "{other.backend}", {replayed[0].name} "replay": pulses of a log are '
+                'not those of other cameras; use backend "replay" for all cameras or for none'
+            )
+        if len({camera.address for camera in replayed}) > 1:
+            raise ValueError(
+                "replayed cameras have different logs, whose pulses have nothing to do with each other: "
+                "give all cameras the same address"
+            )
+        return self
+
+    @property
+    def triplet_shape(self) -> tuple[int, int]:
+        """Rows and columns of the triplet: the frames side by side (paper, Fig. 3)."""
+        return self.cameras[0].region.height, sum(camera.region.width for camera in self.cameras)
+
+    def columns(self) -> tuple[tuple[int, int], ...]:
+        """For each camera: first column and one past the last column of its block."""
+        blocks, first = [], 0
+        for camera in self.cameras:
+            blocks.append((first, first + camera.region.width))
+            first += camera.region.width
+        return tuple(blocks)

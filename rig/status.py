@@ -1,0 +1,273 @@
+"""The state of a running service and of its recordings, in the form that the REST API gives to people and programs.
+
+The service makes these objects; the REST API sends them as JSON and refuses unknown fields in those that it receives.
+Texts for people come with a `code`, so that the page can say the same in another language.
+"""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+
+
+class Model(BaseModel):
+    """Base of all models: unknown fields are errors, instances are immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class State(StrEnum):
+    """What the service is doing: `idle -> arming -> armed <-> recording`, `fault` from anywhere, `disarming`."""
+
+    IDLE = "idle"
+    ARMING = "arming"
+    ARMED = "armed"
+    RECORDING = "recording"
+    DISARMING = "disarming"
+    FAULT = "fault"
+
+
+class Level(StrEnum):
+    """Severity of a statement."""
+
+    GOOD = "good"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class Statement(Model):
+    """One sentence for people, with what to do.
+
+    Attributes:
+        level: severity.
+        code: stable name of the statement, for translation, e.g. `camera_absent`.
+        text: the statement in English, one line.
+        advice: what to do about it, empty if nothing.
+        values: names and numbers in the text, for translation, e.g. `{"camera": "K2"}`.
+    """
+
+    level: Level = Level.INFO
+    code: str
+    text: str
+    advice: str = ""
+    values: dict[str, str | int | float] = {}
+
+
+class CameraState(StrEnum):
+    """State of a camera's connection."""
+
+    OFF = "off"  #: the rig is not armed
+    CONNECTING = "connecting"
+    READY = "ready"  #: connected and set up; frames come when pulses come
+    SILENT = "silent"  #: connected, but frames fail to come while the other cameras deliver
+    ABSENT = "absent"
+
+
+class CameraStatus(Model):
+    """One camera, in the order of the triplet, left to right."""
+
+    name: str
+    backend: str
+    address: str
+    state: CameraState
+    statement: Statement
+    frames_per_s: float | None = Field(None, description="frames of the last second")
+    frames: int = Field(0, description="whole frames since arming")
+    damaged: int = Field(0, description="damaged frames since arming")
+    resent_packets: int = 0
+    reconnects: int = 0
+    temperature_c: float | None = None
+    clock_offset_us: float | None = Field(None, description="trigger time minus the pulse's, median of late")
+    columns: tuple[int, int] | None = Field(None, description="first and one past the last column in the triplet")
+
+
+class PulseStatus(Model):
+    """The trigger pulses of the last second."""
+
+    arriving: bool
+    rate_hz: float | None = None
+    spread_us: float | None = Field(None, description="median spread of the trigger times within a pulse")
+    number: int = Field(0, description="pulses seen since arming")
+
+
+class DiskStatus(Model):
+    """Room for recordings."""
+
+    free_gb: float
+    reserve_gb: float = Field(description="recording stops before less than this is free")
+    seconds_left: float = Field(description="so much can still be recorded")
+    jumps_left: int = Field(description="so many jumps of `jump_s` seconds")
+    jump_s: float
+
+
+class PrerollStatus(Model):
+    """The triplets kept in memory while armed."""
+
+    seconds: float = Field(description="held now")
+    limit_s: float = Field(description="held at most")
+    memory_mb: float = Field(description="memory taken for it")
+
+
+class Causes(Model):
+    """Number of missing frames by cause."""
+
+    lost: int = 0
+    missed: int = 0
+    damaged: int = 0
+    absent: int = 0
+
+
+class Counts(Model):
+    """What became of the pulses of a recording."""
+
+    pulses: int = 0
+    complete: int = 0
+    partial: int = 0
+    causes: Causes = Causes()
+
+
+class ProcessStatus(Model):
+    """One row of the process table."""
+
+    name: str
+    pid: int | None
+    restarts: int = 0
+    statement: Statement | None = None
+
+
+Line = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+Text = Annotated[str, Field(max_length=4000, pattern=r"^[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$")]
+
+
+class SessionFields(Model):
+    """Who jumped, and the conditions; all fields are free text and optional."""
+
+    athlete: Line = Field("", examples=["Ola Nordmann"])
+    bib: Line = Field("", examples=["17"])
+    gate: Line = Field("", examples=["12"])
+    wind: Line = Field("", examples=["0.8 m/s head wind"])
+    notes: Text = Field("", examples=["new boots"])
+    operator: Line = Field("", examples=["Kari"])
+
+
+class SessionChange(Model):
+    """Session fields to change; a field that is left out stays as it is."""
+
+    athlete: Line | None = Field(None, examples=["Ola Nordmann"])
+    bib: Line | None = Field(None, examples=["18"])
+    gate: Line | None = Field(None, examples=["11"])
+    wind: Line | None = Field(None, examples=["calm"])
+    notes: Text | None = Field(None, examples=["fell after landing"])
+    operator: Line | None = Field(None, examples=["Kari"])
+
+
+class RecordingOrder(SessionFields):
+    """Start of a recording.
+
+    `preroll_s` reaches into the past, as far as triplets are held; `duration_s` counts from now and ends the
+    recording by itself. `{"preroll_s": 5, "duration_s": 0}` saves what has just happened.
+    """
+
+    preroll_s: float | None = Field(
+        None, ge=0, le=600, allow_inf_nan=False, description="left out: all that is held", examples=[5.0]
+    )
+    duration_s: float | None = Field(
+        None, ge=0, le=86400, allow_inf_nan=False, description="left out: until stopped", examples=[10.0]
+    )
+
+
+class RecordingState(StrEnum):
+    """State of a recording."""
+
+    RECORDING = "recording"
+    FINISHED = "finished"
+    UNFINISHED = "unfinished"  #: never closed: power loss or a killed recorder; readable to its last second
+    DAMAGED = "damaged"  #: some of it cannot be read
+
+
+class Recording(Model):
+    """One recording of the catalogue."""
+
+    id: str
+    state: RecordingState
+    started: datetime | None = Field(description="time of the first pulse, UTC")
+    duration_s: float
+    bytes: int
+    counts: Counts
+    session: SessionFields
+    verdict: Statement
+    deleted: bool = False
+
+
+class PulseSummary(Model):
+    """What became of one pulse of a recording, for scrubbing."""
+
+    pulse: PulseNumber
+    time_s: float = Field(description="since the first pulse")
+    statuses: tuple[FrameStatus, ...] = Field(description="by camera, left to right")
+
+
+class Pulses(Model):
+    """The pulses of a recording."""
+
+    id: str
+    cameras: tuple[str, ...]
+    columns: tuple[tuple[int, int], ...] = Field(description="first and one past the last column by camera")
+    shape: tuple[int, int] = Field(description="rows and columns of the triplet")
+    pulses: tuple[PulseSummary, ...]
+
+
+class Event(Model):
+    """One event of the live log."""
+
+    number: int = Field(description="counts up by one; a gap means that events were dropped")
+    time: datetime
+    level: Literal["debug", "info", "warning", "error", "fatal"]
+    name: str = Field(description="who or what it is about, e.g. `recorder`, `K2`")
+    message: str
+
+
+class Status(Model):
+    """Everything about the running service at one moment."""
+
+    state: State
+    since: datetime = Field(description="when this state began, UTC")
+    statement: Statement = Field(description="the state in plain words, and what to do next")
+    rig: str
+    version: str
+    cameras: tuple[CameraStatus, ...]
+    pulses: PulseStatus
+    preroll: PrerollStatus
+    disk: DiskStatus
+    recording: Recording | None = Field(description="the recording in progress")
+    last_recording: str | None = Field(description="id of the recording that ended last")
+    processes: tuple[ProcessStatus, ...]
+
+
+class Finding(Model):
+    """One finding of the doctor."""
+
+    level: Literal["PASS", "WARN", "FAIL"]
+    topic: str
+    what: str
+    remedy: str
+
+
+class DoctorReport(Model):
+    """All findings of the doctor."""
+
+    worst: Literal["PASS", "WARN", "FAIL"]
+    findings: tuple[Finding, ...]
+
+
+class RigView(Model):
+    """The rig file in use."""
+
+    name: str
+    toml: str = Field(description="the file as it was read")
+    settings: dict[str, object] = Field(description="the settings with all defaults filled in")

@@ -1,0 +1,108 @@
+"""The first thing that every child process does: set up its control channel, its signals and its lifeline."""
+
+import ctypes
+import os
+import select
+import signal
+import socket
+import sys
+import threading
+from typing import Any, Final, Generic, TypeVar
+
+import msgspec
+
+from rig.transport.channel import ControlChannel
+from rig.transport.messages import Quit
+
+Config = TypeVar("Config")
+
+_CONFIG_S: Final = 10.0
+_BAD_CONFIG: Final = 2
+_PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
+
+
+class ChildContext(Generic[Config]):
+    """Set up by `begin`.
+
+    Attributes:
+        name: name of the process.
+        control: channel to the parent.
+        config: first message of the parent.
+    """
+
+    def __init__(self, name: str, control: ControlChannel[Any], config: Config, grace_s: float) -> None:
+        self.name, self.control, self.config = name, control, config
+        self._grace_s = grace_s
+        self._stop = False
+
+    def stopping(self) -> bool:
+        """Whether the parent asked to quit, is gone, or the process got SIGTERM.
+
+        From then on the process has its grace to end by itself, since a camera's driver may block for long on a camera
+        that is dead.
+        """
+        if not self._stop:
+            self._stop = any(isinstance(message, Quit) for message in self.control.receive(0)) or self.control.ended
+            if self._stop:
+                end_in(self._grace_s)
+        return self._stop
+
+    def terminated(self) -> bool:
+        """Whether the process got SIGTERM. For a main loop that reads the control channel itself."""
+        return self._stop
+
+    def ask_to_stop(self, *_: object) -> None:
+        """Signal handler."""
+        self._stop = True
+
+
+def begin(
+    config: type[Config], commands: Any, grace_s: float, *, killed_with_parent: bool = False
+) -> ChildContext[Config]:
+    """Read the command line `NAME CONTROL_FD` and the configuration; install signal handlers and lifeline.
+
+    Ctrl-C in a terminal goes to every process of the group. Children ignore it: the parent tells them what to do.
+
+    Args:
+        config: type of the configuration, which is the first message.
+        commands: type of the commands that follow, or union of them.
+        grace_s: time that the process has to finish its work after the parent is gone. 0: it has none to finish, so the
+            end of the parent and SIGTERM end it at once.
+        killed_with_parent: let the kernel kill the process, frozen (SIGSTOP) or not, as soon as the *thread* that
+            started it ends. The lifeline does not reach a frozen process.
+
+    Raises:
+        SystemExit: no configuration came.
+    """
+    if killed_with_parent:
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    name, fd = sys.argv[1], int(sys.argv[2])
+    control: ControlChannel[Any] = ControlChannel(socket.socket(fileno=fd), config | commands)
+    try:
+        first = control.next(_CONFIG_S)
+    except msgspec.MsgspecError as error:
+        sys.stderr.write(f"{name}: the configuration is wrong ({error}); this program is started by svev\n")
+        raise SystemExit(_BAD_CONFIG) from None
+    if not isinstance(first, config):
+        raise SystemExit(f"{name}: no configuration came; this program is started by svev")
+    context = ChildContext(name, control, first, grace_s)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if grace_s > 0:
+        signal.signal(signal.SIGTERM, context.ask_to_stop)
+    threading.Thread(target=_lifeline, args=(fd, grace_s), daemon=True, name="lifeline").start()
+    return context
+
+
+def end_in(seconds: float) -> None:
+    """End the process for certain after `seconds`, whatever it is doing then."""
+    timer = threading.Timer(seconds, os._exit, (0,))
+    timer.daemon = True
+    timer.start()
+
+
+def _lifeline(fd: int, grace_s: float) -> None:
+    """Wait for the end of the parent, even while the main thread is blocked."""
+    poll = select.poll()
+    poll.register(fd, 0)  # only hang-up and error: the main loop reads the data
+    poll.poll()
+    end_in(grace_s)

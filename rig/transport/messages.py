@@ -1,0 +1,251 @@
+"""The messages between the processes of a rig: configurations, commands and reports, one type for each.
+
+The first message to a child is its configuration; then the parent sends commands and the child sends reports. The
+channel (`rig.transport.channel`) encodes and checks messages by these types.
+"""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from rig import errors
+from rig.clocks import HostNs, UtcNs
+from rig.errors import SvevError
+from rig.events import Event, Level
+from rig.health import Health
+from rig.settings.model import RigSettings
+from rig.status import Counts
+
+
+class Message(msgspec.Struct, kw_only=True, tag=True):
+    """Base of all messages."""
+
+
+class Quit(Message):
+    """Command to any child: finish the work in progress, then end."""
+
+
+# The grabber
+
+
+class GrabberConfig(Message):
+    """Configuration of a grabber process.
+
+    Attributes:
+        rig: the rig.
+        camera: index of the camera to grab from.
+        ring: descriptor of the camera's ring.
+        doorbell: eventfd that wakes the recorder.
+        epoch: host time of the simulated hill's pulse 0, and of a replay's first pulse.
+    """
+
+    rig: RigSettings
+    camera: int
+    ring: int
+    doorbell: int
+    epoch: HostNs
+
+
+# The recorder
+
+
+class RecorderOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """What the recorder does beside recording.
+
+    Attributes:
+        directory: folder of the recordings; the recorder watches its disk.
+        preroll_s: length of the pre-roll, s.
+        preview: descriptor of the preview slot (`rig.transport.preview`); None: no preview.
+    """
+
+    directory: Path
+    preroll_s: float = 0.0
+    preview: int | None = None
+
+
+class RecorderConfig(Message):
+    """Configuration of the recorder process.
+
+    Attributes:
+        rig: the rig.
+        rings: descriptor of each camera's ring.
+        doorbell: eventfd that the grabbers ring.
+        options: what the recorder does beside recording.
+    """
+
+    rig: RigSettings
+    rings: tuple[int, ...]
+    doorbell: int
+    options: RecorderOptions
+
+
+class Calibration(msgspec.Struct, frozen=True, kw_only=True):
+    """The interior orientations of the cameras, for a log.
+
+    Attributes:
+        json: the result file of the calibration, attached to the log as it is.
+        cameras: serialized `foxglove.CameraCalibration` by camera name.
+    """
+
+    json: bytes
+    cameras: Mapping[str, bytes]
+
+
+class StartRecording(Message):
+    """Command to the recorder: start a recording.
+
+    Attributes:
+        path: log to create; its name without `.mcap` is the id of the recording.
+        session: fields of the session (athlete, bib, gate, wind, notes, operator, session).
+        pulses: stop after so many, counted from the command; None: until told.
+        seconds: stop so long after the command even if fewer pulses came; None: until told.
+        preroll_s: begin so long before the command, as far as pulses are held; None: with the oldest that is held.
+        rig_toml: the rig file as it was read, attached to the log.
+        calibration: calibration of the cameras; None: not known.
+    """
+
+    path: Path
+    session: Mapping[str, str]
+    pulses: int | None = None
+    seconds: float | None = None
+    preroll_s: float | None = 0.0
+    rig_toml: str = ""
+    calibration: Calibration | None = None
+
+    @property
+    def recording(self) -> str:
+        """Id of the recording."""
+        return self.path.stem
+
+
+class StopRecording(Message):
+    """Command to the recorder: close the log with the pulses that have fired until now."""
+
+
+class GrabberDied(Message):
+    """To the recorder: the grabber process of a camera ended; no records come until it is started again."""
+
+    camera: int
+    reason: str
+
+
+class TellEvent(Message):
+    """To the recorder: an event of the service, for the log and for subscribers."""
+
+    event: Event
+
+
+RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | Quit
+
+
+class CameraNews(StrEnum):
+    """What happened to a camera."""
+
+    CONNECTED = "connected"
+    SILENT = "silent"  #: connected, but three pulses behind the other cameras; its grabber connects it again
+    GONE = "gone"
+    NOTICE = "notice"  #: no change of state, but people should know
+
+    @property
+    def level(self) -> Level:
+        """Severity, as an event."""
+        return _LEVELS[self]
+
+
+_LEVELS: Final = {
+    CameraNews.CONNECTED: Level.INFO,
+    CameraNews.SILENT: Level.WARNING,
+    CameraNews.GONE: Level.ERROR,
+    CameraNews.NOTICE: Level.WARNING,
+}
+
+
+class RecorderReady(Message):
+    """The recorder has started: it reads the rings and obeys commands."""
+
+
+class RecorderWarm(Message):
+    """Several complete triplets have come one after the other: the cameras work together."""
+
+
+class CameraChanged(Message):
+    """A camera was connected, fell silent or is gone.
+
+    Attributes:
+        camera: index of the camera.
+        news: what happened.
+        text: description of the camera, or why it is gone.
+    """
+
+    camera: int
+    news: CameraNews
+    text: str
+
+
+class RecordingStarted(Message):
+    """The log is open.
+
+    Attributes:
+        first_pulse: time of the recording's first pulse if it is in the pre-roll already, else None.
+    """
+
+    first_pulse: UtcNs | None
+
+
+class RecordingProgress(Message):
+    """Counts of the recording in progress, several times a second."""
+
+    counts: Counts
+    first_pulse: UtcNs | None
+
+
+class RecordingFinished(RecordingProgress):
+    """The log is closed.
+
+    Attributes:
+        path: the log.
+        bytes: its size.
+        unpublished: triplets that the recorder has dropped so far because subscribers were too slow.
+    """
+
+    path: Path
+    bytes: int
+    unpublished: int
+
+
+class RecorderFailed(Message):
+    """A recording, or the recorder itself, failed; the fields describe the error."""
+
+    kind: str
+    message: str
+
+    @classmethod
+    def of(cls, error: SvevError) -> "RecorderFailed":
+        """The report of an error."""
+        return cls(kind=type(error).__name__, message=str(error))
+
+    def error(self) -> SvevError:
+        """The error that was reported."""
+        kind = getattr(errors, self.kind, SvevError)
+        return kind(self.message) if issubclass(kind, SvevError) else SvevError(self.message)
+
+
+class RecorderHealth(Message):
+    """The health record, once a second."""
+
+    health: Health
+
+
+RecorderReport = (
+    RecorderReady
+    | RecorderWarm
+    | CameraChanged
+    | RecordingStarted
+    | RecordingProgress
+    | RecordingFinished
+    | RecorderFailed
+    | RecorderHealth
+)

@@ -1,0 +1,78 @@
+"""Encodes our own types as JSON, decodes and checks them, and makes their JSON schemas.
+
+For logs, ZeroMQ, and messages between our processes. Values of `rig.clocks.DecimalNs` are strings of decimal digits,
+because JavaScript would round numbers.
+"""
+
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from pydantic import BaseModel
+
+from rig.clocks import DecimalNs
+
+_DECIMAL: Final = {"type": "string", "pattern": "^-?[0-9]+$"}
+
+
+def _to_plain(value: object) -> object:
+    """Convert a value that msgspec cannot encode into one that it can."""
+    if isinstance(value, DecimalNs | Path):
+        return str(value)
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_unset=True)
+    raise NotImplementedError(f"{type(value).__name__} has no form in JSON")
+
+
+def _from_plain(kind: type, value: Any) -> object:
+    """The inverse of `_to_plain`."""
+    if issubclass(kind, DecimalNs):
+        digits = value.removeprefix("-") if isinstance(value, str) else ""
+        if not (digits.isascii() and digits.isdigit()):
+            raise ValueError("a time must be a string of decimal digits")
+        return kind(value)
+    if issubclass(kind, Path):
+        return Path(value)
+    if issubclass(kind, BaseModel):
+        return kind.model_validate(value)
+    raise NotImplementedError(f"{kind.__name__} has no form in JSON")
+
+
+_ENCODER: Final = msgspec.json.Encoder(enc_hook=_to_plain)
+
+
+def encode(value: object) -> bytes:
+    """A value as JSON in UTF-8."""
+    return _ENCODER.encode(value)
+
+
+def to_builtins(value: object) -> Any:
+    """A value converted to the types of JSON: dictionaries, lists, strings and numbers."""
+    return msgspec.json.decode(encode(value))
+
+
+def decoder(kind: Any) -> msgspec.json.Decoder[Any]:
+    """A decoder for one type, or for a union of tagged types; it raises msgspec.MsgspecError for anything else."""
+    return msgspec.json.Decoder(kind, dec_hook=_from_plain)
+
+
+def schema(kind: type[msgspec.Struct], title: str) -> dict[str, Any]:
+    """The JSON schema of a type, without references: each is replaced by the definition that it refers to."""
+    whole = msgspec.json.schema(kind, schema_hook=lambda _: _DECIMAL)
+    definitions = whole.pop("$defs")
+
+    def resolved(part: Any) -> Any:
+        if isinstance(part, list):
+            return [resolved(each) for each in part]
+        if not isinstance(part, dict):
+            return part
+        if "$ref" in part:
+            more = {key: value for key, value in part.items() if key != "$ref"}
+            return resolved(definitions[part["$ref"].rsplit("/", 1)[1]] | more)
+        found = {key: resolved(value) for key, value in part.items() if key not in {"title", "default"}}
+        if "properties" in found:  # a field with a default value is written all the same
+            written = (key for key, field in part["properties"].items() if "default" in field)
+            found["required"] = [*found.get("required", []), *written]
+        return found
+
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **resolved(whole)}

@@ -1,0 +1,254 @@
+"""Runs a rig without panel, for `svev record`, `svev demo` and benchmarks: a program commands the service's supervisor.
+
+```
+with HeadlessRig(rig, rig_toml, on_event) as running:
+    running.wait_until_warm(settle_s, allow_absent=False)
+    running.start_recording(path, session, pulses, seconds)
+    result = running.wait_until_finished(on_progress, stop)
+```
+
+Unlike the service it does not start again what failed, except a grabber: the program is told at once why there is no
+result.
+"""
+
+import signal
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self, TypeVar
+
+from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, UnknownRecordingError
+from rig.events import Event
+from rig.settings.model import RigSettings
+from rig.status import Counts, Recording, SessionFields, State
+from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
+from service.processes.backends import check_backends
+from service.recordings.control import Outcome
+from service.recordings.storage import check_room_for
+from service.status.event_hub import EventHub
+from service.supervision.commands import at_once
+from service.supervision.rig_session import StartHill
+from service.supervision.supervisor import Supervisor, WarmUp
+
+T = TypeVar("T")
+#: Shows progress: called with label and number of steps, gives a function to call with the number of steps done.
+Progress = Callable[[str, int | None], AbstractContextManager[Callable[[int], None]]]
+
+_ANSWER_S: Final = 20.0
+_STOP_S: Final = 30.0
+_POLL_S: Final = 0.1
+
+
+class HeadlessRig:
+    """All processes of one rig, simulated cameras included; a context manager that stops them whatever happens.
+
+    Args:
+        rig: the rig.
+        rig_toml: the rig file's text, attached to every log.
+        on_event: called with one line for each camera that comes or goes and each process that is started again.
+        hill: starts the simulated cameras; None: as the rig file says.
+
+    Raises:
+        BadInputError: a camera's back end cannot be driven here, or the rig's calibration file is missing or wrong.
+    """
+
+    def __init__(
+        self, rig: RigSettings, rig_toml: str, on_event: Callable[[str], None], hill: StartHill | None = None
+    ) -> None:
+        def tell(event: Event) -> None:
+            if event.name != "service":
+                on_event(f"{event.name} {event.message}")
+
+        check_backends(rig)
+        self._rig = rig
+        options = RecorderOptions(directory=rig.recorder.directory)
+        self._supervisor = Supervisor(rig, rig_toml, EventHub(tell), options, hill=hill, enduring=False)
+        self._path: Path | None = None
+        self._ended: Future[Outcome] = Future()
+
+    def __enter__(self) -> Self:
+        self._supervisor.start()
+        try:
+            self._ask(at_once(self._supervisor.arm))
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._supervisor.stop(_STOP_S)
+
+    @property
+    def pids(self) -> dict[str, int]:
+        """Process ids by row of the process table."""
+        return {row.name: row.pid for row in self._supervisor.status.processes if row.pid is not None}
+
+    def wait_until_warm(self, settle_s: float, *, allow_absent: bool) -> None:
+        """Wait until all cameras together have delivered a few complete triplets.
+
+        Args:
+            settle_s: longest wait for a camera that failed to answer, and for pulses once all cameras are connected, s.
+            allow_absent: be content with some of the cameras.
+
+        Raises:
+            CameraNotFoundError: a camera does not answer in time.
+            CameraError: all cameras are connected, but no complete triplet came.
+            SvevError: the rig cannot be set up.
+        """
+        began = complete_since = time.monotonic()
+        while True:
+            seen = self._ask(at_once(self._supervisor.look))
+            if seen.warm and seen.state is State.ARMED:
+                return
+            now = time.monotonic()
+            if seen.cameras is None:
+                began = now  # the simulated hill and the processes are still being started
+            elif all(camera.present for camera in seen.cameras):
+                if now > complete_since + settle_s:
+                    raise CameraError(
+                        f"all cameras are ready, but no complete triplet came within {settle_s:g} s: "
+                        "check the pulse generator, the trigger cables and trigger.rate_hz in the rig file"
+                    )
+                time.sleep(_POLL_S)
+                continue
+            # A camera that failed to answer gets `settle_s`; one whose process is still starting gets longer.
+            elif now > began + (settle_s if all(camera.tried for camera in seen.cameras) else _ANSWER_S):
+                if not (allow_absent and any(camera.present for camera in seen.cameras)):
+                    self._raise_absent(seen)
+                if seen.state is State.ARMED:
+                    return
+            complete_since = now
+            time.sleep(_POLL_S)
+
+    def start_recording(
+        self,
+        path: Path,
+        *,
+        session: Mapping[str, str],
+        pulses: int | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        """Start a recording; it ends after `pulses`, after `seconds`, or with `stop_recording`.
+
+        Raises:
+            SvevError: the log cannot be created.
+        """
+        order = StartRecording(path=path, session=session, pulses=pulses, seconds=seconds)
+        self._path, self._ended = path, Future()
+
+        def start(opened: "Future[Recording]") -> None:
+            self._supervisor.recordings.begin(order, SessionFields(), opened, self._ended)
+
+        self._ask(start)
+
+    def stop_recording(self) -> None:
+        """End the recording with the pulses that have fired until now; one that has just ended stays as it is."""
+        with suppress(UnknownRecordingError):
+            self._ask(at_once(self._supervisor.recordings.stop))
+
+    def wait_until_finished(self, on_progress: Callable[[Counts], None], stop: Callable[[], bool]) -> RecordingFinished:
+        """Wait for the end of the recording.
+
+        Args:
+            on_progress: called with the counts so far.
+            stop: called several times a second; True: end the recording now.
+
+        Raises:
+            StorageError: the log could not be written to the end; what was written is readable.
+            ProcessDiedError: the recorder died; what was written is readable.
+        """
+        told = False
+        while True:
+            if not told and stop():
+                told = True
+                self.stop_recording()
+            try:
+                outcome = self._ended.result(_POLL_S)
+            except FutureTimeoutError:
+                if (recording := self._supervisor.status.recording) is not None:
+                    on_progress(recording.counts)
+                continue
+            if isinstance(outcome, RecordingFinished):
+                return outcome
+            if isinstance(outcome, ProcessDiedError):
+                kept = f"the log until then is readable: svev verify {self._path}"
+                raise ProcessDiedError(f"{outcome}; {kept}; then start again")
+            raise outcome
+
+    def _ask(self, command: Callable[["Future[T]"], None]) -> T:
+        """Have the supervisor carry out a command; if it has ended, raise the error that ended it."""
+        try:
+            return self._supervisor.commands.ask(command, _ANSWER_S)
+        except ProcessDiedError as error:
+            raise self._supervisor.failure or error from None
+
+    def _raise_absent(self, seen: WarmUp) -> None:
+        reasons = "; ".join(
+            heard.text or f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
+            for camera, heard in zip(self._rig.cameras, seen.cameras or (), strict=True)
+            if not heard.present
+        )
+        raise CameraNotFoundError(reasons)
+
+
+def record(
+    running: HeadlessRig,
+    rig: RigSettings,
+    path: Path,
+    seconds: float,
+    *,
+    allow_absent: bool,
+    session: Mapping[str, str],
+    progress: Progress,
+) -> dict[str, Any]:
+    """Record once: wait until the rig is warm, record, wait for the end. Ctrl-C and SIGTERM end the recording early.
+
+    Args:
+        running: the rig's processes.
+        rig: the rig.
+        path: the log to make.
+        seconds: length of the recording.
+        allow_absent: record even if some cameras do not answer.
+        session: session fields for the log.
+        progress: shows how many pulses are recorded.
+
+    Returns:
+        The result as `svev record --json` prints it.
+
+    Raises:
+        SvevError: the disk has no room, a camera does not answer, the disk failed, the recorder died.
+    """
+    check_room_for(rig, path.parent, seconds)
+    running.wait_until_warm(rig.trigger.settle_s, allow_absent=allow_absent)
+    pulses = max(1, round(seconds * rig.trigger.rate_hz))
+    with _stop_signals() as stop, progress(f"recording {path.name}", pulses) as advance:
+        running.start_recording(path, session=session, pulses=pulses, seconds=seconds)
+        report = running.wait_until_finished(lambda counts: advance(counts.pulses), stop)
+        early = stop()
+    return {
+        "log": str(path),
+        **report.counts.model_dump(),
+        "bytes": report.bytes,
+        "unpublished": report.unpublished,
+        "stopped_early": early,
+    }
+
+
+@contextmanager
+def _stop_signals() -> Iterator[Callable[[], bool]]:
+    """Within, Ctrl-C and SIGTERM only set a flag, so that the log can be closed properly."""
+    caught: list[int] = []
+    before = {
+        number: signal.signal(number, lambda n, _: caught.append(n)) for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield lambda: bool(caught)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

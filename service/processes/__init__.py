@@ -1,0 +1,1 @@
+"""The child processes of a rig: their programs, and the object that starts and watches them."""

@@ -1,0 +1,82 @@
+"""Finds the back end that a rig file names for a camera; imports a camera library only if a camera needs it."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Final
+
+from capture.iidc.bandwidth import check_bandwidth
+from capture.iidc.library import load as load_libdc1394
+from capture.seam import OpenCamera
+from rig.clocks import HostNs
+from rig.errors import BadInputError, CameraNotFoundError
+from rig.settings.model import Backend, RigSettings
+from rig.transport.ring import CameraRing
+from service.processes.replayed_log import ReplayedLog, check_replay
+
+_Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
+
+
+def _aravis(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:
+    from capture.aravis.camera import AravisCamera  # noqa: PLC0415
+
+    return lambda: AravisCamera(rig.cameras[index], rig.network, ring, rig.trigger.period_ns)
+
+
+def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:
+    from capture.iidc.camera import IidcCamera  # noqa: PLC0415
+
+    return lambda: IidcCamera(rig.cameras[index], ring, rig.trigger.rate_hz)
+
+
+def _sim(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:
+    from capture.sim.camera import SimCamera  # noqa: PLC0415
+    from service.processes.simulation import sim_scene  # noqa: PLC0415
+
+    scene = sim_scene(rig, index, epoch)  # made once, since a real hill does not begin anew with each connection
+    return lambda: SimCamera(rig.cameras[index], ring, scene)
+
+
+def _replay(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:
+    from capture.replay.camera import ReplayCamera  # noqa: PLC0415
+    from capture.replay.timeline import Timeline  # noqa: PLC0415
+
+    camera = rig.cameras[index]
+
+    @cache
+    def timeline() -> Timeline:
+        """The log's tags, read at the first connection and kept for later ones."""
+        try:
+            return Timeline(ReplayedLog(rig, index), epoch)
+        except BadInputError as error:
+            raise CameraNotFoundError(f"camera {camera.name}: {error}") from None
+
+    return lambda: ReplayCamera(camera, ring, timeline())
+
+
+_BACKENDS: Final[dict[Backend, _Opener]] = {"aravis": _aravis, "iidc": _iidc, "sim": _sim, "replay": _replay}
+
+
+def check_backends(rig: RigSettings) -> None:
+    """Check that all cameras of a rig can be driven on this computer.
+
+    Raises:
+        BadInputError: libdc1394 is missing, a FireWire bus has no room for its cameras, or a log that is to be replayed
+            is missing or does not fit the rig file.
+    """
+    if any(camera.backend == "iidc" for camera in rig.cameras):
+        load_libdc1394()
+        check_bandwidth(rig)
+    check_replay(rig)
+
+
+def camera_opener(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:
+    """A function that connects one camera of the rig; the grabber calls it again after each loss of the camera.
+
+    Args:
+        rig: the rig.
+        index: index of the camera.
+        ring: ring for its frames.
+        epoch: host time of the first pulse of the simulated hill or of the replayed log; the same for all cameras.
+    """
+    check_backends(rig)
+    return _BACKENDS[rig.cameras[index].backend](rig, index, ring, epoch)

@@ -1,0 +1,254 @@
+"""Runs the processes of one rig: rings, one grabber process per camera, one recorder process.
+
+The owner calls `turn` again and again; it passes on the recorder's reports, keeps track of the cameras, and starts dead
+grabbers again. The owner decides what happens when the recorder dies.
+"""
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self
+
+from rig.clocks import HostNs, host_now
+from rig.errors import ProcessDiedError
+from rig.events import Event, Level
+from rig.health import Health
+from rig.settings.model import RigSettings
+from rig.transport.messages import (
+    CameraChanged,
+    CameraNews,
+    GrabberConfig,
+    GrabberDied,
+    RecorderCommand,
+    RecorderConfig,
+    RecorderHealth,
+    RecorderOptions,
+    RecorderReady,
+    RecorderReport,
+    RecorderWarm,
+)
+from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
+from rig.transport.ring import MAX_SLOTS, CameraRing
+from service.processes.backends import check_backends
+
+_LEAST_SLOTS: Final = 16
+RECORDER: Final = "recorder"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPresence:
+    """The recorder's last news of a camera.
+
+    Attributes:
+        news: what happened to the camera; None: no news yet.
+        text: description of the camera, or why it is gone.
+        counted: for a silent camera: number of health records in a row in which it delivered frames again.
+    """
+
+    news: CameraNews | None = None
+    text: str = ""
+    counted: int = 0
+
+    @property
+    def present(self) -> bool:
+        """Whether the camera is connected; a silent one is, until its grabber gives it up."""
+        return self.news in {CameraNews.CONNECTED, CameraNews.SILENT}
+
+    @property
+    def tried(self) -> bool:
+        """Whether the camera has answered, or the grabber has failed to connect it."""
+        return self.news is not None
+
+
+class RigProcesses:
+    """All processes of one rig; a context manager that stops them whatever happens.
+
+    Args:
+        rig: the rig.
+        on_event: called for each camera that comes or goes and each process that is started again.
+        epoch: host time of pulse 0 of the simulated hill or the replayed log; now if left out.
+        recorder: what the recorder does beside recording.
+        environment: variables that grabbers of simulated FireWire cameras need in their environment.
+
+    Attributes:
+        cameras: presence of each camera.
+        warm: whether complete triplets have come.
+        ready: whether the recorder has started.
+        recorder_died: whether the recorder is dead; the presence of cameras is not known then.
+        health: the recorder's last health record.
+
+    Raises:
+        BadInputError: libdc1394 is missing, or a log that is to be replayed does not fit.
+    """
+
+    def __init__(
+        self,
+        rig: RigSettings,
+        on_event: Callable[[Event], None],
+        *,
+        epoch: HostNs | None = None,
+        recorder: RecorderOptions | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        check_backends(rig)
+        self._rig, self._on_event = rig, on_event
+        self._options = recorder or RecorderOptions(directory=rig.recorder.directory)
+        self._environment = dict(environment or {})
+        self._processes = ProcessTable()
+        self._exit = ExitStack()
+        self._rings: list[CameraRing] = []
+        self._doorbell = -1
+        self._epoch = host_now() if epoch is None else epoch
+        self._names = [camera.name for camera in rig.cameras]
+        self._back_offs = {name: BackOff() for name in self._names}
+        self._again: dict[Child, float] = {}
+        self.cameras = [CameraPresence()] * len(rig.cameras)
+        self.warm = self.ready = self.recorder_died = False
+        self.health: Health | None = None
+
+    def __enter__(self) -> Self:
+        with ExitStack() as stack:
+            self._doorbell = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+            stack.callback(os.close, self._doorbell)
+            for camera in self._rig.cameras:
+                ring = CameraRing.create(camera.name, camera.frame_bytes, self._slots())
+                stack.callback(ring.close)
+                self._rings.append(ring)
+            stack.callback(self._processes.stop)
+            self._start_recorder()
+            for index in range(len(self._rig.cameras)):
+                self._start_grabber(index)
+            self._exit = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._exit.close()
+
+    @property
+    def pids(self) -> dict[str, int]:
+        """Process ids by row of the process table."""
+        return {name: self._processes[name].pid for name in (*self._names, RECORDER)}
+
+    @property
+    def restarts(self) -> dict[str, int]:
+        """How many times each grabber died, by camera."""
+        return {name: back_off.deaths for name, back_off in self._back_offs.items()}
+
+    @property
+    def started(self) -> float:
+        """When the recorder was started, on the monotonic clock, s."""
+        return self._processes[RECORDER].started
+
+    def tell(self, command: RecorderCommand, *, or_drop: bool = False) -> None:
+        """Send a command to the recorder; `or_drop`: do not wait if it does not read."""
+        self._processes[RECORDER].control.send(command, or_drop=or_drop)
+
+    def kill_recorder(self) -> None:
+        """Kill a recorder that does not answer; the next `turn` raises ProcessDiedError."""
+        self._processes[RECORDER].kill()
+
+    def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport]:
+        """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
+
+        Args:
+            timeout_s: longest wait for the first report, s.
+            wake: descriptors that end the wait when they become readable.
+
+        Returns:
+            The reports.
+
+        Raises:
+            ProcessDiedError: the recorder died; raised once, after all its reports have been returned.
+        """
+        reports = [message for _, message in self._processes.receive(timeout_s, wake)]
+        for report in reports:
+            match report:
+                case CameraChanged():
+                    self._note_camera(report)
+                case RecorderWarm():
+                    self.warm = True
+                case RecorderReady():
+                    self.ready = True
+                case RecorderHealth():
+                    self.health = report.health
+                    self._note_recovered(report.health)
+        self._tend()
+        return reports
+
+    def restart_recorder(self) -> None:
+        """Start a recorder in place of the dead one; it takes over cameras that are still streaming at once."""
+        self.recorder_died = False
+        self._start_recorder()
+
+    def _note_camera(self, change: CameraChanged) -> None:
+        if change.news is not CameraNews.NOTICE:
+            self.cameras[change.camera] = CameraPresence(change.news, change.text)
+        self._on_event(Event.now(change.news.level, self._names[change.camera], f"{change.news}: {change.text}"))
+
+    def _note_recovered(self, health: Health) -> None:
+        """Note which silent cameras deliver again, by the frames in their health records: no report says so."""
+        for index, camera in enumerate(self.cameras):
+            if camera.news is CameraNews.SILENT:
+                counted = camera.counted + 1 if health.cameras[index].frames_per_s else 0
+                news = CameraNews.CONNECTED if counted > 1 else CameraNews.SILENT
+                self.cameras[index] = CameraPresence(news, camera.text, counted)
+
+    def _tend(self) -> None:
+        """Start dead grabbers again, after a wait that grows; raise if the recorder died."""
+        for child in self._processes.dead():
+            if child.spec.name != RECORDER:
+                self._tend_grabber(child)
+            elif child.control.ended and not self.recorder_died:
+                self.recorder_died, self.ready, self.warm, self.health = True, False, False, None
+                self.cameras = [CameraPresence()] * len(self._names)
+                raise ProcessDiedError(f"the recorder process ended ({child.ending()}): if it recurs, run svev doctor")
+
+    def _tend_grabber(self, child: Child) -> None:
+        name, now = child.spec.name, time.monotonic()
+        if child not in self._again:
+            reason = f"grabber process ended ({child.ending()})"
+            wait_s = self._back_offs[name].died(now - child.started)
+            self._again[child] = now + wait_s
+            self._on_event(Event.now(Level.ERROR, name, f"{reason}; starting it again in {wait_s:g} s"))
+            self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
+        elif now >= self._again[child]:
+            del self._again[child]
+            self._start_grabber(self._names.index(name))
+
+    def _slots(self) -> int:
+        wanted = round(self._rig.recorder.ring_s * self._rig.trigger.rate_hz)
+        return min(MAX_SLOTS, max(_LEAST_SLOTS, wanted))
+
+    def _start_recorder(self) -> None:
+        fds, options = tuple(ring.fd for ring in self._rings), self._options
+        config = RecorderConfig(rig=self._rig, rings=fds, doorbell=self._doorbell, options=options)
+        preview = () if options.preview is None else (options.preview,)
+        self._processes.start(
+            ProcessSpec(
+                RECORDER,
+                "service.processes.recorder_process",
+                config,
+                inherit=(*fds, self._doorbell, *preview),
+                reports=RecorderReport,
+            )
+        )
+
+    def _start_grabber(self, index: int) -> None:
+        ring = self._rings[index].fd
+        config = GrabberConfig(rig=self._rig, camera=index, ring=ring, doorbell=self._doorbell, epoch=self._epoch)
+        # Only libdc1394 needs the variables, to see the emulated bus.
+        more = self._environment if self._rig.cameras[index].backend == "iidc" else {}
+        self._processes.start(
+            ProcessSpec(
+                self._names[index],
+                "service.processes.grabber_process",
+                config,
+                inherit=(ring, self._doorbell),
+                environment=more,
+            )
+        )

@@ -1,0 +1,84 @@
+"""Starts the simulated cameras of a rig file with a `[simulation]` table; no other module here imports `simrig`."""
+
+import ipaddress
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+
+from capture.sim.camera import Scene
+from rig.clocks import HostNs
+from rig.errors import BadInputError
+from rig.settings.model import CameraSettings, Region, RigSettings
+from simrig.programs.scene import SimScene
+from simrig.programs.simulated_hill import SimulatedHill
+from simrig.world.scenario import load_scenario
+
+
+def simulated_hill(
+    rig: RigSettings, epoch: HostNs, *, prerendered: int = 0, link_mbit_s: float = 1000.0
+) -> AbstractContextManager[SimulatedHill | None]:
+    """The simulated GigE Vision and FireWire cameras of a rig with a `[simulation]` table; nothing for other rigs.
+
+    Args:
+        rig: the rig.
+        epoch: host time of hill pulse 0.
+        prerendered: for load tests: GigE Vision cameras draw so many images once and then only stamp them anew.
+        link_mbit_s: rate at which each GigE Vision camera sends packets; 0: as fast as possible.
+
+    Raises:
+        BadInputError: the scenario is wrong or lacks a camera; an address is not on loopback, is in use, or is no GUID.
+    """
+    if rig.simulation is None:
+        return nullcontext()
+    scenario = load_scenario(rig.simulation.scenario)
+    for camera in rig.cameras:
+        scenario.camera_index(camera.name)
+    gige = [camera for camera in rig.cameras if camera.backend == "aravis"]
+    firewire = [camera for camera in rig.cameras if camera.backend == "iidc"]
+    if not gige and not firewire:
+        return nullcontext()
+    for camera in gige:
+        _check_loopback(camera)
+    region = gige[0].region if gige else Region()
+    return SimulatedHill(
+        rig.simulation.scenario,
+        {camera.name: camera.address for camera in gige},
+        rig.trigger.rate_hz,
+        firewire={camera.name: camera.address for camera in firewire},
+        epoch=epoch,
+        width=region.width,
+        height=region.height,
+        prerendered=prerendered,
+        link_mbit_s=link_mbit_s,
+    )
+
+
+@contextmanager
+def hill_environment(rig: RigSettings, epoch: HostNs) -> Iterator[Mapping[str, str]]:
+    """Run the simulated cameras of a rig, if it has any.
+
+    Yields:
+        Environment variables that grabber processes need to see the FireWire cameras among them.
+
+    Raises:
+        BadInputError: as `simulated_hill`; or there is no C compiler for the shim that shows the FireWire cameras.
+    """
+    with simulated_hill(rig, epoch) as hill:
+        yield {} if hill is None else hill.environment
+
+
+def sim_scene(rig: RigSettings, index: int, epoch: HostNs) -> Scene:
+    """The simulated hill as one camera inside its grabber process sees it (back end "sim")."""
+    return SimScene(rig, index, epoch)
+
+
+def _check_loopback(camera: CameraSettings) -> None:
+    """Refuse addresses of simulated cameras that other computers could reach."""
+    try:
+        loopback = ipaddress.ip_address(camera.address).is_loopback
+    except ValueError:
+        loopback = False
+    if not loopback:
+        raise BadInputError(
+            f"simulated camera {camera.name} has address {camera.address}: "
+            "give it one on loopback, e.g. 127.0.0.11, or remove the [simulation] table for real cameras"
+        )

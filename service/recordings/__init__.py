@@ -1,0 +1,1 @@
+"""Recordings: the one in progress, those in the folder, room on the disk for more."""

@@ -1,0 +1,159 @@
+"""Reads the recordings in the service's folder and describes them for the panel, each with its verdict."""
+
+from abc import ABC, abstractmethod
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.images.activity import liveliest_pulse
+from recorder.catalogue.entry import Entry, LogState
+from recorder.catalogue.folder import Catalogue
+from rig.clocks import NS_PER_S
+from rig.errors import StillRecordingError
+from rig.status import (
+    Causes,
+    Counts,
+    Level,
+    Pulses,
+    PulseSummary,
+    Recording,
+    RecordingState,
+    SessionFields,
+    Statement,
+    Status,
+)
+from rig.tag import TripletTag
+
+_STATES = {
+    LogState.CLOSED: RecordingState.FINISHED,
+    LogState.UNFINISHED: RecordingState.UNFINISHED,
+    LogState.DAMAGED: RecordingState.DAMAGED,
+}
+
+
+class Archive(ABC):
+    """The reading part of `service.seam.RigService`: all recordings of the folder, with the one in progress.
+
+    Args:
+        catalogue: of the folder.
+    """
+
+    def __init__(self, catalogue: Catalogue) -> None:
+        self._catalogue = catalogue
+
+    @abstractmethod
+    def status(self) -> Status:
+        """The present status, which has the recording in progress."""
+
+    def recordings(self, *, deleted: bool) -> list[Recording]:
+        """All recordings, newest first; if `deleted`, those in the trash instead."""
+        current = self.status().recording
+        found = [as_recording(entry) for entry in self._catalogue.entries(deleted=deleted)]
+        return [current if current and each.id == current.id else each for each in found]
+
+    def recording(self, recording_id: str) -> Recording:
+        """One recording, in the trash or not."""
+        current = self.status().recording
+        return current if current and current.id == recording_id else as_recording(self._catalogue.entry(recording_id))
+
+    def log_file(self, recording_id: str) -> Path:
+        """Path of the log of a recording that has ended.
+
+        Raises:
+            StillRecordingError: it has not.
+        """
+        current = self.status().recording
+        if current and current.id == recording_id:
+            raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
+        return self._catalogue.entry(recording_id).path
+
+    def pulses(self, recording_id: str) -> Pulses:
+        """What became of each pulse of a recording."""
+        return _as_pulses(recording_id, self._catalogue.tags(recording_id))
+
+    def image(self, recording_id: str, pulse: int) -> NDArray[np.uint8]:
+        """One triplet of a recording, (rows, columns), uint8."""
+        return self._catalogue.image(recording_id, pulse)
+
+    def liveliest_pulse(self, recording_id: str) -> int:
+        """The pulse to show a recording by: the middle of the stretch in which most moves."""
+        return liveliest_pulse(self._catalogue.entry(recording_id).path)
+
+
+def as_recording(entry: Entry) -> Recording:
+    """Describe an entry of the catalogue for the panel."""
+    causes = Causes(**{status.value: count for status, count in entry.causes.items()})
+    counts = Counts(pulses=entry.pulses, complete=entry.complete, partial=entry.partial, causes=causes)
+    known = {name: text for name, text in entry.session.items() if name in SessionFields.model_fields}
+    return Recording(
+        id=entry.id,
+        state=_STATES[entry.state],
+        started=None if entry.started is None else datetime.fromtimestamp(entry.started / NS_PER_S, UTC),
+        duration_s=round(entry.duration_s, 6),
+        bytes=entry.bytes,
+        counts=counts,
+        session=SessionFields.model_construct(None, **known),  # unchecked: old logs may hold what is refused today
+        verdict=verdict(entry),
+        deleted=entry.deleted,
+    )
+
+
+def verdict(entry: Entry) -> Statement:
+    """Say in one line what a recording is good for.
+
+    `values["failures"]` reads e.g. "K2 1 lost, 1 missed; K3 2 absent".
+    """
+    level, code, text, advice = _judge(entry)
+    values: dict[str, str | int | float] = {
+        "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
+        "failures": _failures(entry),
+    }  # fmt: skip
+    return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
+
+
+def _judge(entry: Entry) -> tuple[Level, str, str, str]:
+    if entry.trouble:
+        return Level.ERROR, "trouble", entry.trouble, ""
+    if entry.state is LogState.DAMAGED:
+        text = f"Parts cannot be read or are not there; {entry.pulses} pulses are readable"
+        return Level.ERROR, "damaged", text, "Run svev verify on it"
+    if entry.state is LogState.UNFINISHED:
+        text, advice = f"Never closed; its {entry.pulses} pulses are readable", "svev recover makes a proper log of it"
+        return Level.WARNING, "unfinished", text, advice
+    if not entry.pulses:
+        return Level.WARNING, "empty", "No pulse came", "Look at the trigger"
+    if entry.partial:
+        text = f"{entry.partial} of {entry.pulses} pulses lack a frame: {_failures(entry)}"
+        return Level.WARNING, "partial", text, ""
+    return Level.GOOD, "complete", f"Complete: all {entry.pulses} pulses", ""
+
+
+def _failures(entry: Entry) -> str:
+    cameras = (
+        f"{name} " + ", ".join(f"{count} {status.value}" for status, count in causes.items())
+        for name, causes in entry.failures.items()
+    )
+    return "; ".join(cameras)
+
+
+def _as_pulses(recording_id: str, tags: tuple[TripletTag, ...]) -> Pulses:
+    """Summarize the tags of a recording for the panel."""
+    if not tags:
+        return Pulses(id=recording_id, cameras=(), columns=(), shape=(0, 0), pulses=())
+    first = tags[0]
+    return Pulses(
+        id=recording_id,
+        cameras=tuple(camera.name for camera in first.cameras),
+        columns=tuple(camera.columns for camera in first.cameras),
+        shape=first.shape,
+        pulses=tuple(
+            PulseSummary(
+                pulse=tag.pulse,
+                time_s=round((tag.time - first.time) / NS_PER_S, 6),
+                statuses=tuple(camera.status for camera in tag.cameras),
+            )
+            for tag in tags
+        ),
+    )

@@ -1,0 +1,335 @@
+"""Starts, follows and ends recordings, from the recorder's reports. Runs in the supervisor's thread."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+
+import msgspec
+
+from rig import status
+from rig.clocks import NS_PER_S
+from rig.errors import (
+    BadInputError,
+    ProcessDiedError,
+    StateForbidsError,
+    StorageError,
+    SvevError,
+    UnknownRecordingError,
+)
+from rig.events import Event, Level
+from rig.settings.model import RigSettings
+from rig.status import Counts, Recording, RecordingOrder, RecordingState, SessionChange, SessionFields, State, Statement
+from rig.transport.messages import (
+    Calibration,
+    RecorderFailed,
+    RecorderHealth,
+    RecorderReport,
+    RecordingFinished,
+    RecordingProgress,
+    RecordingStarted,
+    StartRecording,
+    StopRecording,
+)
+from service.processes.rig_processes import RigProcesses
+from service.recordings.storage import check_room_for, new_log_path
+from service.status.statements import FORBIDDEN, recording_ended
+from service.supervision.rig_session import RigSession
+from service.supervision.state_machine import StateMachine
+
+#: How a recording ended: the recorder's report, or the error that ended it.
+Outcome = RecordingFinished | SvevError
+
+
+class RecordingInProgress:
+    """A recording from the order to the recorder's last report of it.
+
+    Args:
+        path: the log.
+        session: the session fields.
+        opened: is answered when the log is open.
+
+    Attributes:
+        id: id of the recording.
+        path: the log.
+        session: the session fields, later changes included.
+        stopping: whether the recorder was told to stop.
+        waiting: are answered when the recording is over.
+    """
+
+    def __init__(self, path: Path, session: SessionFields, opened: "Future[Recording]") -> None:
+        self.id, self.path, self.session = path.stem, path, session
+        self.waiting: list[Future[Outcome]] = []
+        self.stopping = False
+        self._opened: Future[Recording] | None = opened
+        self._ordered = datetime.now(UTC)
+        self._started: datetime | None = None
+        self._counts = Counts()
+        self._bytes = 0
+
+    @property
+    def opening(self) -> bool:
+        """Whether the recorder has not reported yet that the log is open."""
+        return self._opened is not None
+
+    def open(self, report: RecordingStarted) -> Callable[[], None]:
+        """Note that the recorder has opened the log.
+
+        Returns:
+            A function that answers the thread that waits for it.
+        """
+        self._note_first(report)
+        opened, self._opened = self._opened, None
+        return lambda: opened.set_result(self.view()) if opened is not None else None
+
+    def refuse(self, error: Exception) -> None:
+        """Answer the thread that waits for the log to be opened with an error."""
+        if self._opened is not None:
+            self._opened.set_exception(error)
+
+    def progress(self, report: RecordingProgress) -> None:
+        """Note the counts so far."""
+        self._note_first(report)
+        self._counts = report.counts
+
+    def grown(self, size: int) -> None:
+        """Note the size of the log, bytes."""
+        self._bytes = size
+
+    def change_session(self, change: SessionChange) -> None:
+        """Change session fields."""
+        self.session = self.session.model_copy(update=change.model_dump(exclude_none=True))
+
+    def _note_first(self, report: RecordingStarted | RecordingProgress) -> None:
+        if self._started is None and report.first_pulse is not None:
+            self._started = datetime.fromtimestamp(report.first_pulse / NS_PER_S, UTC)
+
+    def end(self, outcome: Outcome) -> None:
+        """Answer the threads that wait for the end."""
+        for future in self.waiting:
+            future.set_result(outcome)
+
+    def view(self) -> Recording:
+        """The recording for the status and the list of recordings."""
+        started = self._started or self._ordered
+        counts = self._counts
+        text = f"recording, {counts.pulses} pulses so far"
+        if counts.partial:
+            text += f", {counts.partial} of them incomplete"
+        verdict = Statement(
+            level=status.Level.WARNING if counts.partial else status.Level.GOOD,
+            code="recording_running",
+            text=text,
+            values={"pulses": counts.pulses, "partial": counts.partial},
+        )
+        return Recording(
+            id=self.id,
+            state=RecordingState.RECORDING,
+            started=started,
+            duration_s=round((datetime.now(UTC) - started).total_seconds(), 1),
+            bytes=self._bytes,
+            counts=counts,
+            session=self.session,
+            verdict=verdict,
+        )
+
+
+class RecordingControl:
+    """Owner of the recording in progress, of which there is at most one.
+
+    Args:
+        machine: the state machine; this object moves it between armed and recording.
+        session: the rig, its processes, and whom to tell events.
+        rig_toml: the rig file's text, attached to every log.
+        calibration: calibration of the cameras, written into every log; None: not known.
+
+    Attributes:
+        current: the recording in progress, or one whose log is being opened.
+        last: id of the recording that ended last.
+        notice: why the last recording ended early, until another one starts.
+        armed_at: when the rig was armed, on the monotonic clock, s.
+    """
+
+    def __init__(
+        self, machine: StateMachine, session: RigSession, rig_toml: str, calibration: Calibration | None
+    ) -> None:
+        self._machine, self._session = machine, session
+        self._rig, self._data = session.rig, session.recorder.directory
+        self._rig_toml, self._calibration = rig_toml, calibration
+        self.current: RecordingInProgress | None = None
+        self.last: str | None = None
+        self.notice: Statement | None = None
+        self.armed_at = time.monotonic()
+        self._answers: list[Callable[[], None]] = []
+
+    def answer(self) -> None:
+        """Answer the waiting threads; called after the status is renewed, so that they see the new state."""
+        answers, self._answers = self._answers, []
+        for answer in answers:
+            answer()
+
+    def start(self, order: RecordingOrder, opened: "Future[Recording]") -> None:
+        """Have the recorder open a log.
+
+        Raises:
+            StateForbidsError: not armed, or a recording is being opened.
+            StorageError: no room, or the folder cannot be written.
+        """
+        self._armed_processes()
+        length_s = self._rig.recorder.jump_s if order.duration_s is None else order.duration_s
+        check_room_for(self._rig, self._data, length_s)
+        session = SessionFields(**order.model_dump(include=set(SessionFields.model_fields)))
+        start = StartRecording(
+            path=self._new_path(),
+            session={name: text for name, text in session.model_dump().items() if text},
+            seconds=order.duration_s,
+            preroll_s=self._reach_s(order),
+        )
+        self.begin(start, session, opened)
+
+    def begin(
+        self,
+        start: StartRecording,
+        session: SessionFields,
+        opened: "Future[Recording]",
+        ended: "Future[Outcome] | None" = None,
+    ) -> None:
+        """Have the recorder open a log.
+
+        Args:
+            start: what the recorder is told; rig file and calibration, the same for all recordings, are added to it.
+            session: the session fields as people see them.
+            opened: is answered when the log is open.
+            ended: is answered when the recording is over, however that comes about.
+
+        Raises:
+            StateForbidsError: not armed, or a recording is being opened.
+        """
+        processes = self._armed_processes()
+        self.current, self.notice = RecordingInProgress(start.path, session, opened), None
+        if ended is not None:
+            self.current.waiting.append(ended)
+        processes.tell(msgspec.structs.replace(start, rig_toml=self._rig_toml, calibration=self._calibration))
+
+    def _armed_processes(self) -> RigProcesses:
+        state, processes = self._machine.state, self._session.processes
+        if processes is None or state is not State.ARMED or self.current is not None:
+            raise StateForbidsError(FORBIDDEN["start", State.RECORDING if state is State.ARMED else state])
+        return processes
+
+    def _new_path(self) -> Path:
+        try:
+            return new_log_path(self._data)
+        except BadInputError:
+            raise StorageError(
+                f"{self._data}: cannot be written; correct its permissions, or start the service with another --data"
+            ) from None
+
+    def _reach_s(self, order: RecordingOrder) -> float:
+        """How far a recording begins in the past: not before the rig was armed, when cameras were missing."""
+        armed_s = time.monotonic() - self.armed_at
+        return armed_s if order.preroll_s is None else min(order.preroll_s, armed_s)
+
+    def stop(self, recording: str | None = None, ended: "Future[Outcome] | None" = None) -> None:
+        """Have the recorder close the log.
+
+        Args:
+            recording: id of the recording; None: the one in progress.
+            ended: is answered when the recording is over.
+
+        Raises:
+            UnknownRecordingError: this recording is not in progress.
+        """
+        current = self.current
+        if current is None or recording not in {None, current.id}:
+            raise UnknownRecordingError(f"recording {recording} is not in progress: see the list of recordings")
+        if ended is not None:
+            current.waiting.append(ended)
+        if self._session.processes is not None and not current.stopping:
+            current.stopping = True
+            self._session.processes.tell(StopRecording())
+
+    def change_session(self, recording: str, change: SessionChange) -> Recording | None:
+        """Change session fields of the recording in progress.
+
+        Returns:
+            The recording; None if `recording` is not in progress.
+        """
+        if self.current is None or self.current.id != recording:
+            return None
+        self.current.change_session(change)
+        return self.current.view()
+
+    def hear(self, report: RecorderReport) -> None:
+        """Handle a report of the recorder."""
+        current = self.current
+        if current is None:
+            return
+        match report:
+            case RecordingStarted():
+                self._answers.append(current.open(report))
+                self._machine.move(State.RECORDING)
+                self._say(Level.INFO, f"recording {current.id} started")
+            case RecorderHealth() if not current.opening:
+                with suppress(FileNotFoundError):  # somebody has moved the log away
+                    current.grown(current.path.stat().st_size)
+            case RecordingFinished():
+                current.progress(report)
+                counts = (
+                    f"{report.counts.pulses} pulses, {report.counts.complete} complete, {report.counts.partial} partial"
+                )
+                self._say(Level.INFO, f"recording {current.id} stopped: {counts}")
+                self._over(report, State.ARMED)
+            case RecordingProgress():
+                current.progress(report)
+            case RecorderFailed():
+                self.fail(report.error(), State.ARMED)
+
+    def fail(self, error: SvevError, then: State) -> None:
+        """End the recording in progress, if there is one, with an error, and go to the state `then`."""
+        current = self.current
+        if current is None:
+            return
+        if current.opening:
+            current.refuse(error)
+            self.current = None
+            return
+        self.notice = recording_ended(current.id, error)
+        self._say(Level.ERROR, self.notice.text)
+        self._over(error, then)
+
+    def abandon(self) -> None:
+        """Answer all waiting threads, because the service ends before the recorder's last report."""
+        self.answer()
+        current, self.current = self.current, None
+        if current is not None:
+            error = ProcessDiedError("the service ends: look at the list of recordings when it runs again")
+            current.refuse(error)
+            current.end(error)
+
+    def _over(self, outcome: Outcome, then: State) -> None:
+        current, self.current = self.current, None
+        if current is not None:
+            self.last = current.id
+            self._machine.move(then)
+            self._answers.append(partial(current.end, outcome))
+
+    def _say(self, level: Level, text: str) -> None:
+        self._session.tell(Event.now(level, "service", text))
+
+
+def read_calibration(rig: RigSettings) -> Calibration | None:
+    """Read the calibration file that the rig file names; None if it names none.
+
+    Raises:
+        BadInputError: the calibration file is missing or wrong.
+    """
+    if rig.calibration is None:
+        return None
+    # Imported here because photogrammetry and its libraries take memory and a second to load.
+    from analysis.export.camera_calibration import calibration_for_log  # noqa: PLC0415
+
+    return calibration_for_log(rig.calibration, rig.cameras)

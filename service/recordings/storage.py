@@ -1,0 +1,82 @@
+"""The folder of the recordings: path of a new log, and how much more fits on the disk."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from rig.disk import free_bytes
+from rig.errors import BadInputError, StorageError
+from rig.settings.model import RigSettings
+
+
+def new_log_path(directory: Path) -> Path:
+    """A path for a new log, named by the present time (UTC), in `directory`, which is made if missing.
+
+    Raises:
+        BadInputError: the directory cannot be made or written.
+    """
+    name = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        probe = directory / f".{name}.probe"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise BadInputError(
+            f"{directory}: cannot be written ({error.strerror}); choose another --out or correct its permissions"
+        ) from None
+    path, again = directory / f"{name}.mcap", 1
+    while path.exists():
+        again += 1
+        path = directory / f"{name}-{again}.mcap"
+    return path
+
+
+_GB: Final = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """How much can still be recorded.
+
+    Attributes:
+        free_bytes: free bytes on the disk.
+        seconds: length of recording until only the reserve is left, whole seconds.
+        jumps: number of jumps of `recorder.jump_s` that fit into it.
+    """
+
+    free_bytes: int
+    seconds: float
+    jumps: int
+
+
+def usable_bytes(rig: RigSettings, free_bytes: int) -> float:
+    """Bytes that recordings may take: the free ones without the reserve; negative if less than the reserve is free."""
+    return free_bytes - rig.recorder.reserve_gb * _GB
+
+
+def bytes_per_s(rig: RigSettings) -> float:
+    """Bytes per second of a recording when all cameras deliver at the rig's rate."""
+    rows, columns = rig.triplet_shape
+    return rows * columns * rig.trigger.rate_hz
+
+
+def room_for(rig: RigSettings, free_bytes: int) -> Room:
+    """How much can be recorded into `free_bytes`."""
+    seconds = max(0.0, usable_bytes(rig, free_bytes)) // bytes_per_s(rig)
+    return Room(free_bytes, seconds, int(seconds / rig.recorder.jump_s))
+
+
+def check_room_for(rig: RigSettings, directory: Path, seconds: float) -> None:
+    """Check that a recording of `seconds` fits on the disk.
+
+    Raises:
+        StorageError: it does not fit.
+    """
+    room = room_for(rig, free_bytes(directory) or 0)
+    if room.seconds < seconds:
+        raise StorageError(
+            f"{directory}: there is room for {room.seconds:.0f} s and {seconds:g} s are wanted, beside the reserve of "
+            f"{rig.recorder.reserve_gb:g} GB: delete recordings, or copy them away"
+        )

@@ -1,0 +1,129 @@
+"""The seam between panel and service: what the panel may call, and the errors by which the service refuses."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from prometheus_client.metrics_core import Metric
+
+from rig.frame import FrameStatus
+from rig.pulse import RigPulse
+from rig.status import DoctorReport, Event, Pulses, Recording, RecordingOrder, RigView, SessionChange, Status
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """The newest triplet, for the live view.
+
+    Attributes:
+        pulse: number of its pulse since the recorder was started.
+        pixels: (rows, columns), uint8; the caller owns it.
+        columns: first and one past the last column by camera.
+        statuses: what became of the pulse, by camera.
+    """
+
+    pulse: RigPulse
+    pixels: NDArray[np.uint8]
+    columns: tuple[tuple[int, int], ...]
+    statuses: tuple[FrameStatus, ...]
+
+
+class RigService(Protocol):
+    """The running service. Any thread may call any method; none waits without a deadline.
+
+    Raises (each where it applies):
+        StateForbidsError: the present state forbids the call.
+        UnknownRecordingError: there is no recording of this id.
+        SvevError: the call failed; the message says what to do.
+    """
+
+    def status(self) -> Status:
+        """The present status; cheap."""
+        ...
+
+    def arm(self) -> Status:
+        """Begin to arm. While arming or armed, nothing changes; while disarming, StateForbidsError."""
+        ...
+
+    def disarm(self) -> Status:
+        """Begin to disarm. While disarming or idle, nothing changes; while recording, StateForbidsError."""
+        ...
+
+    def start_recording(self, order: RecordingOrder) -> Recording:
+        """Start a recording; returns when its log is open. Only while armed."""
+        ...
+
+    def stop_recording(self, recording_id: str) -> Recording:
+        """Stop a recording; returns when its log is closed. A finished recording is returned unchanged."""
+        ...
+
+    def change_session(self, recording_id: str, change: SessionChange) -> Recording:
+        """Change session fields of a recording, also of the one in progress."""
+        ...
+
+    def delete_recording(self, recording_id: str) -> Recording:
+        """Put a recording into the trash; not the one in progress. If it is there already, nothing changes."""
+        ...
+
+    def restore_recording(self, recording_id: str) -> Recording:
+        """Take a recording out of the trash. If it is not there, nothing changes."""
+        ...
+
+    def recordings(self, *, deleted: bool) -> list[Recording]:
+        """All recordings, newest first, with the one in progress; if `deleted`, those in the trash instead."""
+        ...
+
+    def recording(self, recording_id: str) -> Recording:
+        """One recording, in the trash or not."""
+        ...
+
+    def log_file(self, recording_id: str) -> Path:
+        """Path of a recording's log. StateForbidsError: the log is still being written."""
+        ...
+
+    def pulses(self, recording_id: str) -> Pulses:
+        """What became of each pulse of a recording."""
+        ...
+
+    def image(self, recording_id: str, pulse: int) -> NDArray[np.uint8]:
+        """One triplet of a recording, (rows, columns), uint8; the caller owns it."""
+        ...
+
+    def liveliest_pulse(self, recording_id: str) -> int:
+        """The pulse to show a recording by: the middle of the stretch in which most moves."""
+        ...
+
+    def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
+        """Wait for a triplet of another pulse than `newer_than`; None if none came in time."""
+        ...
+
+    def events(self, after: int) -> list[Event]:
+        """The events of the live log with numbers above `after` that are still kept, oldest first."""
+        ...
+
+    def listen(self, wake: Callable[[], None]) -> Callable[[], None]:
+        """Call `wake`, from any thread, whenever status or events have changed.
+
+        Returns:
+            A function that ends the calls.
+        """
+        ...
+
+    def rig(self) -> RigView:
+        """The rig file in use."""
+        ...
+
+    def doctor(self) -> DoctorReport:
+        """Check everything that a recording depends on; takes some seconds. One call at a time."""
+        ...
+
+    def metrics(self) -> Iterable[Metric]:
+        """The metric families of what has been measured so far."""
+        ...
+
+    def healthy(self) -> bool:
+        """Whether the service itself works: the supervisor's loop turns and the recorder answers."""
+        ...

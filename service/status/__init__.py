@@ -1,0 +1,1 @@
+"""What the service says of itself: status, statements, metrics, live log."""

@@ -1,0 +1,135 @@
+"""One moment's picture of the service for the panel, from what the supervisor knows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Final
+
+from rig.health import Health
+from rig.settings.model import RigSettings
+from rig.status import (
+    CameraStatus,
+    DiskStatus,
+    PrerollStatus,
+    ProcessStatus,
+    PulseStatus,
+    Recording,
+    State,
+    Statement,
+    Status,
+)
+from service.processes.rig_processes import CameraPresence
+from service.recordings.storage import Room
+from service.status.statements import about_camera, about_state, camera_state, process_restarted
+from service.supervision.state_machine import Phase
+from service.supervision.watching import PulseRate
+
+#: What the status of a camera takes from its health record.
+_MEASURED: Final = (
+    "frames_per_s", "frames", "damaged", "resent_packets", "reconnects", "temperature_c", "clock_offset_us",
+)  # fmt: skip
+_VERSION: Final = version("svev")
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What the supervisor knows at one moment.
+
+    Attributes:
+        phase: the state and its beginning.
+        notice: what is to be said instead of the usual words for this state.
+        heard: what was last heard of each camera; None while nothing runs.
+        health: the recorder's last health record, None if there is none.
+        warm: whether whole triplets have come.
+        pulses: rate of the pulses.
+        room: on the disk.
+        preroll_s: what is to be held in memory.
+        pids: process ids by row of the process table.
+        restarts: how often each row was started again.
+    """
+
+    phase: Phase
+    notice: Statement | None
+    heard: Sequence[CameraPresence] | None
+    health: Health | None
+    warm: bool
+    pulses: PulseRate
+    room: Room
+    preroll_s: float
+    recording: Recording | None
+    last_recording: str | None
+    pids: dict[str, int]
+    restarts: dict[str, int]
+
+
+def picture(rig: RigSettings, facts: Facts) -> Status:
+    """The status for the panel."""
+    cameras = _cameras(rig, facts)
+    states = [camera.state for camera in cameras]
+    state, pulses = facts.phase.state, facts.pulses
+    arriving = facts.heard is not None and (pulses.arriving or (facts.warm and not facts.health))
+    rate = pulses.rate_hz if arriving else None
+    usual = about_state(state, rig.cameras, states, arriving, rate) if state is not State.FAULT else None
+    statement = facts.notice or usual
+    if statement is None:
+        raise RuntimeError("a fault without words")
+    room, reserve = facts.room, rig.recorder.reserve_gb
+    pairing = None if facts.health is None else facts.health.pairing
+    return Status(
+        state=state,
+        since=facts.phase.since,
+        statement=statement,
+        rig=rig.name,
+        version=_VERSION,
+        cameras=cameras,
+        pulses=PulseStatus(
+            arriving=arriving,
+            rate_hz=rate and round(rate, 2),
+            spread_us=None if pairing is None else pairing.spread_median_us,
+            number=0 if pairing is None else pairing.pulses,
+        ),
+        preroll=_preroll(facts),
+        disk=DiskStatus(
+            free_gb=round(room.free_bytes / 1e9, 2),
+            reserve_gb=reserve,
+            seconds_left=round(room.seconds),
+            jumps_left=room.jumps,
+            jump_s=rig.recorder.jump_s,
+        ),
+        recording=facts.recording,
+        last_recording=facts.last_recording,
+        processes=tuple(_process(name, pid, facts.restarts.get(name, 0)) for name, pid in facts.pids.items()),
+    )
+
+
+def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
+    trying = facts.heard is not None or facts.phase.state is State.ARMING
+    heard = facts.heard or [CameraPresence()] * len(rig.cameras)
+    reported = [None] * len(rig.cameras) if facts.health is None else facts.health.cameras
+    found = []
+    for camera, presence, report, columns in zip(rig.cameras, heard, reported, rig.columns(), strict=True):
+        state = camera_state(trying, presence)
+        found.append(
+            CameraStatus(
+                name=camera.name,
+                backend=camera.backend,
+                address=camera.address,
+                state=state,
+                statement=about_camera(camera, state, presence.text),
+                columns=columns,
+                **({} if report is None else {name: getattr(report, name) for name in _MEASURED}),
+            )
+        )
+    return tuple(found)
+
+
+def _preroll(facts: Facts) -> PrerollStatus:
+    if facts.health is None:
+        return PrerollStatus(seconds=0.0, limit_s=facts.preroll_s, memory_mb=0.0)
+    held = facts.health.preroll
+    return PrerollStatus(seconds=held.seconds, limit_s=held.limit_s, memory_mb=held.memory_mb)
+
+
+def _process(name: str, pid: int, restarts: int) -> ProcessStatus:
+    statement = process_restarted(name, restarts) if restarts else None
+    return ProcessStatus(name=name, pid=pid, restarts=restarts, statement=statement)

@@ -1,0 +1,177 @@
+"""Statements to people: state of the rig and of each camera in plain words, with what to do next.
+
+Each has a code by which the page translates it, and a level which the page shows as colour and mark.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from rig.errors import SvevError
+from rig.settings.model import CameraSettings
+from rig.status import CameraState, Level, State, Statement
+from rig.transport.messages import CameraNews
+from service.processes.rig_processes import CameraPresence
+
+_CAMERA_ADVICE = "check its power and cable; it is connected again by itself"
+_CAMERA_STATES: Final = {
+    CameraNews.CONNECTED: CameraState.READY,
+    CameraNews.SILENT: CameraState.SILENT,
+    CameraNews.GONE: CameraState.ABSENT,
+}
+
+
+def camera_state(trying: bool, heard: CameraPresence) -> CameraState:
+    """The state of a camera.
+
+    Args:
+        trying: whether the rig is armed or being armed.
+        heard: the last news of the camera.
+    """
+    if not trying:
+        return CameraState.OFF
+    return CameraState.CONNECTING if heard.news is None else _CAMERA_STATES[heard.news]
+
+
+def about_camera(camera: CameraSettings, state: CameraState, text: str) -> Statement:
+    """The state of a camera in words.
+
+    Args:
+        camera: the camera.
+        state: its state.
+        text: the text of the last news of it, e.g. why it is not there.
+    """
+    values: dict[str, str | int | float] = {"camera": camera.name, "reason": text}
+    match state:
+        case CameraState.OFF:
+            return Statement(code="camera_off", text=f"{camera.name} is off: the rig is not armed", values=values)
+        case CameraState.CONNECTING:
+            return Statement(code="camera_connecting", text=f"connecting {camera.name}", values=values)
+        case CameraState.READY:
+            return Statement(level=Level.GOOD, code="camera_ready", text=f"{camera.name} is ready", values=values)
+        case CameraState.SILENT:
+            what = f"{camera.name} sends no frames while the others do"
+            advice = "check its trigger cable; it is connected again by itself"
+            return Statement(level=Level.WARNING, code="camera_silent", text=what, advice=advice, values=values)
+        case CameraState.ABSENT:
+            what = f"{camera.name} is absent" + (f": {text}" if text else "")
+            return Statement(level=Level.ERROR, code="camera_absent", text=what, advice=_CAMERA_ADVICE, values=values)
+
+
+def about_state(
+    state: State,
+    cameras: Sequence[CameraSettings],
+    states: Sequence[CameraState],
+    arriving: bool,
+    rate_hz: float | None,
+) -> Statement:
+    """The state of the rig in words; a fault is stated by `no_camera` or `failed`.
+
+    Args:
+        state: any but `FAULT`.
+        cameras: the rig's cameras.
+        states: the state of each of them.
+        arriving: whether pulses arrive.
+        rate_hz: pulses per second, None while unknown.
+    """
+    match state:
+        case State.IDLE:
+            return Statement(code="state_idle", text="not armed", advice="arm the rig to connect the cameras")
+        case State.ARMING:
+            waiting = [c.name for c, s in zip(cameras, states, strict=True) if s is CameraState.CONNECTING]
+            names = ", ".join(waiting)
+            text = f"connecting {names}" if names else "getting ready"
+            return Statement(code="state_arming", text=text, values={"cameras": names})
+        case State.DISARMING:
+            return Statement(code="state_disarming", text="disconnecting the cameras")
+        case State.RECORDING:
+            return _working("state_recording", "recording", cameras, states)
+        case _ if not arriving:
+            return _working("state_waiting", "armed, waiting for trigger pulses", cameras, states)
+        case _:
+            pulses = "pulses arrive" if rate_hz is None else f"{rate_hz:.1f} pulses per second"
+            return _working("state_armed", f"armed, {pulses}", cameras, states, rate_hz)
+
+
+def _working(
+    code: str,
+    text: str,
+    cameras: Sequence[CameraSettings],
+    states: Sequence[CameraState],
+    rate_hz: float | None = None,
+) -> Statement:
+    """Armed or recording. If cameras are missing, it works without them, and the statement says so."""
+    missing = [c.name for c, s in zip(cameras, states, strict=True) if s is not CameraState.READY]
+    values: dict[str, str | int | float] = {
+        "present": len(cameras) - len(missing), "cameras": len(cameras), "missing": ", ".join(missing),
+    }  # fmt: skip
+    if rate_hz is not None:
+        values["rate_hz"] = round(rate_hz, 2)
+    if not missing:
+        return Statement(level=Level.GOOD, code=code, text=text, values=values)
+    return Statement(
+        level=Level.WARNING,
+        code=f"{code}_partly",
+        text=f"{text}, with {len(cameras) - len(missing)} of {len(cameras)} cameras: without {', '.join(missing)}",
+        advice="recording works; see the camera for what to do",
+        values=values,
+    )
+
+
+def no_camera() -> Statement:
+    """The fault that none of the cameras answers."""
+    return Statement(
+        level=Level.ERROR,
+        code="fault_no_camera",
+        text="none of the cameras answers",
+        advice="check their power and cables; they are connected by themselves as soon as they answer",
+    )
+
+
+def failed(error: SvevError, again_in_s: float) -> Statement:
+    """The fault that arming failed or a process died.
+
+    Args:
+        error: why.
+        again_in_s: time until the service tries again.
+    """
+    return Statement(
+        level=Level.ERROR,
+        code="fault_failed",
+        text=str(error),
+        advice=f"it is tried again in {again_in_s:g} s; arm to try at once, disarm to stop trying",
+        values={"reason": str(error), "again_in_s": again_in_s},
+    )
+
+
+def recording_ended(recording: str, error: SvevError) -> Statement:
+    """A recording ended before it was stopped or its duration was over."""
+    return Statement(
+        level=Level.ERROR,
+        code="recording_ended",
+        text=f"recording {recording} ended early: {error}",
+        advice="what was recorded until then is kept; see the recording's verdict",
+        values={"recording": recording, "reason": str(error)},
+    )
+
+
+def process_restarted(name: str, restarts: int) -> Statement:
+    """A process died, and the supervisor started it again."""
+    return Statement(
+        level=Level.WARNING,
+        code="process_restarted",
+        text=f"{name} was started again {restarts} times",
+        advice="if it recurs, run the doctor",
+        values={"process": name, "restarts": restarts},
+    )
+
+
+#: Why a state forbids a call, and what to do, by call and state.
+FORBIDDEN: dict[tuple[str, State], str] = {
+    ("arm", State.DISARMING): "the rig is being disarmed: wait until that is done, then arm",
+    ("disarm", State.RECORDING): "a recording is running: stop it, then disarm",
+    ("start", State.IDLE): "the rig is not armed: arm it, then start recording",
+    ("start", State.ARMING): "the rig is being armed: wait until it is armed, then start recording",
+    ("start", State.RECORDING): "a recording is running: stop it before starting another",
+    ("start", State.DISARMING): "the rig is being disarmed: arm it again, then start recording",
+    ("start", State.FAULT): "the rig has a fault: see its statement for what to do, then start recording",
+}

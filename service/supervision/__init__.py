@@ -1,0 +1,1 @@
+"""The one thread that owns the rig: state machine, set-up and take-down, faults."""

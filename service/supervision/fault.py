@@ -1,0 +1,68 @@
+"""Remembers the fault of the rig, if it has one, and when the supervisor may try again."""
+
+import time
+
+from rig.errors import SvevError
+from rig.status import Statement
+from rig.transport.process_table import BackOff
+from service.status.statements import failed, no_camera
+
+
+class Fault:
+    """The present fault. Only the supervisor's thread uses it.
+
+    Attributes:
+        statement: the fault in words, None if there is none.
+        cause: the error behind the fault, None if there is none.
+    """
+
+    def __init__(self) -> None:
+        self.statement: Statement | None = None
+        self._back_off = BackOff()
+        self._again_at = 0.0
+        self._complaint: SvevError | None = None
+        self.cause: SvevError | None = None
+
+    @property
+    def deaths(self) -> int:
+        """How many times the recorder died or could not be started."""
+        return self._back_off.deaths
+
+    @property
+    def may_try(self) -> bool:
+        """Whether it is time to try again."""
+        return time.monotonic() >= self._again_at
+
+    def complain(self, error: SvevError) -> None:
+        """Note the error with which the recorder says that it is about to end."""
+        self._complaint = error
+
+    def fail(self, error: SvevError, lived_s: float) -> str:
+        """Note that setting up failed or that the recorder died.
+
+        Args:
+            error: the error; a complaint of the recorder, if there is one, is used instead, since it says more.
+            lived_s: how long the rig had worked, s.
+
+        Returns:
+            What happened and when the supervisor tries again, in words.
+        """
+        wait_s = self._back_off.died(lived_s)
+        self._again_at = time.monotonic() + wait_s
+        self.cause = self._complaint or error
+        self.statement = failed(self.cause, wait_s)
+        return f"{self.cause}; starting again in {wait_s:g} s"
+
+    def lack_cameras(self) -> None:
+        """Note that no camera answers; the grabbers go on trying."""
+        self.statement = no_camera()
+
+    def clear(self) -> None:
+        """Forget the fault: it is over, or the supervisor tries again."""
+        self.statement = self.cause = self._complaint = None
+
+    def hurry(self) -> None:
+        """Forget the fault and try at once, because a person asked for it."""
+        self.clear()
+        self._again_at = 0.0
+        self._back_off.forget()

@@ -1,0 +1,325 @@
+"""The thread that owns the rig: obeys commands, keeps the processes running, moves the state machine.
+
+At every turn it compares what is wanted (armed or not) with what is there, and takes one step to make them equal. It
+never waits for anything but the next report or command.
+"""
+
+import select
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from rig.disk import free_bytes
+from rig.errors import ProcessDiedError, StateForbidsError, SvevError
+from rig.events import Event, Level
+from rig.health import Health
+from rig.settings.model import RigSettings
+from rig.status import State, Status
+from rig.transport.messages import RecorderFailed, RecorderOptions, RecorderReport
+from service.processes.rig_processes import RECORDER, CameraPresence
+from service.recordings.control import RecordingControl, read_calibration
+from service.recordings.storage import room_for
+from service.status.event_hub import EventHub
+from service.status.picture import Facts, picture
+from service.status.statements import FORBIDDEN
+from service.supervision.commands import Commands
+from service.supervision.fault import Fault
+from service.supervision.rig_session import RigSession, StartHill
+from service.supervision.state_machine import StateMachine
+from service.supervision.watching import STUCK_S, RecorderWatch, Settling
+
+_TURN_S: Final = 0.2
+_PICTURE_S: Final = 1.0
+_FINISH_S: Final = 4.0
+#: If a turn takes longer than this, the loop hangs.
+_TURNS_S: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class WarmUp:
+    """How far a rig has come since it was armed.
+
+    Attributes:
+        state: the state of the service.
+        cameras: presence of each camera; None while there are no processes.
+        warm: whether complete triplets have come.
+    """
+
+    state: State
+    cameras: tuple[CameraPresence, ...] | None
+    warm: bool
+
+
+class Supervisor:
+    """Runs the loop in a thread of its own.
+
+    Args:
+        rig: the rig.
+        rig_toml: the rig file's text.
+        hub: the live log; gets every event.
+        recorder: what the recorder does beside recording.
+        hill: starts the simulated cameras; None: as the rig file says.
+        enduring: whether to try again when setting up failed or the recorder died; otherwise the thread ends then.
+
+    Raises:
+        BadInputError: the rig's calibration file is missing or wrong.
+
+    Attributes:
+        rig, rig_toml, hub: as given.
+        on_turn: called at every turn, e.g. to feed a watchdog; set it before `start`.
+        on_end: called when the thread ends, for whatever reason; set it before `start`.
+        health: the recorder's last health record, None if there is none.
+        failure: the error that ended the thread, None if there was none.
+        commands: through which other threads give commands.
+        recordings: starts and ends recordings; only for commands in the supervisor's thread.
+    """
+
+    def __init__(
+        self,
+        rig: RigSettings,
+        rig_toml: str,
+        hub: EventHub,
+        recorder: RecorderOptions,
+        *,
+        hill: StartHill | None = None,
+        enduring: bool = True,
+    ) -> None:
+        calibration = read_calibration(rig)
+        self.rig, self.rig_toml, self.hub = rig, rig_toml, hub
+        self._recorder, self._enduring = recorder, enduring
+        self.on_turn: Callable[[], None] = lambda: None
+        self.on_end: Callable[[], None] = lambda: None
+        self.failure: Exception | None = None
+        self.commands = Commands()
+        self._machine = StateMachine(self._moved)
+        self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder, hill=hill)
+        self.recordings = RecordingControl(self._machine, self._session, rig_toml, calibration)
+        self._fault = Fault()
+        self._wanted = False
+        self._settling, self._watch = Settling(), RecorderWatch()
+        self._ending_by: float | None = None
+        self._dirty, self._pictured = True, 0.0
+        self._turned = time.monotonic()
+        self.health: Health | None = None
+        self._status = self._picture()
+        self._thread = threading.Thread(target=self._run, name="supervisor")
+
+    @property
+    def status(self) -> Status:
+        """The latest status, at most a second old; any thread may ask."""
+        return self._status
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def begin_stop(self) -> None:
+        """Begin to end: finish a recording, then stop everything. May be called from a signal handler, and again."""
+        if self._ending_by is None:
+            self._ending_by = time.monotonic() + _FINISH_S
+        self.commands.ring()
+
+    def stop(self, timeout_s: float) -> None:
+        """Finish a recording, stop all processes, wait for the end of the thread.
+
+        Raises:
+            ProcessDiedError: the thread has not ended within `timeout_s` seconds.
+        """
+        self.begin_stop()
+        self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            raise ProcessDiedError(f"the rig did not stop within {timeout_s:g} s: its processes end by themselves")
+        self.commands.close()
+
+    @property
+    def answering(self) -> bool:
+        """Whether the loop turns and the recorder, if there should be one, reports; any thread may ask."""
+        turns = self._thread.is_alive() and time.monotonic() < self._turned + _TURNS_S
+        return turns and not self._watch.late
+
+    def arm(self) -> Status:
+        """Command: begin to arm; after a fault, try again at once."""
+        state = self._machine.state
+        if state is State.DISARMING:
+            raise StateForbidsError(FORBIDDEN["arm", state])
+        if state in {State.IDLE, State.FAULT}:
+            self._wanted = True
+            self._fault.hurry()
+            self._machine.move(State.ARMING)
+            if self._session.processes is not None and not self._session.processes.recorder_died:
+                self._session.begin_take_down(keep_hill=True)
+            self._reconcile()
+        return self._refresh()
+
+    def look(self) -> WarmUp:
+        """Command: say how far the rig has come since it was armed."""
+        processes = self._session.processes
+        cameras = None if processes is None else tuple(processes.cameras)
+        return WarmUp(self._machine.state, cameras, processes is not None and processes.warm)
+
+    def disarm(self) -> Status:
+        """Command: begin to disarm."""
+        if self._machine.state is State.RECORDING or self.recordings.current is not None:
+            raise StateForbidsError(FORBIDDEN["disarm", State.RECORDING])
+        self._wanted = False
+        self._reconcile()
+        return self._refresh()
+
+    def _run(self) -> None:
+        try:
+            while self._ending_by is None or not self._ended(self._ending_by):
+                self._turn()
+        except Exception as error:
+            self.hub.tell(Event.now(Level.FATAL, "service", f"the supervisor failed: {type(error).__name__}: {error}"))
+            self.failure = error
+            raise
+        finally:
+            self._session.close()
+            self.recordings.abandon()
+            self._refresh()
+            self.commands.end()
+            self.on_end()
+
+    def _turn(self) -> None:
+        self.commands.carry_out()
+        self._reconcile()
+        try:
+            self._listen()
+        except ProcessDiedError as error:
+            self._rig_failed(error)
+        self._judge()
+        self._turned = time.monotonic()
+        if self._dirty or self._turned >= self._pictured + _PICTURE_S:
+            self._refresh()
+        self.recordings.answer()
+        self.on_turn()
+
+    def _ended(self, finish_by: float) -> bool:
+        """Whether the thread may end: stop a recording in progress first, and wait for its end until `finish_by`."""
+        self._wanted = False
+        current = self.recordings.current
+        if current is None or time.monotonic() > finish_by:
+            return True
+        if not current.stopping and not current.opening:
+            self.recordings.stop()
+        return False
+
+    def _reconcile(self) -> None:
+        """Take one step from what is there to what is wanted."""
+        try:
+            self._session.collect()
+        except SvevError as error:
+            self._rig_failed(error)
+        state = self._machine.state
+        if not self._wanted and state is not State.IDLE and self.recordings.current is None:
+            if state is not State.DISARMING:
+                self._fault.clear()
+                self._machine.move(State.DISARMING)
+            if self._session.empty:
+                self._machine.move(State.IDLE)
+            elif not self._session.busy:
+                self._session.begin_take_down(keep_hill=False)
+        elif self._wanted and not self._session.busy and self._fault.may_try:
+            processes = self._session.processes
+            if processes is None or processes.recorder_died:
+                self._begin_arming()
+                if processes is None:
+                    self._session.begin_set_up()
+                else:
+                    processes.restart_recorder()
+
+    def _begin_arming(self) -> None:
+        if self._machine.state is not State.ARMING:
+            self._machine.move(State.ARMING)
+        self._settling.begin(time.monotonic())
+        self._fault.clear()
+
+    def _listen(self) -> None:
+        """Wait for reports or a command, and handle the reports."""
+        processes = self._session.processes
+        if processes is None or processes.recorder_died:
+            self._watch.expect_nothing()
+        if processes is None:
+            select.select([self.commands.bell], [], [], _TURN_S)
+            return
+        for report in processes.turn(_TURN_S, (self.commands.bell,)):
+            self._hear(report)
+        if not processes.recorder_died and self._watch.stuck(processes):
+            self._session.tell(Event.now(Level.FATAL, RECORDER, f"no sign of life for {STUCK_S:g} s: it is ended"))
+            processes.kill_recorder()
+
+    def _hear(self, report: RecorderReport) -> None:
+        self._dirty = True
+        self._watch.hear(report)
+        if isinstance(report, RecorderFailed) and self.recordings.current is None:
+            self._fault.complain(report.error())
+        self.recordings.hear(report)
+
+    def _judge(self) -> None:
+        """Move between arming, armed and fault, depending on which cameras are connected."""
+        processes, state = self._session.processes, self._machine.state
+        if processes is None or not self._wanted or self.recordings.current is not None:
+            return
+        present = any(camera.present for camera in processes.cameras)
+        match state:
+            case State.ARMING if self._settling.settled(processes):
+                self.recordings.armed_at = time.monotonic()
+                self._machine.move(State.ARMED) if present else self._lack_cameras()
+            case State.ARMED if not present:
+                self._lack_cameras()
+            case State.FAULT if present:
+                self._fault.clear()
+                self._machine.move(State.ARMED)
+
+    def _lack_cameras(self) -> None:
+        self._fault.lack_cameras()
+        self._machine.move(State.FAULT)
+
+    def _rig_failed(self, error: SvevError) -> None:
+        """Handle that setting up failed or that the recorder died: try again later, or end if not `enduring`."""
+        text = self._fault.fail(error, time.monotonic() - self._settling.began)
+        self.recordings.fail(error, State.FAULT)
+        if not self._enduring:
+            self.failure, self._ending_by = self._fault.cause or error, time.monotonic()
+            return
+        if not self._wanted:
+            return
+        if self._machine.state is not State.FAULT:
+            self._machine.move(State.FAULT)
+        self._session.tell(Event.now(Level.FATAL, RECORDER, text))
+
+    def _moved(self, before: State, to: State) -> None:
+        self._dirty = True
+        level = Level.ERROR if to is State.FAULT else Level.INFO
+        why = f": {self._fault.statement.text}" if to is State.FAULT and self._fault.statement else ""
+        self._session.tell(Event.now(level, "service", f"{before} -> {to}{why}"))
+
+    def _refresh(self) -> Status:
+        self._dirty, self._pictured = False, time.monotonic()
+        self._status = self._picture()
+        self.hub.wake()
+        return self._status
+
+    def _picture(self) -> Status:
+        processes, phase, current = self._session.processes, self._machine.phase, self.recordings.current
+        fault = self._fault.statement if phase.state is State.FAULT else None
+        self.health = None if processes is None else processes.health
+        # The recorder asks the disk in its own time; asking here as well might wait for a disk that hangs.
+        free = self.health.disk.free_bytes if self.health else free_bytes(self._recorder.directory)
+        facts = Facts(
+            phase=phase,
+            notice=fault or (self.recordings.notice if phase.state is State.ARMED else None),
+            heard=None if processes is None else tuple(processes.cameras),
+            health=self.health,
+            warm=processes is not None and processes.warm,
+            pulses=self._watch.pulses,
+            room=room_for(self.rig, free or 0),
+            preroll_s=self._recorder.preroll_s,
+            recording=current.view() if current is not None and not current.opening else None,
+            last_recording=self.recordings.last,
+            pids={} if processes is None else processes.pids,
+            restarts={RECORDER: self._fault.deaths, **(processes.restarts if processes else {})},
+        )
+        return picture(self.rig, facts)

@@ -1,0 +1,117 @@
+"""Watches a running rig for the supervisor: pulse rate, signs of life of the recorder, cameras after arming."""
+
+import time
+from typing import Final
+
+from rig.transport.messages import RecorderHealth, RecorderReport
+from service.processes.rig_processes import RigProcesses
+
+#: Between reports farther apart than this the rate is not known.
+_STALE_S: Final = 3.0
+
+
+class PulseRate:
+    """Measures the pulse rate from the recorder's reports of how many pulses have come.
+
+    Attributes:
+        rate_hz: pulses per second; None: not known.
+        arriving: whether pulses came between the last two reports, or before the first.
+    """
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._at: float | None = None
+        self.rate_hz: float | None = None
+        self.arriving = False
+
+    def count(self, pulses: int, now: float) -> None:
+        """Enter a report.
+
+        Args:
+            pulses: number of pulses so far.
+            now: time of the report on the monotonic clock, s.
+        """
+        if self._at is not None and now > self._at and pulses >= self._count:
+            seconds = now - self._at
+            self.rate_hz = (pulses - self._count) / seconds if seconds < _STALE_S else None
+        self.arriving = pulses > self._count
+        self._count, self._at = pulses, now
+
+    def forget(self) -> None:
+        """Start anew: there is no recorder any more."""
+        self._at = self.rate_hz = None
+        self._count = 0
+        self.arriving = False
+
+
+#: A recorder that has not reported for this time is stuck. Closing a log on a slow disk may take a while.
+STUCK_S: Final = 20.0
+#: After this time without a report the service does not call itself healthy any more.
+_LATE_S: Final = 10.0
+
+
+class RecorderWatch:
+    """Watches the recorder's reports: is it alive, at what rate do pulses come.
+
+    The supervisor's thread enters reports; any thread may ask `late`.
+
+    Attributes:
+        pulses: the pulse rate.
+    """
+
+    def __init__(self) -> None:
+        self.pulses = PulseRate()
+        self._reported = time.monotonic()
+
+    def hear(self, report: RecorderReport) -> None:
+        """Enter a report."""
+        self._reported = time.monotonic()
+        if isinstance(report, RecorderHealth):
+            self.pulses.count(report.health.pairing.pulses, self._reported)
+
+    def expect_nothing(self) -> None:
+        """Note that there is no recorder now, so that no report is late."""
+        self._reported = time.monotonic()
+        self.pulses.forget()
+
+    def stuck(self, processes: RigProcesses) -> bool:
+        """Whether the recorder has sent no report for so long that it has to be ended."""
+        return time.monotonic() > max(self._reported, processes.started) + STUCK_S
+
+    @property
+    def late(self) -> bool:
+        """Whether a report is overdue."""
+        return time.monotonic() > self._reported + _LATE_S
+
+
+#: A camera that has not answered for this time after arming began counts as absent.
+_ANSWER_S: Final = 20.0
+#: Longest wait for the first complete triplets after the cameras have answered: recordings then begin complete.
+_WARM_S: Final = 2.0
+
+
+class Settling:
+    """Decides when arming is done.
+
+    Attributes:
+        began: when arming began, on the monotonic clock, s.
+    """
+
+    def __init__(self) -> None:
+        self.began = 0.0
+        self._tried_at: float | None = None
+
+    def begin(self, now: float) -> None:
+        """Note that arming begins now."""
+        self.began, self._tried_at = now, None
+
+    def settled(self, processes: RigProcesses) -> bool:
+        """Whether every camera has answered or failed, and the connected ones have had time for their first frames."""
+        now = time.monotonic()
+        tried = all(camera.tried for camera in processes.cameras) or now > self.began + _ANSWER_S
+        if not processes.ready or not tried:
+            return False
+        if self._tried_at is None:
+            self._tried_at = now
+        lacking = not any(camera.present for camera in processes.cameras)
+        return lacking or processes.warm or now > self._tried_at + _WARM_S

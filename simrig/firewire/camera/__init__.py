@@ -1,0 +1,1 @@
+"""The emulated AVT Marlin camera: registers, sensor, configuration ROM."""

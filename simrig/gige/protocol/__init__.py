@@ -1,0 +1,1 @@
+"""Wire formats of GigE Vision (GVCP, GVSP) and the UDP sockets that carry them."""

@@ -1,0 +1,1 @@
+"""The registers of a simulated GigE Vision camera, and their GenICam description."""

@@ -1,0 +1,1 @@
+"""The programs of the simulated hill: processes of simulated cameras, their owner, and the scene of back end "sim"."""

@@ -1,0 +1,78 @@
+"""The simulated hill as one camera of the back end "sim" sees it, inside the grabber process."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.clocks import DeviceNs, HostNs
+from rig.errors import BadInputError
+from rig.frame import FrameStatus
+from rig.pulse import HillPulse
+from rig.settings.model import RigSettings
+from simrig.images.view import CameraView
+from simrig.world.faults import Fault, FaultKind, FaultPlan
+from simrig.world.pulses import DeviceClock, PulseTrain
+from simrig.world.scenario import load_scenario
+
+_EXPOSURES = {
+    FaultKind.MISSED_PULSE: FrameStatus.MISSED,
+    FaultKind.OVERRUN: FrameStatus.MISSED,
+    FaultKind.LOST_FRAME: FrameStatus.LOST,
+    FaultKind.LOST_PACKETS: FrameStatus.DAMAGED,
+    FaultKind.LOST_LEADER: FrameStatus.DAMAGED,
+    FaultKind.DAMAGED_FRAME: FrameStatus.DAMAGED,
+    FaultKind.FROZEN: FrameStatus.MISSED,
+    FaultKind.RESTART: FrameStatus.ABSENT,
+}
+
+
+class SimScene:
+    """One camera of a scenario: implements `capture.sim.camera.Scene`.
+
+    Raises:
+        BadInputError: the rig has no scenario, or the scenario no such camera.
+    """
+
+    def __init__(self, rig: RigSettings, index: int, epoch: HostNs) -> None:
+        if rig.simulation is None:
+            raise BadInputError('backend "sim" needs a [simulation] table in the rig file: add a scenario')
+        scenario = load_scenario(rig.simulation.scenario)
+        settings = rig.cameras[index]
+        camera = scenario.camera_index(settings.name)
+        self._train = PulseTrain(epoch, rig.trigger.rate_hz, scenario.pauses)
+        self._view = CameraView(scenario, camera, settings.region.width, settings.region.height, rig.trigger.rate_hz)
+        self._clock = DeviceClock(scenario, camera, epoch)
+        self._plan = FaultPlan(scenario.faults_of(settings.name))
+        self._dark_until = HostNs(0)
+
+    def inject(self, fault: Fault) -> None:
+        """Add a fault while the camera runs."""
+        self._plan.inject(fault)
+
+    def next_pulse(self, after: HostNs) -> int:
+        """Index of the first pulse strictly later than `after`."""
+        return self._train.next_index(after)
+
+    def pulse_time(self, pulse: int) -> HostNs:
+        """When the pulse fires."""
+        return self._train.time(HillPulse(pulse))
+
+    def device_time(self, host: HostNs, pulse: int | None = None) -> DeviceNs:
+        """The camera's own clock; for a pulse, with the jitter of its exposure."""
+        return self._clock.at(host) if pulse is None else self._clock.at_pulse(host, HillPulse(pulse))
+
+    def exposure(self, pulse: int) -> FrameStatus:
+        """What becomes of the pulse, by the faults of the scenario."""
+        time = self._train.time(HillPulse(pulse))
+        faults = self._plan.take(HillPulse(pulse))
+        for fault in faults:
+            if fault.kind in {FaultKind.FROZEN, FaultKind.RESTART}:
+                self._dark_until = max(self._dark_until, HostNs(time + fault.duration_ns))
+        if faults:
+            # Resent packets arrive after all, a slow link still delivers, and there is no bus to reset.
+            harmful = [f for f in faults if f.kind in _EXPOSURES and not (f.packets and f.resend)]
+            return _EXPOSURES[harmful[0].kind] if harmful else FrameStatus.OK
+        return FrameStatus.MISSED if time < self._dark_until else FrameStatus.OK
+
+    def render_into(self, out: NDArray[np.uint8], pulse: int) -> None:
+        """Draw the frame, shape (rows, columns)."""
+        self._view.render_into(out, HillPulse(pulse))

@@ -1,0 +1,161 @@
+"""`svev info`, `svev verify`, `svev recover`: say what a log holds, check it, make a whole log of it."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from recorder.checking.verify import VerifyReport, verify
+from recorder.reading.info import LogInfo, info
+from recorder.recovering.recover import RecoverReport, recover
+from rig.clocks import NS_PER_S
+from rig.errors import LogDamagedError, LogTruncatedError
+from svev import console
+
+_LINES_MAX = 60
+
+LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="the log, a .mcap file", show_default=False)]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object instead")]
+AlsoJson = Annotated[bool, typer.Option("--json", help="end with one JSON object")]
+
+
+def info_command(log: LogPath, as_json: AsJson = False) -> None:
+    """Say what a log holds: pulses, causes of missing frames, rate, spread of the triggers, session, rig.
+
+    Reads tags only and so takes a moment even for a long log; `svev verify` checks every byte.
+
+    Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed or is damaged. What can be
+    read is printed in any case.
+
+    Example: svev info recordings/jump.mcap
+    """
+    found = info(log)
+    if as_json:
+        console.print_json(found.to_json())
+    else:
+        for name, text in _lines(found):
+            console.say(f"{name:<10} {text}")
+    if found.truncated:
+        raise truncated(log)
+    if not found.closed:
+        raise LogDamagedError(f"{log}: the log was not closed, or is still being written; check it with `svev verify`")
+    if found.damaged_bytes:
+        raise LogDamagedError(f"{log}: {found.damaged_bytes} bytes are damaged; see which pulses with `svev verify`")
+
+
+def verify_command(log: LogPath, as_json: AsJson = False) -> None:
+    """Check every byte of a log and say, pulse by pulse, what is missing.
+
+    Checks checksums, message indexes, summary and statistics, compares tags with images, and looks for pulses without
+    a tag. The verdict is "clean" (every pulse complete), "partial" (the log is sound; its tags say which frames are
+    missing and why) or "damaged" (not closed, unreadable in part, or inconsistent).
+
+    Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
+    was killed leaves a log that is not closed). What can be read is printed in any case.
+
+    Example: svev verify recordings/jump.mcap
+    """
+    with console.progress("checking", _size(log)) as done:
+        report = verify(log, done)
+    if as_json:
+        console.print_json(report.to_json())
+    else:
+        _print_verified(report)
+    if report.truncated:
+        raise truncated(log)
+    if report.damaged:
+        raise LogDamagedError(f"{log}: damaged: {_first_flaw(report)}; the pulses counted above are readable")
+
+
+def recover_command(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="the log; it is only read", show_default=False)],
+    out: Annotated[Path, typer.Option("-o", "--out", help="the new log; must not exist", show_default=False)],
+    as_json: AlsoJson = False,
+) -> None:
+    """Make a whole log of one that was not closed or is damaged: closed, indexed, everything in it checked.
+
+    Copies everything that is sound. If the image of a pulse is destroyed but not its tag, the tag is kept, and calls
+    the frames that the image had "damaged". Prints what is lost, and writes it into the new log too.
+
+    Exit codes: 0 nothing was lost; 2 no such file, or no pulse in it that can be read, or the new log cannot be made;
+    3 recovered, but something was lost; 4 the disk is full or fails.
+
+    Example: svev recover recordings/jump.mcap -o recordings/jump-recovered.mcap
+    """
+    with console.progress("recovering", _size(log)) as done:
+        report = recover(log, out, done)
+    if as_json:
+        console.print_json(report.to_json())
+    else:
+        _print_recovered(report)
+    if not report.lossless:
+        raise LogDamagedError(f"{log}: recovered into {out}, but this is lost: {report.in_words()}")
+
+
+def truncated(log: Path) -> LogTruncatedError:
+    """The error for a log that ends in the middle of a record; raised when all that can be read has been printed."""
+    return LogTruncatedError(
+        f"{log}: truncated: it ends in the middle of a record; copy it again from the machine that recorded it, "
+        "or use what can be read"
+    )
+
+
+def _size(log: Path) -> int | None:
+    """Bytes of the log, for the progress bar; None if there is no such file."""
+    return log.stat().st_size if log.is_file() else None
+
+
+def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
+    """What `svev info` prints, as name and text."""
+    ledger, spread = found.ledger, found.ledger.spread_us()
+    yield "log", f"{found.path} ({found.bytes / 1e6:.1f} MB, by {found.library})"
+    yield "state", "closed" if found.closed else "not closed"
+    yield "recording", found.recording or "no pulse"
+    if ledger.first_time is not None:
+        start = datetime.fromtimestamp(ledger.first_time / NS_PER_S, UTC)
+        yield "first", f"{start:%Y-%m-%d %H:%M:%S.%f} UTC"
+    rate = "" if ledger.rate_hz is None else f", {ledger.rate_hz:.3f} Hz"
+    yield "duration", f"{ledger.duration_s:.3f} s{rate}"
+    yield "pulses", ledger.summary_line()
+    if found.missing_pulses:
+        yield "no tag", f"{found.missing_pulses} pulses"
+    if spread is not None:
+        yield "offset", f"{spread['median']} us median, {spread['max']} us at most, from the pulse"
+    if found.shape is not None:
+        yield "triplet", f"{found.shape[1]} x {found.shape[0]} px of {', '.join(found.cameras)}"
+    for name, fields in (("session", found.session), ("rig", found.rig)):
+        if text := ", ".join(f"{key} {value}" for key, value in fields.items() if value):
+            yield name, text
+
+
+def _print_verified(report: VerifyReport) -> None:
+    ledger = report.ledger
+    console.say(f"{report.path}: {report.verdict.value}")
+    console.say(f"{ledger.summary_line()}; {report.bytes / 1e6:.1f} MB; {'' if report.closed else 'not '}closed")
+    lines = [*ledger.in_words(), *report.findings]
+    for line in lines[:_LINES_MAX]:
+        console.say(f"  {line}")
+    if len(lines) > _LINES_MAX:
+        console.say(f"  and {len(lines) - _LINES_MAX} more; see all with --json")
+    for event in report.events[:_LINES_MAX]:
+        console.say(f"  {event.level.value}: {event.name}: {event.message}")
+
+
+def _first_flaw(report: VerifyReport) -> str:
+    if not report.closed:
+        return "it was not closed, or is still being written"
+    if report.findings:
+        more = len(report.findings) - 1
+        return report.findings[0] + (f" (and {more} more)" if more else "")
+    return "pulses have no tag"
+
+
+def _print_recovered(report: RecoverReport) -> None:
+    console.say(f"{report.path}: {report.ledger.summary_line()}; {report.bytes / 1e6:.1f} MB")
+    if not report.was_closed:
+        console.say(f"the recording was not closed; its last pulse is {report.ledger.last_pulse}")
+    for finding in report.findings:
+        console.say(f"  {finding}")
+    console.say(f"check it: svev verify {report.path}")

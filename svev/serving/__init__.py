@@ -1,0 +1,1 @@
+"""`svev serve`: supervisor, web server, signals and systemd in one process."""

@@ -1,0 +1,143 @@
+"""Runs `svev serve`: supervisor in one thread, web server in the main thread, signals and systemd beside them."""
+
+import logging
+import signal
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from recorder.catalogue.folder import Catalogue
+from rig.events import Event, Level
+from rig.settings.file import load_rig
+from rig.transport.messages import RecorderOptions
+from rig.transport.preview import PreviewSlot
+from service.processes.backends import check_backends
+from service.service import Service
+from service.status.event_hub import EventHub
+from service.supervision.supervisor import Supervisor
+from svev import console
+from svev.serving.claims import data_lock, listen, url
+from svev.serving.panel_doctor import PanelDoctor
+from svev.serving.systemd import JournalHandler, Notify, write_line
+from webpanel.app import create_app
+from webpanel.door.access import Access
+from webpanel.server import PanelServer, make_server
+
+_STOP_S: Final = 15.0
+_TRASH_S: Final = 30 * 86400.0
+#: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
+_ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceSettings:
+    """The options of `svev serve`.
+
+    Attributes:
+        rig: rig file.
+        data: folder for recordings; None: the rig file's.
+        port: port to listen on; 0: any that is free.
+        access: who may reach the panel, and at which address it listens.
+        preroll_s: length of the pre-roll, s; None: the rig file's.
+    """
+
+    rig: Path
+    data: Path | None
+    port: int
+    access: Access
+    preroll_s: float | None
+
+
+def serve(settings: ServiceSettings) -> None:
+    """Run the service until SIGTERM or Ctrl-C; finish a recording in progress.
+
+    Raises:
+        BadInputError: rig file, folder, address or port cannot be used, or another service uses them.
+        ProcessDiedError: a process did not end in time.
+    """
+    rig, rig_toml = load_rig(settings.rig), settings.rig.read_text(encoding="utf-8")
+    check_backends(rig)
+    data = settings.data or rig.recorder.directory
+    preroll_s = rig.recorder.preroll_s if settings.preroll_s is None else settings.preroll_s
+    with ExitStack() as stack:
+        stack.enter_context(data_lock(data))
+        listener = stack.enter_context(listen(settings.access.host, settings.port))
+        logging.basicConfig(level=logging.WARNING, handlers=[JournalHandler()])
+        notify = stack.enter_context(closing(Notify()))
+        slot = stack.enter_context(closing(PreviewSlot.create(rig.triplet_shape, len(rig.cameras))))
+        hub, catalogue = EventHub(write_line), Catalogue(data)
+        options = RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
+        supervisor = Supervisor(rig, rig_toml, hub, options)
+        service = Service(supervisor, catalogue, slot, PanelDoctor(rig, data).report)
+        server = make_server(create_app(service, settings.access))
+        _purge(catalogue, hub)
+        supervisor.on_turn = _Reporter(supervisor, server, notify, url(listener)).report
+
+        def end() -> None:
+            server.should_exit = True
+
+        supervisor.on_end = end
+        with _signals(server, supervisor, notify):
+            supervisor.start()
+            try:
+                server.run(sockets=[listener])
+            finally:
+                service.close()
+                supervisor.stop(_STOP_S)
+        if supervisor.failure is not None:
+            raise supervisor.failure
+
+
+def _purge(catalogue: Catalogue, hub: EventHub) -> None:
+    if gone := catalogue.purge(_TRASH_S):
+        hub.tell(Event.now(Level.INFO, "service", f"the trash is emptied of recordings older than 30 days: {gone}"))
+
+
+class _Reporter:
+    """Tells terminal and systemd how the service is; called at every turn of the supervisor.
+
+    Args:
+        supervisor: owns the rig.
+        server: serves the panel.
+        notify: reaches systemd.
+        panel: address of the panel.
+    """
+
+    def __init__(self, supervisor: Supervisor, server: PanelServer, notify: Notify, panel: str) -> None:
+        self._supervisor, self._server, self._notify, self._panel = supervisor, server, notify, panel
+        self._greeted = self._complained = False
+
+    def report(self) -> None:
+        """Send what has changed, and feed the watchdog if all is well."""
+        supervisor, notify = self._supervisor, self._notify
+        if self._server.started and not self._greeted:
+            self._greeted = True
+            console.say(f"svev: panel at {self._panel}")
+            notify.ready()
+        notify.status(f"{supervisor.status.state}: {supervisor.status.statement.text}")
+        if supervisor.answering:
+            notify.feed_watchdog()
+        if notify.unsent and not self._complained:
+            self._complained = True
+            text = "systemd does not read its notification socket: it may restart svev"
+            supervisor.hub.tell(Event.now(Level.WARNING, "service", text))
+
+
+@contextmanager
+def _signals(server: PanelServer, supervisor: Supervisor, notify: Notify) -> Iterator[None]:
+    """Within, signals end the service in order, however often they come; afterwards nothing disturbs its end."""
+
+    def end(*_: object) -> None:
+        server.should_exit = True
+        notify.stopping()
+        supervisor.begin_stop()
+
+    for number in _ENDINGS:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in _ENDINGS:
+            signal.signal(number, signal.SIG_IGN)

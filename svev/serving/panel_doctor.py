@@ -1,0 +1,88 @@
+"""Runs the doctor for the panel: one examination at a time, which disturbs nothing while the rig is armed."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from rig import status as models
+from rig.settings.model import RigSettings
+from rig.status import CameraState, State, Status
+from svev.doctor.examination import probes, run_probe
+from svev.doctor.finding import Finding, Level, Topic, failure, passed, warning
+
+_KEPT_S: Final = 10.0
+#: Names of probes that would disturb an armed rig (disk, cameras) or find its own sockets in the way.
+_ONLY_IDLE: Final = frozenset({"disk", "publication", "cameras", "FireWire", "discovery"})
+_RANK: Final = tuple(Level)
+
+
+class PanelDoctor:
+    """Examines what a recording stands on. May be asked from any thread.
+
+    Args:
+        rig: the rig.
+        data: folder of the recordings.
+    """
+
+    def __init__(self, rig: RigSettings, data: Path) -> None:
+        self._rig, self._data = rig, data
+        self._lock = threading.Lock()
+        self._report: models.DoctorReport | None = None
+        self._key: tuple[bool, float] = (False, 0.0)
+
+    def report(self, status: Status) -> models.DoctorReport:
+        """Examine everything that may be examined in this state; give the last report while it is fresh.
+
+        Args:
+            status: present status of the service.
+        """
+        with self._lock:
+            idle = status.state is State.IDLE
+            kept_idle, until = self._key
+            if self._report is not None and kept_idle == idle and time.monotonic() < until:
+                return self._report
+            findings = list(self._look(status, idle=idle))
+            worst = max((finding.level for finding in findings), key=_RANK.index)
+            self._report = models.DoctorReport(worst=worst.value, findings=tuple(_shown(each) for each in findings))
+            self._key = (idle, time.monotonic() + _KEPT_S)
+            return self._report
+
+    def _look(self, status: Status, *, idle: bool) -> Iterator[Finding]:
+        for probe in probes(self._rig, self._data):
+            if idle or probe.name not in _ONLY_IDLE:
+                yield from run_probe(probe)
+            elif probe.name == "cameras":
+                yield from _cameras_of(status)
+            elif probe.name == "disk":
+                yield _room_of(status)
+        if not idle:
+            yield passed(Topic.CAMERAS, "what would disturb the rig is not examined while it is armed: disarm for that")
+
+
+def _cameras_of(status: Status) -> Iterator[Finding]:
+    """Findings on the cameras of an armed rig, which knows them better than any probe."""
+    for camera in status.cameras:
+        said = camera.statement
+        match camera.state:
+            case CameraState.ABSENT:
+                yield failure(Topic.CAMERAS, said.text, said.advice)
+            case CameraState.SILENT:
+                yield warning(Topic.CAMERAS, said.text, said.advice)
+            case _:
+                yield passed(Topic.CAMERAS, said.text)
+
+
+def _room_of(status: Status) -> Finding:
+    disk = status.disk
+    what = f"{disk.free_gb:g} GB free, room for {disk.jumps_left} jumps of {disk.jump_s:g} s"
+    if disk.jumps_left < 1:
+        return failure(Topic.DISK, what, "delete recordings, or copy them away")
+    return passed(Topic.DISK, f"{what}; disarm to have its speed examined")
+
+
+def _shown(finding: Finding) -> models.Finding:
+    return models.Finding(
+        level=finding.level.value, topic=finding.topic.value, what=finding.what, remedy=finding.remedy
+    )

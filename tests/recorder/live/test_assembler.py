@@ -1,0 +1,134 @@
+"""The assembler with real rings and real buffers: right columns, black blocks, back-pressure without loss."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from recorder.live.assembler import Assembler, Triplet
+from recorder.log.triplet_buffers import TripletBuffers
+from rig.clocks import HostNs, UtcAnchor, host_now
+from rig.frame import FrameStatus
+from rig.transport.messages import CameraNews
+from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, ring_rig
+
+Parts = tuple[Assembler, RingCameras, TripletBuffers]
+
+
+@pytest.fixture
+def parts() -> Iterator[Parts]:
+    rig = ring_rig()
+    with camera_rings(rig) as rings:
+        buffers = TripletBuffers(rig.triplet_shape, 4)
+        yield Assembler(rig, rings, buffers), RingCameras(rings), buffers
+        buffers.close()
+
+
+def _now(pulse: float) -> HostNs:
+    return HostNs(START + round(pulse * PERIOD))
+
+
+def _blocks(buffers: TripletBuffers, triplet: Triplet) -> list[set[int]]:
+    """The grey values in each camera's block; the buffer is released."""
+    assert triplet.slot is not None
+    pixels, first, values = buffers.pixels(triplet.slot), 0, []
+    for width, _ in SIZES:
+        values.append(set(np.unique(pixels[:, first : first + width]).tolist()))
+        first += width
+    buffers.release(triplet.slot)
+    return values
+
+
+def test_frames_stand_side_by_side_in_the_rigs_order(parts: Parts) -> None:
+    assembler, cameras, buffers = parts
+    cameras.expose(1, 2, 0, 1)
+    (triplet,) = assembler.pump(_now(1.3))
+    assert _blocks(buffers, triplet) == [{10}, {11}, {12}]
+    assert all(ring.counters()["slots_queued"] == 0 for ring in cameras.rings)
+    tags = assembler.camera_tags(triplet.pulse, UtcAnchor(0))
+    assert [(tag.columns, tag.status) for tag in tags] == [
+        ((0, 40), FrameStatus.OK), ((40, 104), FrameStatus.OK), ((104, 120), FrameStatus.OK),
+    ]  # fmt: skip
+    assert [tag.offset_us for tag in tags] == [-0.001, 0.0, 0.001]
+
+
+def test_a_missing_frame_is_black_even_where_an_older_one_stood(
+    parts: Parts,
+) -> None:
+    assembler, cameras, buffers = parts
+    for pulse in range(1, 5):
+        cameras.expose(pulse, 0, 1, 2)
+    assert [len(_blocks(buffers, triplet)) for triplet in assembler.pump(_now(4.3))] == [3] * 4
+    cameras.expose(5, 0, 2)
+    cameras.expose(5, 1, lose=True)
+    cameras.expose(6, 0, 1, 2)
+    lost, complete = assembler.pump(_now(6.3))
+    assert [outcome.status for outcome in lost.pulse.outcomes] == [FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK]
+    assert _blocks(buffers, lost) == [{50}, {0}, {52}]
+    assert _blocks(buffers, complete) == [{60}, {61}, {62}]
+
+
+def test_without_a_free_buffer_frames_wait_in_the_rings_and_none_is_lost(
+    parts: Parts,
+) -> None:
+    assembler, cameras, buffers = parts
+    for pulse in range(1, 11):
+        cameras.expose(pulse, 0, 1, 2)
+    numbers: list[int] = []
+    seen: list[list[set[int]]] = []
+    for _ in range(40):
+        for triplet in assembler.pump(_now(10.3)):
+            numbers.append(triplet.pulse.number)
+            seen.append(_blocks(buffers, triplet))
+    assert numbers == list(range(1, 11))
+    assert seen == [[{10 * n}, {10 * n + 1}, {10 * n + 2}] for n in range(1, 11)]
+    assert not assembler.backlog
+    assert buffers.free_count == buffers.count
+
+
+def test_a_recorder_that_takes_anothers_place_goes_on_with_its_cameras() -> None:
+    rig = ring_rig()
+    with camera_rings(rig) as rings:
+        cameras, first = RingCameras(rings, host_now()), TripletBuffers(rig.triplet_shape, 1)
+        dead = Assembler(rig, rings, first)
+        for pulse in (1, 2, 3):
+            cameras.expose(pulse, 0, 1, 2)
+        dead.pump(cameras.time(3.3))  # pulse 1 has the only buffer; it dies with pulse 2 in hand, 3 unread
+        first.close()
+        in_hand = [ring.queued_slots() - ring.unread_slots() for ring in rings]
+        assert [len(slots) for slots in in_hand] == [1, 1, 1]
+
+        buffers = TripletBuffers(rig.triplet_shape, 4)
+        anew = Assembler(rig, rings, buffers)
+        anew.pump(cameras.time(3.4))
+        assert [change.news for change in anew.changes()] == [CameraNews.CONNECTED] * 3
+        assert anew.connected == [True] * 3
+        cameras.latch()
+        cameras.expose(4, 0, 1, 2)
+        (triplet,) = anew.pump(cameras.time(4.3))
+        assert _blocks(buffers, triplet) == [{40}, {41}, {42}]
+        assert [ring.queued_slots() for ring in rings] == in_hand, "a grabber could still be about to queue them"
+        anew.pump(HostNs(host_now() + 2_000_000_000))
+        assert [ring.queued_slots() for ring in rings] == [set()] * 3
+        buffers.close()
+
+
+def test_a_slot_whose_record_was_just_being_queued_is_not_taken_for_stranded() -> None:
+    rig = ring_rig()
+    with camera_rings(rig) as rings:
+        slot = rings[0].take_slot()
+        assert slot is not None
+        rings[0]._map[1024 + slot] = 2  # queued; its record follows only after the new recorder has looked
+        buffers = TripletBuffers(rig.triplet_shape, 4)
+        assembler, cameras = Assembler(rig, rings, buffers), RingCameras(rings, host_now())
+        assembler.pump(cameras.time(0))
+        rings[0]._map[1024 + slot] = 0
+        cameras.expose(1, 0, 1, 2)
+        later = HostNs(host_now() + 2_000_000_000)
+        taken = [buffers.acquire() for _ in range(4)]  # nothing is copied now: the frames stay in their slots
+        assembler.pump(later)
+        assert [len(ring.queued_slots()) for ring in rings] == [1, 1, 1]
+        for held in taken:
+            assert held is not None
+            buffers.release(held)
+        buffers.close()

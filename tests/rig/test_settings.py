@@ -1,0 +1,202 @@
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from rig.errors import BadInputError
+from rig.settings.file import CONFIG, load_rig, rig_schema
+from rig.settings.strict_toml import read_toml
+
+RIGS = sorted((CONFIG / "rigs").glob("*.toml"))
+
+CAMERA = '[[cameras]]\nname = "K1"\nbackend = "aravis"\naddress = "192.168.11.2"\n'
+SECOND = CAMERA.replace("K1", "K2").replace("11.2", "12.2")
+REPLAYED = '[[cameras]]\nname = "K1"\nbackend = "replay"\naddress = "log.mcap"\n'
+HEAD = 'name = "test rig"\n'
+
+
+def _complaint(folder: Path, text: str) -> str:
+    """The error message for `text` as a rig file, without the path with which it must begin."""
+    path = folder / "rig.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInputError) as caught:
+        load_rig(path)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(f"{path}: ")
+    return line.removeprefix(f"{path}: ")
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_shipped_rig_files_are_valid(path: Path) -> None:
+    rig = load_rig(path)
+    assert len(rig.cameras) == 3
+    jsonschema.validate(read_toml(path), json.loads(rig_schema()))
+
+
+def test_the_rig_files_of_the_contract_are_shipped() -> None:
+    assert {"hill-iidc", "hill-gige", "sim"} <= {path.stem for path in RIGS}
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_the_scenario_of_a_shipped_rig_file_exists(path: Path) -> None:
+    simulation = load_rig(path).simulation
+    if simulation is not None:
+        assert simulation.scenario.is_file()
+
+
+def test_the_shipped_schema_is_up_to_date() -> None:
+    assert (CONFIG / "rig.schema.json").read_text(encoding="utf-8") == rig_schema(), (
+        "run: svev schema -o config/rig.schema.json"
+    )
+
+
+def test_the_schema_is_a_schema() -> None:
+    jsonschema.Draft202012Validator.check_schema(json.loads(rig_schema()))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        pytest.param(
+            "name = \nx",
+            "not valid TOML: Invalid value (at line 1, column 8); correct it there",
+            id="broken TOML",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "exposure = 5\n",
+            'unknown key "cameras.1.exposure"; did you mean "exposure_us"?',
+            id="misspelt",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[recorder]\nzzz = 1\n",
+            'unknown key "recorder.zzz"; known keys here: directory, ',
+            id="unknown",
+        ),
+        pytest.param(
+            HEAD + "triger = {}\n" + CAMERA, 'unknown key "triger"; did you mean "trigger"?', id="unknown table"
+        ),
+        pytest.param(
+            HEAD + CAMERA + "region = { widht = 5 }\n",
+            'unknown key "cameras.1.region.widht"; did you mean "width"?',
+            id="deep",
+        ),
+        pytest.param(
+            HEAD + "[simulation]\nscenari = 'x'\n" + CAMERA.replace("aravis", "sim"),
+            'key "simulation.scenario" is missing; add it (and 1 more)',
+            id="two at once",
+        ),
+        pytest.param(
+            HEAD + CAMERA + 'exposure_us = "fast"\n', 'key "cameras.1.exposure_us" = \'fast\': ', id="wrong type"
+        ),
+        pytest.param(
+            HEAD + CAMERA + "exposure_us = -1\n",
+            'key "cameras.1.exposure_us" = -1: input should be greater than 0; correct it',
+            id="out of range",
+        ),
+        pytest.param(CAMERA, 'key "name" is missing; add it', id="missing key"),
+        pytest.param(HEAD, 'key "cameras" is missing; add it', id="no camera"),
+        pytest.param(HEAD + CAMERA + CAMERA, "camera name K1 is used twice: give each camera its own", id="same name"),
+        pytest.param(
+            HEAD + CAMERA + CAMERA.replace("K1", "K2"),
+            "address 192.168.11.2 is used twice: give each camera its own",
+            id="same address",
+        ),
+        pytest.param(
+            HEAD + CAMERA.replace('address = "192.168.11.2"\n', ""),
+            '"cameras.1": backend "aravis" needs an address: add address = "..."',
+            id="no address",
+        ),
+        pytest.param(
+            HEAD + CAMERA + SECOND + "region = { height = 100 }\n",
+            "cameras differ in region.height: frames stand side by side, so make the heights equal",
+            id="heights",
+        ),
+        pytest.param(
+            HEAD + '[[cameras]]\nname = "K1"\nbackend = "sim"\n',
+            'backend "sim" needs a [simulation] table: add scenario = ',
+            id="sim without scenario",
+        ),
+        pytest.param(
+            HEAD + REPLAYED + SECOND,
+            'camera K2 has backend "aravis", K1 "replay": pulses of a log are not those of other cameras; use backend',
+            id="replay beside others",
+        ),
+        pytest.param(
+            HEAD + REPLAYED + REPLAYED.replace("K1", "K2").replace("log", "other"),
+            "replayed cameras have different logs, whose pulses have nothing to do with each other: give all cameras",
+            id="two logs",
+        ),
+        pytest.param(
+            HEAD + CAMERA + '[network]\npublish = "127.0.0.1"\n',
+            'key "network.publish" = \'127.0.0.1\': ',
+            id="publish address",
+        ),
+    ],
+)  # fmt: skip
+def test_a_wrong_rig_file_is_one_line_with_key_and_remedy(tmp_path: Path, text: str, complaint: str) -> None:
+    assert _complaint(tmp_path, text).startswith(complaint)
+
+
+def test_replayed_cameras_share_their_log(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(HEAD + REPLAYED + REPLAYED.replace("K1", "K2"))
+    assert {camera.address for camera in load_rig(path).cameras} == {"log.mcap"}
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"none\.toml: no such file; name an existing one"):
+        load_rig(tmp_path / "none.toml")
+
+
+def test_a_directory_is_no_rig_file(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="is a directory; name the file in it"):
+        load_rig(tmp_path)
+
+
+def test_a_path_through_a_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(BadInputError, match=r"cannot be read \(Not a directory\)"):
+        load_rig(tmp_path / "file" / "rig.toml")
+
+
+def test_a_picture_is_no_rig_file(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_bytes(b"\x89PNG\xff")
+    with pytest.raises(BadInputError, match="is no text file; name a TOML file"):
+        load_rig(tmp_path / "rig.toml")
+
+
+def test_a_scenario_is_relative_to_its_rig_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(HEAD + "[simulation]\nscenario = 'hill.toml'\n" + CAMERA.replace("aravis", "sim"))
+    simulation = load_rig(path).simulation
+    assert simulation is not None
+    assert simulation.scenario == tmp_path / "hill.toml"
+
+
+def test_a_calibration_is_relative_to_its_rig_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(HEAD + CAMERA)
+    assert load_rig(path).calibration is None
+    path.write_text(HEAD + "calibration = 'survey/poses.json'\n" + CAMERA)
+    assert load_rig(path).calibration == tmp_path / "survey" / "poses.json"
+    path.write_text(HEAD + "calibration = '/survey/poses.json'\n" + CAMERA)
+    assert load_rig(path).calibration == Path("/survey/poses.json")
+
+
+def test_frames_stand_side_by_side_in_the_order_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    wide = SECOND + "region = { width = 1936, height = 480 }\n"
+    path.write_text(HEAD + wide + CAMERA)
+    rig = load_rig(path)
+    assert [camera.name for camera in rig.cameras] == ["K2", "K1"]
+    assert rig.columns() == ((0, 1936), (1936, 2576))
+    assert rig.triplet_shape == (480, 2576)
+    assert rig.cameras[0].frame_bytes == 1936 * 480
+
+
+def test_the_period_of_the_pulses_is_in_ns(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(HEAD + CAMERA + "[trigger]\nrate_hz = 30\n")
+    assert load_rig(path).trigger.period_ns == 33_333_333

@@ -1,0 +1,69 @@
+"""`svev ctl` against a real service."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from tests.capture.rigs import write_rig
+from tests.service.serving import serving
+from tests.support.loopback import Loopback
+
+TOKEN = "a-token-for-the-tests-only"  # noqa: S105
+
+
+def _ctl(url: str, *arguments: str, token: str = "") -> "subprocess.CompletedProcess[str]":
+    environment = {**os.environ, "SVEV_URL": url, "SVEV_TOKEN": token}
+    command = [sys.executable, "-m", "svev", "ctl", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
+
+
+def _json(done: "subprocess.CompletedProcess[str]") -> Any:
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) -> None:
+    (tmp_path / "token").write_text(TOKEN + "\n")
+    rig = write_rig(tmp_path, "sim", loopback)
+    with serving(tmp_path, rig, loopback, "--token-file", str(tmp_path / "token"), token=TOKEN) as service:
+        url = service.url
+        assert _json(_ctl(url, "status", "--json", token=TOKEN))["state"] == "idle"
+        refused = _ctl(url, "start", token=TOKEN)
+        assert (refused.returncode, refused.stderr) == (
+            1,
+            "svev: the rig is not armed: arm it, then start recording\n",
+        )
+        armed = _ctl(url, "arm", token=TOKEN)
+        assert armed.returncode == 0, armed.stderr
+        assert armed.stdout.startswith("armed      armed")
+        begun = _json(_ctl(url, "start", "--athlete", "Ola", "--bib", "17", "--json", token=TOKEN))
+        assert begun["state"] == "recording"
+        service.await_pulses(20)
+        ended = _json(_ctl(url, "stop", "--json", token=TOKEN))
+        assert (ended["id"], ended["state"], ended["session"]["bib"]) == (begun["id"], "finished", "17")
+        assert _json(_ctl(url, "session", begun["id"], "--bib", "18", "--json", token=TOKEN))["session"]["bib"] == "18"
+        saved = _json(_ctl(url, "save", "--seconds", "1", "--json", token=TOKEN))
+        assert 0 < saved["counts"]["pulses"] <= 33
+        listed = _ctl(url, "list", token=TOKEN).stdout
+        assert [line.split()[0] for line in listed.splitlines()] == [saved["id"], begun["id"]]
+        assert "[18 Ola]" in listed
+        assert _json(_ctl(url, "delete", begun["id"], "--json", token=TOKEN))["deleted"]
+        assert len(_json(_ctl(url, "list", "--json", token=TOKEN))["recordings"]) == 1
+        assert not _json(_ctl(url, "restore", begun["id"], "--json", token=TOKEN))["deleted"]
+        assert _ctl(url, "stop", token=TOKEN).returncode == 1
+        assert _ctl(url, "delete", "nonsense", token=TOKEN).returncode == 2
+        assert _ctl(url, "start", "--notes", "x" * 5000, token=TOKEN).returncode == 2
+        assert _ctl(url, "disarm", token=TOKEN).stdout.startswith("idle ")
+        wrong = _ctl(url, "status", token=TOKEN[::-1])
+        assert (wrong.returncode, "SVEV_TOKEN" in wrong.stderr) == (2, True)
+
+
+def test_nobody_there_is_said_in_one_line(loopback: Loopback) -> None:
+    done = _ctl(f"http://{loopback.host}:{loopback.free_port()}", "status")
+    assert done.returncode == 6
+    assert "start it with svev serve" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert _ctl("ftp://somewhere", "status").returncode == 2

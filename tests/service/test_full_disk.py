@@ -1,0 +1,46 @@
+"""A disk that fills up while recording: the recording ends, its log is readable, and the service goes on."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from recorder.checking.verify import verify
+from tests.capture.rigs import write_rig
+from tests.service.serving import PATIENCE_S, serving
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+
+def _may_mount() -> bool:
+    command = ["unshare", "--mount", "true"]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def test_a_full_disk_ends_the_recording_and_the_service_lives_on(tmp_path: Path, loopback: Loopback) -> None:
+    """A disk of 300 MB, mounted in a mount namespace of the service's own."""
+    if not _may_mount():
+        pytest.skip("no mount namespace of our own is allowed here: a small disk cannot be made")
+    rig = write_rig(tmp_path, "sim", loopback)
+    rig.write_text(rig.read_text().replace("[network]", "[recorder]\nreserve_gb = 0\njump_s = 4\n[network]"))
+    small, kept = tmp_path / "small", tmp_path / "kept.mcap"
+    small.mkdir()
+    script = 'mount -t tmpfs -o size=300m none "$0" && exec "$@"'
+    prefix = ("unshare", "--mount", "sh", "-c", script, str(small))
+    with serving(tmp_path, rig, loopback, prefix=prefix, data=small) as service:
+        service.arm()
+        recording = service.post("/api/recordings", {"preroll_s": 0})
+        wait_until(lambda: service.state() == "armed", "the disk is full", PATIENCE_S, 0.1)
+        statement = service.get("/api/status")["statement"]
+        assert statement["code"] == "recording_ended"
+        assert "the disk is full" in statement["text"]
+        status, problem = service.call("POST", "/api/recordings", {})
+        assert (status, problem["code"]) == (507, "storage")
+        assert "delete recordings" in problem["detail"]
+        found = service.get(f"/api/recordings/{recording['id']}")
+        assert found["counts"]["complete"] == found["counts"]["pulses"] > 100
+        kept.write_bytes(Path(f"/proc/{service.pid}/root{small}/{recording['id']}.mcap").read_bytes())
+        service.get("/api/doctor")
+    report = verify(kept)
+    assert report.ledger.complete == report.ledger.pulses > 100
+    assert not report.damaged

@@ -1,0 +1,237 @@
+"""`svev record` as a user runs it: real processes, real signals, on the simulated hill."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from recorder.checking.verify import verify
+from recorder.reading.log_reader import LogReader
+from recorder.reading.triplets import triplets
+from rig.events import Event
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+from rig.settings.file import load_rig
+from svev.demo import hill_pulses
+from tests.capture.rigs import write_rig
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+SVEV = [sys.executable, "-m", "svev"]
+
+
+def _record(rig: Path, out: Path, seconds: float, *more: str) -> "subprocess.Popen[str]":
+    command = [*SVEV, "record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out), "--json", *more]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def _result(process: "subprocess.Popen[str]", timeout_s: float = 60) -> tuple[int, dict[str, Any], str]:
+    out, err = process.communicate(timeout=timeout_s)
+    return process.returncode, json.loads(out) if out else {}, err
+
+
+def _children(pid: int) -> dict[str, int]:
+    """Child processes of `svev record` by their row in the process table."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if parent == pid and b"-m" in words:
+            found[words[words.index(b"-m") + 2].decode()] = int(entry.name)
+    return found
+
+
+def _recording(out: Path) -> Callable[[], bool]:
+    """True once a log in `out` has grown by some triplets."""
+    return lambda: any(log.stat().st_size > 5_000_000 for log in out.glob("*.mcap"))
+
+
+@pytest.mark.parametrize("backend", ["sim", "aravis", "iidc", "mixed"])
+def test_every_pulse_is_recorded_whole_and_unmixed(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+    path = write_rig(tmp_path, backend, loopback)
+    code, result, err = _result(_record(path, tmp_path / "logs", 2))
+    assert (code, result["pulses"], result["complete"], result["partial"]) == (0, 60, 60, 0), err
+    assert set(result["causes"].values()) == {0}
+    assert result["bytes"] == Path(result["log"]).stat().st_size
+    report = verify(Path(result["log"]))
+    assert report.verdict == "clean", report
+    hill = hill_pulses(Path(result["log"]), load_rig(path))
+    assert [len(seen) for seen in hill.values()] == [1] * 60
+    first = min(hill[PulseNumber(1)])
+    assert {pulse: min(seen) for pulse, seen in hill.items()} == {n: first + n - 1 for n in range(1, 61)}
+
+
+CAUSES = {"missed_pulse": ("K1", "missed"), "lost_frame": ("K2", "lost"), "damaged_frame": ("K3", "damaged")}
+
+
+@pytest.mark.parametrize("backend", ["sim", "aravis"])
+def test_each_fault_is_recorded_with_its_cause(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+    """Faults come again and again, so that the recording meets some whenever it begins."""
+    faults: list[dict[str, Any]] = [
+        {"kind": kind, "camera": camera, "at_pulse": pulse}
+        for place, (kind, (camera, _)) in enumerate(CAUSES.items())
+        for pulse in range(20 + 20 * place, 1800, 60)
+    ]
+    path = write_rig(tmp_path, backend, loopback, faults=faults)
+    code, result, err = _result(_record(path, tmp_path / "logs", 2.5))
+    assert (code, result["pulses"]) == (0, 75), err
+    log = Path(result["log"])
+    hill = hill_pulses(log, load_rig(path))
+    assert all(len(seen) == 1 for seen in hill.values())
+    expected = {
+        (min(hill[pulse]), camera): status
+        for pulse in hill
+        for kind, (camera, status) in CAUSES.items()
+        if {"kind": kind, "camera": camera, "at_pulse": min(hill[pulse])} in faults
+    }
+    found = {
+        (min(hill[tag.pulse]), camera.name): camera.status.value
+        for tag, _ in triplets(log)
+        for camera in tag.cameras
+        if camera.status != "ok"
+    }
+    assert found == expected
+    assert set(expected.values()) == {"missed", "lost", "damaged"}
+
+
+def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback) -> None:
+    process = _record(write_rig(tmp_path, "sim", loopback), tmp_path / "logs", 60)
+    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    process.send_signal(signal.SIGINT)
+    code, result, err = _result(process)
+    assert code == 0, err
+    assert result["stopped_early"]
+    assert verify(Path(result["log"])).verdict == "clean"
+
+
+@pytest.mark.parametrize("backend", ["sim", "aravis"])
+def test_a_killed_grabber_costs_its_own_frames_only(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+    process = _record(write_rig(tmp_path, backend, loopback), tmp_path / "logs", 120)
+    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    (log,) = (tmp_path / "logs").glob("*.mcap")
+    os.kill(_children(process.pid)["K2"], signal.SIGKILL)
+    wait_until(lambda: "SIGKILL" in _said_of(log, "K2"), "the death is in the log", 30)
+    wait_until(lambda: "connected" in _said_of(log, "K2").partition("SIGKILL")[2], "K2 is back", 60)
+    size = log.stat().st_size
+    wait_until(lambda: log.stat().st_size > size + 60_000_000, "more is recorded", 60)
+    process.send_signal(signal.SIGINT)
+    code, result, err = _result(process)
+    assert code == 0, err
+    assert "K2" in err
+    assert result["causes"]["absent"] > 0
+    fates = [[camera.status for camera in tag.cameras] for tag, _ in triplets(log)]
+    assert all(FrameStatus.ABSENT not in (first, last) for first, _, last in fates), "the others go on"
+    assert fates[-1][1] is not FrameStatus.ABSENT
+    assert not verify(log).damaged
+
+
+def _said_of(log: Path, name: str) -> str:
+    """What the events of a log, which may still grow, say of a camera."""
+    with LogReader(log) as reader:
+        events = [Event.from_protobuf(message.data or b"") for message in reader.messages("/events")]
+    return " | ".join(event.message for event in events if event.name == name)
+
+
+def test_a_killed_recorder_leaves_a_readable_log_and_no_process(tmp_path: Path, loopback: Loopback) -> None:
+    process = _record(write_rig(tmp_path, "sim", loopback), tmp_path / "logs", 60)
+    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    os.kill(_children(process.pid)["recorder"], signal.SIGKILL)
+    code, _, err = _result(process)
+    assert code == 6
+    assert "svev verify" in err
+    assert "Traceback" not in err
+    (log,) = (tmp_path / "logs").glob("*.mcap")
+    report = verify(log)
+    assert report.ledger.pulses > 2
+    assert not report.closed
+
+
+def test_a_killed_parent_leaves_a_finished_log_and_no_process(tmp_path: Path, loopback: Loopback) -> None:
+    process = _record(write_rig(tmp_path, "aravis", loopback), tmp_path / "logs", 60)
+    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    children = _children(process.pid)
+    process.kill()
+    process.communicate(timeout=10)
+    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in children.values()), "children gone", 15)
+    (log,) = (tmp_path / "logs").glob("*.mcap")
+    report = verify(log)
+    assert report.closed
+    assert any("service process is gone" in event.message for event in report.events)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("[trigger]", "[trigger"), "rig.toml: not valid TOML"),
+        (("rate_hz", "rate_herz"), 'unknown key "trigger.rate_herz"; did you mean "rate_hz"?'),
+        (('"scenario.toml"', '"nowhere.toml"'), "nowhere.toml: no such file"),
+        (("tcp://127", "tcp://300"), "cannot be bound"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    tmp_path: Path, loopback: Loopback, change: tuple[str, str], words: str
+) -> None:
+    path = write_rig(tmp_path, "sim", loopback)
+    path.write_text(path.read_text().replace(*change))
+    code, _, err = _result(_record(path, tmp_path / "logs", 1))
+    assert code == 2
+    assert words in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_camera_that_is_not_there_is_named(tmp_path: Path, loopback: Loopback) -> None:
+    path = write_rig(tmp_path, "aravis", loopback)
+    path.write_text(path.read_text().replace('[simulation]\nscenario = "scenario.toml"\n', "settle_s = 1.0\n"))
+    code, _, err = _result(_record(path, tmp_path / "logs", 1))
+    assert code == 2
+    assert f"camera K1 at {loopback.cameras(1)[0]} does not answer" in err.splitlines()[-1]
+
+
+def test_an_unwritable_directory_is_named(tmp_path: Path, loopback: Loopback) -> None:
+    (tmp_path / "file").touch()
+    code, _, err = _result(_record(write_rig(tmp_path, "sim", loopback), tmp_path / "file" / "logs", 1))
+    assert (code, len(err.strip().splitlines())) == (2, 1)
+    assert "cannot be written" in err
+
+
+def test_a_recording_that_does_not_fit_is_refused(tmp_path: Path, loopback: Loopback) -> None:
+    path = write_rig(tmp_path, "sim", loopback)
+    path.write_text(path.read_text().replace("[network]", "[recorder]\nreserve_gb = 1e9\n[network]"))
+    code, _, err = _result(_record(path, tmp_path / "logs", 1))
+    assert code == 4
+    assert "there is room for 0 s and 1 s are wanted, beside the reserve" in err
+
+
+def test_a_full_disk_ends_the_recording_and_what_is_written_is_whole(tmp_path: Path, loopback: Loopback) -> None:
+    """A disk of 40 MB, mounted in a mount namespace of the test's own."""
+    path = write_rig(tmp_path, "sim", loopback)
+    path.write_text(path.read_text().replace("[network]", "[recorder]\nreserve_gb = 0\n[network]"))
+    small = tmp_path / "small"
+    small.mkdir()
+    kept = tmp_path / "kept.mcap"
+    script = (
+        f"mount -t tmpfs -o size=40m none {small} && "
+        f"{sys.executable} -c 'import sys, service.headless as r; r.check_room_for = lambda *_: None; "
+        f"from svev.cli import main; sys.exit(main())' record --rig {path} --seconds 10 --out {small} --json; "
+        f"code=$?; cp {small}/*.mcap {kept}; exit $code"
+    )
+    command = ["unshare", "--mount", "sh", "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    if "unshare" in done.stderr or "mount:" in done.stderr:
+        pytest.skip("no mount namespace of our own is allowed here: a small disk cannot be made")
+    assert done.returncode == 4, done.stderr
+    assert "the disk is full" in done.stderr.splitlines()[-1]
+    report = verify(kept)
+    assert report.ledger.pulses > 20
+    assert report.ledger.complete == report.ledger.pulses

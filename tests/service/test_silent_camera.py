@@ -1,0 +1,60 @@
+"""A camera that freezes or dies during a recording: the recorder reports it, and the grabber sets it up again."""
+
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from recorder.checking.verify import verify
+from recorder.reading.triplets import triplets
+from rig.clocks import NS_PER_S, host_now
+from rig.frame import FrameStatus
+from rig.status import Counts
+from service.headless import HeadlessRig
+from service.processes.simulation import simulated_hill
+from simrig.programs.simulated_hill import SimulatedHill
+from tests.capture.rigs import make_rig
+from tests.support.loopback import Loopback
+
+PERIOD_NS = NS_PER_S // 30
+#: Three pulses, their transport, and a processor that others want too.
+NOTICED_NS = 3 * PERIOD_NS + NS_PER_S // 5
+
+
+@pytest.mark.parametrize("how", ["freeze", "kill"])
+def test_a_camera_that_falls_silent_is_noticed_and_comes_back(tmp_path: Path, loopback: Loopback, how: str) -> None:
+    rig, epoch = make_rig(tmp_path, "aravis", loopback), host_now()
+    path, said = tmp_path / "log.mcap", list[str]()
+    with simulated_hill(rig, epoch) as hill:
+        assert isinstance(hill, SimulatedHill)
+
+        def on_event(line: str) -> None:
+            """Unfreeze or restart the camera when its loss has been reported."""
+            said.append(line)
+            if line.startswith("K2 gone"):
+                hill.thaw("K2") if how == "freeze" else hill.restart("K2")
+
+        def on_progress(counts: Counts) -> None:
+            """Freeze or kill the camera, once, when the recording has some pulses."""
+            if counts.pulses > 20 and not gone:
+                gone.append(counts.pulses)
+                hill.freeze("K2") if how == "freeze" else hill.kill("K2")
+
+        gone: list[int] = []
+        with HeadlessRig(rig, "", on_event, lambda _: nullcontext({})) as running:
+            running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+            running.start_recording(path, session={}, pulses=420, seconds=14)
+            running.wait_until_finished(on_progress, lambda: False)
+    tags = [tag for tag, _ in triplets(path)]
+    assert all(tag.cameras[i].status is FrameStatus.OK for tag in tags for i in (0, 2)), "the others went on"
+    fates = [tag.cameras[1].status for tag in tags]
+    lost = [number for number, status in enumerate(fates) if status is not FrameStatus.OK]
+    assert FrameStatus.ABSENT in fates
+    assert fates[-1] is FrameStatus.OK, said
+    assert len(lost) == lost[-1] - lost[0] + 1, "one hole, and whole on both sides"
+    report = verify(path)
+    messages = [event.message.partition(":")[0] for event in report.events if event.name == "K2"]
+    assert messages[0] == "silent"
+    assert messages[-1] == "connected"
+    noticed = next(event for event in report.events if event.name == "K2")
+    assert noticed.time - tags[lost[0] - 1].time < NOTICED_NS

@@ -1,0 +1,221 @@
+"""Start, stop, list, change, delete and restore recordings, over a real socket."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx
+import pytest
+
+from rig.errors import StorageError, SvevError
+from rig.frame import FrameStatus
+from tests.recorder.logs import ALL_OK
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import Panel, refused
+
+SESSION = {
+    "athlete": "Anna Bjørge",
+    "bib": "17",
+    "gate": "12",
+    "wind": "0.8 m/s",
+    "notes": "new\nboots",
+    "operator": "",
+}
+
+
+def test_a_recording_is_started_and_stopped(client: httpx.Client) -> None:
+    assert client.post("/api/arm").json()["state"] == "armed"
+    started = client.post("/api/recordings", json=SESSION)
+    assert started.status_code == 201
+    recording = started.json()
+    assert started.headers["location"] == f"/api/recordings/{recording['id']}"
+    assert client.get(started.headers["location"]).json() == recording
+    assert recording["session"] == SESSION
+    assert client.get("/api/status").json()["state"] == "recording"
+    stopped = client.post(f"/api/recordings/{recording['id']}/stop")
+    assert stopped.status_code == 200
+    assert stopped.json()["state"] == "finished"
+    assert stopped.json()["verdict"]["code"] == "verdict_complete"
+    assert client.post(f"/api/recordings/{recording['id']}/stop").json() == stopped.json()
+    assert client.get("/api/recordings").json() == [stopped.json()]
+
+
+def test_what_has_just_happened_is_saved(client: httpx.Client) -> None:
+    client.post("/api/arm", json={})
+    saved = client.post("/api/recordings", json={"preroll_s": 5, "duration_s": 0})
+    assert saved.status_code == 201
+    assert saved.json()["state"] == "finished"
+
+
+def test_a_recording_needs_no_fields(client: httpx.Client) -> None:
+    client.post("/api/arm")
+    assert client.post("/api/recordings").status_code == 201
+
+
+def test_the_recording_in_progress_is_listed_as_such(client: httpx.Client, service: MemoryService) -> None:
+    client.post("/api/arm")
+    recording = client.post("/api/recordings").json()
+    write_recording(service.catalogue.directory, recording["id"])
+    assert [each["state"] for each in client.get("/api/recordings").json()] == ["recording"]
+
+
+def test_the_state_forbids_with_what_to_do(client: httpx.Client) -> None:
+    assert "arm" in refused(client.post("/api/recordings", json={}), 409).detail
+    client.post("/api/arm")
+    recording = client.post("/api/recordings", json={}).json()
+    assert "stop it first" in refused(client.post("/api/recordings", json={}), 409).detail
+    assert "stop it first" in refused(client.post("/api/disarm"), 409).detail
+    assert "stop it first" in refused(client.delete(f"/api/recordings/{recording['id']}"), 409).detail
+
+
+def test_of_many_operators_one_starts(panel: Panel, client: httpx.Client) -> None:
+    client.post("/api/arm")
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: httpx.post(f"{panel.url}/api/recordings", json={}, timeout=20), range(8)))
+    assert sorted(answer.status_code for answer in answers) == [201, *[409] * 7]
+
+
+def test_an_unknown_recording(client: httpx.Client) -> None:
+    for path in ("", "/file", "/pulses", "/pulses/1.jpg", "/thumbnail.jpg"):
+        assert refused(client.get(f"/api/recordings/nobody{path}"), 404).code == "unknown_recording"
+    refused(client.post("/api/recordings/nobody/stop"), 404)
+    refused(client.post("/api/recordings/nobody/restore"), 404)
+    refused(client.patch("/api/recordings/nobody", json={"bib": "1"}), 404)
+    refused(client.delete("/api/recordings/nobody"), 404)
+
+
+BAD_FIELDS = [
+    {"speed": 1},
+    {"preroll_s": -1},
+    {"preroll_s": "five"},
+    {"duration_s": 1e9},
+    {"bib": "x" * 201},
+    {"athlete": "a\r\nSet-Cookie: x=1"},
+    {"athlete": ["a"]},
+    [],
+    "text",
+]
+
+
+def test_unknown_and_malformed_fields_are_refused(client: httpx.Client) -> None:
+    for fields in BAD_FIELDS:
+        client.post("/api/arm")
+        problem = refused(client.post("/api/recordings", json=fields), 422)
+        assert problem.errors[0].where.startswith("body")
+        assert client.get("/api/status").json()["state"] == "armed"
+
+
+NO_JSON = [b"{", b"nan", b'{"duration_s": NaN}', b"\xff", b'{"bib": "1"', b"[" * 10_000]
+
+
+def test_what_is_no_json_is_refused(client: httpx.Client) -> None:
+    for body in NO_JSON:
+        client.post("/api/arm")
+        refused(client.post("/api/recordings", content=body, headers={"Content-Type": "application/json"}), 422)
+
+
+def test_calls_without_fields_take_none(client: httpx.Client) -> None:
+    for path in ("/api/arm", "/api/disarm", "/api/recordings/x/stop", "/api/recordings/x/restore", "/api/logout"):
+        refused(client.post(path, json={"force": True}), 422)
+
+
+BAD_QUERIES = [
+    "deleted=perhaps",
+    "deleted=",
+    "limit=3",
+    "deleted=1&deleted=0",
+    "=",
+    "deleted=1&%00=1",
+]
+
+
+def test_unknown_and_malformed_parameters_are_refused(client: httpx.Client) -> None:
+    for query in BAD_QUERIES:
+        refused(client.get(f"/api/recordings?{query}"), 422)
+
+
+def test_session_fields_are_changed_later(client: httpx.Client, service: MemoryService) -> None:
+    log = write_recording(service.catalogue.directory, "jump", session={"athlete": "Anna", "bib": "17"})
+    before = log.read_bytes()
+    changed = client.patch("/api/recordings/jump", json={"bib": "18", "notes": "fell"}).json()
+    assert (changed["session"]["athlete"], changed["session"]["bib"], changed["session"]["notes"]) == (
+        "Anna",
+        "18",
+        "fell",
+    )
+    assert client.get("/api/recordings/jump").json() == changed
+    assert log.read_bytes() == before
+    refused(client.patch("/api/recordings/jump", json={"id": "other"}), 422)
+
+
+def test_a_recording_is_deleted_and_restored(client: httpx.Client, service: MemoryService) -> None:
+    write_recording(service.catalogue.directory, "jump")
+    deleted = client.delete("/api/recordings/jump")
+    assert deleted.status_code == 200
+    assert deleted.json()["deleted"]
+    assert client.get("/api/recordings").json() == []
+    assert client.get("/api/recordings?deleted=true").json() == [deleted.json()]
+    assert client.delete("/api/recordings/jump").json() == deleted.json()
+    assert not client.post("/api/recordings/jump/restore").json()["deleted"]
+    assert [each["id"] for each in client.get("/api/recordings").json()] == ["jump"]
+
+
+def test_the_verdict_names_camera_and_cause(client: httpx.Client, service: MemoryService) -> None:
+    k2_lost = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
+    write_recording(service.catalogue.directory, "jump", (ALL_OK, k2_lost, ALL_OK, k2_lost))
+    recording = client.get("/api/recordings/jump").json()
+    assert recording["verdict"]["text"] == "2 of 4 pulses lack a frame: K2 2 lost"
+    assert recording["counts"] == {
+        "pulses": 4, "complete": 2, "partial": 2, "causes": {"lost": 2, "missed": 0, "damaged": 0, "absent": 0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "code"),
+    [
+        (StorageError("the disk is full: delete recordings"), 507, "storage"),
+        (SvevError("the recorder does not answer: see the log"), 503, "svev"),
+    ],
+)
+def test_failures_of_the_service_are_problems(
+    client: httpx.Client, service: MemoryService, error: SvevError, status: int, code: str
+) -> None:
+    service.broken = error
+    problem = refused(client.get("/api/status"), status)
+    assert (problem.code, problem.detail) == (code, str(error))
+
+
+def test_an_unforeseen_error_tells_nothing_private(client: httpx.Client, service: MemoryService) -> None:
+    service.broken = RuntimeError("/home/secret")
+    answer = client.get("/api/status")
+    assert refused(answer, 500).code == "internal_error"
+    assert "secret" not in answer.text
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    service.broken = None
+    assert client.get("/api/status").status_code == 200
+
+
+WRONG_METHODS = [
+    ("PUT", "/api/status", "GET"),
+    ("POST", "/api/status", "GET"),
+    ("GET", "/api/arm", "POST"),
+    ("DELETE", "/healthz", "GET"),
+    ("TRACE", "/api/status", "GET"),
+    ("PUT", "/api/recordings", "GET, POST"),
+    ("OPTIONS", "/api/recordings/x", "DELETE, GET, PATCH"),
+    ("POST", "/main.js", "GET, HEAD"),
+]
+
+
+def test_a_wrong_method_says_which_is_right(client: httpx.Client) -> None:
+    for method, path, allowed in WRONG_METHODS:
+        answer = client.request(method, path)
+        refused(answer, 405)
+        assert answer.headers["allow"] == allowed, path
+
+
+NOWHERE = ["/api", "/api/", "/api/nothing", "/api/status/", "/nothing.js", "/api/recordings/"]
+
+
+def test_nothing_there(client: httpx.Client) -> None:
+    for path in NOWHERE:
+        refused(client.get(path), 404)
+        refused(client.post(path), 404)

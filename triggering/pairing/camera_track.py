@@ -1,0 +1,284 @@
+"""Follows one camera: places its frames on the common time line, and collects what its ids prove about missing ones.
+
+Ids and clocks are compared within one epoch only: a new connection has another clock and other ids. From a reconnection
+to the first frame after it the camera counts as absent. In its very first connection, if the ids plausibly began at 1,
+the pulses before the first frame are judged by its id, so that a camera that fails at the first pulses is not taken for
+an absent one.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Final
+
+from rig.clocks import ClockLatch, DeviceNs, HostNs
+from rig.frame import FrameStatus, Record
+from rig.health import CameraCounters
+from triggering.pairing.gaps import DamageMatcher, Gap
+from triggering.pairing.outcomes import NO_FRAME, Outcome
+from triggering.timeline.device_clock import DeviceClock
+from triggering.timeline.pulse_train import PulseTrain
+
+#: Damaged arrivals kept until their pulse is decided; only a camera that sends nothing else has more.
+_MOST_DAMAGED: Final = 64
+
+
+class CameraTrack:
+    """State of one camera.
+
+    Args:
+        train: the rhythm of the pulses.
+        tolerance_ns: frames whose trigger times are this close are of one pulse.
+
+    Attributes:
+        clock: the camera's clock in this epoch.
+        counters: totals since the start.
+        epoch: number of the present connection, 0 before the first.
+        connected: whether the camera is there.
+        silent: the camera is connected, but delivers nothing while others do.
+        unanswered: pulses decided without this camera since its last sign of life.
+        alive: host time of the last sign of life: a trigger time or the connection.
+    """
+
+    def __init__(self, train: PulseTrain, tolerance_ns: int) -> None:
+        self.clock = DeviceClock()
+        self.counters = CameraCounters()
+        self.epoch = 0
+        self.connected = False
+        self.silent = False
+        self.unanswered = 0
+        self.alive = HostNs(0)
+        self._train, self._tolerance_ns = train, tolerance_ns
+        self._matcher = DamageMatcher(train.period_ns, self.counters)
+        self._gaps: deque[Gap] = deque()
+        self._since = HostNs(0)
+        self._known_until = HostNs(0)
+        self._last: tuple[Record, HostNs] | None = None  # the epoch's last whole frame and its trigger time
+        # The running gap: it began with the last frame, and its end is not known yet.
+        self._broken = False
+        self._damaged: list[HostNs] = []
+        self._settled_damaged = 0
+        self._settled_unseen = 0  # pulses decided as lost or absent at their deadline, without proof
+
+    @property
+    def latency_ns(self) -> float:
+        """Typical time from the trigger of a frame to its arrival."""
+        return self._matcher.latency_ns
+
+    @property
+    def delivers(self) -> bool:
+        """Whether it has delivered a frame since it was connected."""
+        return self.connected and self._last is not None
+
+    # -- records of the camera -----------------------------------------------------------------------------------
+
+    def connect(self, epoch: int, host: HostNs) -> None:
+        """Begin an epoch: clock, ids and times are unrelated to those of the last one."""
+        if self.connected:
+            self.disconnect(host)
+        self._broken = self.epoch > 0
+        if self._broken:
+            self.clock = DeviceClock()
+        self.epoch, self.connected, self.silent = epoch, True, False
+        self._since = self.alive = host
+        self._last = None
+        self._begin_running_gap()
+
+    def disconnect(self, host: HostNs) -> None:
+        """End the epoch: frames that have not come by now never will."""
+        if not self.connected:
+            return
+        start = self._since if self._last is None else self._last[1]
+        self._gaps.append(Gap(start, host, damaged=self._damaged, broken=True, anchored=False))
+        self._known_until = max(self._known_until, host)
+        self.connected = self.silent = False
+        self._damaged = []
+
+    def latch(self, latch: ClockLatch) -> None:
+        """Enter a reading of the camera's clock."""
+        steps = self.clock.steps
+        self.clock.latch(latch)
+        if self.clock.steps != steps:
+            # Times before and after the step cannot be compared: the next frame counts as a first one.
+            self.counters.clock_steps += 1
+            self._last = None
+            self._broken = True
+
+    def damaged(self, host: HostNs, device: DeviceNs | None = None) -> None:
+        """Enter a damaged arrival.
+
+        Args:
+            host: when it came.
+            device: the camera's clock at its trigger, if known.
+        """
+        if device is not None and self.clock.known:
+            host = self._matcher.arrival_of(self.clock.to_host(device))
+        if len(self._damaged) >= _MOST_DAMAGED:
+            del self._damaged[0]
+            self.counters.unassigned += 1
+        self._damaged.append(host)
+        self.alive = max(self.alive, HostNs(round(self._matcher.trigger_of(host))))
+        self.unanswered = 0
+        if self.silent:
+            self.silent, self._broken = False, True
+
+    def anchor(self, record: Record) -> HostNs | None:
+        """Trigger time of a whole frame on the common time line, None if the clock cannot tell."""
+        clock, first = self.clock, self._last is None
+        if not clock.known or (first and clock.uncertainty_at(record.device_time) > self._tolerance_ns / 2):
+            self.counters.unanchored += 1
+            self._broken = self._broken or first  # the ids of later frames no longer count from the beginning
+            return None
+        time = clock.to_host(record.device_time)
+        if time > record.host_time + self._tolerance_ns:
+            self._implausible(record)
+            return None
+        return time
+
+    def follow(self, record: Record, time: HostNs) -> bool:
+        """Enter a whole frame, triggered at `time`: its id tells what happened since the last one.
+
+        Returns:
+            False if the frame is not newer than the last one; it belongs to no pulse then.
+        """
+        if self.silent:
+            self.silent, self._broken = False, True
+        if self._last is None:
+            taken = self._taken_at_first(record, time)
+            self._gaps.append(self._end_running_gap(self._since, time, taken, anchored=False))
+        else:
+            last, last_time = self._last
+            if time <= last_time:
+                if record.frame_id == last.frame_id:
+                    self.counters.duplicate += 1
+                else:
+                    self._implausible(record)
+                return False
+            taken = self._taken_since(last, last_time, record, time)
+            gap = self._end_running_gap(last_time, time, taken, anchored=not self._broken)
+            gap.overruns = _overruns(last, record, taken + 1) if gap.anchored else 0
+            self.counters.overruns += gap.overruns
+            self._gaps.append(gap)
+        self._last = record, time
+        self._known_until = self.alive = time
+        self._matcher.whole(record.host_time - time)
+        return True
+
+    # -- decisions about pulses ----------------------------------------------------------------------------------
+
+    def may_deliver(self, time: HostNs) -> bool:
+        """Whether a whole frame of a pulse at `time` may still come."""
+        expected = time >= self._since - self._tolerance_ns and time >= self._known_until
+        return expected and self.connected and not self.silent
+
+    def settle(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
+        """Decide what became of a pulse for which the camera has delivered no whole frame.
+
+        Args:
+            time: time of the pulse; pulses are decided in the order of time.
+            rivals: times of the later pulses before the camera's next frame, in order.
+        """
+        gap = self.gap_after(time)
+        if gap is not None:
+            return gap.settle(time, rivals, self._matcher)
+        if not self.connected or time < self._since:
+            return NO_FRAME[FrameStatus.ABSENT]
+        if self._damaged and self._matcher.match(self._damaged, time, rivals):
+            self._settled_damaged += 1
+            return NO_FRAME[FrameStatus.DAMAGED]
+        self._settled_unseen += 1
+        self.unanswered += time > self.alive
+        if self._last is None or self.silent:
+            return NO_FRAME[FrameStatus.ABSENT]
+        self.counters.presumed += 1
+        return NO_FRAME[FrameStatus.LOST]
+
+    def gap_after(self, time: HostNs) -> Gap | None:
+        """The gap in which `time` lies, None if its end is not known yet. Earlier gaps are dropped."""
+        self.forget_until(time)
+        return self._gaps[0] if self._gaps else None
+
+    def forget_until(self, time: HostNs) -> None:
+        """Drop the gaps that ended by `time`: all pulses in them are decided."""
+        while self._gaps and self._gaps[0].end <= time:
+            done = self._gaps.popleft()
+            if done.anchored and done.taken > 0:
+                self.counters.unexplained += done.taken
+            self.counters.unassigned += len(done.damaged)
+
+    def has_damaged(self) -> bool:
+        """Whether there are damaged arrivals that are not assigned to a pulse yet."""
+        return bool(self._damaged) or any(gap.damaged for gap in self._gaps)
+
+    # -- details -------------------------------------------------------------------------------------------------
+
+    def _implausible(self, record: Record) -> None:
+        """Treat a frame from the future, or one older than the last, as damaged: its trigger time is not known."""
+        self.counters.implausible += 1
+        self.damaged(record.host_time)
+
+    def _begin_running_gap(self) -> None:
+        self._damaged = []
+        self._settled_damaged = self._settled_unseen = self.unanswered = 0
+
+    def _end_running_gap(self, start: HostNs, end: HostNs, taken: int, *, anchored: bool) -> Gap:
+        """The running gap, ended by the frame at `end`, with `taken` frames in it; a new gap begins there."""
+        left = taken - self._settled_damaged - self._settled_unseen
+        # Damaged arrivals are certain; pulses decided as lost without proof are not.
+        least = max(0, min(len(self._damaged), taken - self._settled_damaged))
+        if left < least and anchored:
+            self.counters.contradicted += min(least - left, self._settled_unseen)
+        gap = Gap(start, end, max(left, least), taken, self._damaged, self._broken, anchored)
+        self._begin_running_gap()
+        self._broken = False
+        return gap
+
+    def _taken_at_first(self, record: Record, time: HostNs) -> int:
+        """Frames taken before the first one that came: by its id, if the ids may have begun at 1, else 0."""
+        before = record.frame_id - 1
+        if self._broken or not 0 <= before <= self._most_steps(time - self._since):
+            self._broken = True
+            return 0
+        return before
+
+    def _taken_since(self, last: Record, last_time: HostNs, record: Record, time: HostNs) -> int:
+        """Frames taken between the last one that came and this one."""
+        step = id_step(last.frame_id, record.frame_id, record.id_modulus)
+        if not 0 < step <= self._most_steps(time - last_time):
+            self.counters.restarts += 1
+            self._broken = True
+            return 0
+        return step - 1
+
+    def _most_steps(self, span_ns: int) -> float:
+        """Upper limit of the frames that a camera can take in a time, even if the rate is off."""
+        return 1.5 * span_ns / self._train.period_ns + 1.5
+
+
+def _overruns(last: Record, record: Record, frames: int) -> int:
+    """Triggers between two whole frames at which the camera took no frame, when it took `frames` in all."""
+    if record.trigger_count < 0 or last.trigger_count < 0:
+        return 0
+    return max(0, record.trigger_count - last.trigger_count - frames)
+
+
+def id_step(previous: int, current: int, modulus: int) -> int:
+    """Number of frames that the camera took from `previous` (excluded) to `current` (included).
+
+    GigE Vision counts the frames that a camera took (block id): 16-bit ids run 1..65535 and skip 0; 64-bit ids and the
+    frame counters of IIDC cameras never wrap in practice. A frame lost in transfer leaves a hole in the ids, a pulse
+    that the camera did not see leaves none.
+
+    Args:
+        previous: id of the earlier frame.
+        current: id of the later frame.
+        modulus: how many different ids there are (65535 for 16-bit block ids), 0 if they never wrap.
+
+    Returns:
+        1 for neighbours, 0 for the same id, negative if the ids went back. Ids that wrap are taken the short way
+        round, so a step is at most half the modulus either way.
+    """
+    step = current - previous
+    if modulus == 0:
+        return step
+    step %= modulus
+    return step - modulus if step > modulus // 2 else step

@@ -1,0 +1,274 @@
+"""Pairs the frames of all cameras by pulse, and decides what became of every pulse in every camera.
+
+Frames are paired by their trigger times alone, on the common time line to which each camera's clock is converted: never
+by the order of arrival, by equal ids, or by counting from a first frame. The ids then tell why a frame did not come.
+The class is pure: records and times go in, decisions come out.
+"""
+
+from bisect import bisect_left
+from collections.abc import Iterable
+from operator import attrgetter
+from typing import Final
+
+import msgspec
+
+from rig.clocks import NS_PER_S, ClockLatch, DecimalNs, HostNs
+from rig.errors import BadInputError
+from rig.frame import FrameStatus, Record
+from rig.health import CameraCounters, CameraPairing, PairingHealth
+from rig.pulse import RigPulse
+from triggering.pairing.camera_track import CameraTrack
+from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
+from triggering.pairing.undelivered import undelivered_times
+from triggering.timeline.pulse_train import PulseTrain
+
+__all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
+
+_TOLERANCE_PERIODS: Final = 0.3
+_SILENT_PERIODS: Final = 3
+_HELD_BACK_NS: Final = NS_PER_S // 20  # whole frames may be held back this long behind a damaged one
+_FIRST_NS: Final = NS_PER_S // 2  # a newly connected camera may take this long to its first frame
+_TIME: Final = attrgetter("time")
+
+
+class Pairer:
+    """Pairs the frames of all cameras by pulse.
+
+    Pass it every record that has come, in each camera's own order, and only then call `advance`.
+
+    Args:
+        cameras: how many cameras there are.
+        period_ns: nominal period of the pulses; the true one is tracked and may be some per cent off.
+        hold_ns: how long after a pulse its frames may come: exposure, transport, retention of damaged frames, and some
+            periods, so that the camera's next frame can tell what became of a missing one.
+        tolerance_ns: frames whose trigger times are this close are of one pulse; 0.3 periods if left out.
+
+    Raises:
+        BadInputError: an argument makes no sense.
+    """
+
+    def __init__(self, cameras: int, period_ns: int, *, hold_ns: int, tolerance_ns: int | None = None) -> None:
+        tolerance = round(_TOLERANCE_PERIODS * period_ns) if tolerance_ns is None else tolerance_ns
+        if cameras < 1 or period_ns <= 0 or not 0 < tolerance < period_ns / 2 or hold_ns < tolerance:
+            raise BadInputError(
+                f"pairing of {cameras} cameras, period {period_ns} ns, tolerance {tolerance} ns, hold {hold_ns} ns "
+                "cannot work: give at least one camera, a tolerance under half the period and a longer hold"
+            )
+        self._hold_ns, self._tolerance_ns = hold_ns, tolerance
+        self._train = PulseTrain(period_ns)
+        self._tracks = [CameraTrack(self._train, tolerance) for _ in range(cameras)]
+        self._open: list[OpenPulse] = []
+        self._examined: OpenPulse | None = None
+        self._closed = 0
+        self._proven_by_ids = 0
+
+    # -- records in ----------------------------------------------------------------------------------------------
+
+    def frame(self, camera: int, record: Record) -> OpenPulse | None:
+        """Assign a whole frame to its pulse.
+
+        Returns:
+            The pulse, or None if the frame belongs to no open one: the camera's clock is not known yet, the pulse is
+            decided already, or the frame came twice. `counters` tells which.
+        """
+        track = self._tracks[camera]
+        if not self._is_current(track, record):
+            return None
+        time = track.anchor(record)
+        # A frame that was still queued when its camera was disconnected is used, but its id proves nothing.
+        if time is None or (track.connected and not track.follow(record, time)):
+            return None
+        last = self._train.last
+        if last is not None and time <= last + self._tolerance_ns:
+            track.counters.late += 1
+            return None
+        pulse = self._pulse_at(time)
+        if pulse.frames[camera] is not None:
+            track.counters.duplicate += 1
+            return None
+        if pulse.missing < len(self._tracks):
+            # At once, not when the pulse is decided: in a backlog the same error would be corrected many times.
+            track.clock.correct(record.device_time, pulse.time - time)
+        pulse.add(camera, record, time)
+        return pulse
+
+    def damaged(self, camera: int, record: Record) -> None:
+        """Enter a damaged arrival; only the times of the record are used."""
+        track = self._tracks[camera]
+        if not self._is_current(track, record):
+            return
+        if track.connected:
+            track.damaged(record.host_time, record.device_time if record.value == 1 else None)
+        else:
+            track.counters.stale += 1
+
+    def latch(self, camera: int, latch: ClockLatch) -> None:
+        """Enter a reading of the camera's clock; those of an epoch come after its `connected`."""
+        self._tracks[camera].latch(latch)
+
+    def connected(self, camera: int, epoch: int, host: HostNs) -> None:
+        """Begin an epoch of a camera: pulses from now on wait for its frames."""
+        self._tracks[camera].connect(epoch, host)
+
+    def disconnected(self, camera: int, host: HostNs) -> None:
+        """End the epoch of a camera: no pulse waits for it any more."""
+        self._tracks[camera].disconnect(host)
+
+    # -- decisions out -------------------------------------------------------------------------------------------
+
+    def advance(self, now: HostNs) -> list[ClosedPulse]:
+        """Decide what can be decided at host time `now`.
+
+        Returns:
+            The pulses decided now, in the order of time.
+        """
+        closed = []
+        while self._open and self._is_due(self._open[0], now):
+            self._insert_undelivered()
+            closed.append(self._close(self._open.pop(0)))
+        return closed
+
+    def next_deadline(self) -> HostNs | None:
+        """When `advance` must be called at the latest although nothing arrives; None if there is no open pulse."""
+        return HostNs(self._open[0].time + self._hold_ns) if self._open else None
+
+    def silent(self) -> tuple[int, ...]:
+        """The connected cameras that have delivered nothing for three periods while others did."""
+        return tuple(camera for camera, track in enumerate(self._tracks) if track.silent)
+
+    def overdue(self, now: HostNs) -> tuple[int, ...]:
+        """The connected cameras that are three pulses behind the others at host time `now`, and should be examined.
+
+        This comes sooner than `silent` and is only a suspicion: pulses wait for their frames all the same, up to the
+        deadline. Frames that are on their way, or held back behind a damaged one, cause no suspicion.
+        """
+        overdue: list[int] = []
+        if len(self._open) < _SILENT_PERIODS:
+            return ()
+        for camera, track in enumerate(self._tracks):
+            since = track.alive if track.delivers else track.alive + _FIRST_NS
+            behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]
+            late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + _HELD_BACK_NS
+            if late and track.connected:
+                overdue.append(camera)
+        return tuple(overdue)
+
+    @property
+    def counters(self) -> tuple[CameraCounters, ...]:
+        """Totals of each camera."""
+        return tuple(track.counters for track in self._tracks)
+
+    def health(self) -> PairingHealth:
+        """Rhythm, spread and each camera's clock and totals."""
+        train = self._train
+        return PairingHealth(
+            pulses=self._closed,
+            proven_by_ids=self._proven_by_ids,
+            open=len(self._open),
+            period_us=round(train.period_ns / 1000, 3),
+            spread_median_us=train.spread_median_ns / 1000,
+            spread_max_us=train.spread_max_ns / 1000,
+            alarm=train.alarm,
+            cameras=tuple(_camera_health(track) for track in self._tracks),
+        )
+
+    # -- details -------------------------------------------------------------------------------------------------
+
+    def _is_current(self, track: CameraTrack, record: Record) -> bool:
+        """Whether a record is of the camera's present epoch; the first epoch may begin without `connected`."""
+        if record.epoch == track.epoch:
+            return True
+        if track.epoch == 0:
+            track.connect(record.epoch, HostNs(record.host_time - self._hold_ns))
+            return True
+        track.counters.stale += 1
+        return False
+
+    def _pulse_at(self, time: HostNs) -> OpenPulse:
+        """The open pulse nearest to a trigger time, a new one if there is none within the tolerance."""
+        position = bisect_left(self._open, time, key=_TIME)
+        nearest, least = None, self._tolerance_ns
+        for pulse in self._open[max(0, position - 1) : position + 1]:
+            if abs(pulse.time - time) <= least:
+                nearest, least = pulse, abs(pulse.time - time)
+        if nearest is None:
+            nearest = OpenPulse(len(self._tracks), time)
+            self._open.insert(position, nearest)
+        return nearest
+
+    def _is_due(self, pulse: OpenPulse, now: HostNs) -> bool:
+        """Whether the oldest open pulse can be decided."""
+        if pulse.missing == 0 or pulse.proven_by_ids:
+            return True
+        if now >= pulse.time + self._hold_ns:
+            self._notice_silence(pulse)
+            return True
+        return not any(track.may_deliver(pulse.time) for track in self._lacking(pulse))
+
+    def _lacking(self, pulse: OpenPulse) -> Iterable[CameraTrack]:
+        return (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)
+
+    def _notice_silence(self, pulse: OpenPulse) -> None:
+        """At the deadline of a pulse, find which of the cameras that it lacks are silent."""
+        for track in self._lacking(pulse):
+            if not track.may_deliver(pulse.time) or track.alive > pulse.time:
+                continue
+            periods, before = track.unanswered, pulse.time
+            for other in self._open:
+                # Frames of younger pulses may be on their way. Pulses that no camera delivered count too.
+                if other.time - pulse.time < (_SILENT_PERIODS - 0.5) * self._train.period_ns:
+                    periods += 1 + self._train.room(other.time - before)
+                    before = other.time
+            if periods >= _SILENT_PERIODS:
+                track.silent = True
+                track.counters.silences += 1
+
+    def _insert_undelivered(self) -> None:
+        """Insert the pulses that no camera delivered before the one that is about to be decided."""
+        pulse = self._open[0]
+        if pulse.proven_by_ids or pulse is self._examined:
+            return
+        self._examined = pulse
+        times = undelivered_times(self._open, self._tracks, self._train, self._tolerance_ns)
+        self._open[:0] = [OpenPulse(len(self._tracks), time, proven_by_ids=True) for time in times]
+
+    def _close(self, pulse: OpenPulse) -> ClosedPulse:
+        outcomes = []
+        for camera, track in enumerate(self._tracks):
+            record, time = pulse.frames[camera], pulse.times[camera]
+            if record is None or time is None:
+                outcome = track.settle(pulse.time, self._rivals(camera, track))
+            else:
+                track.forget_until(time)
+                offset = time - pulse.time
+                outcome = Outcome(FrameStatus.OK, record, offset)
+            track.counters.count(outcome.status)
+            outcomes.append(outcome)
+        self._train.advance(pulse.time, pulse.spread_ns)
+        self._closed += 1
+        self._proven_by_ids += pulse.proven_by_ids
+        return ClosedPulse(RigPulse(self._closed), pulse.time, tuple(outcomes), pulse.cargo)
+
+    def _rivals(self, camera: int, track: CameraTrack) -> list[HostNs]:
+        """Times of the later pulses that lack the camera too, up to its next frame."""
+        times: list[HostNs] = []
+        if track.has_damaged():
+            for pulse in self._open:
+                if pulse.frames[camera] is not None:
+                    break
+                times.append(pulse.time)
+        return times
+
+
+def _camera_health(track: CameraTrack) -> CameraPairing:
+    clock = track.clock
+    return CameraPairing(
+        connected=track.connected,
+        silent=track.silent,
+        clock_known=clock.known,
+        clock_offset_ns=DecimalNs(clock.offset_ns),
+        clock_drift_ppm=round(clock.drift_ppm, 3),
+        clock_uncertainty_us=round(clock.uncertainty_ns / 1000, 3) if clock.known else None,
+        latency_ms=round(track.latency_ns / 1e6, 3),
+        **msgspec.structs.asdict(track.counters),
+    )

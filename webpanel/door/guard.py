@@ -1,0 +1,134 @@
+"""Checks every request before a route sees it: size, Host, Origin, token, body; puts security headers on answers."""
+
+from http import HTTPStatus
+from typing import Final
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from webpanel.door.access import Access
+from webpanel.door.logins import Door
+from webpanel.problems import SECURITY_HEADERS, ProblemError
+
+BODY_MAX: Final = 64 * 1024
+HEAD_MAX: Final = 16 * 1024
+_HEADER_COST: Final = 32  # bytes that a header counts beside its text (RFC 9113, 6.5.2)
+_TOO_LARGE: Final = f"the request's body is too large: no call needs more than {BODY_MAX // 1024} KiB"
+_READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+#: Paths that need the token. The page's files do not: the page has to ask for the token.
+_PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
+_OPEN: Final = frozenset({"/api/login", "/api/logout"})
+
+
+class Guard:
+    """ASGI middleware: answers requests that fail a check with a problem, and adds the security headers."""
+
+    def __init__(self, app: ASGIApp, door: Door) -> None:
+        self._app = app
+        self._door = door
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        protected = scope["path"].startswith(_PROTECTED)
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in SECURITY_HEADERS.items():
+                    headers.setdefault(name, value)
+                # The browser asks for the page's files each time, but gets only those that have changed.
+                headers.setdefault("cache-control", "no-store" if protected else "no-cache")
+            await send(message)
+
+        try:
+            self._check(HTTPConnection(scope))
+        except ProblemError as error:
+            await error.answer()(scope, receive, send_guarded)
+        else:
+            await self._app(scope, _bounded(scope, receive), send_guarded)
+
+    def _check(self, request: HTTPConnection) -> None:
+        """Raise ProblemError if the request is to be refused."""
+        _check_size(request.scope)
+        headers, path, reading = request.headers, request.scope["path"], request.scope["method"] in _READING
+        check_host(request, self._door.access)
+        if not reading or (path.startswith("/api/") and headers.get("sec-fetch-mode") != "navigate"):
+            _check_origin(headers)
+        if path.startswith(_PROTECTED) and path not in _OPEN:
+            self._door.admit(request)
+        _check_body(headers, reading=reading)
+
+
+def check_host(request: HTTPConnection, access: Access) -> None:
+    """Check that the Host header names this service.
+
+    Raises:
+        ProblemError: 400, it names another one.
+    """
+    hosts = request.headers.getlist("host")
+    server = request.scope.get("server") or ("", None)
+    if len(hosts) != 1 or not access.allows_host(hosts[0], server[0]):
+        text = "the service is not called by this name: use its address, or start it with --allow-host NAME"
+        raise ProblemError(HTTPStatus.BAD_REQUEST, "unknown_host", text)
+
+
+def _check_size(scope: Scope) -> None:
+    size = len(scope["raw_path"]) + len(scope["query_string"])
+    size += sum(len(name) + len(value) + _HEADER_COST for name, value in scope["headers"])
+    if size > HEAD_MAX:
+        text = f"address and headers of the request are too large: {HEAD_MAX // 1024} KiB are enough for every call"
+        raise ProblemError(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "request_head_too_large", text)
+
+
+def _check_origin(headers: Headers) -> None:
+    """Refuse requests that a browser sends for a page of another site. Programs send no such headers."""
+    origins = headers.getlist("origin")
+    foreign = headers.get("sec-fetch-site", "same-origin") not in {"same-origin", "none"}
+    if foreign or any(_authority(origin) != headers["host"].lower() for origin in origins):
+        text = "the request comes from a page of another site: use the page of this service"
+        raise ProblemError(HTTPStatus.FORBIDDEN, "foreign_origin", text)
+
+
+def _authority(origin: str) -> str:
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return ""
+    return parts.netloc.lower() if parts.scheme in {"http", "https"} else ""
+
+
+def _check_body(headers: Headers, *, reading: bool) -> None:
+    length = headers.get("content-length", "0")
+    if length.isdecimal() and int(length[:20]) > BODY_MAX:
+        raise ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "request_entity_too_large", _TOO_LARGE)
+    has_body = length != "0" or "transfer-encoding" in headers
+    media_type = headers.get("content-type", "").partition(";")[0].strip().lower()
+    if has_body and not reading and media_type != "application/json":
+        text = "the body must be JSON: send Content-Type: application/json"
+        raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
+
+
+def _bounded(scope: Scope, receive: Receive) -> Receive:
+    """The size limit for a body whose length is not announced; a body of GET, HEAD and OPTIONS is dropped."""
+    reading = scope["method"] in _READING
+    received = 0
+
+    async def receive_bounded() -> Message:
+        nonlocal received
+        message = await receive()
+        received += len(message.get("body", b""))
+        if reading:
+            return {**message, "body": b""}
+        if received > BODY_MAX:
+            # The framework passes on no other error while it reads a body.
+            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _TOO_LARGE)
+        return message
+
+    return receive_bounded

@@ -1,0 +1,71 @@
+"""Limits the number of long answers (event streams, previews, downloads), and ends the endless ones at shutdown."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from http import HTTPStatus
+
+from webpanel.problems import ProblemError
+
+_EVENT_STREAMS_MAX = 32
+_PREVIEW_STREAMS_MAX = 16
+_DOWNLOADS_MAX = 8  # recording comes first at the disk
+
+
+class Streams:
+    """The open streams of one kind.
+
+    Attributes:
+        open: how many there are.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.open = 0
+        self._most = most
+        self._ending = asyncio.Event()
+
+    @property
+    def ending(self) -> bool:
+        """Whether the service is shutting down: each stream ends itself then."""
+        return self._ending.is_set()
+
+    def end(self) -> None:
+        """Tell all streams to end."""
+        self._ending.set()
+
+    async def ended_within(self, seconds: float) -> bool:
+        """Wait for so long, or until the streams are told to end; True if they are."""
+        try:
+            await asyncio.wait_for(self._ending.wait(), seconds)
+        except TimeoutError:
+            return False
+        return True
+
+    async def place(self) -> AsyncIterator[None]:
+        """Count a stream as open while it lasts; a dependency of routes, `Depends(streams.place)`.
+
+        Raises:
+            ProblemError: 503, the largest number are open.
+        """
+        if self.open >= self._most:
+            text = f"{self._most} are connected already, which is the most: close some, or try again later"
+            raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "too_many_viewers", text, {"Retry-After": "5"})
+        self.open += 1
+        try:
+            yield
+        finally:
+            self.open -= 1
+
+
+@dataclass(frozen=True, slots=True)
+class OpenStreams:
+    """The open streams of all kinds."""
+
+    events: Streams = field(default_factory=lambda: Streams(_EVENT_STREAMS_MAX))
+    previews: Streams = field(default_factory=lambda: Streams(_PREVIEW_STREAMS_MAX))
+    downloads: Streams = field(default_factory=lambda: Streams(_DOWNLOADS_MAX))
+
+    def end(self) -> None:
+        """Tell event streams and previews to end; a download ends by itself."""
+        self.events.end()
+        self.previews.end()

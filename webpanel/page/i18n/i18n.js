@@ -1,0 +1,83 @@
+/** Translates the page. Statements of the service come in English with a code, by which they are translated here. */
+
+import { load, save } from "../shared/store.js";
+import { en } from "./en.js";
+import { statements as nbStatements } from "./nb-statements.js";
+import { nb } from "./nb.js";
+
+/** @typedef {import("../shared/types.js").Statement} Statement */
+/** @typedef {Record<string, string|number>} Values */
+
+const LANGUAGES = { en, nb };
+/** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
+const STATEMENTS = { en: {}, nb: nbStatements };
+
+/** @type {"en"|"nb"} */
+let language = "en";
+
+/** The language chosen last, else the browser's; Norwegian of any kind reads bokmål. */
+export function startLanguage() {
+  const browsers = /^(nb|nn|no)\b/i.test(navigator.language) ? "nb" : "en";
+  setLanguage(load("language", browsers));
+}
+
+/** @param {string} name */
+function setLanguage(name) {
+  language = name === "nb" ? "nb" : "en";
+  document.documentElement.lang = language;
+  for (const [attribute, put] of /** @type {[string, (e: Element, words: string) => void][]} */ ([
+    ["data-t", (element, words) => { element.textContent = words; }],
+    ["data-t-label", (element, words) => { element.setAttribute("aria-label", words); if (element.matches("button, a")) element.setAttribute("title", words); }],
+    ["data-t-placeholder", (element, words) => element.setAttribute("placeholder", words)],
+  ])) {
+    for (const element of document.querySelectorAll(`[${attribute}]`)) put(element, t(element.getAttribute(attribute) ?? ""));
+  }
+}
+
+/** @param {string} name */
+export function chooseLanguage(name) {
+  save("language", name);
+  setLanguage(name);
+}
+
+/** The language in use: "en" or "nb". */
+export function languageInUse() {
+  return language;
+}
+
+/**
+ * The words for `key`, with `{name}` filled in.
+ *
+ * @param {string} key
+ * @param {Values} [values]
+ */
+export function t(key, values = {}) {
+  const words = /** @type {Record<string, string>} */ (LANGUAGES[language])[key];
+  if (words === undefined) throw new Error(`i18n/${language}.js has no "${key}"`);
+  return fill(words, values);
+}
+
+/**
+ * A statement of the service in the operator's language; in English where the translation is missing.
+ *
+ * @param {{ code: string, text: string, advice?: string, values?: Values }} statement
+ * @returns {{ text: string, advice: string }}
+ */
+export function say({ code, text, advice = "", values = {} }) {
+  const translated = STATEMENTS[language][code];
+  if (!translated) return { text, advice };
+  const names = [...translated.join(" ").matchAll(/\{(\w+)\}/g)].map((match) => match[1]);
+  if (names.some((name) => values[name] === undefined)) return { text, advice };
+  return { text: fill(translated[0], values), advice: fill(translated[1] ?? "", values) };
+}
+
+/**
+ * @param {string} words
+ * @param {Values} values
+ */
+function fill(words, values) {
+  return words.replace(/\{(\w+)\}/g, (_, name) => {
+    const value = values[name];
+    return typeof value === "number" ? value.toLocaleString(language, { maximumFractionDigits: 1 }) : String(value);
+  });
+}

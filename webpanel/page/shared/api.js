@@ -1,0 +1,91 @@
+/** Calls the REST API. Every failure is thrown as a Problem, whose message says what to do. */
+
+const DEADLINE_MS = 10_000;
+
+/** An error to show: `code` for its translation, the message in English. */
+export class Problem extends Error {
+  /**
+   * @param {number} status HTTP status; 0: there was no answer
+   * @param {string} code
+   * @param {string} detail
+   */
+  constructor(status, code, detail) {
+    super(detail);
+    this.status = status;
+    this.code = code;
+  }
+}
+
+/** @type {() => void} */
+let whenTokenIsNeeded = () => {};
+
+/**
+ * Set what to do when the service asks for the token.
+ *
+ * @param {() => void} action
+ */
+export function onTokenNeeded(action) {
+  whenTokenIsNeeded = action;
+}
+
+/**
+ * Call the service.
+ *
+ * @param {string} method
+ * @param {string} path below /api/
+ * @param {object} [body] sent as JSON
+ * @param {number} [deadlineMs] time after which the call counts as unanswered
+ * @returns {Promise<any>} the answer's JSON; null if it has none
+ * @throws {Problem}
+ */
+export async function call(method, path, body, deadlineMs = DEADLINE_MS) {
+  /** @type {RequestInit} */
+  const content = body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
+  let answer;
+  try {
+    answer = await fetch(`./api/${path}`, {
+      method, ...content, cache: "no-store", signal: AbortSignal.timeout(deadlineMs),
+    });
+    if (answer.ok) return answer.status === 204 ? null : await answer.json();
+  } catch (error) {
+    const late = error instanceof DOMException && error.name === "TimeoutError";
+    throw late
+      ? new Problem(0, "page_timeout", "no answer in time: look whether it happened all the same, then try again")
+      : new Problem(0, "page_no_connection", "no connection to the service: check network and service, then try again");
+  }
+  const problem = await asProblem(answer);
+  if (problem.status === 401 && path !== "login") whenTokenIsNeeded();
+  throw problem;
+}
+
+/**
+ * @param {Response} answer
+ * @returns {Promise<Problem>}
+ */
+async function asProblem(answer) {
+  if (!answer.headers.get("Content-Type")?.includes("json")) {
+    return new Problem(answer.status, "page_strange", `the service answers ${answer.status} ${answer.statusText}: look at its log`);
+  }
+  const { code, detail, title } = await answer.json();
+  return new Problem(answer.status, code ?? "", detail || title);
+}
+
+/**
+ * Path of a recording, for `call`.
+ *
+ * @param {string} id
+ * @param {string} [part] e.g. "/stop"
+ */
+export function recordingPath(id, part = "") {
+  return `recordings/${encodeURIComponent(id)}${part}`;
+}
+
+/**
+ * Address of a part of a recording, for images and links.
+ *
+ * @param {string} id
+ * @param {string} part e.g. "file"
+ */
+export function partOf(id, part) {
+  return `./api/${recordingPath(id, `/${part}`)}`;
+}

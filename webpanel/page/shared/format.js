@@ -1,0 +1,56 @@
+/** Writes numbers, times and sizes for people, in their language. */
+
+import { languageInUse, t } from "../i18n/i18n.js";
+
+/**
+ * @param {number} value
+ * @param {number} [digits] after the decimal point
+ */
+export function number(value, digits = 0) {
+  return value.toLocaleString(languageInUse(), { minimumFractionDigits: digits, maximumFractionDigits: digits, signDisplay: "negative" });
+}
+
+/**
+ * @param {number|null} value
+ * @param {number} digits
+ * @param {string} unit
+ */
+export function quantity(value, digits, unit) {
+  return value === null ? "–" : `${number(value, digits)}\u202f${unit}`;
+}
+
+/** @param {number} seconds e.g. 72 becomes 1:12 */
+export function clock(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  const rest = String(whole % 60).padStart(2, "0");
+  const minutes = Math.floor(whole / 60) % 60;
+  const hours = Math.floor(whole / 3600);
+  return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${rest}` : `${minutes}:${rest}`;
+}
+
+/** @param {number} bytes */
+export function size(bytes) {
+  return bytes < 1e9 ? quantity(bytes / 1e6, 0, "MB") : quantity(bytes / 1e9, 1, "GB");
+}
+
+/** @param {string|number} time ISO text or ms */
+export function timeOfDay(time) {
+  return new Date(time).toLocaleTimeString(languageInUse(), { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
+}
+
+/** @param {string} time ISO text */
+export function day(time) {
+  const then = new Date(time);
+  if (then.toDateString() === new Date().toDateString()) return t("today");
+  return then.toLocaleDateString(languageInUse(), { weekday: "long", day: "numeric", month: "long", year: "numeric" });
+}
+
+/**
+ * Bib and name, or what there is of them.
+ *
+ * @param {{ bib: string, athlete: string }} session
+ * @param {string} otherwise when there is neither
+ */
+export function who({ bib, athlete }, otherwise) {
+  return [bib, athlete].filter(Boolean).join(" · ") || otherwise;
+}

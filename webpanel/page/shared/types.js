@@ -1,0 +1,133 @@
+/**
+ * The shapes of the answers of the REST API, as in rig/status.py (a test compares the two).
+ *
+ * @typedef {"idle"|"arming"|"armed"|"recording"|"disarming"|"fault"} State
+ * @typedef {"good"|"info"|"warning"|"error"} Level
+ *
+ * @typedef {object} Statement One thing to tell a person, translatable by its code.
+ * @property {Level} level
+ * @property {string} code
+ * @property {string} text
+ * @property {string} advice
+ * @property {Record<string, string|number>} values
+ *
+ * @typedef {object} CameraStatus
+ * @property {string} name
+ * @property {string} backend
+ * @property {string} address
+ * @property {"off"|"connecting"|"ready"|"silent"|"absent"} state
+ * @property {Statement} statement
+ * @property {number|null} frames_per_s
+ * @property {number} frames
+ * @property {number} damaged
+ * @property {number} resent_packets
+ * @property {number} reconnects
+ * @property {number|null} temperature_c
+ * @property {number|null} clock_offset_us
+ * @property {[number, number]|null} columns
+ *
+ * @typedef {object} PulseStatus
+ * @property {boolean} arriving
+ * @property {number|null} rate_hz
+ * @property {number|null} spread_us
+ * @property {number} number
+ *
+ * @typedef {object} DiskStatus
+ * @property {number} free_gb
+ * @property {number} reserve_gb
+ * @property {number} seconds_left
+ * @property {number} jumps_left
+ * @property {number} jump_s
+ *
+ * @typedef {object} PrerollStatus
+ * @property {number} seconds
+ * @property {number} limit_s
+ * @property {number} memory_mb
+ *
+ * @typedef {object} Causes
+ * @property {number} lost
+ * @property {number} missed
+ * @property {number} damaged
+ * @property {number} absent
+ *
+ * @typedef {object} Counts
+ * @property {number} pulses
+ * @property {number} complete
+ * @property {number} partial
+ * @property {Causes} causes
+ *
+ * @typedef {object} ProcessStatus
+ * @property {string} name
+ * @property {number|null} pid
+ * @property {number} restarts
+ * @property {Statement|null} statement
+ *
+ * @typedef {object} SessionFields
+ * @property {string} athlete
+ * @property {string} bib
+ * @property {string} gate
+ * @property {string} wind
+ * @property {string} notes
+ * @property {string} operator
+ *
+ * @typedef {object} Recording
+ * @property {string} id
+ * @property {"recording"|"finished"|"unfinished"|"damaged"} state
+ * @property {string|null} started
+ * @property {number} duration_s
+ * @property {number} bytes
+ * @property {Counts} counts
+ * @property {SessionFields} session
+ * @property {Statement} verdict
+ * @property {boolean} deleted
+ *
+ * @typedef {object} PulseSummary
+ * @property {number} pulse
+ * @property {number} time_s
+ * @property {string[]} statuses
+ *
+ * @typedef {object} Pulses
+ * @property {string} id
+ * @property {string[]} cameras
+ * @property {[number, number][]} columns
+ * @property {[number, number]} shape
+ * @property {PulseSummary[]} pulses
+ *
+ * @typedef {object} Event Something that happened.
+ * @property {number} number
+ * @property {string} time
+ * @property {"debug"|"info"|"warning"|"error"|"fatal"} level
+ * @property {string} name
+ * @property {string} message
+ *
+ * @typedef {object} Status
+ * @property {State} state
+ * @property {string} since
+ * @property {Statement} statement
+ * @property {string} rig
+ * @property {string} version
+ * @property {CameraStatus[]} cameras
+ * @property {PulseStatus} pulses
+ * @property {PrerollStatus} preroll
+ * @property {DiskStatus} disk
+ * @property {Recording|null} recording
+ * @property {string|null} last_recording
+ * @property {ProcessStatus[]} processes
+ *
+ * @typedef {object} Finding
+ * @property {"PASS"|"WARN"|"FAIL"} level
+ * @property {string} topic
+ * @property {string} what
+ * @property {string} remedy
+ *
+ * @typedef {object} DoctorReport
+ * @property {"PASS"|"WARN"|"FAIL"} worst
+ * @property {Finding[]} findings
+ *
+ * @typedef {object} RigView
+ * @property {string} name
+ * @property {string} toml
+ * @property {Record<string, any>} settings
+ */
+
+export {};

@@ -1,0 +1,47 @@
+/** The view of the live log, newest event on top. */
+
+import { hear } from "../shared/connection.js";
+import { $, make } from "../shared/dom.js";
+import { timeOfDay } from "../shared/format.js";
+import { known, watch } from "../shared/store.js";
+
+const LEVELS = ["debug", "info", "warning", "error", "fatal"];
+const KEPT = 500;
+
+/** @typedef {import("../shared/types.js").Event} Event */
+
+/** @type {Event[]} */
+let events = [];
+/** Whether the list on the page shows all of them. */
+let drawn = false;
+/** Whether it will be drawn at the next animation frame. */
+let planned = false;
+
+export function startLog() {
+  hear({
+    opened: () => { events = []; changed(); },
+    log: (event) => { events = [event, ...events].slice(0, KEPT); changed(); },
+  });
+  $("log-level").addEventListener("change", changed);
+  watch(draw);
+}
+
+/** Draw at the next animation frame: at the beginning hundreds of events come at once. */
+function changed() {
+  drawn = false;
+  if (planned) return;
+  planned = true;
+  requestAnimationFrame(() => { planned = false; draw(); });
+}
+
+/** Draw the list if the view is shown and something is new. */
+function draw() {
+  if (known.view !== "log" || drawn) return;
+  drawn = true;
+  const least = LEVELS.indexOf($("log-level").value);
+  const shown = events.filter((event) => LEVELS.indexOf(event.level) >= least);
+  $("log-empty").hidden = shown.length > 0;
+  $("log-list").hidden = !shown.length;
+  $("log-list").replaceChildren(...shown.map(({ level, name, message, time }) => make("li", { "data-level": level },
+    make("time", { dateTime: time }, timeOfDay(time)), make("span", { class: "log-level" }, level), make("strong", {}, name), make("span", { class: "log-message" }, message))));
+}

@@ -1,0 +1,155 @@
+"""Routes that show the rig live: the newest triplet as JPEG, single or as a stream, encoded once for all viewers."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from http import HTTPStatus
+
+import anyio
+import cv2
+import numpy as np
+from anyio.to_thread import run_sync
+from fastapi import APIRouter, Depends, Response
+from fastapi.responses import StreamingResponse
+from numpy.typing import NDArray
+
+from rig.errors import SvevError
+from rig.pulse import RigPulse
+from service.seam import RigService
+from webpanel.door.streams import Streams
+from webpanel.problems import ProblemError
+from webpanel.routes.common import Responses, jpeg_answer, refusals, strict_router
+
+_APART_S = 0.1  # least time between two pictures: the eye needs no more than ten a second
+_WAIT_S = 1.0
+_WIDTH_MAX = 1280
+_QUALITY = 80
+_BOUNDARY = "svev-triplet"
+#: A stream ends after so many seconds without a picture; the page asks again.
+_PATIENCE_S = 30
+_CONTENT = {"multipart/x-mixed-replace": {"schema": {"type": "string", "format": "binary"}}}
+_STREAM: Responses = {200: {"description": "Pictures, one after the other.", "content": _CONTENT}}
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One encoded triplet.
+
+    Attributes:
+        pulse: number of its pulse since the recorder was started.
+        statuses: what became of it in each camera, e.g. `ok,ok,lost`.
+    """
+
+    pulse: RigPulse
+    statuses: str
+    jpeg: bytes
+
+    def headers(self) -> dict[str, str]:
+        """The headers that say what is shown."""
+        return {"X-Svev-Pulse": str(self.pulse), "X-Svev-Statuses": self.statuses}
+
+    def part(self) -> bytes:
+        """The picture as one part of a multipart answer, boundary at its end."""
+        head = {"Content-Type": "image/jpeg", "Content-Length": str(len(self.jpeg))} | self.headers()
+        lines = "".join(f"{name}: {value}\r\n" for name, value in head.items())
+        return lines.encode() + b"\r\n" + self.jpeg + f"\r\n--{_BOUNDARY}\r\n".encode()
+
+
+class PreviewFeed:
+    """The newest picture, fetched and encoded only when a viewer asks, and once for all who ask meanwhile."""
+
+    def __init__(self, service: RigService) -> None:
+        self._service = service
+        self._newest: Picture | None = None
+        self._made_at = 0.0
+        self._making: asyncio.Task[Picture | None] | None = None
+        self._one_thread = anyio.CapacityLimiter(1)
+
+    async def other_than(self, pulse: RigPulse | None) -> Picture | None:
+        """Wait for a picture of another pulse than this; None if none came within a second.
+
+        Args:
+            pulse: the pulse that the viewer saw last, None: no pulse yet.
+        """
+        fresh = asyncio.get_running_loop().time() - self._made_at < _APART_S
+        if fresh and self._newest is not None and self._newest.pulse != pulse:
+            return self._newest
+        if self._making is None or self._making.done():
+            self._making = asyncio.create_task(self._make(RigPulse(-1) if pulse is None else pulse))
+        # A viewer that disconnects must not cancel the picture that the others wait for.
+        return await asyncio.shield(self._making)
+
+    async def _make(self, pulse: RigPulse) -> Picture | None:
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(max(0.0, self._made_at + _APART_S - loop.time()))
+        picture = await run_sync(self._grab, pulse, limiter=self._one_thread)
+        if picture is not None:
+            self._newest, self._made_at = picture, loop.time()
+        return picture
+
+    def _grab(self, pulse: RigPulse) -> Picture | None:
+        preview = self._service.preview(pulse, _WAIT_S)
+        if preview is None:
+            return None
+        statuses = ",".join(status.value for status in preview.statuses)
+        return Picture(preview.pulse, statuses, to_jpeg(preview.pixels, _WIDTH_MAX))
+
+
+def to_jpeg(pixels: NDArray[np.uint8], width: int | None = None) -> bytes:
+    """Encode an image, made smaller if it is wider than `width`.
+
+    Args:
+        pixels: (rows, columns), uint8.
+        width: at most so many columns, None: as it is.
+
+    Raises:
+        SvevError: it cannot be encoded.
+    """
+    if width is not None and width < pixels.shape[1]:
+        height = max(1, round(pixels.shape[0] * width / pixels.shape[1]))
+        pixels = np.asarray(cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+    done, jpeg = cv2.imencode(".jpg", pixels, (cv2.IMWRITE_JPEG_QUALITY, _QUALITY))
+    if not done:
+        raise SvevError(
+            f"an image of {pixels.shape[1]} x {pixels.shape[0]} pixels cannot be made a JPEG: ask for a smaller one"
+        )
+    return jpeg.tobytes()
+
+
+def preview_router(service: RigService, streams: Streams) -> APIRouter:
+    """The routes of the preview."""
+    router = strict_router("Watching")
+    feed = PreviewFeed(service)
+
+    @router.get("/preview.jpg", response_class=Response, responses=jpeg_answer("The triplet.") | refusals(404))
+    async def get_preview() -> Response:
+        """The newest triplet, the cameras side by side. The headers say which pulse it is."""
+        picture = await feed.other_than(None)
+        if picture is None:
+            text = "no triplet has come: arm the rig, and see that pulses arrive"
+            raise ProblemError(HTTPStatus.NOT_FOUND, "no_preview", text)
+        return Response(picture.jpeg, media_type="image/jpeg", headers=picture.headers())
+
+    @router.get(
+        "/preview.mjpg",
+        response_class=StreamingResponse,
+        dependencies=[Depends(streams.place)],
+        responses=_STREAM | refusals(503),
+    )
+    async def watch_preview() -> StreamingResponse:
+        """The newest triplets, at most ten a second, as a stream that an `<img>` shows. Ends after 30 s without any."""
+        return StreamingResponse(_parts(feed, streams), media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}")
+
+    return router
+
+
+async def _parts(feed: PreviewFeed, streams: Streams) -> AsyncIterator[bytes]:
+    loop = asyncio.get_running_loop()
+    seen, seen_at = None, loop.time()
+    # A browser shows a picture when it has received the boundary behind it: each part ends in one.
+    yield f"--{_BOUNDARY}\r\n".encode()
+    while not streams.ending and loop.time() - seen_at < _PATIENCE_S:
+        picture = await feed.other_than(seen)
+        if picture is not None and picture.pulse != seen:
+            seen, seen_at = picture.pulse, loop.time()
+            yield picture.part()

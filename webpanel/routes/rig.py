@@ -1,0 +1,45 @@
+"""The routes of the rig as a whole: status, arm and disarm, the rig file, the doctor."""
+
+from http import HTTPStatus
+
+import anyio
+from anyio.to_thread import run_sync
+from fastapi import APIRouter
+
+from rig.status import DoctorReport, RigView, Status
+from service.seam import RigService
+from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
+
+
+def rig_router(service: RigService) -> APIRouter:
+    """The routes of the rig."""
+    router = strict_router("Rig")
+    # The doctor takes seconds: its callers must not take all threads from those who want to stop a recording.
+    one_at_a_time = anyio.CapacityLimiter(1)
+
+    @router.get("/status")
+    def get_status() -> Status:
+        """Everything about the running service, at one moment."""
+        return service.status()
+
+    @router.post("/arm", status_code=HTTPStatus.OK, responses=CHANGING)
+    def arm(_: NoFields = None) -> Status:
+        """Begin to arm: connect the cameras and keep the last seconds from then on. While armed it changes nothing."""
+        return service.arm()
+
+    @router.post("/disarm", status_code=HTTPStatus.OK, responses=CHANGING)
+    def disarm(_: NoFields = None) -> Status:
+        """Begin to disconnect the cameras. Not while recording. While idle it changes nothing."""
+        return service.disarm()
+
+    @router.get("/rig")
+    def get_rig() -> RigView:
+        """The rig file in use."""
+        return service.rig()
+
+    @router.get("/doctor", responses=refusals(503))
+    async def examine() -> DoctorReport:
+        """Check everything that a recording depends on, and say what to do; takes some seconds."""
+        return await run_sync(service.doctor, limiter=one_at_a_time)
+
+    return router

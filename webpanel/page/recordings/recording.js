@@ -15,6 +15,8 @@ import { clearScrubber, scrub } from "./scrubber.js";
 
 /** @type {Recording|null} */
 let recording = null;
+/** Whether the triplets of the recording are shown, or are being loaded. */
+let scrubbing = false;
 
 export function startRecording() {
   makeFields($("recording-session"), "recording", changed);
@@ -29,15 +31,13 @@ export function startRecording() {
  */
 export async function enterRecording(id) {
   recording = null;
+  scrubbing = false;
   clearScrubber();
   clearSnacks();
   setText($("recording-title"), id);
   $("recording-verdict").replaceChildren();
   $("recording-buttons").replaceChildren();
-  await attempt(async () => {
-    await load(id);
-    if (!isRunning()) scrub(await call("GET", recordingPath(id, "/pulses")));
-  });
+  await attempt(() => load(id));
 }
 
 /** Put the recording shown into the trash. */
@@ -49,14 +49,28 @@ export async function deleteShown() {
 async function reload() {
   const { view, id } = place();
   if (view !== "recording") return;
-  if (isRunning()) return void enterRecording(id); // it may have ended: then there are triplets to show
   await attempt(() => load(id));
 }
 
-/** @param {string} id */
+/**
+ * Load and show a recording; its triplets too as soon as it has ended. Several calls may be on their way at once.
+ *
+ * @param {string} id
+ */
 async function load(id) {
-  recording = await call("GET", recordingPath(id));
+  const loaded = await call("GET", recordingPath(id));
+  if (place().id !== id) return; // another view is shown by now
+  if (loaded.state === "recording" && recording && !isRunning()) return; // an answer that was overtaken
+  recording = loaded;
   draw();
+  if (isRunning() || scrubbing) return;
+  scrubbing = true;
+  try {
+    scrub(await call("GET", recordingPath(id, "/pulses")));
+  } catch (error) {
+    scrubbing = false;
+    throw error;
+  }
 }
 
 /** Whether the recording is still being written: then there are no triplets to show yet. */

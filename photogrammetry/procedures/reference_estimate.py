@@ -22,6 +22,7 @@ _ITERATIONS: Final = 20
 _SETTLED: Final = 1e-10
 _PARAMETERS: Final = 7
 _RANK: Final = 1e-9
+_ROUNDING: Final = 1e-9
 #: Part of the square sum of a large error that may remain with the culprit eliminated: its effect is not linear.
 _LINEAR: Final = 0.005
 #: A rival explains the misclosures if the suspect's test value with the rival eliminated is below this (3 coordinates).
@@ -120,6 +121,7 @@ class ReferenceEstimate:
 
         Raises:
             BadInputError: they lie on a line.
+            LinAlgError: their numbers lie too many orders of magnitude apart.
         """
         points, rows = [everything[i] for i in used], _rows(used)
         block = np.array([p.block for p in points])
@@ -141,6 +143,9 @@ class ReferenceEstimate:
         projected = weights - half @ np.linalg.solve(normals, half.T)
         v = (transform.apply(block) - surveyed).ravel()
         controlled = np.einsum("ij,ji->i", misclosures, projected).reshape(-1, 3)
+        # W is positive semidefinite; rounding of absurd numbers can make the square sum negative or no number at all.
+        if not v @ projected @ v >= -_ROUNDING * (np.abs(v) @ np.abs(projected) @ np.abs(v)):
+            raise np.linalg.LinAlgError("no square sum")
         return cls(transform, tuple(points), tuple(used), v, projected, controlled)
 
     @property
@@ -151,7 +156,7 @@ class ReferenceEstimate:
     @property
     def square_sum(self) -> float:
         """The minimised square sum, in a-priori variances."""
-        return float(self.v @ self.projected @ self.v)
+        return max(0.0, float(self.v @ self.projected @ self.v))
 
     @property
     def ratio(self) -> float:

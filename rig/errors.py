@@ -33,6 +33,10 @@ class StorageError(SvevError):
     exit_code = 4
 
 
+class FileVanishedError(StorageError):
+    """The log that is being written was deleted or moved away."""
+
+
 class ProcessDiedError(SvevError):
     """One of our own processes ended without being asked to."""
 

@@ -4,6 +4,8 @@ The service makes these objects; the REST API sends them as JSON and refuses unk
 Texts for people come with a `code`, so that the page can say the same in another language.
 """
 
+from collections import Counter
+from collections.abc import Iterable
 from datetime import datetime
 from enum import StrEnum
 from typing import Annotated, Literal
@@ -129,6 +131,16 @@ class Counts(Model):
     complete: int = 0
     partial: int = 0
     causes: Causes = Causes()
+
+    @classmethod
+    def sum(cls, parts: Iterable["Counts"]) -> "Counts":
+        """The counts of several logs together."""
+        pulses = complete = partial = 0
+        causes: Counter[str] = Counter()
+        for part in parts:
+            pulses, complete, partial = pulses + part.pulses, complete + part.complete, partial + part.partial
+            causes.update(part.causes.model_dump())
+        return cls(pulses=pulses, complete=complete, partial=partial, causes=Causes(**causes))
 
 
 class ProcessStatus(Model):

@@ -30,6 +30,8 @@ PROFILE: Final = "svev"
 SESSION_METADATA: Final = "svev.session"
 RIG_METADATA: Final = "svev.rig"
 RECOVERY_METADATA: Final = "svev.recovery"
+#: What went wrong while the log was written, by where it went wrong, e.g. "disk".
+TROUBLE_METADATA: Final = "svev.trouble"
 RIG_ATTACHMENT: Final = "rig.toml"
 CALIBRATION_ATTACHMENT: Final = "calibration.json"
 DEFAULT_PUBLISH: Final = "tcp://127.0.0.1:5556"

@@ -17,11 +17,12 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, TypeVar
 
-from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, UnknownRecordingError
+from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, StorageError, UnknownRecordingError
 from rig.events import Event
 from rig.settings.model import RigSettings
 from rig.status import Counts, Recording, SessionFields, State
@@ -147,27 +148,32 @@ class HeadlessRig:
 
         self._ask(start)
 
-    def stop_recording(self) -> None:
-        """End the recording with the pulses that have fired until now; one that has just ended stays as it is."""
-        with suppress(UnknownRecordingError):
-            self._ask(at_once(self._supervisor.recordings.stop))
+    def stop_recording(self, *, wait_for_disk: bool = True) -> None:
+        """End the recording with the pulses that have fired until now; one that has just ended stays as it is.
 
-    def wait_until_finished(self, on_progress: Callable[[Counts], None], stop: Callable[[], bool]) -> RecordingFinished:
+        Args:
+            wait_for_disk: False: give up what the disk has not taken.
+        """
+        with suppress(UnknownRecordingError):
+            self._ask(at_once(partial(self._supervisor.recordings.stop, at_once=not wait_for_disk)))
+
+    def wait_until_finished(self, on_progress: Callable[[Counts], None], stop: Callable[[], int]) -> RecordingFinished:
         """Wait for the end of the recording.
 
         Args:
             on_progress: called with the counts so far.
-            stop: called several times a second; True: end the recording now.
+            stop: called several times a second; tells how often a person has asked to end the recording. Who asks twice
+                does not want to wait for the disk.
 
         Raises:
-            StorageError: the log could not be written to the end; what was written is readable.
+            StorageError: the log could not be made.
             ProcessDiedError: the recorder died; what was written is readable.
         """
-        told = False
+        asked = 0
         while True:
-            if not told and stop():
-                told = True
-                self.stop_recording()
+            if (asks := stop()) > asked:
+                asked = asks
+                self.stop_recording(wait_for_disk=asks == 1)
             try:
                 outcome = self._ended.result(_POLL_S)
             except FutureTimeoutError:
@@ -206,7 +212,7 @@ def record(
     allow_absent: bool,
     session: Mapping[str, str],
     progress: Progress,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], StorageError | None]:
     """Record once: wait until the rig is warm, record, wait for the end. Ctrl-C and SIGTERM end the recording early.
 
     Args:
@@ -219,10 +225,11 @@ def record(
         progress: shows how many pulses are recorded.
 
     Returns:
-        The result as `svev record --json` prints it.
+        The result as `svev record --json` prints it, and why images are missing because of the disk; None if the disk
+        did its work.
 
     Raises:
-        SvevError: the disk has no room, a camera does not answer, the disk failed, the recorder died.
+        SvevError: the disk has no room, a camera does not answer, the log cannot be made, the recorder died.
     """
     check_room_for(rig, path.parent, seconds)
     running.wait_until_warm(rig.trigger.settle_s, allow_absent=allow_absent)
@@ -230,25 +237,36 @@ def record(
     with _stop_signals() as stop, progress(f"recording {path.name}", pulses) as advance:
         running.start_recording(path, session=session, pulses=pulses, seconds=seconds)
         report = running.wait_until_finished(lambda counts: advance(counts.pulses), stop)
-        early = stop()
-    return {
-        "log": str(path),
+        early = stop() > 0
+    logs = [*(part.path for part in report.earlier), report.path]
+    result = {
+        "log": str(report.path),
         **report.counts.model_dump(),
         "bytes": report.bytes,
         "unpublished": report.unpublished,
         "stopped_early": early,
+        "logs": [str(log) for log in logs],
     }
+    return result, _disk_error(report)
+
+
+def _disk_error(report: RecordingFinished) -> StorageError | None:
+    """What the disk cost the recording, as an error; None if nothing."""
+    if report.failure is not None:
+        error = report.failure.error()
+        return error if isinstance(error, StorageError) else StorageError(str(error))
+    return StorageError(f"{report.path}: {report.trouble}") if report.trouble else None
 
 
 @contextmanager
-def _stop_signals() -> Iterator[Callable[[], bool]]:
-    """Within, Ctrl-C and SIGTERM only set a flag, so that the log can be closed properly."""
+def _stop_signals() -> Iterator[Callable[[], int]]:
+    """Within, Ctrl-C and SIGTERM are only counted, so that the log can be closed properly."""
     caught: list[int] = []
     before = {
         number: signal.signal(number, lambda n, _: caught.append(n)) for number in (signal.SIGINT, signal.SIGTERM)
     }
     try:
-        yield lambda: bool(caught)
+        yield lambda: len(caught)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -44,6 +44,9 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
 
     Returns:
         The recording's result, what the subscriber counted, the verdict of the check, and paths of the files.
+
+    Raises:
+        SvevError: as `service.headless.record`, and if images are missing because of the disk.
     """
     rig_file = CONFIG / "rigs" / _RIGS[bus]
     rig = _on_free_addresses(load_rig(rig_file))
@@ -53,8 +56,12 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
         running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
         with subscriber(rig.network.publish) as count_received:
             session = {"session": "demo", "athlete": "simulated jumper"}
-            result = record(running, rig, path, seconds, allow_absent=False, session=session, progress=console.progress)
+            result, disk_error = record(
+                running, rig, path, seconds, allow_absent=False, session=session, progress=console.progress
+            )
             counted = count_received()
+    if disk_error is not None:
+        raise disk_error
     say("checking the log")
     report = verify(path)
     sheet = path.with_suffix(".png")

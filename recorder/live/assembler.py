@@ -85,6 +85,7 @@ class Assembler:
         pairer: decides which frame belongs to which pulse.
         hold_ns: the longest time from a pulse to its decision, ns.
         connected: for each camera, whether it is connected.
+        settled: `pump` has returned every pulse that fired `hold_ns` before this time.
     """
 
     def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], buffers: TripletBuffers) -> None:
@@ -106,6 +107,7 @@ class Assembler:
         self.hold_ns = hold_ns(period)
         self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns)
         self.connected = [False] * len(rings)
+        self.settled = HostNs(0)
 
     def pump(self, now: HostNs) -> list[Triplet]:
         """Read the records that the grabbers have queued, and copy their frames.
@@ -122,10 +124,13 @@ class Assembler:
         # A camera whose frame waits for a buffer has unread records. The pairer must not see a later time than that
         # frame's, or it would take the unread frames for missing ones.
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
-        self._decided.extend(self.pairer.advance(min(waiting, default=now)))
+        seen_until = min(waiting, default=now)
+        self._decided.extend(self.pairer.advance(seen_until))
         self._ask_silent_cameras(now)
         self._free_stranded_slots(now)
-        return list(self._ready())
+        ready = list(self._ready())
+        self.settled = HostNs(min(seen_until, self._decided[0].time)) if self._decided else seen_until
+        return ready
 
     def _ready(self) -> Iterator[Triplet]:
         """The decided pulses up to the first one of which a frame is not copied yet."""

@@ -64,6 +64,10 @@ class HealthMonitor:
             if outcome.offset_ns is not None:
                 kept.append(outcome.offset_ns)
 
+    def underruns(self) -> int:
+        """Frames that have found no free slot in their camera's ring so far, in all cameras."""
+        return sum(ring.counters()["underruns"] for ring in self._rings)
+
     def record(self, connected: Sequence[bool], **others: Any) -> Health:
         """The record for the second that ends now.
 

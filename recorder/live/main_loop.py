@@ -41,6 +41,8 @@ from rig.transport.ring import CameraRing
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000
 _WARM_PULSES: Final = 3
+#: How long the recorder waits for the disk when it is told to quit; less than its parent waits for its end.
+_WIND_UP_S: Final = 6.0
 
 
 class RecorderLoop:
@@ -63,7 +65,9 @@ class RecorderLoop:
         self._publisher = Publisher(rig.network.publish, rig.network.publish_ipc, queue=in_flight // 4)
         self._preroll = Preroll(self._buffers, config.options.preroll_s, held)
         self._health = HealthMonitor(rig, rings, config.options.directory)
-        self._recordings = Recordings(self._assembler, self._preroll, self._publisher, self._health.latency, self._tell)
+        self._recordings = Recordings(
+            self._assembler, self._preroll, self._publisher, self._health.latency, self._health.underruns, self._tell
+        )
         self._quit = False
         self._warm = 0
         now = host_now()
@@ -90,7 +94,7 @@ class RecorderLoop:
                     self._obey(command)
                 self._quit = self._quit or self._control.ended
             self._step(host_now())
-        self._recordings.wind_up("the service process is gone" if self._control.ended else "told to quit")
+        self._recordings.wind_up("the service process is gone" if self._control.ended else "told to quit", _WIND_UP_S)
         self._publisher.close()
         self._buffers.close()
 
@@ -128,7 +132,7 @@ class RecorderLoop:
                 except SvevError as error:
                     self._tell(RecorderFailed.of(error))
             case StopRecording():
-                self._recordings.stop()
+                self._recordings.stop(at_once=command.at_once)
             case GrabberDied():
                 self._assembler.disconnected(command.camera, command.reason, host_now())
             case TellEvent():

@@ -7,7 +7,7 @@ The pixels stay in the triplet buffers in which they were composed, and go to th
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -78,6 +78,10 @@ class Preroll:
     def take(self) -> Held:
         """Remove and return the oldest pulse; the caller releases its slot."""
         return self._held.popleft()
+
+    def put_back(self, pulses: Sequence[Held]) -> None:
+        """Put pulses that were taken back at the front of the queue, in their order; their slots are the queue's."""
+        self._held.extendleft(reversed(pulses))
 
     def drop(self) -> None:
         """Remove the oldest pulse and release its slot."""

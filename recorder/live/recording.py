@@ -1,15 +1,29 @@
-"""One recording: which pulses belong to it, their numbers and tags, and its log."""
+"""One recording: which pulses belong to it, their numbers and tags, and its log. Nothing here waits for the disk."""
 
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
+import msgspec
+
 from recorder.live.assembler import Assembler
-from recorder.writing.log_writer import LogDescription, LogSummary, LogWriter
+from recorder.live.preroll import Held
+from recorder.log.triplet_buffers import TripletBuffers
+from recorder.writing.append_file import storage_error
+from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
-from rig.events import Event, Level
+from rig.errors import FileVanishedError, StorageError
+from rig.events import Event
+from rig.health import WritingHealth
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
-from rig.transport.messages import StartRecording
+from rig.topics import TROUBLE_METADATA
+from rig.transport.messages import LogPart, StartRecording
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
 
@@ -17,60 +31,118 @@ from triggering.pairing.pairer import ClosedPulse
 _SLOW: Final = 0.01
 
 
+@dataclass(frozen=True, slots=True)
+class _InFlight:
+    """A pulse that was handed to the log and is not known to be in the file yet."""
+
+    held: Held
+    tag: TripletTag
+
+
 class Recording:
     """Writes pulses into one log, numbered from 1.
+
+    The log is opened in the background. `log` is None until then.
 
     Args:
         order: what to record.
         assembler: makes the triplets.
+        after: a recording whose log failed, and which this one continues.
 
     Attributes:
         commanded: when the command to start came.
         begin: time of the first pulse that may belong to the recording; may be before `commanded`.
-        ledger: counts of what has been recorded so far.
-        log: writes the log.
+        ledger: what became of the pulses that are in the file.
+        log: writes the log; None until it is open.
+        failure: why the log ended before its time, None if it did not.
+        trouble: what went wrong with the disk without ending the log, empty if nothing.
+        continues: id of the recording that this one continues, empty if none.
     """
 
-    def __init__(self, order: StartRecording, assembler: Assembler) -> None:
+    def __init__(self, order: StartRecording, assembler: Assembler, after: "Recording | None" = None) -> None:
         rig = assembler.rig
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
         self._anchor = UtcAnchor.take()
-        self.commanded = host_now()
-        back = order.preroll_s
-        self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
-        self._end: HostNs | None = None
-        self._ended = False
-        self._since_command = 0
-        if order.seconds is not None:
-            # If the pulses are counted, the clock only ends a recording whose pulses come too slowly or stop coming.
-            grace = 0 if order.pulses is None else round(order.seconds * NS_PER_S * _SLOW) + 2 * rig.trigger.period_ns
-            self._end = HostNs(self.commanded + round(order.seconds * NS_PER_S) + grace)
+        self.continues = "" if after is None else after.id
+        self.failure: StorageError | None = None
+        self.trouble = ""
         self.ledger = Ledger()
+        self._handed = 0
+        self._in_flight: deque[_InFlight] = deque()
+        self._ended = False
+        if after is None:
+            self.commanded = host_now()
+            back = order.preroll_s
+            self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
+            self._end = self._planned_end()
+            self._since_command = 0
+        else:
+            self.commanded, self.begin, self._end = after.commanded, after.begin, after._end
+            self._since_command = after._since_command
         cameras = ", ".join(camera.name for camera in rig.cameras)
-        self.log = LogWriter(
-            order.path,
-            LogDescription(
-                session={"recording": order.recording, **order.session},
-                rig={"name": rig.name, "cameras": cameras, "rate_hz": str(rig.trigger.rate_hz)},
-                rig_toml=order.rig_toml.encode(),
-                calibration_json=None if order.calibration is None else order.calibration.json,
-                calibrations={} if order.calibration is None else order.calibration.cameras,
-            ),
-            assembler.buffers,
+        session = {"recording": order.recording, **order.session}
+        description = LogDescription(
+            session=session | ({"continues": self.continues} if self.continues else {}),
+            rig={"name": rig.name, "cameras": cameras, "rate_hz": str(rig.trigger.rate_hz)},
+            rig_toml=order.rig_toml.encode(),
+            calibration_json=None if order.calibration is None else order.calibration.json,
+            calibrations={} if order.calibration is None else order.calibration.cameras,
         )
+        self.log: LogWriter | None = None
+        self._opening = _in_background(partial(_open, order.path, description, assembler.buffers))
+        self._opening_since = host_now()
+
+    def _planned_end(self) -> HostNs | None:
+        order, period = self._order, self._assembler.rig.trigger.period_ns
+        if order.seconds is None:
+            return None
+        # If the pulses are counted, the clock only ends a recording whose pulses come too slowly or stop coming.
+        grace = 0 if order.pulses is None else round(order.seconds * NS_PER_S * _SLOW) + 2 * period
+        return HostNs(self.commanded + round(order.seconds * NS_PER_S) + grace)
+
+    @property
+    def id(self) -> str:
+        """Id of the recording."""
+        return self._order.recording
 
     @property
     def path(self) -> Path:
         """Path of the log."""
         return self._order.path
 
-    def finished(self, now: HostNs) -> bool:
-        """Whether no further pulse belongs to the recording, provided that all pulses decided by `now` were offered."""
-        return self._ended or self._counted or (self._end is not None and now > self._end + self._assembler.hold_ns)
+    def opened(self) -> bool:
+        """Whether the log is open by now.
+
+        Raises:
+            SvevError: it cannot be made.
+        """
+        if self.log is None and self._opening.done():
+            self.log = self._opening.result()
+        return self.log is not None
+
+    def opening_s(self, now: HostNs) -> float:
+        """For how long the log has been being opened, s."""
+        return (now - self._opening_since) / NS_PER_S
+
+    def give_up(self, error: StorageError) -> None:
+        """Do not wait for the disk any longer; a log that is opened only now is removed again."""
+        if self.log is None:
+            self._opening.add_done_callback(partial(_discard, error))
+        else:
+            self.log.give_up(error)
+
+    def finished(self) -> bool:
+        """Whether no further pulse belongs to the recording, provided that all decided pulses were offered."""
+        settled = self._assembler.settled
+        return self._ended or self._counted or (self._end is not None and settled > self._end + self._assembler.hold_ns)
 
     def stop(self) -> None:
         """End with the last pulse that has fired until now."""
         self._end = host_now()
+
+    def end_now(self) -> None:
+        """End with the last pulse that was handed to the log."""
+        self._ended = True
 
     def is_over(self, pulse: ClosedPulse) -> bool:
         """Whether a pulse comes after the recording's last one. Pulses come in order: the first such pulse ends it."""
@@ -86,40 +158,145 @@ class Recording:
         """The tag of the next pulse of the recording, with its number in it."""
         cameras = self._assembler.camera_tags(pulse, self._anchor)
         session = self._order.session.get("session", "")
-        number, time = PulseNumber(self.ledger.pulses + 1), self._anchor.utc(pulse.time)
-        return TripletTag(number, time, session, self._order.recording, self._shape, cameras)
+        number, time = PulseNumber(self._handed + 1), self._anchor.utc(pulse.time)
+        return TripletTag(number, time, session, self.id, self._shape, cameras)
 
-    def write(self, tag: TripletTag, slot: int | None, encoded: bytes, ready: HostNs) -> None:
-        """Write one pulse; the log holds the triplet buffer until the pixels are on disk.
+    def write(self, tag: TripletTag, held: Held, slot: int | None, encoded: bytes) -> None:
+        """Hand one pulse to the log. The recording keeps it too, until it is known to be in the file.
 
         Args:
             tag: the pulse's tag.
+            held: the pulse, with the caller's hold on its triplet buffer.
             slot: the triplet buffer, None if there is none: only the tag is written.
             encoded: the tag in JSON.
-            ready: when the triplet was ready.
+
+        Raises:
+            StorageError: writing has ended.
         """
-        self.ledger.add(tag)
-        self._since_command += self._anchor.host(tag.time) >= self.commanded
-        log_time = self._anchor.utc(ready)
-        self.log.write_pulse(tag, slot, log_time, encoded)
+        self._handed += 1
+        self._since_command += held.triplet.pulse.time >= self.commanded
+        self._in_flight.append(_InFlight(held, tag))
+        if slot is not None:
+            self._assembler.buffers.hold(slot)
+        self._writer.write_pulse(tag, slot, self._anchor.utc(held.ready), encoded)
+
+    def confirm(self) -> None:
+        """Account for the pulses that are in the file by now, and release their triplet buffers."""
+        while self.log is not None and self._in_flight and self.ledger.pulses < self.log.pulses:
+            done = self._in_flight.popleft()
+            self.ledger.add(done.tag)
+            if done.held.triplet.slot is not None:
+                self._assembler.buffers.release(done.held.triplet.slot)
+
+    @property
+    def all_written(self) -> bool:
+        """Whether every pulse that was handed to the log is in the file."""
+        return not self._in_flight
+
+    def take_back(self) -> list[Held]:
+        """Remove and return the pulses that are not in the file, in order, for another log; for use after a failure."""
+        left = [pulse.held for pulse in self._in_flight]
+        self._in_flight.clear()
+        self._since_command -= sum(held.triplet.pulse.time >= self.commanded for held in left)
+        self._ended = False
+        return left
+
+    def release(self) -> None:
+        """Release the triplet buffers of the pulses that are not in the file and never will be."""
+        for held in self.take_back():
+            if held.triplet.slot is not None:
+                self._assembler.buffers.release(held.triplet.slot)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the log is where it was made: not deleted, not moved away."""
+        return not isinstance(self.failure, FileVanishedError)
+
+    def unclosed(self) -> StorageError | None:
+        """The error that the log has come to its end without being closed; None if it is closed."""
+        if self.log is None or ((summary := self.log.summary) is not None and summary.closed):
+            return None
+        text = "the disk did not take the end of the log; what is written so far stays readable"
+        return self.log.error or StorageError(f"{self.path}: {text}: svev recover")
 
     def event(self, event: Event) -> None:
-        """Write one event."""
-        self.log.write_event(event)
+        """Write one event.
+
+        Raises:
+            StorageError: writing has ended.
+        """
+        self._writer.write_event(event)
 
     def health(self, health: bytes, time: HostNs) -> None:
-        """Write the encoded health record of the second that ended at `time`."""
-        self.log.write_health(health, self._anchor.utc(time))
+        """Write the encoded health record of the second that ended at `time`.
+
+        Raises:
+            StorageError: writing has ended.
+        """
+        self._writer.write_health(health, self._anchor.utc(time))
+
+    def statistics(self) -> WritingHealth | None:
+        """How writing goes; None until the log is open."""
+        return None if self.log is None else self.log.statistics()
 
     def utc(self, time: HostNs) -> UtcNs:
         """UTC of a host time, on the same time scale as the recording's tags."""
         return self._anchor.utc(time)
 
-    def close(self) -> LogSummary:
-        """Finish the log.
+    def begin_close(self) -> None:
+        """Begin to write the end of the log, if it is open."""
+        if self.log is None:
+            return
+        if self.trouble:
+            self._writer.set_metadata(TROUBLE_METADATA, {"disk": self.trouble})
+        self._writer.begin_close()
 
-        Raises:
-            StorageError: not everything could be written; what is in the log is readable.
-        """
-        self.event(Event.now(Level.INFO, "recorder", f"recording stopped: {self.ledger.summary_line()}"))
-        return self.log.close()
+    def continuation(self, path: Path) -> StartRecording:
+        """The order for a recording that continues this one in another log."""
+        return msgspec.structs.replace(self._order, path=path)
+
+    def part(self) -> LogPart:
+        """What became of the log."""
+        summary = None if self.log is None else self.log.summary
+        return LogPart(
+            path=self.path,
+            bytes=0 if self.log is None else self.log.statistics().bytes_written,
+            counts=self.ledger.counts(),
+            closed=summary is not None and summary.closed,
+            failure=str(self.failure or ""),
+        )
+
+    @property
+    def _writer(self) -> LogWriter:
+        if self.log is None:
+            raise RuntimeError("the log is not open yet")
+        return self.log
+
+
+def _open(path: Path, description: LogDescription, buffers: TripletBuffers) -> LogWriter:
+    """Make a log; its folder too, which may have been deleted while a recording was running."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise storage_error(path, error) from error
+    return LogWriter(path, description, buffers)
+
+
+def _in_background(make: Callable[[], LogWriter]) -> "Future[LogWriter]":
+    """Call a function in a thread that never keeps the process alive: the disk may hang for ever."""
+    future: Future[LogWriter] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(make())
+        except BaseException as error:  # noqa: BLE001 - raised where the result is asked for
+            future.set_exception(error)
+
+    threading.Thread(target=run, name="opens a log", daemon=True).start()
+    return future
+
+
+def _discard(error: StorageError, opening: "Future[LogWriter]") -> None:
+    if opening.exception() is None:
+        opening.result().give_up(error)
+        opening.result().path.unlink(missing_ok=True)

@@ -1,27 +1,40 @@
 """Starts and ends recordings, one at a time, and writes into them the pulses that belong to them.
 
 A recording that begins in the past finds hundreds of pulses in the pre-roll. They are written in slices, and between
-two slices the recorder reads the frames that keep coming. A recording is closed only when the disk has taken what was
-written. So the recorder's loop never stands still for long.
+two slices the recorder reads the frames that keep coming. Opening, writing and closing a log happen in other threads.
+So the recorder's loop never stands still, whatever the disk does.
+
+```
+ opening ──► running ──► flushing ──► closing ──► finished
+    │           │  all pulses  everything   the end is written
+    │           ▼  are decided is in the file      ▲
+    └──────► a failure: goes on in another log, or ┘
+```
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable
+from enum import Enum, auto
+from pathlib import Path
 from typing import Final
 
 from recorder.live.assembler import Assembler, Triplet
+from recorder.live.disk_watch import HANGS_S, DiskWatch
 from recorder.live.health import LatencyHistogram
 from recorder.live.preroll import Held, Preroll
 from recorder.live.recording import Recording
 from recorder.publishing.publisher import Publisher
-from rig.clocks import NS_PER_S, HostNs, host_now
-from rig.errors import BadInputError, StorageError
+from rig.clocks import NS_PER_S, HostNs, UtcNs, host_now
+from rig.errors import BadInputError, FileVanishedError, StorageError, SvevError
 from rig.events import Event, Level
 from rig.health import WritingHealth
+from rig.status import Counts
 from rig.tag import TripletTag
 from rig.transport.messages import (
+    RecorderEvent,
     RecorderFailed,
     RecorderReport,
+    RecordingContinued,
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
@@ -32,11 +45,31 @@ from triggering.pairing.pairer import ClosedPulse
 _SLICE_NS: Final = NS_PER_S // 200
 #: How long after its start a recording waits for subscribers that take its pre-roll more slowly than the disk does.
 _PATIENCE_NS: Final = 10 * NS_PER_S
-#: How long a finished recording waits for a disk that does not take what was written.
-_FLUSH_NS: Final = 30 * NS_PER_S
+#: How long a log may take to be opened, s.
+_OPEN_S: Final = 10.0
+#: A log whose disk has taken nothing for so long is given up, s.
+_HUNG_S: Final = 30.0
+#: The same if there is another disk: before the frames no longer fit into memory.
+_HUNG_WITH_FALLBACK_S: Final = 2 * HANGS_S
+#: How long the end of a log may take to be written, s.
+_CLOSE_NS: Final = 10 * NS_PER_S
+#: How often the disk is looked at.
+_LOOK_NS: Final = NS_PER_S // 5
+_PAUSE_S: Final = 0.002
+#: A recording has so many logs at most, however often one of them fails.
+_PARTS_MAX: Final = 20
 
 #: Sends a report to the parent process.
 Report = Callable[[RecorderReport], None]
+
+
+class _Phase(Enum):
+    """What a recording is waiting for."""
+
+    OPENING = auto()
+    RUNNING = auto()
+    FLUSHING = auto()  #: it has all its pulses, and waits until they are in the file
+    CLOSING = auto()
 
 
 class Recordings:
@@ -47,124 +80,339 @@ class Recordings:
         preroll: queue of the pulses that no recording has taken yet.
         publisher: publishes every recorded pulse, every event and every health record.
         latency: counts how long pulses took that did not wait in the pre-roll.
+        underruns: tells how many frames have found no free slot in their camera's ring so far.
         report: sends a report to the service process.
     """
 
     def __init__(
-        self, assembler: Assembler, preroll: Preroll, publisher: Publisher, latency: LatencyHistogram, report: Report
+        self,
+        assembler: Assembler,
+        preroll: Preroll,
+        publisher: Publisher,
+        latency: LatencyHistogram,
+        underruns: Callable[[], int],
+        report: Report,
     ) -> None:
         self._assembler, self._buffers, self._preroll = assembler, assembler.buffers, preroll
         self._publisher, self._latency, self._report = publisher, latency, report
+        self._underruns = underruns
         self._recording: Recording | None = None
-        # Since when the recording has all its pulses and waits for the disk.
-        self._over_since: HostNs | None = None
+        self._phase = _Phase.OPENING
+        self._closing_until = HostNs(0)
+        self._earlier: list[Recording] = []
+        self._watch = DiskWatch(0.0, 0)
+        self._next_look = HostNs(0)
         self._behind = False
 
     @property
     def running(self) -> bool:
-        """Whether a recording is running or being closed."""
+        """Whether a recording is being opened, is running or is being closed."""
         return self._recording is not None
 
     @property
     def pressing(self) -> bool:
         """Whether `work` has something to do at once, even if no new pulse comes."""
-        return self._behind or self._ending
+        return self._behind or (self._recording is not None and self._phase is not _Phase.RUNNING)
 
     def statistics(self) -> WritingHealth | None:
         """Figures on the writing of the log; None without a recording."""
-        return None if self._recording is None else self._recording.log.statistics()
+        return None if self._recording is None else self._recording.statistics()
 
     def start(self, order: StartRecording) -> None:
-        """Begin a recording.
+        """Begin a recording. That its log is open, or cannot be made, is reported later.
 
         Raises:
-            BadInputError: a recording is running already, or the file cannot be made.
-            StorageError: the disk refuses.
+            BadInputError: a recording is running already.
         """
         if self._recording is not None:
             raise BadInputError("a recording is running: stop it before starting another")
-        recording = self._recording = Recording(order, self._assembler)
-        held = [held.triplet.pulse.time for held in self._preroll if held.triplet.pulse.time >= recording.begin]
-        first = recording.utc(held[0]) if held else None
-        self._report(RecordingStarted(first_pulse=first))
-        with self._guarded():
-            for time, note in self._preroll.take_notes(since=recording.begin):
-                if isinstance(note, Event):
-                    recording.event(note)
-                else:
-                    recording.health(note, time)
-        self.happened(Event.now(Level.INFO, "recorder", f"recording {order.recording} started"))
+        self._earlier.clear()
+        self._begin(Recording(order, self._assembler))
 
-    def stop(self) -> None:
-        """End the recording, if there is one, with the pulses that have fired until now."""
-        if self._recording is not None:
-            self._recording.stop()
+    def stop(self, *, at_once: bool = False) -> None:
+        """End the recording, if there is one, with the pulses that have fired until now.
+
+        Args:
+            at_once: do not wait for the disk.
+        """
+        if self._recording is None:
+            return
+        self._recording.stop()
+        if at_once:
+            text = "it was stopped without waiting for the disk; what the disk had taken stays readable"
+            self._give_up(self._recording, StorageError(f"{self._recording.path}: {text}"), may_continue=False)
 
     def take(self, triplet: Triplet) -> None:
         """Take a decided pulse, the latest so far, into the pre-roll."""
         ready = host_now()
-        if self._recording is None or self._ending:
+        if self._recording is None or self._phase is not _Phase.RUNNING:
             self._note_latency(triplet.pulse, ready)
         self._preroll.add(triplet, ready)
 
     def work(self, now: HostNs) -> None:
-        """Write pulses for some milliseconds at most; end the recording when it has all its pulses."""
-        self._write_slice(until=HostNs(now + _SLICE_NS))
+        """Do what can be done without waiting, for some milliseconds at most."""
         recording = self._recording
-        if recording is None or self._ending:
+        for each in (*self._earlier, *([] if recording is None else [recording])):
+            each.confirm()
+        if recording is not None:
+            if recording.failure is None and recording.log is not None and recording.log.error is not None:
+                self._fail(recording, recording.log.error)
+            else:
+                self._go_on(recording, now)
+        if self._recording is None or self._phase in {_Phase.FLUSHING, _Phase.CLOSING}:
             self._preroll.trim(now)
-        if recording is None:
-            return
-        if not self._ending and not self._behind and recording.finished(now):
-            self._over_since = now
-        if self._over_since is not None:
-            flushed = recording.log.statistics().queued == 0
-            if flushed or now > self._over_since + _FLUSH_NS:
-                self._finish()
 
     def progress(self) -> None:
         """Report how far the recording is."""
-        if self._recording is not None:
-            ledger = self._recording.ledger
-            self._report(RecordingProgress(counts=ledger.counts(), first_pulse=ledger.first_time))
+        if self._recording is not None and self._recording.log is not None:
+            counts, first = self._counts(self._recording), self._first_pulse(self._recording)
+            self._report(RecordingProgress(counts=counts, first_pulse=first))
 
     def happened(self, event: Event) -> None:
         """Publish an event and write it into the recording; without one, keep it for a recording with pre-roll."""
         self._publisher.event(event)
-        if self._recording is None:
-            self._preroll.note(host_now(), event)
-        else:
-            with self._guarded():
-                self._recording.event(event)
+        self._note(event, host_now())
 
     def health(self, health: bytes) -> None:
         """Publish and write or keep an encoded health record likewise; end the recording if the disk is nearly full."""
         self._publisher.health(health)
-        now = host_now()
-        if self._recording is None or self._ending:
-            self._preroll.note(now, health)
+        self._note(health, host_now())
+        if self._recording is not None and self._phase is _Phase.RUNNING:
+            self._keep_reserve(self._recording)
+
+    def wind_up(self, why: str, patience_s: float) -> None:
+        """End a running recording now, with all pulses that are decided, and wait for the disk.
+
+        Args:
+            why: reason, for the log.
+            patience_s: longest wait, s.
+        """
+        deadline = host_now() + round(patience_s * NS_PER_S)
+        while (recording := self._recording) is not None and host_now() < deadline:
+            self.work(host_now())
+            if self._recording is recording and self._phase is _Phase.RUNNING:
+                self.happened(Event.now(Level.ERROR, "recorder", f"recording ends early: {why}"))
+                self._write_slice(recording, until=None)
+                recording.end_now()
+            time.sleep(_PAUSE_S)
+        if recording is not None:
+            text = f"the disk has not taken the rest within {patience_s:g} s; look at `dmesg`"
+            self._give_up(recording, StorageError(f"{recording.path}: {text}"), may_continue=False)
+            if self._recording is not None:
+                self._finish(self._recording)
+
+    # -- from phase to phase -------------------------------------------------------------------------------------
+
+    def _begin(self, recording: Recording) -> None:
+        self._recording, self._phase, self._behind = recording, _Phase.OPENING, False
+
+    def _go_on(self, recording: Recording, now: HostNs) -> None:
+        """Do the work of the present phase; go to the next one if it is done."""
+        match self._phase:
+            case _Phase.OPENING:
+                self._await_opened(recording, now)
+            case _Phase.RUNNING:
+                self._write_slice(recording, until=HostNs(now + _SLICE_NS))
+                self._look_at_disk(now)
+                if self._recording is recording and not self._behind and recording.finished():
+                    recording.trouble = self._watch.trouble()
+                    self._phase = _Phase.FLUSHING
+            case _Phase.FLUSHING:
+                self._look_at_disk(now)
+                if self._recording is recording and recording.all_written:
+                    summary = recording.ledger.summary_line()
+                    self.happened(Event.now(Level.INFO, "recorder", f"recording stopped: {summary}"))
+                    self._close(recording, now, _CLOSE_NS)
+            case _Phase.CLOSING:
+                logs = [each.log for each in (*self._earlier, recording)]
+                if now > self._closing_until or all(log is None or log.over for log in logs):
+                    self._finish(recording)
+
+    def _await_opened(self, recording: Recording, now: HostNs) -> None:
+        try:
+            if recording.opened():
+                self._opened(recording)
+            elif recording.opening_s(now) > _OPEN_S:
+                text = f"the disk does not let a file be made within {_OPEN_S:g} s; look at `dmesg`"
+                error = StorageError(f"{recording.path.parent}: {text}, record to another disk")
+                self._give_up(recording, error, may_continue=True)
+        except SvevError as error:
+            self._fail(recording, error)
+
+    def _opened(self, recording: Recording) -> None:
+        self._phase = _Phase.RUNNING
+        rows, columns = self._buffers.shape
+        wanted = rows * columns * self._assembler.rig.trigger.rate_hz
+        self._watch = DiskWatch(wanted, self._underruns())
+        text = f"recording {recording.id} started"
+        if self._earlier:
+            before = self._earlier[-1]
+            text = f"recording {before.id} goes on as {recording.id}: {before.failure}"
+            self._report(RecordingContinued(path=recording.path, before=before.part()))
+        else:
+            held = (held.triplet.pulse.time for held in self._preroll)
+            first = next((time for time in held if time >= recording.begin), None)
+            self._report(RecordingStarted(first_pulse=None if first is None else recording.utc(first)))
+        for time_, note in self._preroll.take_notes(since=recording.begin):
+            self._note(note, time_)
+        self.happened(Event.now(Level.INFO, "recorder", text))
+
+    def _close(self, recording: Recording, now: HostNs, patience_ns: int) -> None:
+        if self._recording is recording:
+            self._phase, self._closing_until = _Phase.CLOSING, HostNs(now + patience_ns)
+            recording.begin_close()
+
+    def _finish(self, recording: Recording) -> None:
+        """Report the end of the recording."""
+        self._recording = None
+        recording.confirm()
+        for each in (recording, *self._earlier):
+            each.release()
+        if recording.failure is None:
+            recording.failure = recording.unclosed()
+        parts = [each.part() for each in self._earlier]
+        gone = next((each.failure for each in self._earlier if isinstance(each.failure, FileVanishedError)), None)
+        failure = recording.failure or gone
+        self._report(
+            RecordingFinished(
+                path=recording.path,
+                bytes=recording.part().bytes,
+                unpublished=self._publisher.dropped,
+                counts=self._counts(recording),
+                first_pulse=self._first_pulse(recording),
+                earlier=tuple(parts),
+                failure=None if failure is None else RecorderFailed.of(failure),
+                trouble="; ".join(each.trouble for each in (*self._earlier, recording) if each.trouble),
+            )
+        )
+        self._earlier.clear()
+
+    def _counts(self, recording: Recording) -> Counts:
+        """Of all logs that are there."""
+        return Counts.sum(each.ledger.counts() for each in (*self._earlier, recording) if each.is_there)
+
+    def _first_pulse(self, recording: Recording) -> UtcNs | None:
+        times = (each.ledger.first_time for each in (*self._earlier, recording) if each.is_there)
+        return next((time_ for time_ in times if time_ is not None), None)
+
+    # -- failures ------------------------------------------------------------------------------------------------
+
+    def _give_up(self, recording: Recording, error: StorageError, *, may_continue: bool) -> None:
+        """End a log whose disk hangs, without waiting for the disk."""
+        recording.give_up(error)
+        self._fail(recording, error, may_continue=may_continue, patience_ns=0)
+
+    def _fail(
+        self,
+        recording: Recording,
+        error: SvevError,
+        *,
+        may_continue: bool = True,
+        whole: bool = False,
+        patience_ns: int = _CLOSE_NS,
+    ) -> None:
+        """Go on in another log if there is a place for one; otherwise end the recording.
+
+        Args:
+            recording: the recording.
+            error: why its log ends.
+            may_continue: whether to look for a place for another log.
+            whole: the log still takes what was handed to it.
+            patience_ns: how long to wait until the log is closed.
+        """
+        recording.failure = error if isinstance(error, StorageError) else None
+        self._publisher.event(Event.now(Level.FATAL, "recorder", str(error)))
+        recording.trouble = recording.trouble or self._watch.trouble()
+        if not whole:
+            self._preroll.put_back(recording.take_back())
+        path = self._next_path(recording, error) if may_continue else None
+        if path is not None:
+            event = Event.now(Level.ERROR, "disk", f"{error}; the recording goes on in {path}")
+            self._report(RecorderEvent(event=event))
+            self._earlier.append(recording)
+            recording.begin_close()
+            self._begin(Recording(recording.continuation(path), self._assembler, after=recording))
+        elif recording.log is None:
+            self._recording = None
+            self._refuse(error)
+        elif whole:
+            self._phase = _Phase.FLUSHING
+        else:
+            self._close(recording, host_now(), patience_ns)
+
+    def _refuse(self, error: SvevError) -> None:
+        """Report that a log could not be made."""
+        if self._earlier:
+            self._finish(self._earlier.pop())
+        else:
+            self._report(RecorderFailed.of(error))
+
+    def _next_path(self, recording: Recording, error: SvevError) -> Path | None:
+        """Where to go on after a failure; None: nowhere.
+
+        After a file has vanished its own folder is as good as before; it is made again if need be.
+        """
+        fallback, own = self._assembler.rig.recorder.fallback_directory, recording.path.parent
+        if isinstance(error, FileVanishedError):
+            folder: Path | None = own
+        elif isinstance(error, StorageError) and fallback is not None and fallback != own:
+            folder = fallback
+        else:
+            folder = None
+        part = len(self._earlier) + 2
+        if folder is None or part > _PARTS_MAX:
+            return None
+        first = self._earlier[0] if self._earlier else recording
+        return folder / f"{first.id}-part{part}{recording.path.suffix}"
+
+    def _look_at_disk(self, now: HostNs) -> None:
+        recording = self._recording
+        if recording is None or recording.log is None or now < self._next_look:
             return
-        with self._guarded():
-            self._recording.health(health, now)
-        self._keep_reserve()
+        self._next_look = HostNs(now + _LOOK_NS)
+        behind = self._assembler.backlog and self._phase is _Phase.RUNNING
+        for event in self._watch.look(now, recording.log, behind=behind, underruns=self._underruns()):
+            self.happened(event)
+            self._report(RecorderEvent(event=event))
+        stalled, fallback = recording.log.stalled_s(), self._assembler.rig.recorder.fallback_directory
+        elsewhere = fallback is not None and fallback != recording.path.parent
+        if self._recording is recording and stalled > (_HUNG_WITH_FALLBACK_S if elsewhere else _HUNG_S):
+            text = f"the disk has taken nothing for {stalled:.0f} s; look at `dmesg`, record to another disk"
+            self._give_up(recording, StorageError(f"{recording.path}: {text}"), may_continue=True)
 
-    def wind_up(self, why: str) -> None:
-        """End a running recording now, with all pulses that are decided."""
-        if self._recording is None:
+    def _keep_reserve(self, recording: Recording) -> None:
+        """End the log while there is still room to close it."""
+        reserve = self._assembler.rig.recorder.reserve_gb
+        free = None if recording.log is None else recording.log.free_bytes
+        if free is None or free >= reserve * 1e9:
             return
-        if not self._ending:
-            self.happened(Event.now(Level.ERROR, "recorder", f"recording ends early: {why}"))
-            self._write_slice(until=None)
-        self._finish()
+        why = f"only {free / 1e9:.1f} GB are free and {reserve:g} GB are kept in reserve: recording stopped; make room"
+        self.happened(Event.now(Level.ERROR, "recorder", why))
+        if self._recording is recording and self._phase is _Phase.RUNNING:
+            error = StorageError(f"{recording.path}: {why}; the log is whole up to there")
+            self._fail(recording, error, whole=True)
 
-    @property
-    def _ending(self) -> bool:
-        return self._over_since is not None
+    # -- pulses and notes ----------------------------------------------------------------------------------------
 
-    def _write_slice(self, until: HostNs | None) -> None:
+    def _note(self, note: Event | bytes, time_: HostNs) -> None:
+        """Write an event or an encoded health record into the log that runs; keep it for the next one otherwise."""
+        recording = self._recording
+        takes = self._phase is _Phase.RUNNING or (self._phase is _Phase.FLUSHING and isinstance(note, Event))
+        if recording is None or not takes:
+            self._preroll.note(time_, note)
+            return
+        try:
+            if isinstance(note, Event):
+                recording.event(note)
+            else:
+                recording.health(note, time_)
+        except StorageError as error:
+            self._fail(recording, error)
+
+    def _write_slice(self, recording: Recording, until: HostNs | None) -> None:
         """Move pulses from the pre-roll into the recording until the time `until`; None: all of them."""
-        recording, self._behind = self._recording, False
-        while recording is not None and self._recording is recording and not self._ending:
+        self._behind = False
+        while self._recording is recording and self._phase is _Phase.RUNNING:
             held = self._preroll.oldest
             if held is None or recording.is_over(held.triplet.pulse):
                 return
@@ -187,13 +435,20 @@ class Recordings:
 
     def _write(self, recording: Recording, held: Held) -> None:
         pulse, slot = held.triplet.pulse, held.triplet.slot
-        if slot is None and (slot := self._buffers.acquire()) is not None:
-            self._buffers.pixels(slot).fill(0)  # no frame came at all: a black triplet
+        black = self._buffers.acquire() if slot is None else None  # no frame came at all: a black triplet
+        if black is not None:
+            self._buffers.pixels(black).fill(0)
+            slot = black
         tag = recording.tag(pulse)
         encoded = tag.encode()
         self._publisher.triplet(encoded, self._buffers, slot)
-        with self._guarded():
-            recording.write(tag, slot, encoded, held.ready)
+        try:
+            recording.write(tag, held, slot, encoded)
+        except StorageError as error:
+            self._fail(recording, error)
+        finally:
+            if black is not None:
+                self._buffers.release(black)
         if pulse.time >= recording.commanded:
             self._note_latency(pulse, host_now())
         self._tell_overruns(tag, pulse)
@@ -210,47 +465,3 @@ class Recordings:
             if outcome.overrun:
                 text = f"pulse {tag.pulse}: {why}; shorten its exposure or lower trigger.rate_hz"
                 self.happened(Event.now(Level.WARNING, camera.name, text))
-
-    def _finish(self) -> None:
-        recording, self._recording, self._over_since = self._recording, None, None
-        if recording is None:
-            return
-        try:
-            summary = recording.close()
-        except StorageError as error:
-            recording.log.abandon()
-            self._report(RecorderFailed.of(error))
-            return
-        self._report(
-            RecordingFinished(
-                path=recording.path,
-                bytes=summary.bytes,
-                unpublished=self._publisher.dropped,
-                counts=recording.ledger.counts(),
-                first_pulse=recording.ledger.first_time,
-            )
-        )
-
-    @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """If writing fails within, end the recording, keep what its log holds, tell subscribers and the service."""
-        try:
-            yield
-        except StorageError as error:
-            recording, self._recording, self._over_since = self._recording, None, None
-            if recording is not None:
-                recording.log.abandon()
-            self._publisher.event(Event.now(Level.FATAL, "recorder", str(error)))
-            self._report(RecorderFailed.of(error))
-
-    def _keep_reserve(self) -> None:
-        """End the recording while there is still room to close its log."""
-        recording, reserve = self._recording, self._assembler.rig.recorder.reserve_gb
-        free = None if recording is None else recording.log.free_bytes()
-        if recording is None or free is None or free >= reserve * 1e9:
-            return
-        why = f"only {free / 1e9:.1f} GB are free and {reserve:g} GB are kept in reserve: recording stopped; make room"
-        self.happened(Event.now(Level.ERROR, "recorder", why))
-        with self._guarded():
-            recording.close()
-            raise StorageError(f"{recording.path}: {why}; the log is whole up to there")

@@ -9,7 +9,7 @@ from recorder.reading.log_reader import Chunk, LogReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import tag_of
 from rig.tag import TripletTag
-from rig.topics import RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG
+from rig.topics import RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
 from triggering.ledger import Ledger, runs_from_text
 
 
@@ -29,6 +29,7 @@ class LogInfo:
         session: fields of the last session record, with the changes that were made after the recording.
         rig: fields of the last rig record.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
+        trouble: what went wrong with the disk while the log was written, in one line; empty if nothing.
         messages: number of messages per topic.
         library: the program that wrote the log.
     """
@@ -44,6 +45,7 @@ class LogInfo:
     session: dict[str, str]
     rig: dict[str, str]
     known_lost: tuple[tuple[int, int], ...]
+    trouble: str
     messages: dict[str, int]
     library: str
 
@@ -87,6 +89,7 @@ class LogInfo:
             "cameras": list(self.cameras),
             "session": self.session,
             "rig": self.rig,
+            "trouble": self.trouble,
             "messages": self.messages,
             "library": self.library,
         }
@@ -124,7 +127,8 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
         session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
         return LogInfo(
             path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
-            reader.metadata.get(RIG_METADATA, {}), known_lost(reader), messages, reader.library,
+            reader.metadata.get(RIG_METADATA, {}), known_lost(reader),
+            "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), messages, reader.library,
         )  # fmt: skip
 
 

@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from recorder.log.mcap_layout import PAGE
-from rig.disk import free_bytes, set_direct
-from rig.errors import BadInputError, StorageError
+from rig.disk import set_direct
+from rig.errors import BadInputError, FileVanishedError, StorageError
 
 _REMEDIES = {
     errno.ENOSPC: "the disk is full: make room on it or record to another one",
@@ -99,7 +99,10 @@ class AppendFile:
         set_direct(self._fd, wanted=False)
         done = 0
         while done < len(rest):
-            done += os.pwrite(self._fd, rest[done:], self.size + done)
+            written = os.pwrite(self._fd, rest[done:], self.size + done)
+            if written == 0:
+                raise OSError(errno.EIO, "the disk took nothing")
+            done += written
         self.sync_entry()
         self.size += done
 
@@ -116,9 +119,26 @@ class AppendFile:
         finally:
             os.close(directory)
 
-    def free_bytes(self) -> int | None:
-        """Room left on the disk for us, in bytes; None if the disk does not say."""
-        return free_bytes(self._fd)
+    def look(self) -> int:
+        """Check that the file is still in its place.
+
+        Returns:
+            Room left on the disk for us, in bytes.
+
+        Raises:
+            FileVanishedError: the file was deleted or moved away, or its folder was.
+            OSError: the disk does not say.
+        """
+        own = os.fstat(self._fd)
+        try:
+            there = os.stat(self.path)  # noqa: PTH116 - both the same call
+        except FileNotFoundError:
+            there = None
+        if there is None or (there.st_dev, there.st_ino) != (own.st_dev, own.st_ino):
+            what = "was deleted while it was recorded" if own.st_nlink == 0 else "was moved away while it was recorded"
+            raise FileVanishedError(f"{self.path}: {what}; leave the folder of the recordings alone meanwhile")
+        disk = os.fstatvfs(self._fd)
+        return disk.f_bavail * disk.f_frsize
 
     def discard(self) -> None:
         """Close and remove the file."""

@@ -55,23 +55,26 @@ class LogDescription:
 
 @dataclass(frozen=True, slots=True)
 class LogSummary:
-    """What became of a log that is closed.
+    """What became of a log.
 
     Attributes:
         bytes: size of the file.
         unwritten: chunks that were handed over and did not reach the disk (after a storage error).
+        closed: the end of the log was written.
     """
 
     bytes: int
     unwritten: int
+    closed: bool
 
 
 class LogWriter:
     """Writes one log file, in a thread of its own; one other thread may call the methods.
 
+    Only the constructor and `close` wait for the disk.
+
     Attributes:
         path: the file.
-        summary: what became of the log, None until `close` has been called.
     """
 
     def __init__(self, path: Path, description: LogDescription, buffers: TripletBuffers):
@@ -87,7 +90,6 @@ class LogWriter:
             StorageError: the disk refuses.
         """
         self.path = path
-        self.summary: LogSummary | None = None
         self._buffers = buffers
         self._metadata = {SESSION_METADATA: dict(description.session), RIG_METADATA: dict(description.rig)}
         self._written_metadata: dict[str, dict[str, str]] = {}
@@ -97,12 +99,12 @@ class LogWriter:
         self._file = AppendFile(path)
         try:
             self._write_opening(records(*schemas, *channels), description)
+            self._thread = WriteThread(self._file, self._index, buffers.release, self._closing_bytes)
         except BaseException as error:
             self._file.discard()
             if isinstance(error, OSError):
                 raise storage_error(path, error) from error
             raise
-        self._thread = WriteThread(self._file, self._index, buffers.release)
         self._write_first_messages(description.calibrations)
 
     def __enter__(self) -> "LogWriter":
@@ -127,17 +129,18 @@ class LogWriter:
             ValueError: the tag is too long.
         """
         if slot is None:
-            self._write_small(TAG_CHANNEL, tag.pulse, encoded or tag.encode(), tag.time, log_time)
+            data = encoded or tag.encode()
+            self._write_small(TAG_CHANNEL, tag.pulse, data, tag.time, log_time, is_pulse=True)
             return
         try:
             self._check()
             pages, plan = self._buffers.layout.complete(
                 self._buffers.memory(slot), encoded or tag.encode(), tag.pulse, tag.time, log_time
             )
+            self._thread.submit(pages, plan, slot, is_pulse=True)
         except BaseException:
             self._buffers.release(slot)
             raise
-        self._thread.submit(pages, plan, slot)
 
     def write_event(self, event: Event) -> None:
         """Queue an event; in the file within a second.
@@ -173,32 +176,63 @@ class LogWriter:
         """How writing goes since the log was opened."""
         return self._thread.statistics()
 
-    def free_bytes(self) -> int | None:
-        """Room left on the disk, in bytes; None if the disk does not say. Only while the log is open."""
-        return self._file.free_bytes()
+    @property
+    def error(self) -> StorageError | None:
+        """Why writing ended, None while it goes on."""
+        return self._thread.error
+
+    @property
+    def pulses(self) -> int:
+        """Pulses that are in the file."""
+        return self._thread.pulses
+
+    @property
+    def free_bytes(self) -> int:
+        """Room left on the disk about a second ago, in bytes."""
+        return self._thread.free_bytes
+
+    def stalled_s(self) -> float:
+        """For how long the disk has not finished anything although something waits for it, s."""
+        return self._thread.stalled_s()
+
+    def give_up(self, error: StorageError) -> None:
+        """End the log with an error found by the caller, e.g. that the disk hangs; do not wait for the disk."""
+        self._thread.give_up(error)
+
+    def begin_close(self) -> None:
+        """Write what waits and the summary section, and make all of it durable; `over` tells when that is done.
+
+        After an error the log is closed all the same if the disk takes the rest.
+        """
+        self._thread.stop()
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing happens to the file any more; `summary` says what became of it."""
+        return self._thread.over.is_set()
+
+    @property
+    def summary(self) -> LogSummary | None:
+        """What became of the log, None until it is over."""
+        return LogSummary(self._file.size, self._thread.unwritten, self._thread.closed) if self.over else None
 
     def close(self) -> LogSummary:
-        """Write what waits and the summary section, and make all of it durable.
-
-        After an error the log is closed all the same if the disk takes the rest: `summary` says how much it holds. A
-        second call only returns the summary.
+        """Close the log and wait until that is done; a second call only returns the summary.
 
         Raises:
             StorageError: something that was handed over is not in the file, or the file is not closed.
         """
-        if self.summary is None:
-            self._thread.stop(CLOSE_TIMEOUT_S)
-            error = self._thread.error
-            try:
-                self._file.finish(self._closing_bytes())
-            except OSError as reason:
-                error = error or storage_error(self.path, reason)
-                self._cut()
-            self._file.close()
-            self.summary = LogSummary(self._file.size, self._thread.unwritten)
-            if error is not None:
-                raise error
-        return self.summary
+        summary = self.summary
+        if summary is None:
+            self.begin_close()
+            if not self._thread.over.wait(CLOSE_TIMEOUT_S):
+                raise StorageError(
+                    f"{self.path}: the disk has not taken the rest within {CLOSE_TIMEOUT_S:g} s; look at `dmesg`, "
+                    "and check the log with `svev verify`"
+                )
+            if self.error is not None:
+                raise self.error
+        return self.summary or LogSummary(0, 0, closed=False)
 
     def abandon(self) -> LogSummary | None:
         """Close after an error that has been reported already; None if even closing failed."""
@@ -208,14 +242,17 @@ class LogWriter:
             return self.summary
 
     def _check(self) -> None:
-        if self.summary is not None:
-            raise StorageError(f"{self.path}: the log is closed; open another one")
         if self._thread.error is not None:
-            raise StorageError(*self._thread.error.args) from self._thread.error.__cause__
+            raise type(self._thread.error)(*self._thread.error.args) from self._thread.error.__cause__
+        if self._thread.stopping:
+            raise StorageError(f"{self.path}: the log is closed; open another one")
 
-    def _write_small(self, channel: int, sequence: int, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
+    def _write_small(
+        self, channel: int, sequence: int, data: bytes, publish_time: UtcNs, log_time: UtcNs, *, is_pulse: bool = False
+    ) -> None:
         self._check()
-        self._thread.submit(*chunk_of_one(channel, sequence, data, publish_time, log_time))
+        chunk, plan = chunk_of_one(channel, sequence, data, publish_time, log_time)
+        self._thread.submit(chunk, plan, is_pulse=is_pulse)
 
     def _write_opening(self, declarations: bytes, description: LogDescription) -> None:
         """Write everything before the first message at once, and make it durable."""
@@ -229,8 +266,7 @@ class LogWriter:
             record = records(attachment)
             self._index.add_attachment(attachment, len(out), len(record))
             out += record
-        with join_pages([out]) as pages:
-            self._file.append(pages)
+        self._file.append(join_pages([out]))
         self._file.sync_entry()
 
     def _changed_metadata(self, position: int) -> bytes:
@@ -255,12 +291,6 @@ class LogWriter:
     def _closing_bytes(self) -> bytes:
         metadata = self._changed_metadata(self._file.size)
         return metadata + self._index.closing_bytes(self._file.size + len(metadata))
-
-    def _cut(self) -> None:
-        try:
-            self._file.cut()
-        except OSError as error:
-            raise storage_error(self.path, error) from error
 
 
 def _library() -> str:

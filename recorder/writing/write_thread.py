@@ -1,7 +1,11 @@
-"""Writes chunks to the disk in a thread of its own, in order, and makes them durable once a second."""
+"""Writes chunks to the disk in a thread of its own, in order, makes them durable once a second, and closes the file.
+
+All calls that may wait for the disk are made here, so that nobody else ever waits for a disk that hangs.
+"""
 
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,53 +25,79 @@ _SMALL_WAITING_MAX = 20_000
 
 @dataclass(frozen=True, slots=True)
 class _Job:
-    """A chunk that waits for the disk: the pages of a slot, or, if `slot` is None, small and not padded yet."""
+    """A chunk that waits for the disk.
+
+    Attributes:
+        data: the pages of a slot or, if `slot` is None, a small chunk that is not padded yet.
+        plan: where the chunk stands in `data`.
+        slot: the slot.
+        is_pulse: whether the chunk is that of a pulse.
+    """
 
     data: memoryview | bytes
     plan: ChunkPlan
     slot: int | None
+    is_pulse: bool
 
 
 class WriteThread:
-    """Takes chunks from any thread and appends them to the file.
+    """Takes chunks from any thread and appends them to the file; closes the file at the end.
 
-    After the first error it writes nothing more; it releases the slots that wait, and counts the chunks.
+    After the first error it writes no more chunks; it releases the slots that wait, counts the chunks, and still tries
+    to close the file. Whatever happens in it, an error of the program included, ends up in `error`.
 
     Attributes:
         error: why writing ended, None while it goes on.
         unwritten: chunks that were queued and did not reach the file.
+        pulses: pulses that are in the file.
+        stopping: whether the thread was told to end.
+        over: set when the thread is done with the file, closed or not.
+        closed: whether the end of the log was written.
+        free_bytes: room on the disk about a second ago.
     """
 
-    def __init__(self, file: AppendFile, index: LogIndex, release: Callable[[int], None]):
+    def __init__(
+        self, file: AppendFile, index: LogIndex, release: Callable[[int], None], closing_bytes: Callable[[], bytes]
+    ):
         """Start the thread.
 
         Args:
-            file: the file; nobody else writes to it until `stop`.
+            file: the file; nobody else writes to it from now on.
             index: gets every chunk that is whole in the file.
             release: called with each slot that is in the file, or never will be.
+            closing_bytes: makes the end of the log, when all chunks are written.
         """
         self.error: StorageError | None = None
-        self.unwritten = 0
-        self._file = file
-        self._index = index
-        self._release = release
+        self.unwritten = self.pulses = 0
+        self.over = threading.Event()
+        self.closed = False
+        self._file, self._index = file, index
+        self._release, self._closing_bytes = release, closing_bytes
         self._jobs: deque[_Job] = deque()
         self._small_waiting = 0
-        self._stopping = False
+        self._busy_since: float | None = None
+        self.stopping = self._given_up = self._drained = False
         self._wake = threading.Condition()
         self._unsynced_since: float | None = None
+        self._looked = 0.0
+        self.free_bytes = file.look()
         self._slowest_write = 0.0
         self._slowest_sync = 0.0
         self._thread = threading.Thread(target=self._run, name=f"log {file.path.name}", daemon=True)
         self._thread.start()
 
-    def submit(self, chunk: memoryview | bytes, plan: ChunkPlan, slot: int | None = None) -> None:
+    def submit(
+        self, chunk: memoryview | bytes, plan: ChunkPlan, slot: int | None = None, *, is_pulse: bool = False
+    ) -> None:
         """Queue the pages of a completed slot (the number of slots limits how many wait), or a small chunk.
 
         Raises:
-            StorageError: the disk has taken nothing for so long that the queue of small chunks is full.
+            StorageError: writing has ended, or the disk has taken nothing for so long that the queue of small chunks is
+                full. The slot stays the caller's.
         """
         with self._wake:
+            if self._drained:
+                raise self.error or StorageError(f"{self._file.path}: the log is closed; open another one")
             if slot is None:
                 if self._small_waiting >= _SMALL_WAITING_MAX:
                     raise StorageError(
@@ -75,24 +105,28 @@ class WriteThread:
                         "record to another disk"
                     )
                 self._small_waiting += 1
-            self._jobs.append(_Job(chunk, plan, slot))
+            self._jobs.append(_Job(chunk, plan, slot, is_pulse))
+            if self._busy_since is None:
+                self._busy_since = time.monotonic()
             self._wake.notify()
 
-    def stop(self, timeout_s: float) -> None:
-        """Write what waits, sync, and end the thread; a second call does nothing.
-
-        Raises:
-            StorageError: the disk did not take the rest within `timeout_s`.
-        """
+    def stop(self) -> None:
+        """Write what waits, close the file, and end the thread; `over` tells when that is done."""
         with self._wake:
-            self._stopping = True
+            self.stopping = True
             self._wake.notify()
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
-            raise StorageError(
-                f"{self._file.path}: the disk has not taken the rest within {timeout_s:g} s; look at `dmesg`, "
-                "and check the log with `svev verify`"
-            )
+
+    def give_up(self, error: StorageError) -> None:
+        """End writing with an error found by somebody else, e.g. that the disk hangs; return at once."""
+        with self._wake:
+            self.error = self.error or error
+            self._given_up = True
+        self.stop()
+
+    def stalled_s(self) -> float:
+        """For how long the disk has not finished anything although something waits for it, s."""
+        since = self._busy_since
+        return 0.0 if since is None else time.monotonic() - since
 
     def statistics(self) -> WritingHealth:
         """How writing goes since the log was opened; `queued` chunks wait for the disk."""
@@ -105,25 +139,38 @@ class WriteThread:
         )
 
     def _run(self) -> None:
-        while jobs := self._next():
-            if not self._attempt(self._write, jobs):
-                self.unwritten += len(jobs)
-            for job in jobs:
-                if job.slot is not None:
-                    self._release(job.slot)
-        self._attempt(self._sync)
+        try:
+            while jobs := self._next():
+                written = False
+                try:
+                    written = self._attempt(self._write, jobs)
+                finally:
+                    self._done(jobs, written=written)
+            self._attempt(self._sync)
+            self._finish()
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it must not end the thread in silence
+            traceback.print_exception(error)
+            self._broken(error)
+        finally:
+            self._drain()
+            self._file.close()
+            self._busy_since = None
+            self.over.set()
 
     def _next(self) -> list[_Job]:
         """The next slot, or all small chunks up to the next slot; syncs while none waits; empty at the end."""
         while True:
             with self._wake:
-                if not self._jobs and not self._stopping:
-                    self._wake.wait(SYNC_INTERVAL_S)
+                if not self._jobs:
+                    self._busy_since = None
+                    if not self.stopping:
+                        self._wake.wait(SYNC_INTERVAL_S)
                 if self._jobs:
                     return self._take()
-                if self._stopping:
+                if self.stopping:
+                    self._busy_since = time.monotonic()
                     return []
-            self._attempt(self._sync_if_due)
+            self._attempt(self._keep_up)
 
     def _attempt(self, step: Callable[..., None], *arguments: Any) -> bool:
         """Take a step that uses the disk, unless writing has ended; the first error ends it.
@@ -135,7 +182,9 @@ class WriteThread:
             try:
                 step(*arguments)
             except OSError as error:
-                self._fail(error)
+                self._fail(storage_error(self._file.path, error), error)
+            except StorageError as error:
+                self._fail(error, error.__cause__)
         return self.error is None
 
     def _take(self) -> list[_Job]:
@@ -146,14 +195,24 @@ class WriteThread:
             self._small_waiting -= len(taken)
         return taken
 
+    def _done(self, jobs: list[_Job], *, written: bool) -> None:
+        if written:
+            self.pulses += sum(job.is_pulse for job in jobs)
+        else:
+            self.unwritten += len(jobs)
+        for job in jobs:
+            if job.slot is not None:
+                self._release(job.slot)
+        if self._busy_since is not None:
+            self._busy_since = time.monotonic()
+
     def _write(self, jobs: list[_Job]) -> None:
         begin = time.monotonic()
         position = self._file.size
         if jobs[0].slot is not None:
             self._file.append(memoryview(jobs[0].data))
         else:
-            with join_pages(bytes(job.data) for job in jobs) as pages:
-                self._file.append(pages)
+            self._file.append(join_pages(bytes(job.data) for job in jobs))
         for job in jobs:
             self._index.add_chunk(position, job.plan)
             position += len(job.data)
@@ -161,11 +220,16 @@ class WriteThread:
         self._slowest_write = max(self._slowest_write, now - begin)
         if self._unsynced_since is None:
             self._unsynced_since = now
-        self._sync_if_due()
+        self._keep_up()
 
-    def _sync_if_due(self) -> None:
-        if self._unsynced_since is not None and time.monotonic() - self._unsynced_since >= SYNC_INTERVAL_S:
+    def _keep_up(self) -> None:
+        """Once a second: make durable what was written, see whether the file is still in its place."""
+        now = time.monotonic()
+        if self._unsynced_since is not None and now - self._unsynced_since >= SYNC_INTERVAL_S:
             self._sync()
+        if now - self._looked >= SYNC_INTERVAL_S:
+            self.free_bytes = self._file.look()
+            self._looked = now
 
     def _sync(self) -> None:
         begin = time.monotonic()
@@ -173,10 +237,33 @@ class WriteThread:
         self._slowest_sync = max(self._slowest_sync, time.monotonic() - begin)
         self._unsynced_since = None
 
-    def _fail(self, error: OSError) -> None:
-        self.error = storage_error(self._file.path, error)
-        self.error.__cause__ = error
+    def _finish(self) -> None:
+        """Write the end of the log and make it durable; after an error too, if the disk takes it."""
+        if self._given_up:
+            return  # what is in the file is not known: the call that hung may have written after all
+        try:
+            self._file.finish(self._closing_bytes())
+            self.closed = True
+        except OSError as error:
+            self._fail(storage_error(self._file.path, error), error)
+
+    def _fail(self, reason: StorageError, cause: BaseException | None) -> None:
+        if self.error is None:
+            self.error = reason
+            self.error.__cause__ = cause
         try:
             self._file.cut()
         except OSError as second:
             self.error.add_note(f"the torn end could not be cut off: {second}")
+
+    def _broken(self, error: BaseException) -> None:
+        """Note an error of the program, which nobody foresaw."""
+        text = f"writing ended by {type(error).__name__}: {error}; what is written so far stays readable; report this"
+        self.error = self.error or StorageError(f"{self._file.path}: {text}")
+
+    def _drain(self) -> None:
+        """Release the slots of everything that nobody will write any more."""
+        with self._wake:
+            self._drained = True
+            left, self._jobs = list(self._jobs), deque()
+        self._done(left, written=False)

@@ -102,6 +102,11 @@ class RecorderSettings(StrictModel):
     """Where recordings are written and how much is buffered on the way."""
 
     directory: Path = Field(Path("recordings"), description="relative to the working directory")
+    fallback_directory: Path | None = Field(
+        None,
+        description="folder on another disk, relative to the working directory: a recording whose disk fails, hangs or "
+        "is full goes on there",
+    )
     ring_s: float = Field(2.0, gt=0, le=60, description="each camera's ring in shared memory, seconds of frames")
     triplets_s: float = Field(2.0, gt=0, le=60, description="triplets waiting for the disk, seconds")
     preroll_s: float = Field(

@@ -18,6 +18,7 @@ Config = TypeVar("Config")
 
 _CONFIG_S: Final = 10.0
 _BAD_CONFIG: Final = 2
+_THREAD_FAILED: Final = 70  # EX_SOFTWARE of <sysexits.h>
 _PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
 
 
@@ -74,6 +75,7 @@ def begin(
     Raises:
         SystemExit: no configuration came.
     """
+    end_with_failed_thread()
     if killed_with_parent:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     name, fd = sys.argv[1], int(sys.argv[2])
@@ -91,6 +93,20 @@ def begin(
         signal.signal(signal.SIGTERM, context.ask_to_stop)
     threading.Thread(target=_lifeline, args=(fd, grace_s), daemon=True, name="lifeline").start()
     return context
+
+
+def end_with_failed_thread() -> None:
+    """Let an unforeseen error in any thread end the process, so that its parent notices.
+
+    A process that goes on without one of its threads looks healthy and does only part of its work.
+    """
+
+    def end(failed: threading.ExceptHookArgs) -> None:
+        threading.__excepthook__(failed)
+        sys.stderr.flush()
+        os._exit(_THREAD_FAILED)
+
+    threading.excepthook = end
 
 
 def end_in(seconds: float) -> None:

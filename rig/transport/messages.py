@@ -122,7 +122,13 @@ class StartRecording(Message):
 
 
 class StopRecording(Message):
-    """Command to the recorder: close the log with the pulses that have fired until now."""
+    """Command to the recorder: close the log with the pulses that have fired until now.
+
+    Attributes:
+        at_once: do not wait for the disk: give up what it has not taken.
+    """
+
+    at_once: bool = False
 
 
 class GrabberDied(Message):
@@ -202,22 +208,58 @@ class RecordingProgress(Message):
     first_pulse: UtcNs | None
 
 
-class RecordingFinished(RecordingProgress):
-    """The log is closed.
+class LogPart(msgspec.Struct, frozen=True, kw_only=True):
+    """One log of a recording.
 
     Attributes:
         path: the log.
         bytes: its size.
+        counts: what became of the pulses that are in it.
+        closed: the log was closed properly.
+        failure: why it ended before its time, empty if it did not.
+    """
+
+    path: Path
+    bytes: int
+    counts: Counts
+    closed: bool = True
+    failure: str = ""
+
+
+class RecordingContinued(Message):
+    """The log failed, and the recording goes on in another one.
+
+    Attributes:
+        path: the new log.
+        before: the log that failed.
+    """
+
+    path: Path
+    before: LogPart
+
+
+class RecordingFinished(RecordingProgress):
+    """The recording has ended; `counts` are those of the pulses that are in its log.
+
+    Attributes:
+        path: the log; the last one if the recording has several.
+        bytes: its size.
         unpublished: triplets that the recorder has dropped so far because subscribers were too slow.
+        earlier: the logs before it, which failed.
+        failure: why the recording ended before its time; None if it did not.
+        trouble: frames that were lost because of the disk, in words; empty if none.
     """
 
     path: Path
     bytes: int
     unpublished: int
+    earlier: tuple[LogPart, ...] = ()
+    failure: "RecorderFailed | None" = None
+    trouble: str = ""
 
 
 class RecorderFailed(Message):
-    """A recording, or the recorder itself, failed; the fields describe the error."""
+    """A recording could not be started, or the recorder itself failed; the fields describe the error."""
 
     kind: str
     message: str
@@ -233,6 +275,12 @@ class RecorderFailed(Message):
         return kind(self.message) if issubclass(kind, SvevError) else SvevError(self.message)
 
 
+class RecorderEvent(Message):
+    """Something that people should know at once, e.g. that the disk falls behind."""
+
+    event: Event
+
+
 class RecorderHealth(Message):
     """The health record, once a second."""
 
@@ -245,7 +293,9 @@ RecorderReport = (
     | CameraChanged
     | RecordingStarted
     | RecordingProgress
+    | RecordingContinued
     | RecordingFinished
     | RecorderFailed
+    | RecorderEvent
     | RecorderHealth
 )

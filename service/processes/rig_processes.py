@@ -24,6 +24,7 @@ from rig.transport.messages import (
     GrabberDied,
     RecorderCommand,
     RecorderConfig,
+    RecorderEvent,
     RecorderHealth,
     RecorderOptions,
     RecorderReady,
@@ -174,6 +175,8 @@ class RigProcesses:
                     self.warm = True
                 case RecorderReady():
                     self.ready = True
+                case RecorderEvent():
+                    self._on_event(report.event)
                 case RecorderHealth():
                     self.health = report.health
                     self._note_recovered(report.health)

@@ -28,6 +28,7 @@ from rig.transport.messages import (
     RecorderFailed,
     RecorderHealth,
     RecorderReport,
+    RecordingContinued,
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
@@ -36,7 +37,7 @@ from rig.transport.messages import (
 )
 from service.processes.rig_processes import RigProcesses
 from service.recordings.storage import check_room_for, new_log_path
-from service.status.statements import FORBIDDEN, recording_ended
+from service.status.statements import FORBIDDEN, recording_continued, recording_ended
 from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
 
@@ -53,15 +54,15 @@ class RecordingInProgress:
         opened: is answered when the log is open.
 
     Attributes:
-        id: id of the recording.
-        path: the log.
+        ids: ids of its logs; there are several if logs failed.
+        path: the log, the last one if there are several.
         session: the session fields, later changes included.
         stopping: whether the recorder was told to stop.
         waiting: are answered when the recording is over.
     """
 
     def __init__(self, path: Path, session: SessionFields, opened: "Future[Recording]") -> None:
-        self.id, self.path, self.session = path.stem, path, session
+        self.ids, self.path, self.session = [path.stem], path, session
         self.waiting: list[Future[Outcome]] = []
         self.stopping = False
         self._opened: Future[Recording] | None = opened
@@ -69,6 +70,11 @@ class RecordingInProgress:
         self._started: datetime | None = None
         self._counts = Counts()
         self._bytes = 0
+
+    @property
+    def id(self) -> str:
+        """Id of the log that is being written."""
+        return self.ids[-1]
 
     @property
     def opening(self) -> bool:
@@ -89,6 +95,11 @@ class RecordingInProgress:
         """Answer the thread that waits for the log to be opened with an error."""
         if self._opened is not None:
             self._opened.set_exception(error)
+
+    def continue_in(self, path: Path) -> None:
+        """Note that the log failed and the recording goes on in another one."""
+        self.ids.append(path.stem)
+        self.path = path
 
     def progress(self, report: RecordingProgress) -> None:
         """Note the counts so far."""
@@ -233,24 +244,27 @@ class RecordingControl:
         armed_s = time.monotonic() - self.armed_at
         return armed_s if order.preroll_s is None else min(order.preroll_s, armed_s)
 
-    def stop(self, recording: str | None = None, ended: "Future[Outcome] | None" = None) -> None:
+    def stop(
+        self, recording: str | None = None, ended: "Future[Outcome] | None" = None, *, at_once: bool = False
+    ) -> None:
         """Have the recorder close the log.
 
         Args:
             recording: id of the recording; None: the one in progress.
             ended: is answered when the recording is over.
+            at_once: do not wait for the disk.
 
         Raises:
             UnknownRecordingError: this recording is not in progress.
         """
         current = self.current
-        if current is None or recording not in {None, current.id}:
+        if current is None or recording not in {None, *current.ids}:
             raise UnknownRecordingError(f"recording {recording} is not in progress: see the list of recordings")
         if ended is not None:
             current.waiting.append(ended)
-        if self._session.processes is not None and not current.stopping:
+        if self._session.processes is not None and (at_once or not current.stopping):
             current.stopping = True
-            self._session.processes.tell(StopRecording())
+            self._session.processes.tell(StopRecording(at_once=at_once))
 
     def change_session(self, recording: str, change: SessionChange) -> Recording | None:
         """Change session fields of the recording in progress.
@@ -258,7 +272,7 @@ class RecordingControl:
         Returns:
             The recording; None if `recording` is not in progress.
         """
-        if self.current is None or self.current.id != recording:
+        if self.current is None or recording not in self.current.ids:
             return None
         self.current.change_session(change)
         return self.current.view()
@@ -276,17 +290,24 @@ class RecordingControl:
             case RecorderHealth() if not current.opening:
                 with suppress(FileNotFoundError):  # somebody has moved the log away
                     current.grown(current.path.stat().st_size)
+            case RecordingContinued():
+                current.continue_in(report.path)
+                self.notice = recording_continued(report.before.path.stem, report.path, report.before.failure)
             case RecordingFinished():
-                current.progress(report)
-                counts = (
-                    f"{report.counts.pulses} pulses, {report.counts.complete} complete, {report.counts.partial} partial"
-                )
-                self._say(Level.INFO, f"recording {current.id} stopped: {counts}")
-                self._over(report, State.ARMED)
+                self._finished(current, report)
             case RecordingProgress():
                 current.progress(report)
             case RecorderFailed():
                 self.fail(report.error(), State.ARMED)
+
+    def _finished(self, current: RecordingInProgress, report: RecordingFinished) -> None:
+        current.progress(report)
+        counts = f"{report.counts.pulses} pulses, {report.counts.complete} complete, {report.counts.partial} partial"
+        self._say(Level.INFO, f"recording {current.id} stopped: {counts}")
+        if report.failure is not None:
+            self.notice = recording_ended(current.id, report.failure.error())
+            self._say(Level.ERROR, self.notice.text)
+        self._over(report, State.ARMED)
 
     def fail(self, error: SvevError, then: State) -> None:
         """End the recording in progress, if there is one, with an error, and go to the state `then`."""

@@ -4,6 +4,7 @@ Each has a code by which the page translates it, and a level which the page show
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 from rig.errors import SvevError
@@ -151,6 +152,23 @@ def recording_ended(recording: str, error: SvevError) -> Statement:
         text=f"recording {recording} ended early: {error}",
         advice="what was recorded until then is kept; see the recording's verdict",
         values={"recording": recording, "reason": str(error)},
+    )
+
+
+def recording_continued(recording: str, path: Path, reason: str) -> Statement:
+    """The log of a recording failed, and the recording goes on in another one.
+
+    Args:
+        recording: id of the log that failed.
+        path: the log in which it goes on.
+        reason: why the log failed.
+    """
+    return Statement(
+        level=Level.ERROR,
+        code="recording_continued",
+        text=f"recording {recording} goes on in {path}: {reason}",
+        advice="after it, look at the disk before the next recording",
+        values={"recording": recording, "log": str(path), "reason": reason},
     )
 
 

@@ -310,7 +310,7 @@ class Supervisor:
         free = self.health.disk.free_bytes if self.health else free_bytes(self._recorder.directory)
         facts = Facts(
             phase=phase,
-            notice=fault or (self.recordings.notice if phase.state is State.ARMED else None),
+            notice=fault or (self.recordings.notice if phase.state in {State.ARMED, State.RECORDING} else None),
             heard=None if processes is None else tuple(processes.cameras),
             health=self.health,
             warm=processes is not None and processes.warm,

@@ -24,27 +24,32 @@ def record(
     """Record once with the cameras of a rig file, for a number of seconds.
 
     Makes one log (.mcap) with the frames of all trigger pulses. For each pulse and camera the log says whether the
-    frame came and, if not, why. Ctrl-C ends the recording early; its log is finished properly.
+    frame came and, if not, why. Ctrl-C ends the recording early; its log is finished properly. A second Ctrl-C does not
+    wait for a disk that is slow or hangs.
 
     Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, or a camera does not answer,
-    4 the disk failed or has too little room, 5 the cameras are ready, but no pulses come, 6 the recorder died; the log
-    is readable up to that moment.
+    4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but no pulses come, 6 the
+    recorder died; the log is readable up to that moment.
 
     Example: svev record --rig config/rigs/hill-gige.toml --seconds 10 --out recordings
     """
     settings = load_rig(rig)
     path = new_log_path(out)
     with HeadlessRig(settings, rig.read_text(encoding="utf-8"), _aside) as running:
-        result = record_with(
+        result, disk_error = record_with(
             running, settings, path, seconds, allow_absent=allow_absent, session={"session": session},
             progress=console.progress,
         )  # fmt: skip
     if as_json:
         console.print_json(result)
-        return
-    console.say(f"{result['pulses']} pulses, {result['complete']} complete{_causes(result)}")
-    console.say(f"{result['bytes'] / 1e6:.1f} MB in {result['log']}")
-    console.say(f"check it: svev verify {result['log']}")
+    else:
+        console.say(f"{result['pulses']} pulses, {result['complete']} complete{_causes(result)}")
+        for log in result["logs"][:-1]:
+            console.say(f"the first part is in {log}")
+        console.say(f"{result['bytes'] / 1e6:.1f} MB in {result['log']}")
+        console.say(f"check it: svev verify {result['log']}")
+    if disk_error is not None:
+        raise disk_error
 
 
 def demo(

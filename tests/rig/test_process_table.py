@@ -131,3 +131,16 @@ def test_stopping_takes_no_longer_than_the_slowest_child() -> None:
     before = time.monotonic()
     assert table.stop() == []
     assert time.monotonic() - before < 8.0  # the deadline is one for all, not one each
+
+
+def test_an_error_in_a_thread_ends_the_process() -> None:
+    program = (
+        "import threading, time\n"
+        "from rig.transport.child import end_with_failed_thread\n"
+        "end_with_failed_thread()\n"
+        "threading.Thread(target=lambda: 1 // 0).start()\n"
+        "threading.Event().wait(60)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=50, check=False)
+    assert done.returncode == 70
+    assert "ZeroDivisionError" in done.stderr

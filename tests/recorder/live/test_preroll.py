@@ -24,9 +24,10 @@ from recorder.publishing.publisher import Publisher
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.clocks import HostNs
+from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
-from rig.transport.messages import RecorderFailed, RecorderReport, RecordingFinished, RecordingStarted, StartRecording
+from rig.transport.messages import RecorderReport, RecordingFinished, RecordingStarted, StartRecording
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
 from tests.support.waiting import wait_until
 
@@ -84,7 +85,20 @@ class Recorder:
         self.recordings.start(
             StartRecording(path=path, session={"session": "s"}, pulses=pulses, seconds=seconds, preroll_s=preroll_s)
         )
+        before, now = len(self.reports), HostNs(self.clock.time)  # no time passes while the log is opened
+
+        def is_open() -> bool:
+            self.recordings.work(now)
+            return len(self.reports) > before
+
+        wait_until(is_open, "the log is open", timeout_s=30, poll_s=0.001)
         return path
+
+    def has_room(self) -> bool:
+        """Whether more than a few triplet buffers are free, after one more turn if need be."""
+        if self.buffers.free_count <= 3:
+            self.step()
+        return self.buffers.free_count > 3
 
     def finish(self) -> RecordingFinished:
         """Take steps until the recording is closed; returns its report."""
@@ -116,9 +130,9 @@ def _recorder(path: Path, publisher: Publisher, seconds: float, limit: int) -> I
         cameras, buffers = RingCameras(rings), TripletBuffers(RIG.triplet_shape, 12 + limit)
         assembler, latency = Assembler(RIG, rings, buffers), LatencyHistogram()
         preroll, reports = Preroll(buffers, seconds, limit), list[RecorderReport]()
-        recordings = Recordings(assembler, preroll, publisher, latency, reports.append)
+        recordings = Recordings(assembler, preroll, publisher, latency, lambda: 0, reports.append)
         yield Recorder(cameras, assembler, buffers, preroll, recordings, clock, path, latency, reports)
-        recordings.wind_up("the test is over")
+        recordings.wind_up("the test is over", 10.0)
         while len(preroll):
             preroll.drop()
         assert buffers.free_count == buffers.count, "every slot came back"
@@ -221,7 +235,7 @@ def test_hundreds_of_pulses_are_written_in_slices_while_new_ones_come(tmp_path: 
             before = recorder.clock.time
             recorder.step()
             assert recorder.clock.time - before < 8 * MS, "no turn takes long"
-            wait_until(lambda: recorder.buffers.free_count > 3, "the disk takes something", timeout_s=30, poll_s=0.001)
+            wait_until(recorder.has_room, "the disk takes something", timeout_s=30, poll_s=0.001)
         assert turns > 10
     assert _pulses(path) == list(range(1, 331))
 
@@ -266,13 +280,14 @@ def test_a_failing_disk_leaves_the_rest_of_the_past_for_another_try(tmp_path: Pa
         recorder.start(None, seconds=0)
         recording = recorder.recordings._recording
         assert recording is not None
-        recording.log.close()  # whoever writes from now on is told so
-        recorder.step()
-        assert isinstance(recorder.reports[-1], RecorderFailed)
-        assert not recorder.recordings.running
+        assert recording.log is not None
+        recording.log.give_up(StorageError("the disk fails: see to it"))
+        failed = recorder.finish()
+        assert failed.failure is not None
+        assert "the disk fails" in failed.failure.message
         path = recorder.start(None, seconds=0)
         recorder.finish()
-    assert _pulses(path) == list(range(2, 81))
+    assert _pulses(path) == list(range(failed.counts.pulses + 1, 81))
 
 
 def test_only_pulses_of_the_present_count_as_latency(tmp_path: Path, publisher: Publisher) -> None:

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import tracemalloc
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -241,7 +242,7 @@ def test_writing_after_close_is_an_error(tmp_path: Path) -> None:
     buffers = TripletBuffers((8, 16), 1)
     log = open_writer(tmp_path / "log.mcap", buffers)
     log.close()
-    assert log.close() is log.summary
+    assert log.close() == log.summary
     with pytest.raises(StorageError, match="closed"):
         log.write_event(Event(UtcNs(0), Level.INFO, "recorder", "too late"))
     with pytest.raises(StorageError, match="closed"):
@@ -302,6 +303,29 @@ def test_a_disk_that_cannot_sync_ends_the_log_with_a_remedy(tmp_path: Path, monk
     wait_until(lambda: log._thread.error is not None, "the first sync, a second after the first write")
     with pytest.raises(StorageError, match=r"log\.mcap: the disk fails: look at `dmesg`"):
         write_pulse(log, buffers, make_tag(2, (OK, OK), (8, 16)))
-    assert log.abandon() is log.summary
+    assert log.abandon() == log.summary
     wait_until(lambda: buffers.free_count == 2, "all slots are free")
     assert verify(tmp_path / "log.mcap").closed
+
+
+def test_an_unforeseen_error_in_the_write_thread_is_told_and_all_buffers_come_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("nobody foresaw this")
+
+    buffers = TripletBuffers((8, 16), 4)
+    log = open_writer(tmp_path / "log.mcap", buffers)
+    write_pulse(log, buffers, make_tag(1, (OK, OK), (8, 16)))
+    wait_until(lambda: log.pulses == 1, "the first pulse is in the file")
+    monkeypatch.setattr(log._index, "add_chunk", fail)
+    for pulse in (2, 3, 4):
+        with suppress(StorageError):
+            write_pulse(log, buffers, make_tag(pulse, (OK, OK), (8, 16)))
+    wait_until(lambda: log.over, "the thread has ended")
+    with pytest.raises(StorageError, match=r"writing ended by RuntimeError: nobody foresaw this.*report this"):
+        write_pulse(log, buffers, make_tag(5, (OK, OK), (8, 16)))
+    assert buffers.free_count == 4
+    assert log.pulses == 1
+    assert "nobody foresaw this" in capfd.readouterr().err
+    assert verify(tmp_path / "log.mcap").ledger.pulses >= 1

@@ -17,6 +17,7 @@ export const statements = {
 
   fault_no_camera: ["ingen av kameraene svarer", "sjekk strøm og kabler; de kobles til av seg selv når de svarer"],
   fault_failed: ["{reason}", "det prøves igjen om {again_in_s} s; gjør klar for å prøve med en gang, slå av for å la være"],
+  recording_continued: ["opptaket {recording} fortsetter i {log}: {reason}", "se etter disken før neste opptak"],
   recording_ended: ["opptaket {recording} tok slutt for tidlig: {reason}", "det som ble tatt opp til da, er tatt vare på; se hva opptaket sier"],
   process_restarted: ["{process} ble startet på nytt {restarts} ganger", "skjer det igjen, sjekk riggen"],
 

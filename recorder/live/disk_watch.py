@@ -1,0 +1,91 @@
+"""Watches whether the disk keeps up with a recording: is it behind, does it hang, how many frames does that cost."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from recorder.writing.log_writer import LogWriter
+from rig.clocks import NS_PER_S, HostNs
+from rig.events import Event, Level
+
+#: A disk that has finished nothing for so long hangs: much longer than any disk's housekeeping takes.
+HANGS_S: Final = 2.0
+#: Frames may wait for the disk for so long before people are told.
+_BEHIND_NS: Final = NS_PER_S
+_MB: Final = 1e6
+
+
+class DiskWatch:
+    """Looks several times a second at one log and at the frames that wait for it.
+
+    Args:
+        wanted_bytes_per_s: what the cameras make.
+        underruns: frames that have found no free slot in their camera's ring so far.
+
+    Attributes:
+        lost: frames lost because everything that could hold them waited for the disk.
+    """
+
+    def __init__(self, wanted_bytes_per_s: float, underruns: int) -> None:
+        self._wanted, self._underruns = wanted_bytes_per_s, underruns
+        self.lost = 0
+        self._behind_since: tuple[HostNs, int] | None = None
+        self._rate: float | None = None
+        self._told_behind = self._told_lost = self._hanging = False
+        self._hung_s = 0.0
+
+    def look(self, now: HostNs, log: LogWriter, *, behind: bool, underruns: int) -> Iterator[Event]:
+        """Take note of the present state.
+
+        Args:
+            now: present time.
+            log: the log.
+            behind: whether frames wait for a free triplet buffer.
+            underruns: as in the constructor.
+
+        Yields:
+            What people should know.
+        """
+        yield from self._look_for_hanging(log.stalled_s())
+        written = log.statistics().bytes_written
+        was_behind = self._behind_since is not None
+        if behind and self._behind_since is None:
+            self._behind_since = now, written
+        if self._behind_since is not None and now > self._behind_since[0]:
+            since, before = self._behind_since
+            self._rate = (written - before) / ((now - since) / NS_PER_S)
+            if now - since > _BEHIND_NS and not self._told_behind and not self._hanging:
+                self._told_behind = True
+                yield Event.now(Level.WARNING, "disk", f"the disk falls behind: it takes {self._rates()}")
+        new, self._underruns = underruns - self._underruns, underruns
+        if new > 0 and (behind or was_behind):
+            self.lost += new
+            if not self._told_lost:
+                self._told_lost = True
+                yield Event.now(Level.ERROR, "disk", f"{self._cause()}: frames are lost; {_REMEDY}")
+        if not behind:
+            self._behind_since = None
+
+    def trouble(self) -> str:
+        """What the disk cost the recording, in one line; empty if nothing."""
+        return f"{self._cause()}: {self.lost} frames were lost; {_REMEDY}" if self.lost else ""
+
+    def _look_for_hanging(self, stalled_s: float) -> Iterator[Event]:
+        if stalled_s >= HANGS_S:
+            self._hung_s = max(self._hung_s, stalled_s)
+            if not self._hanging:
+                yield Event.now(
+                    Level.ERROR, "disk", f"the disk hangs: it has taken nothing for {HANGS_S:g} s; look at `dmesg`"
+                )
+        elif self._hanging:
+            yield Event.now(Level.WARNING, "disk", f"the disk takes data again, after {self._hung_s:.0f} s")
+        self._hanging = stalled_s >= HANGS_S
+
+    def _cause(self) -> str:
+        return f"the disk hung for {self._hung_s:.0f} s" if self._hung_s else f"disk too slow: it took {self._rates()}"
+
+    def _rates(self) -> str:
+        rate = "few" if self._rate is None else f"{self._rate / _MB:.1f}"
+        return f"{rate} MB/s, the cameras make {self._wanted / _MB:.1f} MB/s"
+
+
+_REMEDY: Final = "record to a faster disk, and let nothing else use it"

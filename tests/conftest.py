@@ -5,16 +5,20 @@ from tests.support.plugin import (
     loopback,
     pytest_addoption,
     pytest_collection_modifyitems,
+    pytest_configure,
     pytest_runtest_makereport,
     run_token,
     short_path,
 )
+from tests.support.reliability import fault_table
 
 __all__ = [
     "_nothing_left_behind",
+    "fault_table",
     "loopback",
     "pytest_addoption",
     "pytest_collection_modifyitems",
+    "pytest_configure",
     "pytest_runtest_makereport",
     "run_token",
     "short_path",

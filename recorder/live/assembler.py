@@ -85,7 +85,7 @@ class Assembler:
         pairer: decides which frame belongs to which pulse.
         hold_ns: the longest time from a pulse to its decision, ns.
         connected: for each camera, whether it is connected.
-        settled: `pump` has returned every pulse that fired `hold_ns` before this time.
+        settled: `pump` has returned every pulse that fired `hold_ns` before this time or earlier.
     """
 
     def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], buffers: TripletBuffers) -> None:
@@ -108,6 +108,7 @@ class Assembler:
         self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns)
         self.connected = [False] * len(rings)
         self.settled = HostNs(0)
+        self._keeping_up_since: HostNs | None = HostNs(0)
 
     def pump(self, now: HostNs) -> list[Triplet]:
         """Read the records that the grabbers have queued, and copy their frames.
@@ -124,13 +125,25 @@ class Assembler:
         # A camera whose frame waits for a buffer has unread records. The pairer must not see a later time than that
         # frame's, or it would take the unread frames for missing ones.
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
-        seen_until = min(waiting, default=now)
-        self._decided.extend(self.pairer.advance(seen_until))
+        self._decided.extend(self.pairer.advance(min(waiting, default=now)))
         self._ask_silent_cameras(now)
         self._free_stranded_slots(now)
         ready = list(self._ready())
-        self.settled = HostNs(min(seen_until, self._decided[0].time)) if self._decided else seen_until
+        self._settle(now)
         return ready
+
+    def _settle(self, now: HostNs) -> None:
+        """Find up to which time every pulse has been returned.
+
+        While frames waited for buffers the rings may have overflowed. The ids of the frames that come after that tell
+        which pulses were lost, so those are waited for.
+        """
+        if self._waiting or self._decided:
+            self._keeping_up_since = None
+        elif self._keeping_up_since is None:
+            self._keeping_up_since = now
+        if self._keeping_up_since is not None and now >= self._keeping_up_since + self.hold_ns:
+            self.settled = now
 
     def _ready(self) -> Iterator[Triplet]:
         """The decided pulses up to the first one of which a frame is not copied yet."""

@@ -65,9 +65,15 @@ class DiskWatch:
         if not behind:
             self._behind_since = None
 
-    def trouble(self) -> str:
-        """What the disk cost the recording, in one line; empty if nothing."""
-        return f"{self._cause()}: {self.lost} frames were lost; {_REMEDY}" if self.lost else ""
+    def trouble(self, lost: int) -> str:
+        """What the disk cost the recording, in one line; empty if nothing.
+
+        Args:
+            lost: frames of the recording that are lost, for whatever reason. Those that overflowed are more if pulses
+                came on after its end.
+        """
+        lost = min(lost, self.lost)
+        return f"{self._cause()}: {lost} frames were lost; {_REMEDY}" if lost else ""
 
     def _look_for_hanging(self, stalled_s: float) -> Iterator[Event]:
         if stalled_s >= HANGS_S:

@@ -27,6 +27,7 @@ from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, UtcNs, host_now
 from rig.errors import BadInputError, FileVanishedError, StorageError, SvevError
 from rig.events import Event, Level
+from rig.frame import FrameStatus
 from rig.health import WritingHealth
 from rig.status import Counts
 from rig.tag import TripletTag
@@ -215,7 +216,6 @@ class Recordings:
                 self._write_slice(recording, until=HostNs(now + _SLICE_NS))
                 self._look_at_disk(now)
                 if self._recording is recording and not self._behind and recording.finished():
-                    recording.trouble = self._watch.trouble()
                     self._phase = _Phase.FLUSHING
             case _Phase.FLUSHING:
                 self._look_at_disk(now)
@@ -258,6 +258,7 @@ class Recordings:
         self.happened(Event.now(Level.INFO, "recorder", text))
 
     def _close(self, recording: Recording, now: HostNs, patience_ns: int) -> None:
+        recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
         if self._recording is recording:
             self._phase, self._closing_until = _Phase.CLOSING, HostNs(now + patience_ns)
             recording.begin_close()
@@ -322,7 +323,7 @@ class Recordings:
         """
         recording.failure = error if isinstance(error, StorageError) else None
         self._publisher.event(Event.now(Level.FATAL, "recorder", str(error)))
-        recording.trouble = recording.trouble or self._watch.trouble()
+        recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
         if not whole:
             self._preroll.put_back(recording.take_back())
         path = self._next_path(recording, error) if may_continue else None

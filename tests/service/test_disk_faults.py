@@ -23,8 +23,11 @@ from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.faulty_disk import SMALL, Call, FaultyDisk
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
+DISK = "The disk"
+AFTER = "those from then on"
 SVEV = [sys.executable, "-m", "svev"]
 
 
@@ -86,7 +89,7 @@ def _agree(result: dict[str, Any], *reports: VerifyReport) -> None:
 )
 @pytest.mark.parametrize("size", ["small", "large"])
 def test_a_failed_write_of_any_size_ends_the_recording_and_is_said(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, error: int, words: str, size: str
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, error: int, words: str, size: str
 ) -> None:
     recording = Record(_rig(tmp_path, loopback), tmp_path / "logs", 60, disk)
     recording.await_bytes(20_000_000)
@@ -101,10 +104,12 @@ def test_a_failed_write_of_any_size_ends_the_recording_and_is_said(
     report = verify(Path(result["log"]))
     _agree(result, report)
     assert not report.ledger.missing
+    what = "an event or health record" if size == "small" else "a triplet"
+    fault_table.tell(DISK, f"{errno.errorcode[error]} on a write of {what}", lost=AFTER, said=_last(err), code=code)
 
 
 def test_after_a_failed_write_the_service_says_so_and_the_next_recording_is_whole(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable
 ) -> None:
     with serving(tmp_path, _rig(tmp_path, loopback), loopback, environment=disk.environment) as service:
         service.arm()
@@ -123,6 +128,8 @@ def test_after_a_failed_write_the_service_says_so_and_the_next_recording_is_whol
         _tells_the_truth(service, second["id"], told)
         assert told[second["id"]]["pulses"] >= 60
     assert verify(service.data / f"{second['id']}.mcap").verdict == "clean"
+    lost = f"{AFTER}; the next recording is whole"
+    fault_table.tell(DISK, "ENOSPC on a write of an event, under the service", lost=lost, said=statement["text"])
 
 
 def _tells_the_truth(service: Serving, recording: str, told: dict[str, Any]) -> None:
@@ -132,24 +139,34 @@ def _tells_the_truth(service: Serving, recording: str, told: dict[str, Any]) -> 
 
 @pytest.mark.parametrize("calls", [Call.WRITE, Call.SYNC])
 def test_a_disk_that_hangs_across_the_end_costs_no_tag(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, calls: Call
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, calls: Call
 ) -> None:
-    recording = Record(_rig(tmp_path, loopback), tmp_path / "logs", 4, disk)
+    rig = _rig(tmp_path, loopback, "ring_s = 0.5\ntriplets_s = 0.5")
+    recording = Record(rig, tmp_path / "logs", 5, disk)
     recording.await_bytes(60_000_000)
     disk.hang(calls)
     recording.await_words("the disk hangs")
-    # The recording's last pulse passes, and the cameras' rings overflow.
+    # The cameras' rings overflow, and the recording's last pulse passes.
     let_pass(4.0)
     disk.heal()
     code, result, err = recording.result()
     report = verify(Path(result["log"]))
     _agree(result, report)
-    assert result["pulses"] == 120, err
+    assert result["pulses"] == 150, err
     assert report.verdict != "damaged", report.findings
-    assert code == (4 if result["partial"] else 0), err
-    if result["partial"]:
-        assert "the disk hung for" in err
-        assert "the disk hung for" in info(Path(result["log"])).trouble
+    assert result["partial"] > 0
+    assert code == 4, err
+    assert "the disk hung for" in err
+    assert "the disk hung for" in info(Path(result["log"])).trouble
+    what = "write" if calls is Call.WRITE else "sync"
+    lost = f"{result['partial']} of {result['pulses']}, with tags"
+    said = f"the disk hangs: it has taken nothing for 2 s; then: {_last(err)}"
+    fault_table.tell(DISK, f"{what} hangs for 6 s across the end of the recording", lost=lost, said=said, code=code)
+
+
+def _last(err: str) -> str:
+    """The last line that was said."""
+    return err.strip().splitlines()[-1]
 
 
 def let_pass(seconds: float) -> None:
@@ -160,7 +177,7 @@ def let_pass(seconds: float) -> None:
 
 @pytest.mark.parametrize("megabytes_per_s", [10, 20])
 def test_a_slow_disk_is_called_slow_and_every_pulse_has_its_tag(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, megabytes_per_s: int
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, megabytes_per_s: int
 ) -> None:
     disk.slow(megabytes_per_s * 1_000_000)
     recording = Record(_rig(tmp_path, loopback, "ring_s = 0.5\ntriplets_s = 0.5"), tmp_path / "logs", 6, disk)
@@ -173,10 +190,12 @@ def test_a_slow_disk_is_called_slow_and_every_pulse_has_its_tag(
     assert code == 4
     assert "disk too slow: it took" in err
     assert "disk too slow: it took" in info(Path(result["log"])).trouble
+    lost = f"{result['partial']} of {result['pulses']}, with tags"
+    fault_table.tell(DISK, f"the disk takes {megabytes_per_s} MB/s of 27.6", lost=lost, said=_last(err), code=code)
 
 
 def test_a_disk_that_hangs_for_ever_ends_at_the_second_ctrl_c(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable
 ) -> None:
     recording = Record(_rig(tmp_path, loopback), tmp_path / "logs", 60, disk)
     log = recording.await_bytes(20_000_000)
@@ -191,20 +210,24 @@ def test_a_disk_that_hangs_for_ever_ends_at_the_second_ctrl_c(
     assert code == 4
     assert "stopped without waiting for the disk" in err
     _agree(result, verify(log))
+    fault_table.tell(DISK, "the disk hangs for ever; two Ctrl-C", lost=AFTER, said=_last(err), code=code)
     assert verify(log).ledger.pulses > 10
 
 
-def test_a_disk_that_lets_no_file_be_made_is_named(tmp_path: Path, loopback: Loopback, disk: FaultyDisk) -> None:
+def test_a_disk_that_lets_no_file_be_made_is_named(
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable
+) -> None:
     disk.hang(Call.OPEN)
     code, result, err = Record(_rig(tmp_path, loopback), tmp_path / "logs", 4, disk).result()
     disk.heal()
     assert (code, result) == (4, {})
     assert "the disk does not let a file be made within 10 s" in err
+    fault_table.tell(DISK, "the disk hangs when the log is made", lost="all", said=_last(err), code=code)
 
 
 @pytest.mark.parametrize("what", ["file", "folder", "moved"])
 def test_a_log_that_vanishes_is_noticed_and_the_recording_goes_on(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, what: str
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, what: str
 ) -> None:
     recording = Record(_rig(tmp_path, loopback), tmp_path / "logs", 5, disk)
     log = recording.await_bytes(20_000_000)
@@ -223,11 +246,14 @@ def test_a_log_that_vanishes_is_noticed_and_the_recording_goes_on(
     assert report.verdict == "clean"
     assert result["pulses"] == report.ledger.pulses > 30
     assert info(Path(result["log"])).session["continues"] == log.stem
+    faults = {"file": "the log is deleted", "folder": "its folder is deleted", "moved": "the log is moved away"}
+    lost = "none: they went with the file" if what == "moved" else "those that were in it"
+    fault_table.tell(DISK, f"{faults[what]} while it is recorded", lost=lost, said=_last(err), code=code)
 
 
 @pytest.mark.parametrize("fault", ["fails", "hangs"])
 def test_on_a_second_disk_the_recording_goes_on_without_a_gap(
-    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault: str
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, fault: str
 ) -> None:
     fallback = tmp_path / "second"
     rig = _rig(tmp_path, loopback, f'fallback_directory = "{fallback}"\ntriplets_s = 6')
@@ -247,3 +273,6 @@ def test_on_a_second_disk_the_recording_goes_on_without_a_gap(
     assert reports[1].verdict == "clean"
     assert code == 0, err
     assert f"the recording goes on in {second}" in err
+    (said,) = (line for line in err.splitlines() if "goes on in" in line)
+    name = "fails (EIO)" if fault == "fails" else "hangs for ever"
+    fault_table.tell(DISK, f"the disk {name}; there is a second one", lost=0, said=said, code=code)

@@ -11,7 +11,7 @@ import hypothesis
 import pytest
 
 from tests.support import loopback as loopback_blocks
-from tests.support import processes
+from tests.support import processes, reliability
 from tests.support.leaks import Leaks, Snapshot, await_nothing_left
 from tests.support.loopback import Loopback
 
@@ -30,6 +30,9 @@ hypothesis.settings.load_profile("repeatable")
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Options of our own."""
     parser.addoption("--hardware", action="store_true", help="also run the tests that need real cameras")
+    parser.addoption(
+        "--write-reliability", action="store_true", help="write what faults come to into docs/reliability.md"
+    )
     parser.addoption("--leak-grace", type=float, default=2.0, help="seconds that what a test started has to go away")
 
 
@@ -40,6 +43,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("hardware"):
             item.add_marker(pytest.mark.skip(reason="needs real cameras; run with --hardware"))
+
+
+class _ReliabilityWriter:
+    """Collects the rows that tests tell, in the process that starts the workers."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        reliability.note(self._config, report)
+
+    def pytest_sessionfinish(self) -> None:
+        reliability.write(self._config)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """With --write-reliability the table of faults is written anew."""
+    if config.getoption("--write-reliability") and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(_ReliabilityWriter(config))
 
 
 @pytest.hookimpl(wrapper=True)

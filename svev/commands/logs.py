@@ -121,6 +121,8 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
     yield "pulses", ledger.summary_line()
     if found.missing_pulses:
         yield "no tag", f"{found.missing_pulses} pulses"
+    if found.trouble:
+        yield "trouble", found.trouble
     if spread is not None:
         yield "offset", f"{spread['median']} us median, {spread['max']} us at most, from the pulse"
     if found.shape is not None:

@@ -1,5 +1,6 @@
 """Measures the state of the recorder: makes the health record of every second."""
 
+import threading
 from collections import deque
 from collections.abc import Sequence
 from itertools import accumulate
@@ -15,6 +16,7 @@ from rig.transport.ring import CameraRing
 from triggering.pairing.pairer import ClosedPulse
 
 _LATE_PULSES: Final = 30
+_ROOM_S: Final = 1.0
 #: Upper bounds, s. Fixed, so that figures of different days and machines can be added up.
 _BUCKETS_S: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
@@ -40,6 +42,29 @@ class LatencyHistogram:
         return Latency(buckets, round(self._sum_s, 6), sum(self._counts))
 
 
+class FreeRoom:
+    """Asks once a second, in a thread of its own, how much room a disk has: the answer may take long.
+
+    Attributes:
+        free_bytes: as `rig.disk.free_bytes`, about a second ago; None until the first answer.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.free_bytes: int | None = None
+        self._directory, self._over = directory, threading.Event()
+        threading.Thread(target=self._run, name="free room", daemon=True).start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._over.set()
+
+    def _run(self) -> None:
+        while True:
+            self.free_bytes = free_bytes(self._directory)
+            if self._over.wait(_ROOM_S):
+                return
+
+
 class HealthMonitor:
     """Collects measurements while pulses come, and makes a record of them once a second.
 
@@ -53,7 +78,7 @@ class HealthMonitor:
     """
 
     def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], directory: Path) -> None:
-        self._names, self._rings, self._directory = [camera.name for camera in rig.cameras], rings, directory
+        self._names, self._rings, self._room = [camera.name for camera in rig.cameras], rings, FreeRoom(directory)
         self._frames_before = [ring.counters()["frames"] for ring in rings]
         self._offsets: list[deque[int]] = [deque(maxlen=_LATE_PULSES) for _ in rings]
         self.latency = LatencyHistogram()
@@ -76,8 +101,12 @@ class HealthMonitor:
             others: the fields of `rig.health.Health` that other objects measure.
         """
         cameras = tuple(self._camera(index, is_there) for index, is_there in enumerate(connected))
-        disk = DiskHealth(free_bytes(self._directory))
+        disk = DiskHealth(self._room.free_bytes)
         return Health(cameras=cameras, disk=disk, latency=self.latency.figures(), **others)
+
+    def close(self) -> None:
+        """End the thread that asks the disk."""
+        self._room.close()
 
     def _camera(self, index: int, connected: bool) -> CameraHealth:
         counters = self._rings[index].counters()

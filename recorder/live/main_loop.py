@@ -96,6 +96,7 @@ class RecorderLoop:
             self._step(host_now())
         self._recordings.wind_up("the service process is gone" if self._control.ended else "told to quit", _WIND_UP_S)
         self._publisher.close()
+        self._health.close()
         self._buffers.close()
 
     def _step(self, now: HostNs) -> None:

@@ -111,6 +111,11 @@ class Recordings:
         return self._recording is not None
 
     @property
+    def saving(self) -> bool:
+        """Whether a recording has all its pulses, and waits for the disk."""
+        return self._recording is not None and self._phase in {_Phase.FLUSHING, _Phase.CLOSING}
+
+    @property
     def pressing(self) -> bool:
         """Whether `work` has something to do at once, even if no new pulse comes."""
         return self._behind or (self._recording is not None and self._phase is not _Phase.RUNNING)
@@ -160,7 +165,7 @@ class Recordings:
                 self._fail(recording, recording.log.error)
             else:
                 self._go_on(recording, now)
-        if self._recording is None or self._phase in {_Phase.FLUSHING, _Phase.CLOSING}:
+        if self._recording is None or self.saving:
             self._preroll.trim(now)
 
     def progress(self) -> None:

@@ -11,6 +11,7 @@ from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 
 
 @contextmanager
@@ -26,7 +27,9 @@ def _hill_and_service(folder: Path, loopback: Loopback, *absent: str) -> Iterato
             yield hill, service
 
 
-def test_two_of_three_cameras_record_and_the_third_joins_in(tmp_path: Path, loopback: Loopback) -> None:
+def test_two_of_three_cameras_record_and_the_third_joins_in(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     with _hill_and_service(tmp_path, loopback, "K2") as (hill, service):
         service.arm()
         status = service.await_cameras("ready", "absent", "ready")
@@ -42,14 +45,23 @@ def test_two_of_three_cameras_record_and_the_third_joins_in(tmp_path: Path, loop
         assert ended["counts"]["causes"]["absent"] == ended["counts"]["pulses"] == ended["counts"]["partial"]
         hill.restart("K2")
         assert service.await_cameras("ready", "ready", "ready")["state"] == "armed"
+    said = (
+        f"{status['cameras'][1]['statement']['text'].partition(':')[0]}; {status['cameras'][1]['statement']['advice']}"
+    )
+    fault_table.tell(
+        "Cameras and pulses", "one of three cameras is not there", lost="none: its frames, absent", said=said
+    )
 
 
-def test_a_rig_that_loses_all_cameras_is_armed_again_when_one_is_back(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_rig_that_loses_all_cameras_is_armed_again_when_one_is_back(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     with _hill_and_service(tmp_path, loopback, "K3") as (hill, service):
         service.arm()
         hill.kill("K1")
         hill.kill("K2")
-        assert service.await_state("fault")["statement"]["code"] == "fault_no_camera"
+        fault = service.await_state("fault")["statement"]
+        assert fault["code"] == "fault_no_camera"
         hill.restart("K2")
         status = service.await_state("armed")
         assert [camera["state"] for camera in status["cameras"]] == ["absent", "ready", "absent"]
@@ -60,3 +72,5 @@ def test_a_rig_that_loses_all_cameras_is_armed_again_when_one_is_back(tmp_path: 
         service.await_state("fault")
         service.post("/api/disarm")
         service.await_state("idle")
+    said = f"{fault['text']}; {fault['advice']}"
+    fault_table.tell("Cameras and pulses", "all cameras go while the rig is armed", lost="-", said=said)

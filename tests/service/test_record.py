@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,8 +22,10 @@ from rig.settings.file import load_rig
 from svev.demo import hill_pulses
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
+PROCESSES = "Processes"
 SVEV = [sys.executable, "-m", "svev"]
 
 
@@ -76,7 +79,9 @@ CAUSES = {"missed_pulse": ("K1", "missed"), "lost_frame": ("K2", "lost"), "damag
 
 
 @pytest.mark.parametrize("backend", ["sim", "aravis"])
-def test_each_fault_is_recorded_with_its_cause(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+def test_each_fault_is_recorded_with_its_cause(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str
+) -> None:
     """Faults come again and again, so that the recording meets some whenever it begins."""
     faults: list[dict[str, Any]] = [
         {"kind": kind, "camera": camera, "at_pulse": pulse}
@@ -103,9 +108,14 @@ def test_each_fault_is_recorded_with_its_cause(tmp_path: Path, loopback: Loopbac
     }
     assert found == expected
     assert set(expected.values()) == {"missed", "lost", "damaged"}
+    what = {"missed_pulse": "a camera does not see a pulse", "lost_frame": "a frame is lost in transfer"}
+    what["damaged_frame"] = "a frame comes damaged"
+    for kind, (camera, status) in CAUSES.items():
+        fault = f"{what[kind]} ({'GigE Vision' if backend == 'aravis' else 'sim'})"
+        fault_table.tell("Cameras and pulses", fault, lost="none: that frame", said=f"{camera} {status}", code=code)
 
 
-def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback) -> None:
+def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     process = _record(write_rig(tmp_path, "sim", loopback), tmp_path / "logs", 60)
     wait_until(_recording(tmp_path / "logs"), "recording", 20)
     process.send_signal(signal.SIGINT)
@@ -113,10 +123,13 @@ def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback) 
     assert code == 0, err
     assert result["stopped_early"]
     assert verify(Path(result["log"])).verdict == "clean"
+    fault_table.tell(PROCESSES, "Ctrl-C during `svev record`", lost=0, said='"stopped_early": true', code=code)
 
 
 @pytest.mark.parametrize("backend", ["sim", "aravis"])
-def test_a_killed_grabber_costs_its_own_frames_only(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+def test_a_killed_grabber_costs_its_own_frames_only(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str
+) -> None:
     process = _record(write_rig(tmp_path, backend, loopback), tmp_path / "logs", 120)
     wait_until(_recording(tmp_path / "logs"), "recording", 20)
     (log,) = (tmp_path / "logs").glob("*.mcap")
@@ -134,6 +147,9 @@ def test_a_killed_grabber_costs_its_own_frames_only(tmp_path: Path, loopback: Lo
     assert all(FrameStatus.ABSENT not in (first, last) for first, _, last in fates), "the others go on"
     assert fates[-1][1] is not FrameStatus.ABSENT
     assert not verify(log).damaged
+    lost = f"none: {result['causes']['absent']} frames of K2, absent"
+    said = next(line for line in err.splitlines() if "SIGKILL" in line)
+    fault_table.tell(PROCESSES, f"kill -9 of a grabber ({backend})", lost=lost, said=said, code=code)
 
 
 def _said_of(log: Path, name: str) -> str:
@@ -143,7 +159,9 @@ def _said_of(log: Path, name: str) -> str:
     return " | ".join(event.message for event in events if event.name == name)
 
 
-def test_a_killed_recorder_leaves_a_readable_log_and_no_process(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_killed_recorder_leaves_a_readable_log_and_no_process(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     process = _record(write_rig(tmp_path, "sim", loopback), tmp_path / "logs", 60)
     wait_until(_recording(tmp_path / "logs"), "recording", 20)
     os.kill(_children(process.pid)["recorder"], signal.SIGKILL)
@@ -155,9 +173,13 @@ def test_a_killed_recorder_leaves_a_readable_log_and_no_process(tmp_path: Path, 
     report = verify(log)
     assert report.ledger.pulses > 2
     assert not report.closed
+    said = err.strip().splitlines()[-1]
+    fault_table.tell(PROCESSES, "kill -9 of the recorder", lost="those from then on", said=said, code=code)
 
 
-def test_a_killed_parent_leaves_a_finished_log_and_no_process(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_killed_parent_leaves_a_finished_log_and_no_process(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     process = _record(write_rig(tmp_path, "aravis", loopback), tmp_path / "logs", 60)
     wait_until(_recording(tmp_path / "logs"), "recording", 20)
     children = _children(process.pid)
@@ -167,7 +189,11 @@ def test_a_killed_parent_leaves_a_finished_log_and_no_process(tmp_path: Path, lo
     (log,) = (tmp_path / "logs").glob("*.mcap")
     report = verify(log)
     assert report.closed
-    assert any("service process is gone" in event.message for event in report.events)
+    said = next(event.message for event in report.events if "service process is gone" in event.message)
+    what = "kill -9 of `svev record`"
+    fault_table.tell(
+        PROCESSES, what, lost="those from then on", said=f"{said} (event in the log)", code=process.returncode
+    )
 
 
 @pytest.mark.parametrize(
@@ -190,30 +216,37 @@ def test_bad_input_is_one_line_and_exit_2(
     assert len(err.strip().splitlines()) == 1
 
 
-def test_a_camera_that_is_not_there_is_named(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_camera_that_is_not_there_is_named(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     path = write_rig(tmp_path, "aravis", loopback)
     path.write_text(path.read_text().replace('[simulation]\nscenario = "scenario.toml"\n', "settle_s = 1.0\n"))
     code, _, err = _result(_record(path, tmp_path / "logs", 1))
     assert code == 2
     assert f"camera K1 at {loopback.cameras(1)[0]} does not answer" in err.splitlines()[-1]
+    said = re.sub(r"[\d.]{7,}", "ADDRESS", err.strip().splitlines()[-1].partition(";")[0])
+    fault_table.tell("Cameras and pulses", "no camera answers at the start", lost="all", said=said, code=code)
 
 
-def test_an_unwritable_directory_is_named(tmp_path: Path, loopback: Loopback) -> None:
+def test_an_unwritable_directory_is_named(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     (tmp_path / "file").touch()
     code, _, err = _result(_record(write_rig(tmp_path, "sim", loopback), tmp_path / "file" / "logs", 1))
     assert (code, len(err.strip().splitlines())) == (2, 1)
     assert "cannot be written" in err
+    fault_table.tell("The disk", "the folder cannot be written", lost="all", said=err, code=code)
 
 
-def test_a_recording_that_does_not_fit_is_refused(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_recording_that_does_not_fit_is_refused(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     path = write_rig(tmp_path, "sim", loopback)
     path.write_text(path.read_text().replace("[network]", "[recorder]\nreserve_gb = 1e9\n[network]"))
     code, _, err = _result(_record(path, tmp_path / "logs", 1))
     assert code == 4
     assert "there is room for 0 s and 1 s are wanted, beside the reserve" in err
+    said = re.sub(r"1e\+09", "N", err)
+    fault_table.tell("The disk", "the recording does not fit on the disk", lost="all", said=said, code=code)
 
 
-def test_a_full_disk_ends_the_recording_and_what_is_written_is_whole(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_full_disk_ends_the_recording_and_what_is_written_is_whole(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     """A disk of 40 MB, mounted in a mount namespace of the test's own."""
     path = write_rig(tmp_path, "sim", loopback)
     path.write_text(path.read_text().replace("[network]", "[recorder]\nreserve_gb = 0\n[network]"))
@@ -235,3 +268,7 @@ def test_a_full_disk_ends_the_recording_and_what_is_written_is_whole(tmp_path: P
     report = verify(kept)
     assert report.ledger.pulses > 20
     assert report.ledger.complete == report.ledger.pulses
+    said = done.stderr.splitlines()[-1]
+    fault_table.tell(
+        "The disk", "the disk is full (a real one)", lost="those from then on", said=said, code=done.returncode
+    )

@@ -16,6 +16,7 @@ from rig.topics import RIG_ATTACHMENT, TAG
 from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
 
@@ -60,7 +61,9 @@ def test_a_recording_of_a_given_length_ends_by_itself(tmp_path: Path, loopback: 
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_while_recording_finishes_the_file(tmp_path: Path, loopback: Loopback, number: signal.Signals) -> None:
+def test_a_signal_while_recording_finishes_the_file(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, number: signal.Signals
+) -> None:
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
         service.arm()
         service.post("/api/recordings", {})
@@ -71,6 +74,9 @@ def test_a_signal_while_recording_finishes_the_file(tmp_path: Path, loopback: Lo
             assert service.exit_code() == 0, service.log.read_text()
     (log,) = (tmp_path / "data").glob("*.mcap")
     assert verify(log).verdict == "clean"
+    fault_table.tell(
+        "Processes", f"{number.name} to the service while recording", lost=0, said="the log is clean", code=0
+    )
 
 
 def test_signals_that_keep_coming_do_not_spoil_the_end(tmp_path: Path, loopback: Loopback) -> None:
@@ -84,7 +90,7 @@ def test_signals_that_keep_coming_do_not_spoil_the_end(tmp_path: Path, loopback:
         assert service.exit_code() == 0, service.log.read_text()
 
 
-def test_a_killed_grabber_comes_back(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_killed_grabber_comes_back(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
         service.arm()
         recording = service.post("/api/recordings", {})
@@ -99,9 +105,14 @@ def test_a_killed_grabber_comes_back(tmp_path: Path, loopback: Loopback) -> None
         ended = service.post(f"/api/recordings/{recording['id']}/stop")
         assert ended["counts"]["causes"]["absent"] > 0
         assert "K2: grabber process ended (killed by SIGKILL)" in service.log.read_text()
+    lost = f"none: {ended['counts']['causes']['absent']} frames of K2, absent"
+    said = rows["K2"]["statement"]["text"]
+    fault_table.tell("Processes", "kill -9 of a grabber of the service", lost=lost, said=said)
 
 
-def test_a_killed_recorder_ends_the_recording_and_the_rig_is_armed_again(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_killed_recorder_ends_the_recording_and_the_rig_is_armed_again(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
         service.arm()
         recording = service.post("/api/recordings", {})
@@ -117,9 +128,13 @@ def test_a_killed_recorder_ends_the_recording_and_the_rig_is_armed_again(tmp_pat
         again = service.post("/api/recordings", {"duration_s": 0.5})
         assert service.await_state("armed")["statement"]["code"] in {"state_armed", "state_armed_partly"}
         assert service.get(f"/api/recordings/{again['id']}")["state"] == "finished"
+    said, lost = status["statement"]["text"], "those from then on; the next recording is whole"
+    fault_table.tell("Processes", "kill -9 of the recorder of the service", lost=lost, said=said)
 
 
-def test_a_killed_service_leaves_a_whole_log_and_no_process(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_killed_service_leaves_a_whole_log_and_no_process(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     rig = write_rig(tmp_path, "sim", loopback)
     with serving(tmp_path, rig, loopback, ends_with=-signal.SIGKILL) as service:
         service.arm()
@@ -131,7 +146,11 @@ def test_a_killed_service_leaves_a_whole_log_and_no_process(tmp_path: Path, loop
         wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids.values()), "all gone", PATIENCE_S)
     report = verify(service.data / f"{recording['id']}.mcap")
     assert report.closed
-    assert any("service process is gone" in event.message for event in report.events)
+    said = next(event.message for event in report.events if "service process is gone" in event.message)
+    what = f"{said} (event in the log); the log is closed"
+    fault_table.tell(
+        "Processes", "kill -9 of the service while recording", lost="those from then on", said=what, code=-9
+    )
     with serving(tmp_path, rig, loopback) as again:
         (found,) = again.get("/api/recordings")
         assert (found["id"], found["state"]) == (recording["id"], "finished")

@@ -15,6 +15,7 @@ from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 
 PERIOD_NS = NS_PER_S // 30
 #: Three pulses, their transport, and a processor that others want too.
@@ -22,7 +23,9 @@ NOTICED_NS = 3 * PERIOD_NS + NS_PER_S // 5
 
 
 @pytest.mark.parametrize("how", ["freeze", "kill"])
-def test_a_camera_that_falls_silent_is_noticed_and_comes_back(tmp_path: Path, loopback: Loopback, how: str) -> None:
+def test_a_camera_that_falls_silent_is_noticed_and_comes_back(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, how: str
+) -> None:
     rig, epoch = make_rig(tmp_path, "aravis", loopback), host_now()
     path, said = tmp_path / "log.mcap", list[str]()
     with simulated_hill(rig, epoch) as hill:
@@ -58,3 +61,6 @@ def test_a_camera_that_falls_silent_is_noticed_and_comes_back(tmp_path: Path, lo
     assert messages[-1] == "connected"
     noticed = next(event for event in report.events if event.name == "K2")
     assert noticed.time - tags[lost[0] - 1].time < NOTICED_NS
+    fault = "a camera freezes, and goes on" if how == "freeze" else "a camera loses its power, and comes back"
+    words = f"K2 {noticed.message}; after that K2 connected"
+    fault_table.tell("Cameras and pulses", fault, lost=f"none: {len(lost)} frames of K2, lost or absent", said=words)

@@ -161,7 +161,8 @@ class Recordings:
         for each in (*self._earlier, *([] if recording is None else [recording])):
             each.confirm()
         if recording is not None:
-            if recording.failure is None and recording.log is not None and recording.log.error is not None:
+            writing = self._phase in {_Phase.RUNNING, _Phase.FLUSHING}
+            if writing and recording.log is not None and recording.log.error is not None:
                 self._fail(recording, recording.log.error)
             else:
                 self._go_on(recording, now)
@@ -349,6 +350,7 @@ class Recordings:
     def _refuse(self, error: SvevError) -> None:
         """Report that a log could not be made."""
         if self._earlier:
+            self._report(RecorderEvent(event=Event.now(Level.ERROR, "disk", f"there neither: {error}")))
             self._finish(self._earlier.pop())
         else:
             self._report(RecorderFailed.of(error))

@@ -251,6 +251,20 @@ def test_a_log_that_vanishes_is_noticed_and_the_recording_goes_on(
     fault_table.tell(DISK, f"{faults[what]} while it is recorded", lost=lost, said=_last(err), code=code)
 
 
+def test_a_second_disk_that_fails_too_is_said(
+    tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable
+) -> None:
+    rig = _rig(tmp_path, loopback, f'fallback_directory = "{tmp_path / "second"}"')
+    recording = Record(rig, tmp_path / "logs", 60, disk)
+    recording.await_bytes(20_000_000)
+    disk.fail(errno.EIO, Call.WRITE | Call.OPEN)
+    code, result, err = recording.result()
+    assert code == 4
+    assert "there neither: " in err
+    _agree(result, verify(Path(result["log"])))
+    fault_table.tell(DISK, "both disks fail", lost=AFTER, said=_last(err), code=code)
+
+
 @pytest.mark.parametrize("fault", ["fails", "hangs"])
 def test_on_a_second_disk_the_recording_goes_on_without_a_gap(
     tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, fault: str

@@ -10,6 +10,7 @@ from mcap.records import (
     Attachment,
     AttachmentIndex,
     ChunkIndex,
+    DataEnd,
     Footer,
     McapRecord,
     MessageIndex,
@@ -46,11 +47,16 @@ class StructureCheck:
     Args:
         reader: the log that the items are from.
         report: called with each finding.
+
+    Attributes:
+        data_checksum: the log holds a checksum over every byte before its summary.
+        summary_checksum: the log holds a checksum over its summary.
     """
 
     def __init__(self, reader: LogReader, report: Callable[[str], None]) -> None:
         self._reader = reader
         self._report = report
+        self.data_checksum = self.summary_checksum = False
         self._sound = True
         self._chunk: _OpenChunk | None = None
         self._expected: dict[int, list[bytes]] = {opcode: [] for opcode in _LISTED}
@@ -81,6 +87,8 @@ class StructureCheck:
     def finish(self) -> None:
         """Report what is missing at the end of the file."""
         self._end_chunk()
+        if self._summary_start is None and self._reader.closed:
+            self._report("the log does not say where its data ends")
         if self._summary_start is None or not self._sound:
             return
         for opcode, (name, _) in _LISTED.items():
@@ -141,6 +149,12 @@ class StructureCheck:
                 self._report(f"message at byte {item.offset}: stands outside of a chunk")
             case Opcode.DATA_END:
                 self._summary_start = item.offset + item.length
+                self._data_end(DataEnd.read(stream(item.body)))
+
+    def _data_end(self, data_end: DataEnd) -> None:
+        self.data_checksum = bool(data_end.data_section_crc)
+        if self.data_checksum and self._reader.data_crc not in (data_end.data_section_crc, None):
+            self._report("the checksum of everything before the summary is wrong")
 
     def _summary_record(self, item: SmallRecord) -> None:
         start, length = self._groups.get(item.opcode, (item.offset, 0))
@@ -197,6 +211,7 @@ class StructureCheck:
             self._report(f"the footer says that the summary starts at byte {footer.summary_start}, not {start}")
             return
         if footer.summary_crc:
+            self.summary_checksum = True
             crc = 0
             for offset in range(start, item.offset, _PIECE):
                 crc = crc32(self._reader.read(offset, min(_PIECE, item.offset - offset)), crc)

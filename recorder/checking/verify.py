@@ -61,8 +61,10 @@ class VerifyReport:
         truncated: the log ends in the middle of a record.
         ledger: what became of every pulse.
         findings: what is wrong with the log itself, one sentence each.
-        known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         events: events in the log, the first thousand.
+        every_byte: the log holds checksums over every byte of it; logs of earlier versions hold them over images, tags
+            and messages, but not over metadata and what stands between chunks.
+        known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
     """
 
     path: Path
@@ -72,6 +74,7 @@ class VerifyReport:
     ledger: Ledger
     findings: tuple[str, ...]
     events: tuple[Event, ...]
+    every_byte: bool
     known_lost: tuple[tuple[int, int], ...] = ()
 
     @property
@@ -94,6 +97,7 @@ class VerifyReport:
             "verdict": self.verdict.value,
             "closed": self.closed,
             "truncated": self.truncated,
+            "every_byte_checked": self.every_byte,
             **self.ledger.counts().model_dump(),
             "bytes": self.bytes,
             "missing_pulses": numbers(self.ledger.missing, _PULSES_MAX),
@@ -130,7 +134,7 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
             findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
         return VerifyReport(
             path, reader.size, reader.closed, reader.truncated, pulses.ledger, findings.lines(), tuple(pulses.events),
-            known_lost(reader),
+            structure.data_checksum and structure.summary_checksum, known_lost(reader),
         )  # fmt: skip
 
 

@@ -20,7 +20,8 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from recorder.log.mcap_layout import MAGIC, ChunkPlan, records
+from recorder.log.crc import combined_crc
+from recorder.log.mcap_layout import MAGIC, ChunkPlan, padding, records
 from rig.clocks import UtcNs
 
 #: The part of the footer record that its own CRC covers: opcode, length, start of summary and of summary offsets.
@@ -30,7 +31,8 @@ FOOTER_BEFORE_CRC = struct.Struct("<BQQQ")
 class LogIndex:
     """Notes what is in the file and builds the summary section.
 
-    Keeps chunk indexes as the bytes that the summary will hold (about 100 per triplet).
+    Keeps chunk indexes as the bytes that the summary will hold (about 100 per triplet), and the CRC of all bytes that
+    were written, from the first one of the file on. Everything is noted in the order of the file.
 
     Attributes:
         messages: number of messages per channel id.
@@ -47,9 +49,16 @@ class LogIndex:
         self.chunks = 0
         self._first = UtcNs(0)
         self._last = UtcNs(0)
+        self._covered = 0
+        self._crc = 0
+
+    def add_bytes(self, position: int, data: bytes) -> None:
+        """Note bytes outside of chunks that were written `position` bytes into the file."""
+        self._cover(position, len(data), crc32(data))
 
     def add_chunk(self, position: int, plan: ChunkPlan) -> None:
         """Note a chunk that was written `position` bytes into the file."""
+        self._cover(position, plan.written, plan.crc)
         index = ChunkIndex(
             chunk_length=plan.length,
             chunk_start_offset=position + plan.offset,
@@ -82,7 +91,8 @@ class LogIndex:
         Args:
             position: where these bytes will stand in the file.
         """
-        data_end = records(DataEnd(0))
+        self._cover(position, 0, 0)
+        data_end = records(DataEnd(self._crc))
         start = position + len(data_end)
         statistics = Statistics(
             attachment_count=len(self._attachments),
@@ -111,6 +121,13 @@ class LogIndex:
         offsets_start = start + len(summary)
         summary += offsets.end()  # type: ignore[no-untyped-call]
         return data_end + bytes(summary) + footer(bytes(summary), start, offsets_start) + MAGIC
+
+    def _cover(self, position: int, length: int, crc: int) -> None:
+        """Take the next written bytes into the CRC of the data section; what was left out before them is padding."""
+        if position > self._covered:
+            self._crc = crc32(padding(position - self._covered), self._crc)
+        self._crc = combined_crc(self._crc, crc, length)
+        self._covered = position + length
 
 
 def attachment_index(attachment: Attachment, position: int, length: int) -> AttachmentIndex:

@@ -19,6 +19,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import McapRecord
 
+from recorder.log.crc import combined_crc
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
 
@@ -53,6 +54,8 @@ class ChunkPlan:
         log_time: log time of all its messages, UTC.
         indexes: for each channel with a message in the chunk, its id and where its message index record starts.
         indexes_length: bytes of the message index records, which follow the chunk.
+        written: bytes of the write.
+        crc: CRC-32 of these bytes.
     """
 
     offset: int
@@ -61,6 +64,8 @@ class ChunkPlan:
     log_time: UtcNs
     indexes: tuple[tuple[int, int], ...]
     indexes_length: int
+    written: int
+    crc: int
 
 
 def round_up(size: int, unit: int = PAGE) -> int:
@@ -89,7 +94,10 @@ def chunk_of_one(
     size = len(head) + len(data)
     chunk = _chunk_head(log_time, size, crc32(data, crc32(head))) + head + data
     index = _index(channel, log_time, 0)
-    return chunk + index, ChunkPlan(0, len(chunk), size, log_time, ((channel, len(chunk)),), len(index))
+    whole = chunk + index
+    return whole, ChunkPlan(
+        0, len(chunk), size, log_time, ((channel, len(chunk)),), len(index), len(whole), crc32(whole)
+    )  # fmt: skip
 
 
 class SlotLayout:
@@ -106,6 +114,7 @@ class SlotLayout:
         self.pixels = HEAD_ROOM
         self.end = HEAD_ROOM + shape[0] * shape[1]
         self.slot_bytes = round_up(self.end + 2 * _INDEX_OF_ONE.size + RECORD.size)
+        combined_crc(0, 0, (1 << self.slot_bytes.bit_length()) - 1)  # makes its tables now, not with the first triplet
 
     def complete(
         self, slot: memoryview, tag: bytes, pulse: PulseNumber, pulse_time: UtcNs, log_time: UtcNs
@@ -132,18 +141,22 @@ class SlotLayout:
             TRIPLET_CHANNEL, pulse, len(prefix) + pixels, pulse_time, log_time
         ) + prefix  # fmt: skip
         size = len(before) + pixels
-        head = _chunk_head(log_time, size, crc32(slot[self.pixels : self.end], crc32(before))) + before
+        content_crc = crc32(slot[self.pixels : self.end], crc32(before))
+        head = _chunk_head(log_time, size, content_crc) + before
         start = self.pixels - round_up(len(head) + RECORD.size)
         if start < 0:
             raise ValueError(f"tag of {len(tag)} bytes does not fit before the pixels; shorten session and recording")
         chunk = self.pixels - len(head)
-        slot[start : self.pixels] = padding(chunk - start) + head
+        lead = padding(chunk - start)
+        slot[start : self.pixels] = lead + head
         tail = _index(TAG_CHANNEL, log_time, 0) + _index(TRIPLET_CHANNEL, log_time, len(tag_message))
-        slot[self.end : self.slot_bytes] = tail + padding(self.slot_bytes - self.end - len(tail))
+        slot[self.end : self.slot_bytes] = rest = tail + padding(self.slot_bytes - self.end - len(tail))
         tag_index = self.end - start
+        crc = combined_crc(crc32(head[: -len(before)], crc32(lead)), content_crc, size)  # the pixels are read once
         return slot[start : self.slot_bytes], ChunkPlan(
             chunk - start, len(head) + pixels, size, log_time,
             ((TAG_CHANNEL, tag_index), (TRIPLET_CHANNEL, tag_index + _INDEX_OF_ONE.size)), len(tail),
+            self.slot_bytes - start, crc32(rest, crc),
         )  # fmt: skip
 
 

@@ -112,6 +112,8 @@ class LogReader:
         library: the program that wrote it, empty if `salvage`.
         metadata: fields of the metadata records by name, the last of each, as far as the log has been read.
         attachments: contents by name, as far as the log has been read.
+        data_crc: CRC-32 of all bytes from the first one of the file to the data end record, None until `items` has
+            come to that record without meeting damage, and always if it does not read everything.
     """
 
     def __init__(self, path: Path, *, skim: bool = False, salvage: bool = False) -> None:
@@ -130,6 +132,7 @@ class LogReader:
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.truncated = False
+        self.data_crc: int | None = None
         self._assumed = {channel.id: channel.topic for channel in schemas_and_channels()[1]} if salvage else {}
         self._topics = dict(self._assumed)
         self._window = FileWindow(path, direct=not skim)
@@ -156,11 +159,18 @@ class LogReader:
         Raises:
             BadInputError: the disk cannot read the file.
         """
+        crc = crc32(self._window.read(0, len(MAGIC))) if only is None else None
         for record in walk(self._window):
             if isinstance(record, Damage):
+                crc = None
                 self.truncated = self.truncated or record.torn
                 yield record
-            elif record.opcode == Opcode.CHUNK:
+                continue
+            if record.opcode == Opcode.DATA_END:
+                self.data_crc, crc = crc, None
+            elif crc is not None:
+                crc = crc32(self._window.read(record.offset, record.length), crc)
+            if record.opcode == Opcode.CHUNK:
                 yield self._chunk(record, only)
             elif record.opcode != PADDING_OPCODE:
                 yield self._small(record)

@@ -181,6 +181,8 @@ def _record_at(window: FileWindow, offset: int) -> RawRecord | None:
             plausible = _is_chunk(window, offset + RECORD.size, content)
         case Opcode.FOOTER:
             plausible = content == 8 + 8 + 4
+        case Opcode.DATA_END:
+            plausible = content == 4
         case _ if opcode == PADDING_OPCODE:
             plausible = content <= _PADDING_MAX
         case _:
@@ -221,6 +223,6 @@ def _begins_readable(window: FileWindow, offset: int) -> bool:
     if record is None:
         return False
     if record.opcode == Opcode.DATA_END:
-        return record.length == RECORD.size + 4
+        return True
     inner = window.read(record.offset + RECORD.size + CHUNK_HEAD.size + 8, RECORD.size)
     return record.opcode == Opcode.CHUNK and inner[0] == Opcode.MESSAGE and record.length > MESSAGE.size

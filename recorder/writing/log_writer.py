@@ -266,6 +266,7 @@ class LogWriter:
             record = records(attachment)
             self._index.add_attachment(attachment, len(out), len(record))
             out += record
+        self._index.add_bytes(0, out)
         self._file.append(join_pages([out]))
         self._file.sync_entry()
 
@@ -290,6 +291,7 @@ class LogWriter:
 
     def _closing_bytes(self) -> bytes:
         metadata = self._changed_metadata(self._file.size)
+        self._index.add_bytes(self._file.size, metadata)
         return metadata + self._index.closing_bytes(self._file.size + len(metadata))
 
 

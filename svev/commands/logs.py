@@ -136,6 +136,8 @@ def _print_verified(report: VerifyReport) -> None:
     ledger = report.ledger
     console.say(f"{report.path}: {report.verdict.value}")
     console.say(f"{ledger.summary_line()}; {report.bytes / 1e6:.1f} MB; {'' if report.closed else 'not '}closed")
+    if report.closed and not report.every_byte:
+        console.say("  no checksum over the whole log: what stands outside of images, tags and messages is not checked")
     lines = [*ledger.in_words(), *report.findings]
     for line in lines[:_LINES_MAX]:
         console.say(f"  {line}")

@@ -17,6 +17,7 @@ from mcap_protobuf.schema import register_schema
 from recorder.checking.verify import VerifyReport, verify
 from rig.clocks import UtcNs
 from rig.tag import TAG_SCHEMA, TripletTag
+from svev.cli import main
 from tests.recorder.logs import ABSENT, ALL_OK, DAMAGED, LOST, OK, READY_NS, make_image, make_tag, write_log
 
 
@@ -80,10 +81,35 @@ def test_a_complete_log_is_clean(tmp_path: Path) -> None:
     assert read[-1] == (tmp_path / "log.mcap").stat().st_size - 8  # all but the closing magic
     assert report.to_json() | {"events": []} == {
         "log": str(tmp_path / "log.mcap"), "verdict": "clean", "closed": True, "truncated": False,
-        "pulses": 5, "complete": 5, "partial": 0,
+        "every_byte_checked": True, "pulses": 5, "complete": 5, "partial": 0,
         "causes": {"lost": 0, "missed": 0, "damaged": 0, "absent": 0}, "bytes": (tmp_path / "log.mcap").stat().st_size,
         "missing_pulses": [], "incomplete_pulses": [], "findings": [], "events": [],
     }  # fmt: skip
+
+
+def test_a_log_without_a_checksum_over_everything_is_read_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As earlier versions wrote them."""
+    path = tmp_path / "log.mcap"
+    write_log(path, (ALL_OK,) * 2)
+    data = bytearray(path.read_bytes())
+    end = data.rindex(b"\x0f\x04\0\0\0\0\0\0\0")
+    data[end + 9 : end + 13] = bytes(4)
+    path.write_bytes(data)
+    report = verify(path)
+    assert (report.verdict, report.findings, report.every_byte) == ("clean", (), False)
+    assert main(["verify", str(path)]) == 0
+    assert "no checksum over the whole log" in capsys.readouterr().out
+
+
+def test_a_log_that_does_not_say_where_its_data_ends_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    write_log(path, (ALL_OK,) * 2)
+    data = bytearray(path.read_bytes())
+    data[data.rindex(b"\x0f\x04\0\0\0\0\0\0\0")] = 0x80
+    path.write_bytes(data)
+    assert verify(path).findings == ("the log does not say where its data ends",)
 
 
 def test_a_partial_log_says_per_pulse_what_is_missing(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import tracemalloc
+import zlib
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,8 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import McapReader, NonSeekingReader, make_reader
+from mcap.records import DataEnd
+from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from recorder.checking.verify import verify
@@ -64,6 +67,17 @@ def _check(written: list[Written], reader: McapReader) -> None:
         assert (image.encoding, image.frame_id) == ("mono8", "triplet")
         assert image.timestamp.ToNanoseconds() == w.tag.time
         assert np.array_equal(np.frombuffer(image.data, np.uint8).reshape(w.tag.shape), w.image)
+
+
+def test_the_checksum_covers_every_byte_before_it(tmp_path: Path) -> None:
+    """The mcap package checks it as it reads; and it is that of the bytes in the file."""
+    path = tmp_path / "log.mcap"
+    write_log(path, PULSES)
+    with path.open("rb") as file:
+        ends = [record for record in StreamReader(file, validate_crcs=True).records if isinstance(record, DataEnd)]
+    data = path.read_bytes()
+    end = data.rindex(b"\x0f\x04\0\0\0\0\0\0\0")
+    assert [record.data_section_crc for record in ends] == [zlib.crc32(data[:end])]
 
 
 @pytest.mark.parametrize("shape", [(24, 90), (64, 192), (3, 3)])

@@ -21,11 +21,14 @@ from mcap.records import McapRecord
 
 from recorder.log.crc import combined_crc
 from rig.clocks import UtcNs
+from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 
 MAGIC = b"\x89MCAP0\r\n"
 PAGE = 4096
 PADDING_OPCODE = 0x80
+#: No chunk is longer: readers refuse what claims to be.
+CHUNK_MAX = 256 << 20
 
 TRIPLET_CHANNEL = 1
 TAG_CHANNEL = 2
@@ -110,6 +113,16 @@ class SlotLayout:
     """
 
     def __init__(self, shape: tuple[int, int]):
+        """Lay out a slot.
+
+        Raises:
+            BadInputError: the triplet is larger than a chunk may be.
+        """
+        if HEAD_ROOM + shape[0] * shape[1] > CHUNK_MAX:
+            raise BadInputError(
+                f"a triplet of {shape[1]} x {shape[0]} px: a log takes {CHUNK_MAX >> 20} MB per pulse at most; "
+                "make the cameras' regions smaller"
+            )
         self.shape = shape
         self.pixels = HEAD_ROOM
         self.end = HEAD_ROOM + shape[0] * shape[1]

@@ -15,10 +15,30 @@ from mcap.records import Attachment, Channel, Header, Metadata
 
 from recorder.log.channels import schemas_and_channels
 from recorder.log.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, RECORD
-from recorder.reading.records import CHUNK_HEAD, Damage, FileWindow, RawRecord, is_closed, walk
+from recorder.reading.records import CHUNK_HEAD, Damage, FileWindow, RawRecord, chunks_anywhere, is_closed, walk
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
-from rig.topics import PROFILE, TRIPLET
+from rig.topics import (
+    CALIBRATION_ATTACHMENT,
+    EVENTS,
+    HEALTH,
+    PROFILE,
+    RECOVERY_METADATA,
+    RIG_ATTACHMENT,
+    RIG_METADATA,
+    SESSION_METADATA,
+    TAG,
+    TRIPLET,
+)
+
+#: The metadata records and attachments whose content is kept.
+_METADATA = (SESSION_METADATA, RIG_METADATA, RECOVERY_METADATA)
+_ATTACHMENTS = (RIG_ATTACHMENT, CALIBRATION_ATTACHMENT)
+#: So many channels, messages in a chunk, and bytes of a message on these topics are taken, so that no file can use up
+#: the memory; ours have a few.
+_CHANNELS_MAX, _MESSAGES_MAX, _SMALL_MAX = 1000, 1 << 16, 1 << 16
+_SMALL_TOPICS = (TAG.name, EVENTS.name, HEALTH.name)
+_NAME_MAX = 60
 
 #: What the `mcap` library raises on bytes that are not the record that it is asked to read.
 UNREADABLE = (struct.error, ValueError, OverflowError, McapError)
@@ -77,6 +97,8 @@ class Chunk:
         messages: its messages, as far as they could be read.
         declarations: schemas and channels that it declares (svev declares them before the first chunk).
         flaw: why its content cannot be trusted, empty if it can.
+        crc: CRC-32 of the records in it, as its head says; 0 may mean that it says none.
+        checked: that is the CRC-32 of the records in it; False if they were not read.
     """
 
     offset: int
@@ -87,6 +109,8 @@ class Chunk:
     messages: tuple[Message, ...]
     declarations: tuple[SmallRecord, ...]
     flaw: str
+    crc: int
+    checked: bool
 
     @property
     def images(self) -> dict[int, Message]:
@@ -110,8 +134,8 @@ class LogReader:
         closed: the log was closed properly: it ends in a footer.
         truncated: the log ends in the middle of a record; known only when it has been read to its end.
         library: the program that wrote it, empty if `salvage`.
-        metadata: fields of the metadata records by name, the last of each, as far as the log has been read.
-        attachments: contents by name, as far as the log has been read.
+        metadata: fields of our metadata records by name, the last of each, as far as the log has been read.
+        attachments: contents of our attachments by name, as far as the log has been read, if it is read in full.
         data_crc: CRC-32 of all bytes from the first one of the file to the data end record, None until `items` has
             come to that record without meeting damage, and always if it does not read everything.
     """
@@ -160,20 +184,37 @@ class LogReader:
             BadInputError: the disk cannot read the file.
         """
         crc = crc32(self._window.read(0, len(MAGIC))) if only is None else None
-        for record in walk(self._window):
+        for record in walk(self._window, len(MAGIC), self.size):
             if isinstance(record, Damage):
                 crc = None
-                self.truncated = self.truncated or record.torn
-                yield record
-                continue
-            if record.opcode == Opcode.DATA_END:
+            elif record.opcode == Opcode.DATA_END:
                 self.data_crc, crc = crc, None
             elif crc is not None:
                 crc = crc32(self._window.read(record.offset, record.length), crc)
-            if record.opcode == Opcode.CHUNK:
-                yield self._chunk(record, only)
-            elif record.opcode != PADDING_OPCODE:
-                yield self._small(record)
+            if (item := self._item(record, only)) is not None:
+                yield item
+
+    def items_between(self, begin: int, end: int) -> Iterator[Item]:
+        """Everything that stands between two places of the file, read and checked.
+
+        Raises:
+            BadInputError: the disk cannot read the file.
+        """
+        for record in walk(self._window, begin, end):
+            if (item := self._item(record, None)) is not None:
+                yield item
+
+    def next_sound_chunk(self, begin: int) -> Chunk | None:
+        """The first chunk from `begin` on, at any offset, whose checksum is right and whose records can be read.
+
+        Raises:
+            BadInputError: the disk cannot read the file.
+        """
+        for record in chunks_anywhere(self._window, begin):
+            chunk = self._chunk(record, None)
+            if chunk.checked and not chunk.flaw:
+                return chunk
+        return None
 
     def sound_chunks(self, only: Collection[str] | None = None) -> Iterator[Chunk]:
         """The chunks without a flaw; `only` as for `items`."""
@@ -190,6 +231,14 @@ class LogReader:
     def read(self, offset: int, length: int) -> memoryview:
         """Bytes of the file, valid until anything else is read."""
         return self._window.read(offset, length)
+
+    def has_grown(self) -> bool:
+        """Whether the log is longer now than when it was opened: somebody is writing it."""
+        return self._window.has_grown()
+
+    def next_data(self, offset: int) -> int:
+        """The first byte from `offset` on that is not in a hole of the file; its size if there is none."""
+        return self._window.next_data(offset)
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -211,9 +260,23 @@ class LogReader:
             raise BadInputError(f"{self.path}: is cut off or damaged before it says what it is; nothing can be read")
         if header.profile != PROFILE:
             raise ForeignFileError(
-                f'{self.path}: is an MCAP log, but not written by svev (profile "{header.profile}"); name a log of svev'
+                f"{self.path}: is an MCAP log, but not written by svev "
+                f'(profile "{_printable(header.profile)}"); name a log of svev'
             )
-        return str(header.library)
+        return _printable(header.library)
+
+    def _item(self, record: RawRecord | Damage, only: Collection[str] | None) -> Item | None:
+        """What a record holds; None for padding and for what is not asked for."""
+        if isinstance(record, Damage):
+            self.truncated = self.truncated or record.torn
+            return record
+        if record.opcode == Opcode.CHUNK:
+            return self._chunk(record, only)
+        if record.opcode == PADDING_OPCODE:
+            return None
+        if only is not None and record.opcode not in (Opcode.CHANNEL, Opcode.METADATA):
+            return None
+        return self._small(record)
 
     def _small(self, record: RawRecord) -> SmallRecord | Damage:
         body = bytes(self._window.read(record.offset + RECORD.size, record.length - RECORD.size))
@@ -221,17 +284,20 @@ class LogReader:
             match record.opcode:
                 case Opcode.CHANNEL:
                     channel = Channel.read(stream(body))
+                    if len(self._topics) >= _CHANNELS_MAX:
+                        raise ValueError(f"more than {_CHANNELS_MAX} channels")
                     self._topics[channel.id] = self._assumed.get(channel.id, channel.topic)
                 case Opcode.METADATA:
                     metadata = Metadata.read(stream(body))
-                    self.metadata[metadata.name] = metadata.metadata
+                    if metadata.name in _METADATA:
+                        self.metadata[metadata.name] = metadata.metadata
                 case Opcode.ATTACHMENT:
                     attachment = Attachment.read(stream(body))
-                    if crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
-                        return Damage(
-                            record.offset, record.length, f"checksum of attachment {attachment.name} is wrong"
-                        )
-                    self.attachments[attachment.name] = attachment.data
+                    if crc32(memoryview(body)[:-4]) != int.from_bytes(body[-4:], "little"):
+                        text = f"checksum of attachment {_printable(attachment.name)} is wrong"
+                        return Damage(record.offset, record.length, text)
+                    if attachment.name in _ATTACHMENTS:
+                        self.attachments[attachment.name] = attachment.data
         except UNREADABLE as error:
             name = Opcode(record.opcode).name.lower()
             return Damage(record.offset, record.length, f"unreadable {name} record: {error}")
@@ -244,17 +310,18 @@ class LogReader:
             self._window.read(record.offset, record.length)
         start_time, end_time, size, crc, name_bytes = CHUNK_HEAD.unpack(self._window.read(begin, CHUNK_HEAD.size))
         first = begin + CHUNK_HEAD.size + name_bytes + 8
+        checked = only is None and crc32(self._window.read(first, end - first)) == crc
         messages: list[Message] = []
         declarations: list[SmallRecord] = []
         if name_bytes:
             flaw = "it is compressed; rewrite the log with `mcap decompress`"
         else:
-            wrong = only is None and crc and crc32(self._window.read(first, end - first)) != crc
+            wrong = only is None and crc and not checked
             trouble = self._content(first, end, only, messages, declarations)
             flaw = "its checksum is wrong" if wrong else trouble
         return Chunk(
             record.offset, record.length, UtcNs(start_time), UtcNs(end_time), size,
-            tuple(messages), tuple(declarations), flaw,
+            tuple(messages), tuple(declarations), flaw, crc, checked,
         )  # fmt: skip
 
     def _content(
@@ -277,6 +344,8 @@ class LogReader:
             following = position + RECORD.size + length
             if following > end:
                 return "its records overrun its end"
+            if len(messages) + len(declarations) >= _MESSAGES_MAX:
+                return f"it holds more than {_MESSAGES_MAX} messages"
             if opcode == Opcode.MESSAGE:
                 message = self._message(head, position, first, following, only)
                 if isinstance(message, str):
@@ -301,6 +370,8 @@ class LogReader:
             return "a message in it is of a channel that is not declared"
         topic = self._topics[channel]
         offset = position + MESSAGE.size
+        if topic in _SMALL_TOPICS and following - offset > _SMALL_MAX:
+            return f"a message in it on {topic} is longer than {_SMALL_MAX} bytes"
         data: memoryview | None = None
         if only is None:
             data = self._window.read(offset, following - offset)
@@ -315,3 +386,9 @@ class LogReader:
 def stream(body: bytes) -> Any:
     """A record's body as a stream, from which the `mcap` library's record classes read."""
     return ReadDataStream(BytesIO(body))
+
+
+def _printable(text: str) -> str:
+    """A name from a file as it can stand in a line: control characters escaped, not too long."""
+    shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text[: _NAME_MAX + 1])
+    return shown if len(shown) <= _NAME_MAX else f"{shown[:_NAME_MAX]}..."

@@ -7,15 +7,15 @@ cache.
 import errno
 import mmap
 import os
+import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from mcap.opcode import Opcode
 
-from recorder.log.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, PAGE, RECORD, round_up
+from recorder.log.mcap_layout import CHUNK_MAX, MAGIC, PADDING_OPCODE, PAGE, RECORD, round_up
 from rig.disk import set_direct
 from rig.errors import BadInputError
 
@@ -23,11 +23,26 @@ from rig.errors import BadInputError
 _READ_ON = 4 * PAGE
 #: Start and end time, size of the records, their CRC, length of the compression's name (which follows).
 CHUNK_HEAD = struct.Struct("<QQQII")
-#: A record that claims to be longer than this is none of ours.
-_CHUNK_MAX, _SMALL_MAX, _PADDING_MAX = 1 << 30, 64 << 20, 8 * PAGE
-#: After damage, pages are searched in pieces of so many bytes for one of the records with which a write begins.
-_SEARCH_BYTES = 256 * PAGE
-_WRITE_BEGINS = (PADDING_OPCODE, Opcode.CHUNK, Opcode.DATA_END)
+#: A record that claims to be longer than this is none of ours: by its kind, all others.
+_LONGEST: dict[int, int] = {
+    Opcode.CHUNK: CHUNK_MAX,
+    Opcode.ATTACHMENT: 64 << 20,
+    Opcode.MESSAGE: 16 << 20,
+    Opcode.MESSAGE_INDEX: 16 << 20,
+    PADDING_OPCODE: 8 * PAGE,
+}
+_LONGEST_OTHER = 1 << 20
+#: How the records begin with which reading goes on after damage: a chunk (its lengths are looked at closely
+#: afterwards), our metadata, our attachments, the end of the data. A match is one byte: another may begin behind it.
+_CHUNK_BEGINS = re.compile(rb"\x06(?=.{4}\0{4}.{16}.{4}\0{4}.{4}\0{4}.{4}\0{4})", re.DOTALL)
+_OTHERS_BEGIN = (
+    re.compile(rb"\x0c(?=.{4}\0{4}.\0{3}svev\.)", re.DOTALL),
+    re.compile(rb"\x09(?=.{4}\0{4}.{16}.\0{3}(?:rig\.toml|calibration\.json))", re.DOTALL),
+    re.compile(rb"\x0f(?=\x04\0{7})"),
+)
+_BEGINNING_MAX = 64
+#: They are searched for in pieces of so many bytes: first in what the window holds already.
+_FIRST_PIECE, _LONGEST_PIECE = _READ_ON, 4 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +116,17 @@ class FileWindow:
         first = offset - self._begin
         return self._view[first : max(first, min(first + length, self._end - self._begin))]
 
+    def has_grown(self) -> bool:
+        """Whether the file is longer now than when it was opened."""
+        return os.fstat(self._fd).st_size > self.size
+
+    def next_data(self, offset: int) -> int:
+        """The first byte from `offset` on that is not in a hole of the file; the size of the file if there is none."""
+        try:
+            return max(offset, os.lseek(self._fd, offset, os.SEEK_DATA))
+        except OSError as error:
+            return self.size if error.errno == errno.ENXIO else offset
+
     def close(self) -> None:
         """Close the file; a second call does nothing."""
         if self._fd >= 0:
@@ -141,17 +167,18 @@ class FileWindow:
         return buffer
 
 
-def walk(window: FileWindow) -> Iterator[RawRecord | Damage]:
-    """All records from the one after the magic bytes to the footer, and the damage between readable parts."""
-    offset = len(MAGIC)
-    while offset < window.size:
-        record = _record_at(window, offset)
+def walk(window: FileWindow, begin: int, end: int) -> Iterator[RawRecord | Damage]:
+    """All records between two places of the file, and the damage between readable parts; at most to the footer."""
+    offset = begin
+    while offset < end:
+        record = record_at(window, offset, end)
         if record is None:
-            found = _next_readable(window, offset)
-            end = window.size if found is None else found
-            text = "the file ends in the middle of a record" if found is None else "unreadable"
-            yield Damage(offset, end - offset, text, torn=found is None)
-            offset = end
+            found = next(_beginnings(window, offset + 1, end, (_CHUNK_BEGINS, *_OTHERS_BEGIN)), None)
+            until = end if found is None else found.offset
+            torn = found is None and end == window.size
+            text = "the file ends in the middle of a record" if torn else "unreadable"
+            yield Damage(offset, until - offset, text, torn)
+            offset = until
             continue
         yield record
         offset += record.length
@@ -161,6 +188,11 @@ def walk(window: FileWindow) -> Iterator[RawRecord | Damage]:
             return
 
 
+def chunks_anywhere(window: FileWindow, begin: int) -> Iterator[RawRecord]:
+    """Everything from `begin` on that looks like a chunk, at any offset, also inside of others."""
+    return _beginnings(window, begin, window.size, (_CHUNK_BEGINS,))
+
+
 def is_closed(window: FileWindow) -> bool:
     """Whether the file ends in a footer: the log was closed."""
     footer_bytes = RECORD.size + 8 + 8 + 4
@@ -168,13 +200,13 @@ def is_closed(window: FileWindow) -> bool:
     return len(end) == footer_bytes + len(MAGIC) and end[0] == Opcode.FOOTER and bytes(end[footer_bytes:]) == MAGIC
 
 
-def _record_at(window: FileWindow, offset: int) -> RawRecord | None:
-    """The record at `offset`, None if its opcode or length is impossible or the file ends before it does."""
+def record_at(window: FileWindow, offset: int, end: int) -> RawRecord | None:
+    """The record at `offset`, None if its opcode or length is impossible or it does not end before `end`."""
     head = window.read(offset, RECORD.size)
     if len(head) < RECORD.size:
         return None
     opcode, content = RECORD.unpack(head)
-    if offset + RECORD.size + content > window.size:
+    if offset + RECORD.size + content > end or content > _LONGEST.get(opcode, _LONGEST_OTHER):
         return None
     match opcode:
         case Opcode.CHUNK:
@@ -183,46 +215,33 @@ def _record_at(window: FileWindow, offset: int) -> RawRecord | None:
             plausible = content == 8 + 8 + 4
         case Opcode.DATA_END:
             plausible = content == 4
-        case _ if opcode == PADDING_OPCODE:
-            plausible = content <= _PADDING_MAX
+        case Opcode.MESSAGE_INDEX:  # channel and length of what follows
+            plausible = content >= 6 and struct.unpack("<I", window.read(offset + RECORD.size + 2, 4))[0] == content - 6
         case _:
-            plausible = Opcode.HEADER <= opcode <= Opcode.DATA_END and content <= _SMALL_MAX
+            plausible = Opcode.HEADER <= opcode <= Opcode.DATA_END or opcode == PADDING_OPCODE
     return RawRecord(opcode, offset, RECORD.size + content) if plausible else None
 
 
 def _is_chunk(window: FileWindow, offset: int, content: int) -> bool:
     """Whether the lengths in a chunk's head agree with the length of its record."""
-    if not CHUNK_HEAD.size + 8 <= content <= _CHUNK_MAX:
+    if content < CHUNK_HEAD.size + 8:
         return False
     _, _, size, _, name_bytes = CHUNK_HEAD.unpack(window.read(offset, CHUNK_HEAD.size))
     before = CHUNK_HEAD.size + name_bytes + 8
-    if before > content or size > _CHUNK_MAX:
+    if before > content or size > CHUNK_MAX:
         return False
     (stored,) = struct.unpack("<Q", window.read(offset + before - 8, 8))
     return bool(stored == content - before and (name_bytes or stored == size))
 
 
-def _next_readable(window: FileWindow, offset: int) -> int | None:
-    """The next page after `offset` with which a write of ours begins; None if there is none up to the end."""
-    page = offset - offset % PAGE + PAGE
-    while page < window.size:
-        starts = np.frombuffer(window.read(page, _SEARCH_BYTES), np.uint8)[::PAGE]
-        for candidate in np.flatnonzero(np.isin(starts, _WRITE_BEGINS)):
-            position = page + int(candidate) * PAGE
-            if _begins_readable(window, position):
-                return position
-        page += _SEARCH_BYTES
-    return None
-
-
-def _begins_readable(window: FileWindow, offset: int) -> bool:
-    """Whether a chunk with a message, or the end of the data, stands at `offset` or after padding there."""
-    record = _record_at(window, offset)
-    if record is not None and record.opcode == PADDING_OPCODE:
-        record = _record_at(window, offset + record.length)
-    if record is None:
-        return False
-    if record.opcode == Opcode.DATA_END:
-        return True
-    inner = window.read(record.offset + RECORD.size + CHUNK_HEAD.size + 8, RECORD.size)
-    return record.opcode == Opcode.CHUNK and inner[0] == Opcode.MESSAGE and record.length > MESSAGE.size
+def _beginnings(window: FileWindow, begin: int, end: int, patterns: Sequence[re.Pattern[bytes]]) -> Iterator[RawRecord]:
+    """The records between two places of the file that begin like one of the patterns, in their order, at any offset."""
+    length = _FIRST_PIECE - _BEGINNING_MAX
+    while (begin := window.next_data(begin)) < end:
+        piece = bytes(window.read(begin, min(length + _BEGINNING_MAX, end - begin)))
+        places = {match.start() for pattern in patterns for match in pattern.finditer(piece)}
+        for place in sorted(places):
+            if place < length and (record := record_at(window, begin + place, end)) is not None:
+                yield record
+        begin += length
+        length = min(4 * length, _LONGEST_PIECE)

@@ -9,11 +9,14 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
+from recorder.log.mcap_layout import CHUNK_MAX
 from recorder.reading.log_reader import LogReader, Message
 from rig.clocks import UtcNs
 from rig.tag import TripletTag
 from rig.topics import TAG
 
+#: Pulse numbers are 32 bits in MCAP; times are below 2**63 ns (year 2262).
+_SEQUENCE_MAX, _TIME_MAX = (1 << 32) - 1, (1 << 63) - 1
 _DATA_KEY = RawImage.DATA_FIELD_NUMBER << 3 | 2
 
 
@@ -32,7 +35,7 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
             images = {pulse: image.data for pulse, image in chunk.images.items()}
             for message in chunk.messages:
                 if message.topic == TAG.name and message.data is not None:
-                    tag = TripletTag.decode(message.data)
+                    tag = read_tag(message.data)
                     data = images.get(tag.pulse)
                     yield tag, np.zeros(tag.shape, np.uint8) if data is None else pixels(view_image(data))
 
@@ -71,9 +74,24 @@ def tag_of(message: Message) -> TripletTag | None:
 def decoded_tag(data: bytes | memoryview) -> TripletTag | None:
     """The tag that these bytes encode, None if they encode none."""
     try:
-        return TripletTag.decode(data)
+        return read_tag(data)
     except ValueError:
         return None
+
+
+def read_tag(data: bytes | memoryview) -> TripletTag:
+    """The tag that these bytes encode.
+
+    Raises:
+        ValueError: they encode none, or one with numbers that no recorder writes.
+    """
+    tag = TripletTag.decode(data)
+    rows, columns = tag.shape
+    if not (tag.pulse <= _SEQUENCE_MAX and 0 <= tag.time <= _TIME_MAX):
+        raise ValueError("pulse or time out of bounds")
+    if rows < 1 or columns < 1 or rows * columns > CHUNK_MAX or not tag.cameras or tag.dtype != "uint8":
+        raise ValueError("no shape of a triplet")
+    return tag
 
 
 @dataclass(frozen=True, slots=True)

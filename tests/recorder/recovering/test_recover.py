@@ -1,11 +1,14 @@
 """Recovering logs: whatever was cut off or destroyed, what comes out is whole, and what is lost is said."""
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
@@ -14,6 +17,7 @@ from mcap.reader import make_reader
 
 from recorder.catalogue.folder import Catalogue
 from recorder.checking.verify import verify
+from recorder.log.mcap_layout import PAGE
 from recorder.log.session_changes import write_session_changes
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.info import info
@@ -223,6 +227,80 @@ def test_memory_does_not_grow_with_the_log(tmp_path: Path) -> None:
     """Four slots carry a log of a hundred."""
     written = write_log(tmp_path / "log.mcap", (ALL_OK,) * 100)
     _check(recover(tmp_path / "log.mcap", tmp_path / "out.mcap"), written)
+
+
+def test_a_pulse_that_is_just_being_written_is_not_called_lost(
+    whole: tuple[Path, list[Written]], tmp_path: Path
+) -> None:
+    """The recorder goes on while its log is recovered."""
+    path, written = whole
+    data = path.read_bytes()
+    image = written[5].image
+    assert image is not None
+    now = data.index(image.tobytes()) + 100
+    growing = tmp_path / "growing.mcap"
+    growing.write_bytes(data[:now])
+
+    def go_on(_: int) -> None:
+        growing.write_bytes(data[: now + 5000])
+
+    report = recover(growing, tmp_path / "out.mcap", go_on)
+    _check(report, written)
+    assert (report.lossless, report.ledger.last_pulse) == (True, 5)
+
+
+def test_a_log_is_recovered_while_a_process_writes_it(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    command = [sys.executable, "-m", "tests.recorder.writing.writing_process", str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3]) as process:
+        assert process.stdout is not None
+        while (safe := int(process.stdout.readline())) < 20:
+            pass
+        report = recover(path, tmp_path / "out.mcap")
+        process.kill()
+    assert report.ledger.complete >= safe
+    assert not report.ledger.missing
+    assert not verify(report.path).damaged
+
+
+def test_what_a_torn_end_held_is_said_in_the_new_log(whole: tuple[Path, list[Written]], tmp_path: Path) -> None:
+    path, _ = whole
+    data = path.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: data.index(b'{"pulse":5,') - 20])  # in the head of the chunk
+    report = recover(cut, tmp_path / "out.mcap")
+    assert not report.lossless
+    assert report.in_words().startswith("the last ")
+    assert verify(report.path).events[-1].message == f"recovered from cut.mcap: this is lost: {report.in_words()}"
+    assert verify(report.path).events[-1].level == "warning"
+
+
+def test_changed_session_fields_of_a_closed_log_are_noticed(whole: tuple[Path, list[Written]], tmp_path: Path) -> None:
+    """Nothing but the checksum over everything knows."""
+    path = tmp_path / "log.mcap"
+    path.write_bytes(whole[0].read_bytes().replace(b"Anna Berg", b"Anne Berg"))
+    report = recover(path, tmp_path / "out.mcap")
+    assert not report.lossless
+    assert "session, rig or attachments may be false" in report.in_words()
+    assert verify(report.path).every_byte
+
+
+def test_pulses_of_another_recording_are_left_out(whole: tuple[Path, list[Written]], tmp_path: Path) -> None:
+    """As a block that the disk had not overwritten yet."""
+    path, written = whole
+    buffers = TripletBuffers(SHAPE, 4)
+    with open_writer(tmp_path / "other.mcap", buffers) as log:
+        for pulse in range(1, 5):
+            write_pulse(log, buffers, msgspec.structs.replace(make_tag(pulse), recording="r0"))
+    buffers.close()
+    other, data = (tmp_path / "other.mcap").read_bytes(), path.read_bytes()
+    place = data.index(b'{"pulse":7,') // PAGE * PAGE
+    chunk = other.index(b'{"pulse":3,') // PAGE * PAGE
+    (tmp_path / "log.mcap").write_bytes(data[:place] + other[chunk : chunk + 3 * PAGE] + data[place + 3 * PAGE :])
+    report = recover(tmp_path / "log.mcap", tmp_path / "out.mcap")
+    _check(report, written)
+    assert "pulse 3: its tag is of another recording or other cameras, left out" in report.findings
+    assert report.ledger.last_pulse == 6
 
 
 @contextmanager

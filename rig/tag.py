@@ -77,7 +77,7 @@ class TripletTag(msgspec.Struct, frozen=True, rename={"time": "time_ns"}):
         """
         try:
             tag: TripletTag = _DECODER.decode(text)
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, RecursionError) as error:
             raise ValueError(str(error)) from None
         return tag
 

@@ -15,6 +15,7 @@ from rig.status import Causes, Counts
 from rig.tag import TripletTag
 
 _NONE: Final = PulseNumber(0)
+_DIGITS_MAX: Final = 10  #: of a pulse number
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +136,9 @@ def runs_from_text(text: str) -> list[tuple[int, int]]:
     runs = []
     for word in text.split():
         first, _, last = word.partition("-")
-        if first.isdecimal() and (last or first).isdecimal():
+        if all(
+            number.isascii() and number.isdecimal() and len(number) <= _DIGITS_MAX for number in (first, last or first)
+        ):
             runs.append((int(first), int(last or first)))
     return runs
 

@@ -1,12 +1,11 @@
 """Checks the messages of a log: tags against each other, images against their tags, events, health."""
 
-import json
 from collections.abc import Callable
 
-from google.protobuf.message import DecodeError
+import msgspec
 
-from recorder.reading.log_reader import Chunk, Message
-from recorder.reading.triplets import ImageView, pixels, view_image
+from recorder.reading.items import Chunk, Message
+from recorder.reading.triplets import ImageView, event_of, is_json, pixels, read_tag, view_image
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
@@ -15,6 +14,12 @@ from rig.topics import EVENTS, HEALTH, TAG, TRIPLET
 from triggering.ledger import Ledger
 
 _EVENTS_MAX = 1000
+
+
+class _Said(msgspec.Struct):
+    """What a tag says of itself."""
+
+    complete: bool
 
 
 class PulseCheck:
@@ -59,10 +64,10 @@ class PulseCheck:
     def _tag(self, message: Message) -> None:
         try:
             data = bytes(message.data or b"")
-            tag = TripletTag.decode(data)
-            says_complete = json.loads(data)["complete"]
-        except (ValueError, KeyError, TypeError) as error:
-            self._report(f"pulse {message.sequence}: its tag cannot be read ({error!r})")
+            tag = read_tag(data)
+            says_complete = msgspec.json.decode(data, type=_Said).complete
+        except ValueError as error:
+            self._report(f"pulse {message.sequence}: its tag cannot be read ({error})")
             return
         if flaw := self._tag_flaw(tag, message, says_complete):
             self._report(f"pulse {tag.pulse}: {flaw}")
@@ -99,19 +104,15 @@ class PulseCheck:
             self._report(f"pulse {message.sequence}: {flaw}")
 
     def _event(self, message: Message) -> None:
-        try:
-            event = Event.from_protobuf(message.data or b"")
-        except (DecodeError, ValueError, KeyError) as error:
-            self._report(f"event {message.sequence}: cannot be read ({error})")
-            return
-        if len(self.events) < _EVENTS_MAX:
+        event = event_of(message)
+        if event is None:
+            self._report(f"event {message.sequence}: cannot be read")
+        elif len(self.events) < _EVENTS_MAX:
             self.events.append(event)
 
     def _health(self, message: Message) -> None:
-        try:
-            json.loads(bytes(message.data or b""))
-        except ValueError as error:
-            self._report(f"health record {message.sequence}: cannot be read ({error})")
+        if not is_json(message.data or b""):
+            self._report(f"health record {message.sequence}: cannot be read")
 
 
 def _side_by_side(columns: list[tuple[int, int]], width: int) -> bool:

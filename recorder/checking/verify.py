@@ -9,7 +9,8 @@ from typing import Any
 from recorder.checking.pulse_check import PulseCheck
 from recorder.checking.structure_check import StructureCheck
 from recorder.reading.info import known_lost
-from recorder.reading.log_reader import Chunk, Item, LogReader
+from recorder.reading.items import Chunk, Item, printable
+from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
 from rig.events import Event
 from rig.transport import wire
@@ -17,6 +18,7 @@ from triggering.ledger import Ledger, numbers
 
 _PULSES_MAX = 10_000
 _FINDINGS_MAX = 500
+_FINDING_MAX = 300
 
 
 class Findings:
@@ -31,10 +33,10 @@ class Findings:
         self._kept: list[str] = []
 
     def add(self, text: str) -> None:
-        """Note one finding."""
+        """Note one finding; names from the file, which may be in it, are shown and not obeyed by a terminal."""
         self.total += 1
         if len(self._kept) < _FINDINGS_MAX:
-            self._kept.append(text)
+            self._kept.append(printable(text, _FINDING_MAX))
 
     def lines(self) -> tuple[str, ...]:
         """The findings that were kept; if there are more, the last line says how many."""

@@ -8,8 +8,14 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
+
+import msgspec
 
 from rig.errors import BadInputError
+
+#: A request to the service has at most so many bytes; more text than that was not written by svev.
+_BYTES_MAX: Final = 64 << 10
 
 
 def session_path(log: Path) -> Path:
@@ -21,20 +27,21 @@ def session_changes(log: Path) -> dict[str, str]:
     """The changed fields of a log, empty if there are none.
 
     Raises:
-        BadInputError: the file exists, but cannot be read or holds something else.
+        BadInputError: the file exists, but cannot be read, is too large, or holds something else.
     """
     path = session_path(log)
     try:
-        changes = json.loads(path.read_bytes())
+        text = _read(path)
     except FileNotFoundError:
         return {}
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
+    if len(text) > _BYTES_MAX:
+        raise BadInputError(f"{path}: is larger than {_BYTES_MAX >> 10} KiB; shorten it, or remove it")
+    try:
+        return msgspec.json.decode(text, type=dict[str, str])
     except ValueError:
-        changes = None
-    if not isinstance(changes, dict) or not all(isinstance(text, str) for text in changes.values()):
-        raise BadInputError(f"{path}: holds no session fields; correct it, or remove it to undo the changes")
-    return changes
+        raise BadInputError(f"{path}: holds no session fields; correct it, or remove it to undo the changes") from None
 
 
 def write_session_changes(log: Path, changes: Mapping[str, str]) -> None:
@@ -50,3 +57,12 @@ def write_session_changes(log: Path, changes: Mapping[str, str]) -> None:
         file.flush()
         os.fsync(file.fileno())
     half_done.replace(path)
+
+
+def _read(path: Path) -> bytes:
+    """The file, no more of it than a byte above the limit. A pipe of this name is empty: nobody waits for it."""
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    try:
+        return os.read(fd, _BYTES_MAX + 1)
+    finally:
+        os.close(fd)

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,12 @@ from typing import Any
 import zmq
 
 from recorder.publishing.publisher import Publisher, bind, live_topic
-from recorder.reading.log_reader import Chunk, LogReader, Message
+from recorder.reading.items import Chunk, Message
+from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
-from recorder.reading.triplets import view_image
+from recorder.reading.triplets import event_of, is_json, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
-from rig.events import Event
 from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, TAG, TRIPLET
 from rig.transport import wire
 
@@ -23,6 +23,8 @@ _TRIPLET, _EVENT, _HEALTH = live_topic(TRIPLET), live_topic(EVENTS), live_topic(
 _Parts = list[bytes | memoryview]
 _POLL_S = 0.1
 _LINGER_S = 5.0
+#: No message is waited for longer, whatever time it has.
+_WAIT_MAX_S = 3600.0
 #: Replayed images are copied, so a subscriber's queue costs memory, not slots.
 _QUEUE = 64
 
@@ -259,7 +261,7 @@ class _Replay:
             first = log_time if first is None else first
             if self.options.speed is not None:
                 due = begin + (log_time - first) / NS_PER_S / self.options.speed
-                self.stop.wait(max(0.0, due - time.monotonic()))
+                self.stop.wait(min(max(0.0, due - time.monotonic()), _WAIT_MAX_S))
             if self.stop.is_set() or not self.sink.send(parts, self.stop):
                 break
             self.report.messages += 1
@@ -283,23 +285,49 @@ class _Replay:
                     if self.options.last is not None and pulse > self.options.last:
                         return
                 if begun:
-                    yield from _published(item)
+                    yield from self._published(item)
+
+    def _published(self, chunk: Chunk) -> Iterator[tuple[UtcNs, _Parts]]:
+        """Log time and parts of a chunk's messages as they are published; pixels are valid until the next one is taken.
+
+        What cannot be read is left out and counted.
+        """
+        images = chunk.images
+        for message in chunk.messages:
+            if message.topic == TRIPLET.name:
+                continue
+            parts = _parts(message, images)
+            if parts is not None:
+                yield message.log_time, parts
+            elif message.topic in (TAG.name, EVENTS.name, HEALTH.name):
+                self.damaged_bytes += message.length
 
 
-def _published(chunk: Chunk) -> Iterator[tuple[UtcNs, _Parts]]:
-    """Log time and parts of a chunk's messages as they are published; pixels are valid until the next one is taken."""
-    images = chunk.images
-    for message in chunk.messages:
-        data = message.data or memoryview(b"")
-        match message.topic:
-            case TAG.name:
-                yield message.log_time, [_TRIPLET, bytes(data), _pixels(images.get(message.sequence))]
-            case EVENTS.name:
-                yield message.log_time, [_EVENT, wire.encode(Event.from_protobuf(data))]
-            case HEALTH.name:
-                yield message.log_time, [_HEALTH, bytes(data)]
+def _parts(message: Message, images: Mapping[int, Message]) -> _Parts | None:
+    """A message as it is published, None if it is not or cannot be read."""
+    data = message.data or memoryview(b"")
+    match message.topic:
+        case TAG.name:
+            try:
+                return [_TRIPLET, bytes(data), _pixels(images.get(message.sequence))] if tag_of(message) else None
+            except ValueError:
+                return None
+        case EVENTS.name:
+            event = event_of(message)
+            return None if event is None else [_EVENT, wire.encode(event)]
+        case HEALTH.name:
+            return [_HEALTH, bytes(data)] if is_json(data) else None
+    return None
 
 
 def _pixels(image: Message | None) -> memoryview:
-    """The pixels of an image message in place; none for a pulse without an image."""
-    return memoryview(b"") if image is None else view_image(image.data or memoryview(b"")).pixels
+    """The pixels of an image message in place; none for a pulse without an image.
+
+    Raises:
+        ValueError: the message is no image, or not one of ours.
+    """
+    if image is None:
+        return memoryview(b"")
+    found = view_image(image.data or memoryview(b""))
+    pixels(found)
+    return found.pixels

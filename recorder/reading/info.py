@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from recorder.log.session_changes import session_changes
-from recorder.reading.log_reader import Chunk, LogReader
+from recorder.reading.items import Chunk
+from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import tag_of
 from rig.tag import TripletTag

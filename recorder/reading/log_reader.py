@@ -2,7 +2,6 @@
 
 import struct
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from mcap.records import Attachment, Channel, Header, Metadata
 
 from recorder.log.channels import schemas_and_channels
 from recorder.log.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, RECORD
+from recorder.reading.items import Chunk, Item, Message, SmallRecord, printable
 from recorder.reading.records import CHUNK_HEAD, Damage, FileWindow, RawRecord, chunks_anywhere, is_closed, walk
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
@@ -23,102 +23,21 @@ from rig.topics import (
     EVENTS,
     HEALTH,
     PROFILE,
-    RECOVERY_METADATA,
     RIG_ATTACHMENT,
-    RIG_METADATA,
-    SESSION_METADATA,
     TAG,
-    TRIPLET,
 )
 
-#: The metadata records and attachments whose content is kept.
-_METADATA = (SESSION_METADATA, RIG_METADATA, RECOVERY_METADATA)
+#: Of our metadata records, these first many, and of attachments these are kept.
+_METADATA_BEGINS, _METADATA_MAX = "svev.", 64
 _ATTACHMENTS = (RIG_ATTACHMENT, CALIBRATION_ATTACHMENT)
-#: So many channels, messages in a chunk, and bytes of a message on these topics are taken, so that no file can use up
+#: So many channels, records in a chunk, and bytes of a message on these topics are taken, so that no file can use up
 #: the memory; ours have a few.
-_CHANNELS_MAX, _MESSAGES_MAX, _SMALL_MAX = 1000, 1 << 16, 1 << 16
+_CHANNELS_MAX, _RECORDS_MAX, _SMALL_MAX = 1000, 1 << 16, 1 << 16
+_NAME_MAX = 1000
 _SMALL_TOPICS = (TAG.name, EVENTS.name, HEALTH.name)
-_NAME_MAX = 60
 
 #: What the `mcap` library raises on bytes that are not the record that it is asked to read.
 UNREADABLE = (struct.error, ValueError, OverflowError, McapError)
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A message as it stands in the log.
-
-    Attributes:
-        topic: name of its channel.
-        channel: id of its channel.
-        sequence: pulse number on the channels of tags and images; a count on the others.
-        log_time: when the message was ready, UTC.
-        publish_time: time of its pulse or event, UTC.
-        position: where the message record starts in the chunk's records.
-        offset: where its data starts in the file.
-        length: bytes of the data.
-        data: the data, valid until the next item is read; None if it was not asked for.
-    """
-
-    topic: str
-    channel: int
-    sequence: int
-    log_time: UtcNs
-    publish_time: UtcNs
-    position: int
-    offset: int
-    length: int
-    data: memoryview | None
-
-
-@dataclass(frozen=True, slots=True)
-class SmallRecord:
-    """A record that is no chunk; `body` is what follows opcode and length, `offset` where it stands in the file."""
-
-    opcode: int
-    offset: int
-    body: bytes
-
-    @property
-    def length(self) -> int:
-        """Bytes of the whole record."""
-        return RECORD.size + len(self.body)
-
-
-@dataclass(frozen=True, slots=True)
-class Chunk:
-    """A chunk and the messages in it.
-
-    Attributes:
-        offset: where the chunk record starts in the file.
-        length: bytes of the chunk record.
-        start_time, end_time: first and last log time in it, as its head says.
-        size: bytes of the records in it.
-        messages: its messages, as far as they could be read.
-        declarations: schemas and channels that it declares (svev declares them before the first chunk).
-        flaw: why its content cannot be trusted, empty if it can.
-        crc: CRC-32 of the records in it, as its head says; 0 may mean that it says none.
-        checked: that is the CRC-32 of the records in it; False if they were not read.
-    """
-
-    offset: int
-    length: int
-    start_time: UtcNs
-    end_time: UtcNs
-    size: int
-    messages: tuple[Message, ...]
-    declarations: tuple[SmallRecord, ...]
-    flaw: str
-    crc: int
-    checked: bool
-
-    @property
-    def images(self) -> dict[int, Message]:
-        """The image messages in it, by pulse."""
-        return {message.sequence: message for message in self.messages if message.topic == TRIPLET.name}
-
-
-Item = Chunk | SmallRecord | Damage
 
 
 class ForeignFileError(BadInputError):
@@ -236,9 +155,9 @@ class LogReader:
         """Whether the log is longer now than when it was opened: somebody is writing it."""
         return self._window.has_grown()
 
-    def next_data(self, offset: int) -> int:
+    def data_from(self, offset: int) -> int:
         """The first byte from `offset` on that is not in a hole of the file; its size if there is none."""
-        return self._window.next_data(offset)
+        return self._window.data_from(offset)
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -261,9 +180,9 @@ class LogReader:
         if header.profile != PROFILE:
             raise ForeignFileError(
                 f"{self.path}: is an MCAP log, but not written by svev "
-                f'(profile "{_printable(header.profile)}"); name a log of svev'
+                f'(profile "{printable(header.profile)}"); name a log of svev'
             )
-        return _printable(header.library)
+        return printable(header.library)
 
     def _item(self, record: RawRecord | Damage, only: Collection[str] | None) -> Item | None:
         """What a record holds; None for padding and for what is not asked for."""
@@ -286,15 +205,19 @@ class LogReader:
                     channel = Channel.read(stream(body))
                     if len(self._topics) >= _CHANNELS_MAX:
                         raise ValueError(f"more than {_CHANNELS_MAX} channels")
+                    _check_name(channel.topic)
                     self._topics[channel.id] = self._assumed.get(channel.id, channel.topic)
                 case Opcode.METADATA:
                     metadata = Metadata.read(stream(body))
-                    if metadata.name in _METADATA:
+                    _check_name(metadata.name)
+                    room = len(self.metadata) < _METADATA_MAX or metadata.name in self.metadata
+                    if metadata.name.startswith(_METADATA_BEGINS) and room:
                         self.metadata[metadata.name] = metadata.metadata
                 case Opcode.ATTACHMENT:
                     attachment = Attachment.read(stream(body))
+                    _check_name(attachment.name, attachment.media_type)
                     if crc32(memoryview(body)[:-4]) != int.from_bytes(body[-4:], "little"):
-                        text = f"checksum of attachment {_printable(attachment.name)} is wrong"
+                        text = f"checksum of attachment {printable(attachment.name)} is wrong"
                         return Damage(record.offset, record.length, text)
                     if attachment.name in _ATTACHMENTS:
                         self.attachments[attachment.name] = attachment.data
@@ -337,15 +260,18 @@ class LogReader:
         Returns:
             What is wrong with them, empty if nothing.
         """
-        position = first
+        position, count = first, 0
         while position < end:
+            count += 1
+            if count > _RECORDS_MAX:
+                return f"it holds more than {_RECORDS_MAX} records"
             head = bytes(self._window.read(position, min(MESSAGE.size, end - position)))
             opcode, length = RECORD.unpack(head[: RECORD.size]) if len(head) >= RECORD.size else (0, end)
             following = position + RECORD.size + length
             if following > end:
                 return "its records overrun its end"
-            if len(messages) + len(declarations) >= _MESSAGES_MAX:
-                return f"it holds more than {_MESSAGES_MAX} messages"
+            if opcode == 0:  # no opcode at all: zeros where records were
+                return "zeros stand in place of its records"
             if opcode == Opcode.MESSAGE:
                 message = self._message(head, position, first, following, only)
                 if isinstance(message, str):
@@ -388,7 +314,11 @@ def stream(body: bytes) -> Any:
     return ReadDataStream(BytesIO(body))
 
 
-def _printable(text: str) -> str:
-    """A name from a file as it can stand in a line: control characters escaped, not too long."""
-    shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text[: _NAME_MAX + 1])
-    return shown if len(shown) <= _NAME_MAX else f"{shown[:_NAME_MAX]}..."
+def _check_name(*names: str) -> None:
+    """Refuse names that are too long to be kept.
+
+    Raises:
+        ValueError: one is.
+    """
+    if any(len(name) > _NAME_MAX for name in names):
+        raise ValueError(f"a name of more than {_NAME_MAX} letters")

@@ -28,10 +28,10 @@ _LONGEST: dict[int, int] = {
     Opcode.CHUNK: CHUNK_MAX,
     Opcode.ATTACHMENT: 64 << 20,
     Opcode.MESSAGE: 16 << 20,
-    Opcode.MESSAGE_INDEX: 16 << 20,
+    Opcode.MESSAGE_INDEX: 2 << 20,
     PADDING_OPCODE: 8 * PAGE,
 }
-_LONGEST_OTHER = 1 << 20
+_LONGEST_OTHER = 128 << 10
 #: How the records begin with which reading goes on after damage: a chunk (its lengths are looked at closely
 #: afterwards), our metadata, our attachments, the end of the data. A match is one byte: another may begin behind it.
 _CHUNK_BEGINS = re.compile(rb"\x06(?=.{4}\0{4}.{16}.{4}\0{4}.{4}\0{4}.{4}\0{4})", re.DOTALL)
@@ -120,7 +120,7 @@ class FileWindow:
         """Whether the file is longer now than when it was opened."""
         return os.fstat(self._fd).st_size > self.size
 
-    def next_data(self, offset: int) -> int:
+    def data_from(self, offset: int) -> int:
         """The first byte from `offset` on that is not in a hole of the file; the size of the file if there is none."""
         try:
             return max(offset, os.lseek(self._fd, offset, os.SEEK_DATA))
@@ -237,7 +237,7 @@ def _is_chunk(window: FileWindow, offset: int, content: int) -> bool:
 def _beginnings(window: FileWindow, begin: int, end: int, patterns: Sequence[re.Pattern[bytes]]) -> Iterator[RawRecord]:
     """The records between two places of the file that begin like one of the patterns, in their order, at any offset."""
     length = _FIRST_PIECE - _BEGINNING_MAX
-    while (begin := window.next_data(begin)) < end:
+    while (begin := window.data_from(begin)) < end:
         piece = bytes(window.read(begin, min(length + _BEGINNING_MAX, end - begin)))
         places = {match.start() for pattern in patterns for match in pattern.finditer(piece)}
         for place in sorted(places):

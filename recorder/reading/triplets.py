@@ -4,19 +4,24 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from recorder.log.mcap_layout import CHUNK_MAX
-from recorder.reading.log_reader import LogReader, Message
+from recorder.reading.items import Message
+from recorder.reading.log_reader import LogReader
 from rig.clocks import UtcNs
+from rig.events import Event
 from rig.tag import TripletTag
 from rig.topics import TAG
 
 #: Pulse numbers are 32 bits in MCAP; times are below 2**63 ns (year 2262).
 _SEQUENCE_MAX, _TIME_MAX = (1 << 32) - 1, (1 << 63) - 1
+#: All fields of an image but its pixels take some 50 bytes.
+_OTHERS_MAX = 1 << 12
 _DATA_KEY = RawImage.DATA_FIELD_NUMBER << 3 | 2
 
 
@@ -79,6 +84,23 @@ def decoded_tag(data: bytes | memoryview) -> TripletTag | None:
         return None
 
 
+def event_of(message: Message) -> Event | None:
+    """The event in a message, None if it holds none."""
+    try:
+        return Event.from_protobuf(message.data or b"")
+    except (DecodeError, ValueError, KeyError):
+        return None
+
+
+def is_json(data: bytes | memoryview) -> bool:
+    """Whether these bytes are JSON, nested no deeper than any reader takes."""
+    try:
+        msgspec.json.decode(data)
+    except (msgspec.MsgspecError, RecursionError):
+        return False
+    return True
+
+
 def read_tag(data: bytes | memoryview) -> TripletTag:
     """The tag that these bytes encode.
 
@@ -124,6 +146,8 @@ def view_image(message: memoryview) -> ImageView:
     while position < len(message):
         field = position
         key, position = _varint(message, position)
+        if key < 8 or len(others) > _OTHERS_MAX:
+            raise ValueError("no foxglove.RawImage: no field, or too many")
         length, position = _field_length(message, position, key & 7)
         if key == _DATA_KEY:
             pixels = message[position : position + length]

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recorder.log.triplet_buffers import TripletBuffers
-from recorder.reading.log_reader import Message
+from recorder.reading.items import Message
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Event
 from rig.tag import TripletTag
-from rig.topics import RECOVERY_METADATA
 
 _SLOTS: Final = 4
 _DISK_S: Final = 60.0
@@ -84,11 +83,11 @@ class RebuiltLog:
         """
         self._writer.write_message(topic, data, publish_time, log_time)
 
-    def close(self, recovery: Mapping[str, str], event: Event) -> int:
+    def close(self, metadata: Mapping[str, Mapping[str, str]], event: Event) -> int:
         """Finish the log.
 
         Args:
-            recovery: fields of the metadata record that says where the log comes from and what is lost.
+            metadata: fields of more metadata records, by name.
             event: last event of the log.
 
         Returns:
@@ -98,7 +97,8 @@ class RebuiltLog:
             StorageError: the disk refuses.
         """
         self._writer.write_event(event)
-        self._writer.set_metadata(RECOVERY_METADATA, recovery)
+        for name, fields in metadata.items():
+            self._writer.set_metadata(name, fields)
         size = self._writer.close().bytes
         self._closed = True
         return size

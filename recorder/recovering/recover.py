@@ -17,7 +17,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from recorder.log.session_changes import session_changes
-from recorder.reading.log_reader import LogReader, Message
+from recorder.reading.items import Message
+from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import read_tag, tag_of
 from recorder.recovering.rebuilt_log import RebuiltLog
 from recorder.recovering.scan import Scan, picture_of
@@ -27,7 +28,15 @@ from rig.errors import BadInputError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.tag import CameraTag, TripletTag
-from rig.topics import CALIBRATION_ATTACHMENT, EVENTS, HEALTH, RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA
+from rig.topics import (
+    CALIBRATION_ATTACHMENT,
+    EVENTS,
+    HEALTH,
+    RECOVERY_METADATA,
+    RIG_ATTACHMENT,
+    RIG_METADATA,
+    SESSION_METADATA,
+)
 from triggering.ledger import Ledger, numbers, runs_to_text
 
 _PULSES_MAX: Final = 10_000
@@ -178,7 +187,10 @@ class _Recovery:
         words = _loss(self.ledger, self.lost_pixels, self.findings.lines())
         said = f"this is lost: {words}" if words else "no pulse is lost"
         event = Event.now(Level.WARNING if words else Level.INFO, "recover", f"recovered from {name}: {said}")
-        return self._rebuilt.close({"source": name, "time": time, **lost}, event)
+        others = {
+            key: each for key, each in self._reader.metadata.items() if key not in (SESSION_METADATA, RIG_METADATA)
+        }
+        return self._rebuilt.close({**others, RECOVERY_METADATA: {"source": name, "time": time, **lost}}, event)
 
     def _pulse(self, sighting: Sighting) -> None:
         tag, picture, message = self._read(sighting)

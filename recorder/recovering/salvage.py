@@ -12,7 +12,8 @@ from typing import Final
 from mcap.opcode import Opcode
 
 from recorder.log.mcap_layout import MESSAGE, RECORD, TAG_CHANNEL
-from recorder.reading.log_reader import LogReader, Message
+from recorder.reading.items import Message
+from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import decoded_tag
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
@@ -38,7 +39,7 @@ def tags_in(reader: LogReader, offset: int, length: int) -> Iterator[FoundTag]:
     overlap = MESSAGE.size + _TAG_MAX
     end = offset + length
     begin = offset
-    while (begin := reader.next_data(begin)) < end:
+    while (begin := reader.data_from(begin)) < end:
         piece = bytes(reader.read(begin, min(_PIECE + overlap, end - begin)))
         place = piece.find(_TAG_BEGINS)
         while 0 <= place < _PIECE + MESSAGE.size:

@@ -17,7 +17,8 @@ from recorder.checking.verify import Findings
 from recorder.log.channels import CALIBRATION_TOPIC
 from recorder.log.crc import combined_crc
 from recorder.log.mcap_layout import MAGIC, PADDING_OPCODE, PAGE, RECORD
-from recorder.reading.log_reader import Chunk, LogReader, Message, SmallRecord, stream
+from recorder.reading.items import Chunk, Message, SmallRecord
+from recorder.reading.log_reader import LogReader, stream
 from recorder.reading.records import Damage
 from recorder.reading.triplets import pixels, tag_of, view_image
 from recorder.recovering.salvage import pulse_of, tags_in

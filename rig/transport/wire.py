@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from rig.clocks import DecimalNs
 
 _DECIMAL: Final = {"type": "string", "pattern": "^-?[0-9]+$"}
+_DIGITS_MAX: Final = 20  #: of a 64-bit number
 
 
 def _to_plain(value: object) -> object:
@@ -28,8 +29,8 @@ def _from_plain(kind: type, value: Any) -> object:
     """The inverse of `_to_plain`."""
     if issubclass(kind, DecimalNs):
         digits = value.removeprefix("-") if isinstance(value, str) else ""
-        if not (digits.isascii() and digits.isdigit()):
-            raise ValueError("a time must be a string of decimal digits")
+        if not (digits.isascii() and digits.isdigit() and len(digits) <= _DIGITS_MAX):
+            raise ValueError("a time must be a string of at most 20 decimal digits")
         return kind(value)
     if issubclass(kind, Path):
         return Path(value)

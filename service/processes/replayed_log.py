@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.reading.log_reader import UNREADABLE, Chunk, LogReader
+from recorder.reading.items import Chunk
+from recorder.reading.log_reader import UNREADABLE, LogReader
 from recorder.reading.triplets import pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, CameraError

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from recorder.log.mcap_layout import PAGE
-from recorder.reading.log_reader import Chunk, LogReader
+from recorder.reading.items import Chunk
+from recorder.reading.log_reader import LogReader
 from tests.recorder.logs import ABSENT, ALL_OK, LOST, OK, Written, write_log
 
 PULSES = (ALL_OK, (OK, LOST, OK), ALL_OK, (ABSENT,) * 3, *(ALL_OK,) * 8)

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from recorder.checking.verify import verify
-from recorder.reading.log_reader import Chunk, LogReader
+from recorder.reading.items import Chunk
+from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.clocks import host_now
 from rig.errors import BadInputError, CameraNotFoundError

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 import zmq
 
-from recorder.reading.log_reader import Chunk, LogReader
+from recorder.reading.items import Chunk
+from recorder.reading.log_reader import LogReader
 from svev.cli import main
 from tests.recorder.logs import ALL_OK, LOST, OK, write_log
 from tests.support.loopback import Loopback

@@ -13,6 +13,7 @@ import zmq
 from recorder.publishing.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError
 from rig.transport import wire
+from tests.recorder.hostile.builder import Builder, event, image
 from tests.recorder.logs import ALL_OK, LOST, OK, PERIOD_NS, Written, write_log
 from tests.support.loopback import Loopback
 
@@ -75,8 +76,8 @@ def _replayed(path: Path, listener: Listener, options: ReplayOptions) -> tuple[R
 def _check(messages: list[list[bytes]], written: list[Written]) -> None:
     triplets = [message for message in messages if message[0] == b"triplet"]
     assert [json.loads(tag) for _, tag, _ in triplets] == [wire.to_builtins(w.tag) for w in written]
-    for (_, _, image), w in zip(triplets, written, strict=True):
-        assert image == (b"" if w.image is None else w.image.tobytes())
+    for (_, _, pixels), w in zip(triplets, written, strict=True):
+        assert pixels == (b"" if w.image is None else w.image.tobytes())
 
 
 @pytest.mark.parametrize(("kind", "reliable"), [(zmq.SUB, False), (zmq.PULL, True)])
@@ -95,6 +96,26 @@ def test_all_messages_are_those_of_live_operation(
     assert json.loads(messages[-2][1]) == {"free_triplets": 4}
     assert (report.triplets, report.messages, report.rounds, report.attended) == (5, 8, 1, True)
     assert report.bytes == sum(w.image.size for w in written if w.image is not None)
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        Builder().event(event() + b"\x10\x63"),
+        Builder().health(b"[" * 30_000 + b"]" * 30_000),
+        Builder().tag_with(shape=[0, 0]),
+        Builder().picture(image(2, data=b"")),
+    ],
+    ids=["event of level 99", "nested health record", "shape of zero", "image without pixels"],
+)
+def test_what_cannot_be_read_is_left_out_and_counted(tmp_path: Path, loopback: Loopback, odd: Builder) -> None:
+    odd.write(tmp_path / "log.mcap")
+    with _listening(zmq.PULL) as listener:
+        report, messages = _replayed(
+            tmp_path / "log.mcap", listener, ReplayOptions(loopback.endpoint(), speed=None, reliable=True)
+        )
+    assert [message[0] for message in messages] == [b"triplet", b"triplet"]
+    assert (report.triplets, report.damaged_bytes > 0) == (2, True)
 
 
 def test_a_slow_worker_loses_nothing(tmp_path: Path, loopback: Loopback) -> None:

@@ -15,7 +15,8 @@ from mcap.writer import Writer
 
 from recorder.checking.verify import VerifyReport, verify
 from recorder.reading.info import info
-from recorder.reading.log_reader import Chunk, LogReader, SmallRecord
+from recorder.reading.items import Chunk, SmallRecord
+from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.errors import BadInputError
 from tests.recorder.logs import ALL_OK, LOST, OK, Written, write_log

@@ -213,6 +213,7 @@ def test_calibrations_and_early_events_come_along(tmp_path: Path) -> None:
     buffers = TripletBuffers(SHAPE, 4)
     calibrated = replace(DESCRIPTION, calibration_json=b"{}", calibrations={"K1": b"\n\x04left"})
     with open_writer(tmp_path / "log.mcap", buffers, calibrated) as log:
+        log.set_metadata("svev.more", {"key": "value"})
         log.write_event(Event(UtcNs(5), Level.ERROR, "K2", "gone"))
         write_pulse(log, buffers, make_tag(1))
     buffers.close()
@@ -220,6 +221,7 @@ def test_calibrations_and_early_events_come_along(tmp_path: Path) -> None:
     with LogReader(tmp_path / "out.mcap") as reader:
         assert [bytes(m.data or b"") for m in reader.messages("/calibration/K1")] == [b"\n\x04left"]
         assert reader.attachments["calibration.json"] == b"{}"
+        assert reader.metadata["svev.more"] == {"key": "value"}
     assert verify(tmp_path / "out.mcap").events[0].message == "gone"
 
 

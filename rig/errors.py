@@ -27,6 +27,12 @@ class CameraError(SvevError):
     exit_code = 5
 
 
+class PulsesPausedError(SvevError):
+    """A recording is whole, but for a while no pulses came in it."""
+
+    exit_code = 5
+
+
 class StorageError(SvevError):
     """The log cannot be written any further (disk full, device gone). What is written stays readable."""
 

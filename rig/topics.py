@@ -29,6 +29,7 @@ HEALTH: Final = Topic("/health", "svev.Health", "json", "health")
 PROFILE: Final = "svev"
 SESSION_METADATA: Final = "svev.session"
 RIG_METADATA: Final = "svev.rig"
+RECORDING_METADATA: Final = "svev.recording"
 RECOVERY_METADATA: Final = "svev.recovery"
 #: What went wrong while the log was written, by where it went wrong, e.g. "disk".
 TROUBLE_METADATA: Final = "svev.trouble"

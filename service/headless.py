@@ -26,6 +26,7 @@ from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, Stora
 from rig.events import Event
 from rig.settings.model import RigSettings
 from rig.status import Counts, Recording, SessionFields, State
+from rig.transport import wire
 from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
 from service.processes.backends import check_backends
 from service.recordings.control import Outcome
@@ -242,6 +243,7 @@ def record(
     result = {
         "log": str(report.path),
         **report.counts.model_dump(),
+        "pauses": [wire.to_builtins(pause) for pause in report.pauses],
         "bytes": report.bytes,
         "unpublished": report.unpublished,
         "stopped_early": early,

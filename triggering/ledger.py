@@ -1,59 +1,98 @@
 """Counts what became of every pulse in every camera, from the tags of a log or of a recording in progress."""
 
-from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import groupby, islice
-from statistics import median
+from itertools import islice
 from typing import Any, Final
 
 from rig.clocks import NS_PER_S, UtcNs
 from rig.frame import FrameStatus
+from rig.pause import Pause
 from rig.pulse import PulseNumber
 from rig.status import Causes, Counts
 from rig.tag import TripletTag
+from triggering.timeline.pauses import PauseFinder, pause_of_margin
 
 _NONE: Final = PulseNumber(0)
 _DIGITS_MAX: Final = 10  #: of a pulse number
+#: Runs of incomplete pulses that are kept one by one; the counts go on.
+_RUNS_KEPT: Final = 10_000
+#: Offsets are counted in steps of 0.1 us; those of a second and more are one.
+_STEPS_PER_US: Final = 10
+_STEPS_MAX: Final = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Incomplete:
-    """A pulse with missing frames; `cameras` are (name, status) of the cameras that delivered none."""
+class IncompleteRun:
+    """Neighbouring pulses with the same fate; `cameras` are (name, status) of the cameras that delivered no frame."""
 
-    pulse: PulseNumber
+    first: PulseNumber
+    last: PulseNumber
     cameras: tuple[tuple[str, FrameStatus], ...]
 
-    def to_json(self) -> dict[str, Any]:
-        """Pulse, and status by camera name."""
-        return {"pulse": self.pulse, "cameras": {name: status.value for name, status in self.cameras}}
+    def to_json(self) -> Iterator[dict[str, Any]]:
+        """Pulse by pulse: its number, and status by camera name."""
+        statuses = {name: status.value for name, status in self.cameras}
+        return ({"pulse": pulse, "cameras": statuses} for pulse in range(self.first, self.last + 1))
+
+
+class Spread:
+    """How far the trigger times of frames lie from their pulses: median and maximum, in memory that does not grow."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[int] = Counter()
+        self._largest = 0.0
+
+    def add(self, offset_us: float) -> None:
+        """Enter the offset of a frame, us."""
+        size = abs(offset_us)
+        self._largest = max(self._largest, size)
+        self._counts[min(round(size * _STEPS_PER_US), _STEPS_MAX)] += 1
+
+    def figures(self) -> dict[str, float] | None:
+        """Median (to 0.1 us) and maximum, us; None without any offset."""
+        wanted = (self._counts.total() + 1) // 2
+        for step in sorted(self._counts):
+            wanted -= self._counts[step]
+            if wanted <= 0:
+                return {"median": step / _STEPS_PER_US, "max": round(self._largest, 3)}
+        return None
 
 
 @dataclass(slots=True)
 class Ledger:
-    """The account of a recording; tags are added in the order of the log.
+    """The account of a recording; tags are added in the order of the log. Its memory does not grow with their number.
 
     Attributes:
         pulses: number of tags.
+        partial: how many of them lack a frame.
         causes: missing frames by status.
-        incomplete: the pulses with missing frames.
+        failures: the same by name of the camera, without the cameras that delivered all frames.
+        incomplete: runs of pulses with missing frames, the first ten thousand.
         missing: runs of pulses without a tag, as (first, last).
         out_of_order: pulses whose tag comes twice or too late.
         last_pulse: highest pulse number so far.
         first_time, last_time: times of the first and the last pulse, UTC.
-        offsets_us: |offset_us| of all frames.
+        spread: |offset_us| of all frames.
     """
 
     pulses: int = 0
+    partial: int = 0
     causes: Counter[FrameStatus] = field(default_factory=Counter)
-    incomplete: list[Incomplete] = field(default_factory=list)
+    failures: dict[str, Counter[FrameStatus]] = field(default_factory=dict)
+    incomplete: list[IncompleteRun] = field(default_factory=list)
     missing: list[tuple[int, int]] = field(default_factory=list)
     out_of_order: list[PulseNumber] = field(default_factory=list)
     last_pulse: PulseNumber = _NONE
     first_time: UtcNs | None = None
-    last_time: UtcNs | None = None
-    offsets_us: "array[float]" = field(default_factory=lambda: array("d"))
+    spread: Spread = field(default_factory=Spread)
+    _first_pulse: PulseNumber = _NONE
+    _last: TripletTag | None = None
+    _pauses: PauseFinder = field(default_factory=PauseFinder)
+    _begin: UtcNs | None = None
+    _end: UtcNs | None = None
+    _runs: int = 0
 
     def add(self, tag: TripletTag) -> None:
         """Add the next tag of the log."""
@@ -62,20 +101,56 @@ class Ledger:
             return
         if tag.pulse > self.last_pulse + 1:
             self.missing.append((self.last_pulse + 1, tag.pulse - 1))
-        self.last_pulse = tag.pulse
+        if self._last is None:
+            self.first_time, self._first_pulse = tag.time, tag.pulse
+        elif tag.time > self._last.time:
+            self._pauses.add(self._last, tag)
+        self.last_pulse, self._last = tag.pulse, tag
         self.pulses += 1
-        self.first_time = tag.time if self.first_time is None else self.first_time
-        self.last_time = tag.time
         failed = tuple((camera.name, camera.status) for camera in tag.cameras if camera.status is not FrameStatus.OK)
         if failed:
-            self.causes.update(status for _, status in failed)
-            self.incomplete.append(Incomplete(tag.pulse, failed))
-        self.offsets_us.extend(abs(camera.offset_us) for camera in tag.cameras if camera.offset_us is not None)
+            self._count_failed(tag.pulse, failed)
+        for camera in tag.cameras:
+            if camera.offset_us is not None:
+                self.spread.add(camera.offset_us)
+
+    def _count_failed(self, pulse: PulseNumber, failed: tuple[tuple[str, FrameStatus], ...]) -> None:
+        self.partial += 1
+        for name, status in failed:
+            self.causes[status] += 1
+            self.failures.setdefault(name, Counter())[status] += 1
+        last = self.incomplete[-1] if self.incomplete else None
+        if last is not None and last.last == pulse - 1 and last.cameras == failed and self._runs <= _RUNS_KEPT:
+            self.incomplete[-1] = IncompleteRun(last.first, pulse, last.cameras)
+            return
+        self._runs += 1
+        if self._runs <= _RUNS_KEPT:
+            self.incomplete.append(IncompleteRun(pulse, pulse, failed))
+
+    def lasted(self, begin: UtcNs | None, end: UtcNs | None, period_ns: float | None) -> None:
+        """Say when the recording began and ended, so that time before the first and after the last pulse counts.
+
+        Args:
+            begin: UTC; None if it is not known.
+            end: likewise.
+            period_ns: nominal time between two pulses, for recordings of fewer than three; None likewise.
+        """
+        self._begin, self._end, self._pauses.nominal_ns = begin, end, period_ns
+
+    @property
+    def last_time(self) -> UtcNs | None:
+        """Time of the last pulse, UTC; None if there is no pulse."""
+        return None if self._last is None else self._last.time
 
     @property
     def complete(self) -> int:
         """Pulses that every camera delivered."""
-        return self.pulses - len(self.incomplete)
+        return self.pulses - self.partial
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is missing: every pulse has a tag and all its frames, and there is no pause."""
+        return not (self.partial or self.missing or self.out_of_order or self.pauses())
 
     @property
     def duration_s(self) -> float:
@@ -89,36 +164,67 @@ class Ledger:
         """Pulses per second, None if there are fewer than two."""
         return (self.last_pulse - self._first_pulse) / self.duration_s if self.duration_s > 0 else None
 
-    @property
-    def _first_pulse(self) -> int:
-        return self.missing[0][1] + 1 if self.missing and self.missing[0][0] == 1 else 1
+    def pauses(self) -> tuple[Pause, ...]:
+        """The stretches of time without a pulse, in order; of very many only the first thousand and the last ones.
+
+        This is the one account of time: every report and every verdict asks here.
+        """
+        finder = self._pauses
+        if self._last is None:
+            return tuple(self._margin(self._begin, self._end, None, finder.last_period()))
+        at_begin = self.first_time if self._first_pulse == 1 else None
+        return (
+            *self._margin(self._begin, at_begin, self._first_pulse, finder.first_period()),
+            *finder.pauses(),
+            *self._margin(self._last.time, self._end, None, finder.last_period()),
+        )
+
+    def _margin(
+        self, begin: UtcNs | None, end: UtcNs | None, before: PulseNumber | None, period: float | None
+    ) -> Iterator[Pause]:
+        if begin is None or end is None or period is None:
+            return
+        after = self.last_pulse if before is None else _NONE
+        if (pause := pause_of_margin(begin, end, after, before, period)) is not None:
+            yield pause
 
     def counts(self) -> Counts:
         """Pulses, complete, partial and causes, as every command reports them; causes count frames, not pulses."""
         failures = [status for status in FrameStatus if status is not FrameStatus.OK]
         causes = Causes(**{status.value: self.causes[status] for status in failures})
-        return Counts(pulses=self.pulses, complete=self.complete, partial=self.pulses - self.complete, causes=causes)
+        return Counts(pulses=self.pulses, complete=self.complete, partial=self.partial, causes=causes)
 
-    def spread_us(self) -> dict[str, float] | None:
-        """Median and maximum of |offset_us|: how well the cameras' triggers agree; None without any."""
-        if not self.offsets_us:
-            return None
-        return {"median": round(median(self.offsets_us), 3), "max": round(max(self.offsets_us), 3)}
+    def incomplete_pulses(self, limit: int) -> list[dict[str, Any]]:
+        """The pulses with missing frames one by one, as JSON; at most `limit` of them."""
+        return list(islice((pulse for run in self.incomplete for pulse in run.to_json()), limit))
 
     def in_words(self) -> Iterator[str]:
-        """One line per run of pulses with the same fate, e.g. "pulses 61-64: K2 lost"."""
-        runs = groupby(enumerate(self.incomplete), key=lambda entry: (entry[1].pulse - entry[0], entry[1].cameras))
-        for (_, cameras), run in runs:
-            pulses = [entry.pulse for _, entry in run]
-            yield f"{span(pulses[0], pulses[-1])}: " + ", ".join(f"{name} {status.value}" for name, status in cameras)
+        """One line per run of pulses with the same fate, e.g. "pulses 61-64: K2 lost", and one per pause."""
+        for run in self.incomplete:
+            fates = ", ".join(f"{name} {status.value}" for name, status in run.cameras)
+            yield f"{span(run.first, run.last)}: {fates}"
+        if self._runs > _RUNS_KEPT:
+            yield f"and {self._runs - _RUNS_KEPT} more runs of pulses with missing frames"
         for first, last in self.missing:
             yield f"{span(first, last)}: no tag, nothing is known of {'it' if first == last else 'them'}"
+        for pause in self.pauses():
+            yield pause.in_words()
 
     def summary_line(self) -> str:
         """The counts in words."""
         failed = ", ".join(f"{count} {status.value}" for status, count in sorted(self.causes.items()))
-        line = f"{self.pulses} pulses, {self.complete} complete, {self.pulses - self.complete} partial"
-        return line + (f" (frames: {failed})" if failed else "")
+        line = f"{self.pulses} pulses, {self.complete} complete, {self.partial} partial"
+        line += f" (frames: {failed})" if failed else ""
+        return f"{line}; {words}" if (words := pauses_in_words(self.pauses())) else line
+
+
+def pauses_in_words(pauses: Iterable[Pause]) -> str:
+    """The pauses of a recording in a few words, empty if there are none."""
+    lengths = [pause.seconds for pause in pauses]
+    if not lengths:
+        return ""
+    times = "" if len(lengths) == 1 else f" in {len(lengths)} pauses"
+    return f"no pulses for {sum(lengths):.3g} s{times}"
 
 
 def span(first: int, last: int) -> str:

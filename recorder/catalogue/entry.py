@@ -2,7 +2,6 @@
 
 import threading
 import time
-from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -16,8 +15,8 @@ from recorder.reading.triplets import stored_triplets
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
+from rig.pause import Pause
 from rig.pulse import PulseNumber
-from triggering.ledger import Ledger
 
 #: A growing log is read again when this many times the duration of the last reading has passed.
 _PATIENCE: Final = 10
@@ -53,6 +52,7 @@ class Entry:
         missing: number of pulses without a tag.
         causes: number of frames that are missing, by cause.
         failures: the same by name of the camera, without the cameras that delivered all frames.
+        pauses: stretches of time without a pulse.
         cameras: names, left to right.
         shape: rows and columns of the triplets, None if there is no pulse.
         session: the session's fields, with later changes applied.
@@ -72,6 +72,7 @@ class Entry:
     missing: int = 0
     causes: Mapping[FrameStatus, int] = field(default_factory=dict)
     failures: Mapping[str, Mapping[FrameStatus, int]] = field(default_factory=dict)
+    pauses: tuple[Pause, ...] = ()
     cameras: tuple[str, ...] = ()
     shape: tuple[int, int] | None = None
     session: Mapping[str, str] = field(default_factory=dict)
@@ -103,7 +104,7 @@ def read_entry(path: Path) -> Entry:
         path.stem, path, found.bytes, modified, _state(found),
         started=ledger.first_time, duration_s=ledger.duration_s,
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
-        causes=dict(ledger.causes), failures=_failures(ledger),
+        causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session,
     )  # fmt: skip
 
@@ -195,14 +196,6 @@ def _file_key(path: Path) -> _FileKey:
     """What changes when a file does: inode, size, time of the last write."""
     stat = path.stat()
     return stat.st_ino, stat.st_size, stat.st_mtime_ns
-
-
-def _failures(ledger: Ledger) -> dict[str, Counter[FrameStatus]]:
-    failures: dict[str, Counter[FrameStatus]] = defaultdict(Counter)
-    for pulse in ledger.incomplete:
-        for name, status in pulse.cameras:
-            failures[name][status] += 1
-    return dict(failures)
 
 
 def _state(found: LogInfo) -> LogState:

@@ -8,6 +8,7 @@ from typing import Any
 
 from recorder.checking.pulse_check import PulseCheck
 from recorder.checking.structure_check import StructureCheck
+from recorder.log.extent import apply_extent
 from recorder.reading.info import known_lost
 from recorder.reading.items import Chunk, Item, printable
 from recorder.reading.log_reader import LogReader
@@ -47,8 +48,10 @@ class Findings:
 class Verdict(StrEnum):
     """The result of `verify` in one word."""
 
-    CLEAN = "clean"  #: every pulse complete, everything consistent
-    PARTIAL = "partial"  #: consistent; some pulses lack frames, and their tags say which and why
+    CLEAN = "clean"  #: every pulse complete, no pause, everything consistent
+    PARTIAL = (
+        "partial"  #: consistent; pulses lack frames, and their tags say which and why, or no pulses came for a while
+    )
     DAMAGED = "damaged"  #: not closed, unreadable in part, or inconsistent
 
 
@@ -81,11 +84,10 @@ class VerifyReport:
 
     @property
     def verdict(self) -> Verdict:
-        """DAMAGED if the log is not sound, otherwise CLEAN if every pulse is complete, otherwise PARTIAL."""
+        """DAMAGED if the log is not sound, otherwise CLEAN if nothing is missing, no time either, otherwise PARTIAL."""
         if self.findings or not self.closed or not set(self.ledger.missing) <= set(self.known_lost):
             return Verdict.DAMAGED
-        whole = self.ledger.complete == self.ledger.pulses and not self.ledger.missing
-        return Verdict.CLEAN if whole else Verdict.PARTIAL
+        return Verdict.CLEAN if self.ledger.whole else Verdict.PARTIAL
 
     @property
     def damaged(self) -> bool:
@@ -103,7 +105,8 @@ class VerifyReport:
             **self.ledger.counts().model_dump(),
             "bytes": self.bytes,
             "missing_pulses": numbers(self.ledger.missing, _PULSES_MAX),
-            "incomplete_pulses": [pulse.to_json() for pulse in self.ledger.incomplete[:_PULSES_MAX]],
+            "incomplete_pulses": self.ledger.incomplete_pulses(_PULSES_MAX),
+            "pauses": [wire.to_builtins(pause) for pause in self.ledger.pauses()],
             "findings": list(self.findings),
             "events": [wire.to_builtins(event) for event in self.events],
         }
@@ -132,6 +135,7 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
                 progress(item.offset + item.length)
         pulses.finish()
         structure.finish()
+        apply_extent(reader.metadata, pulses.ledger)
         if not reader.closed:
             findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
         return VerifyReport(

@@ -13,6 +13,7 @@ import msgspec
 
 from recorder.live.assembler import Assembler
 from recorder.live.preroll import Held
+from recorder.log.extent import extent
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
 from recorder.writing.log_writer import LogDescription, LogWriter
@@ -22,7 +23,7 @@ from rig.events import Event
 from rig.health import WritingHealth
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
-from rig.topics import TROUBLE_METADATA
+from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
 from rig.transport.messages import LogPart, StartRecording
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
@@ -76,9 +77,14 @@ class Recording:
             self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
             self._end = self._planned_end()
             self._since_command = 0
+            self._account_from = self.commanded
         else:
             self.commanded, self.begin, self._end = after.commanded, after.begin, after._end
             self._since_command = after._since_command
+            last = after.ledger.last_time
+            self._account_from = after._account_from if last is None else after._anchor.host(last)
+        self._account_until: HostNs | None = None
+        self._tell_ledger()
         cameras = ", ".join(camera.name for camera in rig.cameras)
         session = {"recording": order.recording, **order.session}
         description = LogDescription(
@@ -243,10 +249,29 @@ class Recording:
         """UTC of a host time, on the same time scale as the recording's tags."""
         return self._anchor.utc(time)
 
+    def end_account(self) -> None:
+        """Fix the moment until which the log tells of every pulse; time without pulses before it is a pause."""
+        last = self.ledger.last_time
+        if (self._counted or self.failure is not None) and last is not None:
+            self._account_until = self._anchor.host(last)
+        else:  # pulses of the last moments may be undecided
+            decided = HostNs(self._assembler.settled - self._assembler.hold_ns)
+            self._account_until = decided if self._end is None else min(self._end, decided)
+        self._tell_ledger()
+
+    def _tell_ledger(self) -> None:
+        until = None if self._account_until is None else self.utc(self._account_until)
+        self.ledger.lasted(self.utc(self._account_from), until, self._assembler.rig.trigger.period_ns)
+
     def begin_close(self) -> None:
         """Begin to write the end of the log, if it is open."""
         if self.log is None:
             return
+        if self._account_until is None:
+            self.end_account()
+        if self._account_until is not None:
+            fields = extent(self.utc(self._account_from), self.utc(self._account_until))
+            self._writer.set_metadata(RECORDING_METADATA, fields)
         if self.trouble:
             self._writer.set_metadata(TROUBLE_METADATA, {"disk": self.trouble})
         self._writer.begin_close()

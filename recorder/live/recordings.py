@@ -29,6 +29,7 @@ from rig.errors import BadInputError, FileVanishedError, StorageError, SvevError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.health import WritingHealth
+from rig.pause import Pause
 from rig.status import Counts
 from rig.tag import TripletTag
 from rig.transport.messages import (
@@ -173,7 +174,7 @@ class Recordings:
         """Report how far the recording is."""
         if self._recording is not None and self._recording.log is not None:
             counts, first = self._counts(self._recording), self._first_pulse(self._recording)
-            self._report(RecordingProgress(counts=counts, first_pulse=first))
+            self._report(RecordingProgress(counts=counts, first_pulse=first, pauses=self._pauses(self._recording)))
 
     def happened(self, event: Event) -> None:
         """Publish an event and write it into the recording; without one, keep it for a recording with pre-roll."""
@@ -226,6 +227,7 @@ class Recordings:
             case _Phase.FLUSHING:
                 self._look_at_disk(now)
                 if self._recording is recording and recording.all_written:
+                    recording.end_account()
                     summary = recording.ledger.summary_line()
                     self.happened(Event.now(Level.INFO, "recorder", f"recording stopped: {summary}"))
                     self._close(recording, now, _CLOSE_NS)
@@ -287,6 +289,7 @@ class Recordings:
                 unpublished=self._publisher.dropped,
                 counts=self._counts(recording),
                 first_pulse=self._first_pulse(recording),
+                pauses=self._pauses(recording),
                 earlier=tuple(parts),
                 failure=None if failure is None else RecorderFailed.of(failure),
                 trouble="; ".join(each.trouble for each in (*self._earlier, recording) if each.trouble),
@@ -301,6 +304,10 @@ class Recordings:
     def _first_pulse(self, recording: Recording) -> UtcNs | None:
         times = (each.ledger.first_time for each in (*self._earlier, recording) if each.is_there)
         return next((time_ for time_ in times if time_ is not None), None)
+
+    def _pauses(self, recording: Recording) -> tuple[Pause, ...]:
+        """Of all logs that are there, each with the pulse numbers of its own log."""
+        return tuple(p for each in (*self._earlier, recording) if each.is_there for p in each.ledger.pauses())
 
     # -- failures ------------------------------------------------------------------------------------------------
 

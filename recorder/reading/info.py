@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from recorder.log.extent import apply_extent
 from recorder.log.session_changes import session_changes
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
@@ -11,6 +12,7 @@ from recorder.reading.records import Damage
 from recorder.reading.triplets import tag_of
 from rig.tag import TripletTag
 from rig.topics import RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
+from rig.transport import wire
 from triggering.ledger import Ledger, runs_from_text
 
 
@@ -80,12 +82,13 @@ class LogInfo:
             "damaged_bytes": self.damaged_bytes,
             **ledger.counts().model_dump(),
             "missing_pulses": self.missing_pulses,
+            "pauses": [wire.to_builtins(pause) for pause in ledger.pauses()],
             "bytes": self.bytes,
             "recording": self.recording,
             "start_ns": None if ledger.first_time is None else str(ledger.first_time),
             "duration_s": round(ledger.duration_s, 6),
             "rate_hz": None if ledger.rate_hz is None else round(ledger.rate_hz, 4),
-            "offset_us": ledger.spread_us(),
+            "offset_us": ledger.spread.figures(),
             "shape": None if self.shape is None else list(self.shape),
             "cameras": list(self.cameras),
             "session": self.session,
@@ -125,6 +128,7 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
                     if tag is not None:
                         first = first or tag
                         ledger.add(tag)
+        apply_extent(reader.metadata, ledger)
         session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
         return LogInfo(
             path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,

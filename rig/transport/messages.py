@@ -16,6 +16,7 @@ from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.health import Health
+from rig.pause import Pause
 from rig.settings.model import RigSettings
 from rig.status import Counts
 
@@ -202,10 +203,17 @@ class RecordingStarted(Message):
 
 
 class RecordingProgress(Message):
-    """Counts of the recording in progress, several times a second."""
+    """Account of the recording in progress, several times a second.
+
+    Attributes:
+        counts: what became of the pulses.
+        first_pulse: time of the first pulse; None: none has come yet.
+        pauses: stretches of time without a pulse.
+    """
 
     counts: Counts
     first_pulse: UtcNs | None
+    pauses: tuple[Pause, ...]
 
 
 class LogPart(msgspec.Struct, frozen=True, kw_only=True):

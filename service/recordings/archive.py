@@ -25,6 +25,7 @@ from rig.status import (
     Status,
 )
 from rig.tag import TripletTag
+from triggering.ledger import pauses_in_words
 
 _STATES = {
     LogState.CLOSED: RecordingState.FINISHED,
@@ -108,7 +109,8 @@ def verdict(entry: Entry) -> Statement:
     level, code, text, advice = _judge(entry)
     values: dict[str, str | int | float] = {
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
-        "failures": _failures(entry),
+        "failures": _failures(entry), "pauses": len(entry.pauses),
+        "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1),
     }  # fmt: skip
     return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
 
@@ -124,9 +126,19 @@ def _judge(entry: Entry) -> tuple[Level, str, str, str]:
         return Level.WARNING, "unfinished", text, advice
     if not entry.pulses:
         return Level.WARNING, "empty", "No pulse came", "Look at the trigger"
+    return _judge_account(entry)
+
+
+def _judge_account(entry: Entry) -> tuple[Level, str, str, str]:
+    lacking = f"{entry.partial} of {entry.pulses} pulses lack a frame: {_failures(entry)}"
+    if entry.pauses:
+        paused = pauses_in_words(entry.pauses)
+        advice = "Look at the trigger, and at the cameras' events of that time: svev verify says when"
+        if entry.partial:
+            return Level.WARNING, "partial_paused", f"{lacking}; {paused}", advice
+        return Level.WARNING, "paused", f"{entry.pulses} pulses, all complete, but {paused}", advice
     if entry.partial:
-        text = f"{entry.partial} of {entry.pulses} pulses lack a frame: {_failures(entry)}"
-        return Level.WARNING, "partial", text, ""
+        return Level.WARNING, "partial", lacking, ""
     return Level.GOOD, "complete", f"Complete: all {entry.pulses} pulses", ""
 
 

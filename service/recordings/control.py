@@ -68,7 +68,7 @@ class RecordingInProgress:
         self._opened: Future[Recording] | None = opened
         self._ordered = datetime.now(UTC)
         self._started: datetime | None = None
-        self._counts = Counts()
+        self._counts, self._pauses = Counts(), 0
         self._bytes = 0
 
     @property
@@ -102,9 +102,9 @@ class RecordingInProgress:
         self.path = path
 
     def progress(self, report: RecordingProgress) -> None:
-        """Note the counts so far."""
+        """Note the account so far."""
         self._note_first(report)
-        self._counts = report.counts
+        self._counts, self._pauses = report.counts, len(report.pauses)
 
     def grown(self, size: int) -> None:
         """Note the size of the log, bytes."""
@@ -130,11 +130,13 @@ class RecordingInProgress:
         text = f"recording, {counts.pulses} pulses so far"
         if counts.partial:
             text += f", {counts.partial} of them incomplete"
+        if self._pauses:
+            text += ", with a pause" if self._pauses == 1 else f", with {self._pauses} pauses"
         verdict = Statement(
-            level=status.Level.WARNING if counts.partial else status.Level.GOOD,
-            code="recording_running",
+            level=status.Level.WARNING if counts.partial or self._pauses else status.Level.GOOD,
+            code="recording_paused" if self._pauses else "recording_running",
             text=text,
-            values={"pulses": counts.pulses, "partial": counts.partial},
+            values={"pulses": counts.pulses, "partial": counts.partial, "pauses": self._pauses},
         )
         return Recording(
             id=self.id,

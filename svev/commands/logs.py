@@ -49,8 +49,9 @@ def verify_command(log: LogPath, as_json: AsJson = False) -> None:
     """Check every byte of a log and say, pulse by pulse, what is missing.
 
     Checks checksums, message indexes, summary and statistics, compares tags with images, and looks for pulses without
-    a tag. The verdict is "clean" (every pulse complete), "partial" (the log is sound; its tags say which frames are
-    missing and why) or "damaged" (not closed, unreadable in part, or inconsistent).
+    a tag and for pauses: time without a pulse. The verdict is "clean" (every pulse complete, no pause), "partial" (the
+    log is sound; its tags say which frames are missing and why, and the times of its pulses where there is a pause) or
+    "damaged" (not closed, unreadable in part, or inconsistent).
 
     Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
     was killed leaves a log that is not closed). What can be read is printed in any case.
@@ -109,7 +110,7 @@ def _size(log: Path) -> int | None:
 
 def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
     """What `svev info` prints, as name and text."""
-    ledger, spread = found.ledger, found.ledger.spread_us()
+    ledger, spread = found.ledger, found.ledger.spread.figures()
     yield "log", f"{found.path} ({found.bytes / 1e6:.1f} MB, by {found.library})"
     yield "state", "closed" if found.closed else "not closed"
     yield "recording", found.recording or "no pulse"
@@ -123,6 +124,8 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
         yield "no tag", f"{found.missing_pulses} pulses"
     if found.trouble:
         yield "trouble", found.trouble
+    for pause in ledger.pauses()[:_LINES_MAX]:
+        yield "pause", pause.in_words()
     if spread is not None:
         yield "offset", f"{spread['median']} us median, {spread['max']} us at most, from the pulse"
     if found.shape is not None:

@@ -3,8 +3,11 @@
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import typer
 
+from rig.errors import PulsesPausedError
+from rig.pause import Pause
 from rig.settings.file import load_rig
 from service.headless import HeadlessRig
 from service.headless import record as record_with
@@ -28,8 +31,9 @@ def record(
     wait for a disk that is slow or hangs.
 
     Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, or a camera does not answer,
-    4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but no pulses come, 6 the
-    recorder died; the log is readable up to that moment.
+    4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but no pulses come, or none
+    came for a while (the log is whole, and "pauses" says when), 6 the recorder died; the log is readable up to that
+    moment.
 
     Example: svev record --rig config/rigs/hill-gige.toml --seconds 10 --out recordings
     """
@@ -50,6 +54,12 @@ def record(
         console.say(f"check it: svev verify {result['log']}")
     if disk_error is not None:
         raise disk_error
+    if result["pauses"]:
+        first, more = msgspec.convert(result["pauses"][0], Pause).in_words(), len(result["pauses"]) - 1
+        raise PulsesPausedError(
+            f"{result['log']}: {first}{f', and {more} more pauses' if more else ''}; look at the trigger, or at what "
+            "the log says of the cameras at that time: svev verify"
+        )
 
 
 def demo(

@@ -70,6 +70,7 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
     for path in [*(ROOT / "service").rglob("*.py"), *(ROOT / "webpanel").rglob("*.py")]:
         text = path.read_text()
         stated |= set(re.findall(r'\bcode="(\w+)"', text))
+        stated |= set(re.findall(r'\bcode=.* else "(\w+)"', text))
         stated |= set(re.findall(r'_working\("(\w+)"', text))
         stated |= {f"{code}_partly" for code in re.findall(r'_working\("(\w+)"', text)}
         stated |= set(

@@ -15,10 +15,26 @@ from mcap.writer import CompressionType, IndexType, Writer
 from mcap_protobuf.schema import register_schema
 
 from recorder.checking.verify import VerifyReport, verify
+from recorder.log.extent import extent
+from recorder.log.triplet_buffers import TripletBuffers
+from recorder.reading.info import info
 from rig.clocks import UtcNs
 from rig.tag import TAG_SCHEMA, TripletTag
 from svev.cli import main
-from tests.recorder.logs import ABSENT, ALL_OK, DAMAGED, LOST, OK, READY_NS, make_image, make_tag, write_log
+from tests.recorder.logs import (
+    ABSENT,
+    ALL_OK,
+    DAMAGED,
+    LOST,
+    OK,
+    READY_NS,
+    SHAPE,
+    make_image,
+    make_tag,
+    open_writer,
+    write_log,
+    write_pulse,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +87,31 @@ def _verify(tmp_path: Path, *pulses: Pulse, **options: Any) -> VerifyReport:
     return verify(_write(tmp_path / "log.mcap", list(pulses), **options))
 
 
+def test_a_log_with_a_pause_is_not_clean_though_every_pulse_is_complete(tmp_path: Path) -> None:
+    pulses = [Pulse.make(pulse) for pulse in range(1, 11)]
+    shifted = [msgspec.structs.replace(make_tag(n), time=UtcNs(make_tag(n + 99).time)) for n in range(11, 21)]
+    report = _verify(tmp_path, *pulses, *(Pulse(tag, None, tag.pulse) for tag in shifted))
+    assert report.ledger.complete == 20
+    assert [(pause.after_pulse, pause.pulses, pause.idle) for pause in report.ledger.pauses()] == [
+        (10, 99, ("K1", "K2", "K3"))
+    ]
+    assert "no pulses for 3.33 s after pulse 10" in " ".join(report.ledger.in_words())
+
+
+@pytest.mark.parametrize(("end", "verdict"), [(5, "clean"), (8, "partial")])
+def test_a_log_without_pulses_before_its_end_is_not_clean(tmp_path: Path, end: int, verdict: str) -> None:
+    buffers = TripletBuffers(SHAPE, 4)
+    with open_writer(tmp_path / "log.mcap", buffers) as log:
+        for pulse in range(1, 6):
+            write_pulse(log, buffers, make_tag(pulse))
+        log.set_metadata("svev.recording", extent(make_tag(1).time, make_tag(end).time))
+    buffers.close()
+    for found in (verify(tmp_path / "log.mcap"), info(tmp_path / "log.mcap")):
+        assert len(found.ledger.pauses()) == (verdict == "partial")
+        assert len(found.to_json()["pauses"]) == (verdict == "partial")
+    assert verify(tmp_path / "log.mcap").verdict == verdict
+
+
 def test_a_complete_log_is_clean(tmp_path: Path) -> None:
     write_log(tmp_path / "log.mcap", (ALL_OK,) * 5)
     read: list[int] = []
@@ -83,7 +124,7 @@ def test_a_complete_log_is_clean(tmp_path: Path) -> None:
         "log": str(tmp_path / "log.mcap"), "verdict": "clean", "closed": True, "truncated": False,
         "every_byte_checked": True, "pulses": 5, "complete": 5, "partial": 0,
         "causes": {"lost": 0, "missed": 0, "damaged": 0, "absent": 0}, "bytes": (tmp_path / "log.mcap").stat().st_size,
-        "missing_pulses": [], "incomplete_pulses": [], "findings": [], "events": [],
+        "missing_pulses": [], "incomplete_pulses": [], "pauses": [], "findings": [], "events": [],
     }  # fmt: skip
 
 

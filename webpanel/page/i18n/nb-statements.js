@@ -28,8 +28,11 @@ export const statements = {
   camera_absent: ["{camera} er borte", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
 
   recording_running: ["tar opp: {pulses} pulser, {partial} mangler et bilde"],
+  recording_paused: ["tar opp: {pulses} pulser, {partial} mangler et bilde; {pauses} ganger kom det ingen pulser en stund"],
   verdict_complete: ["Komplett: alle {pulses} pulser"],
   verdict_partial: ["{partial} av {pulses} pulser mangler et bilde"],
+  verdict_paused: ["{pulses} pulser, alle komplette, men i {paused_s} s kom det ingen", "Se på triggeren og på hva kameraene meldte da: svev verify sier når"],
+  verdict_partial_paused: ["{partial} av {pulses} pulser mangler et bilde, og i {paused_s} s kom det ingen", "Se på triggeren og på hva kameraene meldte da: svev verify sier når"],
   verdict_empty: ["Det kom ingen puls", "Se på triggeren"],
   verdict_unfinished: ["Ble aldri avsluttet; {pulses} pulser kan leses", "svev recover lager en ordentlig logg av den"],
   verdict_damaged: ["Deler kan ikke leses eller mangler; {pulses} pulser kan leses", "Kjør svev verify på den"],

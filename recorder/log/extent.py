@@ -1,0 +1,42 @@
+"""The metadata record of when a recording began and ended: a log may have no pulses for a while before its end."""
+
+from collections.abc import Mapping
+
+from rig.clocks import NS_PER_S, UtcNs
+from rig.topics import RECORDING_METADATA, RIG_METADATA
+from triggering.ledger import Ledger
+
+
+def extent(begin: UtcNs, end: UtcNs) -> dict[str, str]:
+    """The fields of the record.
+
+    Args:
+        begin: the command to start, UTC; a recording with pre-roll has pulses before it.
+        end: the moment from which on pulses no longer belong to the recording, UTC.
+    """
+    return {"begin_ns": str(begin), "end_ns": str(end)}
+
+
+def apply_extent(metadata: Mapping[str, Mapping[str, str]], ledger: Ledger) -> None:
+    """Tell a ledger what a log's metadata say of its extent; a log that was not closed has no such record.
+
+    Args:
+        metadata: fields of the metadata records by name.
+        ledger: of the log.
+    """
+    fields = metadata.get(RECORDING_METADATA, {})
+    ledger.lasted(_time(fields, "begin_ns"), _time(fields, "end_ns"), _period_ns(metadata.get(RIG_METADATA, {})))
+
+
+def _time(fields: Mapping[str, str], name: str) -> UtcNs | None:
+    text = fields.get(name, "")
+    return UtcNs(text) if text.isascii() and text.isdecimal() and len(text) <= 20 else None
+
+
+def _period_ns(fields: Mapping[str, str]) -> float | None:
+    """The nominal period by the rig's metadata; None if it is not there or makes no sense."""
+    try:
+        rate_hz = float(fields.get("rate_hz", ""))
+    except ValueError:
+        return None
+    return NS_PER_S / rate_hz if 1e-6 < rate_hz < 1e6 else None

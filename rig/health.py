@@ -86,12 +86,20 @@ class PairingHealth(msgspec.Struct, frozen=True):
     proven_by_ids: Annotated[
         int, Meta(description="of them, no camera delivered so many, but the cameras' frame numbers prove them")
     ]
+    unwatched: Annotated[
+        int, Meta(description="of them, so many were due by the rhythm of the others while no camera was there")
+    ]
     open: Annotated[int, Meta(description="pulses that are not decided yet")]
     period_us: Annotated[float, Meta(description="between pulses, tracked")]
     spread_median_us: Annotated[float, Meta(description="of trigger times within a pulse")]
     spread_max_us: Annotated[float, Meta(description="likewise, the largest of late")]
     alarm: Annotated[bool, Meta(description="whether the spread is larger than the pairing allows for")]
     cameras: tuple[CameraPairing, ...]
+
+    @property
+    def seen(self) -> int:
+        """Pulses of which some camera told."""
+        return self.pulses - self.unwatched
 
 
 class PrerollHealth(msgspec.Struct, frozen=True):

@@ -450,7 +450,8 @@ class Recordings:
 
     def _write(self, recording: Recording, held: Held) -> None:
         pulse, slot = held.triplet.pulse, held.triplet.slot
-        black = self._buffers.acquire() if slot is None else None  # no frame came at all: a black triplet
+        # No frame came at all: a black triplet, unless no camera was there, which may last for hours.
+        black = self._buffers.acquire() if slot is None and not pulse.unwatched else None
         if black is not None:
             self._buffers.pixels(black).fill(0)
             slot = black

@@ -86,7 +86,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
             arriving=arriving,
             rate_hz=rate and round(rate, 2),
             spread_us=None if pairing is None else pairing.spread_median_us,
-            number=0 if pairing is None else pairing.pulses,
+            number=0 if pairing is None else pairing.seen,
         ),
         preroll=_preroll(facts),
         disk=DiskStatus(

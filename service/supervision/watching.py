@@ -67,7 +67,7 @@ class RecorderWatch:
         """Enter a report."""
         self._reported = time.monotonic()
         if isinstance(report, RecorderHealth):
-            self.pulses.count(report.health.pairing.pulses, self._reported)
+            self.pulses.count(report.health.pairing.seen, self._reported)
 
     def expect_nothing(self) -> None:
         """Note that there is no recorder now, so that no report is late."""

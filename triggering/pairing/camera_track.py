@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from rig.clocks import ClockLatch, DeviceNs, HostNs
+from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record
 from rig.health import CameraCounters
 from triggering.pairing.gaps import DamageMatcher, Gap
@@ -20,6 +20,10 @@ from triggering.timeline.pulse_train import PulseTrain
 
 #: Damaged arrivals kept until their pulse is decided; only a camera that sends nothing else has more.
 _MOST_DAMAGED: Final = 64
+#: A newly connected camera may take this long to its first frame.
+FIRST_NS: Final = NS_PER_S // 2
+#: Whole frames may be held back this long behind a damaged one.
+HELD_BACK_NS: Final = NS_PER_S // 20
 
 
 class CameraTrack:
@@ -51,6 +55,9 @@ class CameraTrack:
         self._matcher = DamageMatcher(train.period_ns, self.counters)
         self._gaps: deque[Gap] = deque()
         self._since = HostNs(0)
+        self._first: HostNs | None = None  # trigger time of the epoch's first whole frame
+        self._seen = HostNs(0)  # until then the camera was there in this epoch: frames triggered before would be here
+        self._left = HostNs(0)  # the same of the last epoch
         self._known_until = HostNs(0)
         self._last: tuple[Record, HostNs] | None = None  # the epoch's last whole frame and its trigger time
         # The running gap: it began with the last frame, and its end is not known yet.
@@ -79,8 +86,8 @@ class CameraTrack:
         if self._broken:
             self.clock = DeviceClock()
         self.epoch, self.connected, self.silent = epoch, True, False
-        self._since = self.alive = host
-        self._last = None
+        self._since = self._seen = self.alive = host
+        self._last = self._first = None
         self._begin_running_gap()
 
     def disconnect(self, host: HostNs) -> None:
@@ -90,6 +97,7 @@ class CameraTrack:
         start = self._since if self._last is None else self._last[1]
         self._gaps.append(Gap(start, host, damaged=self._damaged, broken=True, anchored=False))
         self._known_until = max(self._known_until, host)
+        self._left = max(self._left, self.alive if self.silent else self._seen)
         self.connected = self.silent = False
         self._damaged = []
 
@@ -97,6 +105,7 @@ class CameraTrack:
         """Enter a reading of the camera's clock."""
         steps = self.clock.steps
         self.clock.latch(latch)
+        self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
         if self.clock.steps != steps:
             # Times before and after the step cannot be compared: the next frame counts as a first one.
             self.counters.clock_steps += 1
@@ -117,6 +126,7 @@ class CameraTrack:
             self.counters.unassigned += 1
         self._damaged.append(host)
         self.alive = max(self.alive, HostNs(round(self._matcher.trigger_of(host))))
+        self._seen = max(self._seen, self.alive)
         self.unanswered = 0
         if self.silent:
             self.silent, self._broken = False, True
@@ -159,7 +169,9 @@ class CameraTrack:
             self.counters.overruns += gap.overruns
             self._gaps.append(gap)
         self._last = record, time
+        self._first = self._first or time
         self._known_until = self.alive = time
+        self._seen = max(self._seen, time)
         self._matcher.whole(record.host_time - time)
         return True
 
@@ -191,6 +203,33 @@ class CameraTrack:
             return NO_FRAME[FrameStatus.ABSENT]
         self.counters.presumed += 1
         return NO_FRAME[FrameStatus.LOST]
+
+    @property
+    def watches(self) -> bool:
+        """Whether the camera is there and has been seeing pulses since the last decided one."""
+        last = self._train.last
+        return (
+            self.delivers and not self.silent and self._first is not None and last is not None and self._first <= last
+        )
+
+    def was_away(self, time: HostNs) -> bool:
+        """Whether the camera was not there at `time`: it was disconnected, or not set up yet."""
+        if time <= self._left or not self.connected:
+            return time > self._left
+        if self.silent:  # that it answers proves nothing: it does so while pulses come
+            return time > self.alive
+        return time < (self._since + FIRST_NS if self._first is None else self._first - self._tolerance_ns)
+
+    def settle_unwatched(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
+        """Decide what became of a pulse at which the camera was away: absent, unless a damaged arrival is left of it.
+
+        Args:
+            time: time of the pulse.
+            rivals: as for `settle`.
+        """
+        gap = self.gap_after(time)
+        outcome = NO_FRAME[FrameStatus.ABSENT] if gap is None else gap.settle(time, rivals, self._matcher)
+        return NO_FRAME[FrameStatus.ABSENT] if outcome.status is FrameStatus.MISSED else outcome
 
     def gap_after(self, time: HostNs) -> Gap | None:
         """The gap in which `time` lies, None if its end is not known yet. Earlier gaps are dropped."""

@@ -19,17 +19,19 @@ class OpenPulse:
         times: the frames' trigger times, likewise.
         missing: how many frames have not come.
         proven_by_ids: no camera delivered a frame, but the frame ids prove that the pulse fired.
+        unwatched: no camera was there; the rhythm of the train tells that the pulse was due.
     """
 
-    __slots__ = ("cargo", "frames", "missing", "proven_by_ids", "time", "times")
+    __slots__ = ("cargo", "frames", "missing", "proven_by_ids", "time", "times", "unwatched")
 
-    def __init__(self, cameras: int, time: HostNs, *, proven_by_ids: bool = False) -> None:
+    def __init__(self, cameras: int, time: HostNs, *, proven_by_ids: bool = False, unwatched: bool = False) -> None:
         self.cargo: object | None = None
         self.time = time
         self.frames: list[Record | None] = [None] * cameras
         self.times: list[HostNs | None] = [None] * cameras
         self.missing = cameras
         self.proven_by_ids = proven_by_ids
+        self.unwatched = unwatched
 
     def add(self, camera: int, record: Record, time: HostNs) -> None:
         """Add a camera's frame, triggered at `time`."""
@@ -76,12 +78,14 @@ class ClosedPulse:
         time: time of the pulse on the common time line.
         outcomes: one per camera.
         cargo: that of the `OpenPulse`; None if no frame came.
+        unwatched: no camera was there; the rhythm of the train tells that the pulse was due.
     """
 
     number: RigPulse
     time: HostNs
     outcomes: tuple[Outcome, ...]
     cargo: object | None
+    unwatched: bool = False
 
     @property
     def complete(self) -> bool:

@@ -12,22 +12,21 @@ from typing import Final
 
 import msgspec
 
-from rig.clocks import NS_PER_S, ClockLatch, DecimalNs, HostNs
+from rig.clocks import ClockLatch, DecimalNs, HostNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus, Record
 from rig.health import CameraCounters, CameraPairing, PairingHealth
 from rig.pulse import RigPulse
-from triggering.pairing.camera_track import CameraTrack
+from triggering.pairing.camera_track import FIRST_NS, HELD_BACK_NS, CameraTrack
 from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
 from triggering.pairing.undelivered import undelivered_times
+from triggering.pairing.unwatched import unwatched_time
 from triggering.timeline.pulse_train import PulseTrain
 
 __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 
 _TOLERANCE_PERIODS: Final = 0.3
 _SILENT_PERIODS: Final = 3
-_HELD_BACK_NS: Final = NS_PER_S // 20  # whole frames may be held back this long behind a damaged one
-_FIRST_NS: Final = NS_PER_S // 2  # a newly connected camera may take this long to its first frame
 _TIME: Final = attrgetter("time")
 
 
@@ -60,7 +59,7 @@ class Pairer:
         self._open: list[OpenPulse] = []
         self._examined: OpenPulse | None = None
         self._closed = 0
-        self._proven_by_ids = 0
+        self._proven_by_ids = self._unwatched = 0
 
     # -- records in ----------------------------------------------------------------------------------------------
 
@@ -122,11 +121,16 @@ class Pairer:
         Returns:
             The pulses decided now, in the order of time.
         """
-        closed = []
-        while self._open and self._is_due(self._open[0], now):
-            self._insert_undelivered()
+        closed: list[ClosedPulse] = []
+        while True:
+            due = bool(self._open) and self._is_due(self._open[0], now)
+            if due:
+                self._insert_undelivered()
+            if not (due and self._open[0].proven_by_ids):
+                self._insert_unwatched(now, due=due)
+            if not (due or (self._open and self._open[0].unwatched)):
+                return closed
             closed.append(self._close(self._open.pop(0)))
-        return closed
 
     def next_deadline(self) -> HostNs | None:
         """When `advance` must be called at the latest although nothing arrives; None if there is no open pulse."""
@@ -146,9 +150,9 @@ class Pairer:
         if len(self._open) < _SILENT_PERIODS:
             return ()
         for camera, track in enumerate(self._tracks):
-            since = track.alive if track.delivers else track.alive + _FIRST_NS
+            since = track.alive if track.delivers else track.alive + FIRST_NS
             behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]
-            late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + _HELD_BACK_NS
+            late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + HELD_BACK_NS
             if late and track.connected:
                 overdue.append(camera)
         return tuple(overdue)
@@ -164,6 +168,7 @@ class Pairer:
         return PairingHealth(
             pulses=self._closed,
             proven_by_ids=self._proven_by_ids,
+            unwatched=self._unwatched,
             open=len(self._open),
             period_us=round(train.period_ns / 1000, 3),
             spread_median_us=train.spread_median_ns / 1000,
@@ -198,7 +203,7 @@ class Pairer:
 
     def _is_due(self, pulse: OpenPulse, now: HostNs) -> bool:
         """Whether the oldest open pulse can be decided."""
-        if pulse.missing == 0 or pulse.proven_by_ids:
+        if pulse.missing == 0 or pulse.proven_by_ids or pulse.unwatched:
             return True
         if now >= pulse.time + self._hold_ns:
             self._notice_silence(pulse)
@@ -232,22 +237,37 @@ class Pairer:
         times = undelivered_times(self._open, self._tracks, self._train, self._tolerance_ns)
         self._open[:0] = [OpenPulse(len(self._tracks), time, proven_by_ids=True) for time in times]
 
+    def _insert_unwatched(self, now: HostNs, *, due: bool) -> None:
+        """Insert the pulse that was expected before the next one, if no camera was there to see it.
+
+        That is certain only when frames of it cannot come any more: like those of the next one, if it is `due`.
+        """
+        following = self._open[0] if self._open else None
+        time = unwatched_time(self._train, self._tracks, None if following is None else following.time)
+        if time is not None and (due or now >= time + self._hold_ns):
+            self._open.insert(0, OpenPulse(len(self._tracks), time, unwatched=True))
+
     def _close(self, pulse: OpenPulse) -> ClosedPulse:
         outcomes = []
         for camera, track in enumerate(self._tracks):
             record, time = pulse.frames[camera], pulse.times[camera]
             if record is None or time is None:
-                outcome = track.settle(pulse.time, self._rivals(camera, track))
+                settle = track.settle_unwatched if pulse.unwatched else track.settle
+                outcome = settle(pulse.time, self._rivals(camera, track))
             else:
                 track.forget_until(time)
                 offset = time - pulse.time
                 outcome = Outcome(FrameStatus.OK, record, offset)
             track.counters.count(outcome.status)
             outcomes.append(outcome)
-        self._train.advance(pulse.time, pulse.spread_ns)
+        if pulse.unwatched:
+            self._train.go_on(pulse.time)
+        else:
+            self._train.advance(pulse.time, pulse.spread_ns)
         self._closed += 1
         self._proven_by_ids += pulse.proven_by_ids
-        return ClosedPulse(RigPulse(self._closed), pulse.time, tuple(outcomes), pulse.cargo)
+        self._unwatched += pulse.unwatched
+        return ClosedPulse(RigPulse(self._closed), pulse.time, tuple(outcomes), pulse.cargo, pulse.unwatched)
 
     def _rivals(self, camera: int, track: CameraTrack) -> list[HostNs]:
         """Times of the later pulses that lack the camera too, up to its next frame."""

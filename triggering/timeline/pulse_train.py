@@ -1,6 +1,7 @@
 """Tracks the period of the pulses, and how far the trigger times of the frames of one pulse lie apart."""
 
 from collections import deque
+from statistics import median_low
 from typing import Final
 
 from rig.clocks import HostNs
@@ -10,6 +11,10 @@ _RECENT: Final = 256
 #: pauses or disturbances.
 _NEIGHBOUR: Final = 0.3
 _PERIOD_GAIN: Final = 0.02
+#: The rhythm is known if, of so many intervals, at least half agree with their median to this share of it.
+_RHYTHM: Final = 64
+_RHYTHM_LEAST: Final = 4
+_AGREE: Final = 0.05
 #: With a larger spread, as a share of the period, frames may soon be paired with the wrong pulse.
 _ALARM: Final = 0.25
 
@@ -26,6 +31,23 @@ class PulseTrain:
         self.period_ns = float(period_ns)
         self.last: HostNs | None = None
         self._spreads: deque[int] = deque(maxlen=_RECENT)
+        self._intervals: deque[int] = deque(maxlen=_RHYTHM)
+
+    @property
+    def rhythm_ns(self) -> float | None:
+        """The period by which an unbroken train goes on, ns; None if the pulses so far do not tell one.
+
+        The mean of the recent intervals is nearer to it than `period_ns`, which follows slowly.
+        """
+        if len(self._intervals) < _RHYTHM_LEAST:
+            return None
+        usual = median_low(self._intervals)
+        agreeing = [interval for interval in self._intervals if abs(interval - usual) < _AGREE * usual]
+        return sum(agreeing) / len(agreeing) if 2 * len(agreeing) >= len(self._intervals) else None
+
+    def go_on(self, time: HostNs) -> None:
+        """Enter a pulse that no camera could see; its time follows from the rhythm, so it tells nothing of it."""
+        self.last = time
 
     def room(self, span_ns: int) -> int:
         """How many pulses of an unbroken train lie between two that are `span_ns` apart."""
@@ -40,6 +62,7 @@ class PulseTrain:
         """
         if self.last is not None:
             interval = time - self.last
+            self._intervals.append(interval)
             deviation = interval - self.period_ns
             if abs(deviation) < _NEIGHBOUR * self.period_ns:
                 self.period_ns += _PERIOD_GAIN * deviation

@@ -1,0 +1,80 @@
+"""All cameras go, or freeze, during a recording: every pulse has a tag, or the recording says that there is a pause."""
+
+import json
+import subprocess
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from recorder.checking.verify import verify
+from recorder.reading.info import info
+from rig.clocks import host_now
+from rig.frame import FrameStatus
+from rig.status import Counts
+from service.headless import HeadlessRig
+from service.processes.simulation import simulated_hill
+from simrig.programs.simulated_hill import SimulatedHill
+from tests.capture.rigs import make_rig, write_rig
+from tests.support.loopback import Loopback
+
+NAMES = ("K1", "K2", "K3")
+
+
+@pytest.mark.parametrize("come_back", [True, False])
+def test_pulses_without_any_camera_are_tagged_absent(tmp_path: Path, loopback: Loopback, come_back: bool) -> None:
+    rig, epoch = make_rig(tmp_path, "aravis", loopback), host_now()
+    path, gone = tmp_path / "log.mcap", set[str]()
+    with simulated_hill(rig, epoch) as hill:
+        assert isinstance(hill, SimulatedHill)
+
+        def on_event(line: str) -> None:
+            name = line.partition(" ")[0]
+            if line.startswith(f"{name} gone") and name not in gone:
+                gone.add(name)
+                if come_back:
+                    hill.restart(name)
+
+        def on_progress(counts: Counts) -> None:
+            if counts.pulses > 20 and not killed:
+                killed.append(counts.pulses)
+                for name in NAMES:
+                    hill.kill(name)
+
+        killed: list[int] = []
+        with HeadlessRig(rig, "", on_event, lambda _: nullcontext({})) as running:
+            running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+            running.start_recording(path, session={}, pulses=420, seconds=14)
+            ended = running.wait_until_finished(on_progress, lambda: False)
+    report = verify(path)
+    assert ended.pauses == report.ledger.pauses() == ()
+    assert (report.verdict, report.ledger.pulses) == ("partial", 420)
+    assert report.ledger.causes[FrameStatus.ABSENT] > 3 * 30
+    last = report.ledger.incomplete[-1]
+    assert (last.last < 420) if come_back else (last.last, len(last.cameras)) == (420, 3)
+    assert report.ledger.rate_hz == pytest.approx(30, abs=0.05)
+
+
+@pytest.mark.parametrize("backend", ["aravis", "iidc"])
+def test_a_recording_in_which_all_cameras_froze_is_never_called_clean(
+    tmp_path: Path, loopback: Loopback, backend: str
+) -> None:
+    """Nobody can tell this from a trigger that pauses: the frame numbers go on without a hole."""
+    faults = [
+        {"kind": "frozen", "camera": name, "at_pulse": pulse, "duration_s": 1.5}
+        for pulse in range(210, 3000, 150)
+        for name in NAMES
+    ]
+    rig = write_rig(tmp_path, backend, loopback, faults=faults)
+    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "8", "--out", str(tmp_path)]
+    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=90, check=False)
+    assert done.returncode == 5, done.stderr
+    assert "no pulses for" in done.stderr.splitlines()[-1]
+    assert "look at the trigger" in done.stderr
+    result = json.loads(done.stdout)
+    assert result["pauses"]
+    assert all(pause["seconds"] > 1.3 for pause in result["pauses"])
+    report, said = verify(Path(result["log"])), info(Path(result["log"])).to_json()
+    assert report.verdict == "partial"
+    assert len(said["pauses"]) == len(report.to_json()["pauses"]) == len(result["pauses"])

@@ -143,7 +143,8 @@ class Assembler:
         elif self._keeping_up_since is None:
             self._keeping_up_since = now
         if self._keeping_up_since is not None and now >= self._keeping_up_since + self.hold_ns:
-            self.settled = now
+            oldest = self.pairer.oldest
+            self.settled = now if oldest is None else min(now, HostNs(oldest + self.hold_ns))
 
     def _ready(self) -> Iterator[Triplet]:
         """The decided pulses up to the first one of which a frame is not copied yet."""

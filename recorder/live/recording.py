@@ -142,6 +142,11 @@ class Recording:
         settled = self._assembler.settled
         return self._ended or self._counted or (self._end is not None and settled > self._end + self._assembler.hold_ns)
 
+    def hurry(self, now: HostNs) -> None:
+        """Let none of the recording's pulses wait for what later ones may tell, once its end has come."""
+        if self._end is not None and now > self._end:
+            self._assembler.pairer.hurry(self._end)
+
     def stop(self) -> None:
         """End with the last pulse that has fired until now."""
         self._end = host_now()

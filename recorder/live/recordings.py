@@ -200,6 +200,7 @@ class Recordings:
             self.work(host_now())
             if self._recording is recording and self._phase is _Phase.RUNNING:
                 self.happened(Event.now(Level.ERROR, "recorder", f"recording ends early: {why}"))
+                self._decide_now()
                 self._write_slice(recording, until=None)
                 recording.end_now()
             time.sleep(_PAUSE_S)
@@ -222,6 +223,7 @@ class Recordings:
             case _Phase.RUNNING:
                 self._write_slice(recording, until=HostNs(now + _SLICE_NS))
                 self._look_at_disk(now)
+                recording.hurry(now)
                 if self._recording is recording and not self._behind and recording.finished():
                     self._phase = _Phase.FLUSHING
             case _Phase.FLUSHING:
@@ -406,6 +408,13 @@ class Recordings:
         if self._recording is recording and self._phase is _Phase.RUNNING:
             error = StorageError(f"{recording.path}: {why}; the log is whole up to there")
             self._fail(recording, error, whole=True)
+
+    def _decide_now(self) -> None:
+        """Take in the pulses that would have waited for what later ones may tell."""
+        now = host_now()
+        self._assembler.pairer.hurry(now)
+        for triplet in self._assembler.pump(now):
+            self.take(triplet)
 
     # -- pulses and notes ----------------------------------------------------------------------------------------
 

@@ -13,6 +13,14 @@ from tests.triggering.simulation import MS, US
 from triggering.pairing.pairer import Pairer
 
 
+def running_train(pulses: int = 10) -> Feed:
+    """A feed with some complete pulses, so that their rhythm is known."""
+    feed = Feed()
+    for pulse in range(pulses):
+        feed.all_cameras(pulse, [pulse + 1] * 3)
+    return feed
+
+
 def test_an_id_gone_wild_does_not_fill_a_pause() -> None:
     feed = Feed()
     for pulse in range(3):
@@ -136,45 +144,43 @@ def test_a_frame_that_comes_twice_is_placed_once() -> None:
 
 
 def test_a_frame_after_its_pulse_is_decided_is_late() -> None:
-    feed = Feed()
-    feed.frame(0, 0, 1)
-    feed.frame(1, 0, 1)
-    assert feed.pairer.next_deadline() == feed.time_of(0) + HOLD
-    feed.advance(feed.time_of(0) + HOLD)
-    assert len(feed.closed) == 1
-    assert not feed.frame(2, 0, 1, after=HOLD + MS)
+    feed = running_train()
+    feed.frame(0, 10, 11)
+    feed.frame(1, 10, 11)
+    assert feed.pairer.next_deadline() == feed.time_of(10) + HOLD
+    feed.advance(feed.time_of(10) + HOLD)
+    assert len(feed.closed) == 11
+    assert not feed.frame(2, 10, 11, after=HOLD + MS)
     assert feed.pairer.counters[2].late == 1
 
 
 def test_a_pulse_decided_too_early_is_counted_when_the_ids_contradict() -> None:
-    feed = Feed()
-    feed.all_cameras(0, [1, 1, 1])
-    feed.all_cameras(1, [2, None, 2])
+    feed = running_train()
+    feed.all_cameras(10, [11, None, 11])
     feed.advance(feed.time_of(30))
-    assert feed.closed[1].outcomes[1].status is LOST, "presumed"
-    feed.all_cameras(31, [3, 2, 3])
+    assert feed.closed[10].outcomes[1].status is LOST, "presumed"
+    feed.all_cameras(31, [12, 11, 12])
     assert feed.pairer.counters[1].presumed == 1
     assert feed.pairer.counters[1].contradicted == 1
 
 
 def test_a_damaged_arrival_outweighs_a_wrong_presumption() -> None:
-    feed = Feed()
-    feed.all_cameras(0, [1, 1, 1])
-    feed.all_cameras(1, [2, None, 2])
+    feed = running_train()
+    feed.all_cameras(10, [11, None, 11])
     feed.advance(feed.time_of(30))
     feed.pairer.damaged(1, Record(RecordKind.DAMAGED, 1, HostNs(feed.time_of(31) + 5 * MS)))
-    feed.all_cameras(31, [3, None, 3])
-    feed.all_cameras(32, [4, 3, 4])
-    assert [tag.outcomes[1].status for tag in feed.closed] == [OK, LOST, DAMAGED, OK]
+    feed.all_cameras(31, [12, None, 12])
+    feed.all_cameras(32, [13, 12, 13])
+    assert [tag.outcomes[1].status for tag in feed.closed[9:]] == [OK, LOST, DAMAGED, OK]
     assert feed.pairer.counters[1].contradicted == 1
 
 
 def test_with_a_short_hold_silence_is_noticed_from_what_was_decided_before() -> None:
     feed = Feed(hold_ns=PERIOD + 5 * MS)
-    for pulse in range(8):
-        feed.all_cameras(pulse, [pulse + 1, None if pulse >= 4 else pulse + 1, pulse + 1])
+    for pulse in range(14):
+        feed.all_cameras(pulse, [pulse + 1, None if pulse >= 10 else pulse + 1, pulse + 1])
     assert feed.pairer.silent() == (1,)
-    assert [tag.outcomes[1].status for tag in feed.closed] == [OK] * 4 + [LOST] + [ABSENT] * 3
+    assert [tag.outcomes[1].status for tag in feed.closed] == [OK] * 10 + [LOST] + [ABSENT] * 3
 
 
 def test_frames_that_others_may_still_deliver_prove_no_pulse_in_a_pause() -> None:

@@ -8,17 +8,11 @@ from rig.frame import FrameStatus
 from tests.triggering.feed import HOLD, PERIOD, Feed
 from tests.triggering.oracle import ABSENT, LOST, OK, check, check_no_pulse_is_mixed
 from tests.triggering.simulation import MS, Hill, Outage, Run, Scenario
+from tests.triggering.test_records import running_train
 
 
 def fates(feed: Feed) -> list[set[FrameStatus]]:
     return [{outcome.status for outcome in pulse.outcomes} for pulse in feed.closed]
-
-
-def running_train(pulses: int = 20) -> Feed:
-    feed = Feed()
-    for pulse in range(pulses):
-        feed.all_cameras(pulse, [pulse + 1] * 3)
-    return feed
 
 
 def all_gone(feed: Feed, pulse: float) -> None:
@@ -27,7 +21,7 @@ def all_gone(feed: Feed, pulse: float) -> None:
 
 
 def test_pulses_go_on_while_every_camera_is_gone_and_are_counted_when_they_are_decided() -> None:
-    feed = running_train()
+    feed = running_train(20)
     all_gone(feed, 20.5)
     feed.advance(feed.time_of(50) + HOLD - MS)
     assert len(feed.closed) == 50, "pulse 50 may still come late"
@@ -41,7 +35,7 @@ def test_pulses_go_on_while_every_camera_is_gone_and_are_counted_when_they_are_d
 
 
 def test_the_train_goes_on_where_it_is_when_the_cameras_are_back() -> None:
-    feed = running_train()
+    feed = running_train(20)
     all_gone(feed, 20.5)
     feed.advance(feed.time_of(60))
     for camera in range(3):
@@ -56,7 +50,7 @@ def test_the_train_goes_on_where_it_is_when_the_cameras_are_back() -> None:
 
 
 def test_one_camera_that_is_there_shows_that_the_train_paused() -> None:
-    feed = running_train()
+    feed = running_train(20)
     for camera in (0, 1):
         feed.pairer.disconnected(camera, feed.time_of(20.5))
     feed.advance(feed.time_of(200))
@@ -67,7 +61,7 @@ def test_one_camera_that_is_there_shows_that_the_train_paused() -> None:
 
 
 def test_a_train_that_paused_before_the_cameras_were_unplugged_is_not_continued() -> None:
-    feed = running_train()
+    feed = running_train(20)
     for camera in range(3):
         feed.latch(camera, feed.time_of(60))  # it answers, and no frame came: the train has paused
     all_gone(feed, 61)
@@ -76,7 +70,7 @@ def test_a_train_that_paused_before_the_cameras_were_unplugged_is_not_continued(
 
 
 def test_cameras_that_fall_silent_together_are_absent_from_their_last_frame_on_once_they_are_given_up() -> None:
-    feed = running_train()
+    feed = running_train(20)
     feed.advance(feed.time_of(100))
     assert len(feed.closed) == 20, "the train may have paused"
     all_gone(feed, 110)
@@ -112,7 +106,7 @@ def test_the_true_rate_counts_not_the_nominal_one() -> None:
 
 
 def test_a_frame_that_was_on_its_way_when_its_camera_was_given_up_is_used() -> None:
-    feed = running_train()
+    feed = running_train(20)
     all_gone(feed, 20.2)
     assert feed.frame(1, 20, 21)
     feed.advance(feed.time_of(23) + HOLD + MS)
@@ -159,7 +153,7 @@ def test_all_cameras_go_and_come_back_one_after_the_other(
 
 
 def test_absent_pulses_take_no_memory() -> None:
-    feed = running_train()
+    feed = running_train(20)
     all_gone(feed, 20.5)
     feed.advance(feed.time_of(20) + 3600 * NS_PER_S)
     assert len(feed.closed) > 107_000

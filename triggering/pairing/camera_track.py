@@ -76,6 +76,11 @@ class CameraTrack:
         """Whether it has delivered a frame since it was connected."""
         return self.connected and self._last is not None
 
+    @property
+    def will_tell(self) -> bool:
+        """Whether the id of its next whole frame will tell what became of those before it."""
+        return self.connected and not self.silent and not self._broken
+
     # -- records of the camera -----------------------------------------------------------------------------------
 
     def connect(self, epoch: int, host: HostNs) -> None:

@@ -12,7 +12,7 @@ from typing import Final
 
 import msgspec
 
-from rig.clocks import ClockLatch, DecimalNs, HostNs
+from rig.clocks import NS_PER_S, ClockLatch, DecimalNs, HostNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus, Record
 from rig.health import CameraCounters, CameraPairing, PairingHealth
@@ -27,6 +27,8 @@ __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 
 _TOLERANCE_PERIODS: Final = 0.3
 _SILENT_PERIODS: Final = 3
+#: Where the pulses have no rhythm, one that lacks a frame waits this long for later pulses, which tell why.
+_PATIENCE_NS: Final = 30 * NS_PER_S
 _TIME: Final = attrgetter("time")
 
 
@@ -58,6 +60,8 @@ class Pairer:
         self._tracks = [CameraTrack(self._train, tolerance) for _ in range(cameras)]
         self._open: list[OpenPulse] = []
         self._examined: OpenPulse | None = None
+        self._hurry_until = HostNs(0)
+        self._open_most = max(_SILENT_PERIODS, hold_ns // period_ns)
         self._closed = 0
         self._proven_by_ids = self._unwatched = 0
 
@@ -134,7 +138,16 @@ class Pairer:
 
     def next_deadline(self) -> HostNs | None:
         """When `advance` must be called at the latest although nothing arrives; None if there is no open pulse."""
-        return HostNs(self._open[0].time + self._hold_ns) if self._open else None
+        return self._deadline() if self._open else None
+
+    @property
+    def oldest(self) -> HostNs | None:
+        """Time of the oldest pulse that is not decided yet; None if there is none."""
+        return self._open[0].time if self._open else None
+
+    def hurry(self, until: HostNs) -> None:
+        """Let no pulse up to a time wait longer than the hold for what later pulses may tell: a recording ends."""
+        self._hurry_until = max(self._hurry_until, until)
 
     def silent(self) -> tuple[int, ...]:
         """The connected cameras that have delivered nothing for three periods while others did."""
@@ -151,6 +164,7 @@ class Pairer:
             return ()
         for camera, track in enumerate(self._tracks):
             since = track.alive if track.delivers else track.alive + FIRST_NS
+            since = max(since, HostNs(now - self._hold_ns))
             behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]
             late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + HELD_BACK_NS
             if late and track.connected:
@@ -205,10 +219,28 @@ class Pairer:
         """Whether the oldest open pulse can be decided."""
         if pulse.missing == 0 or pulse.proven_by_ids or pulse.unwatched:
             return True
-        if now >= pulse.time + self._hold_ns:
+        if now >= self._deadline():
             self._notice_silence(pulse)
             return True
         return not any(track.may_deliver(pulse.time) for track in self._lacking(pulse))
+
+    def _deadline(self) -> HostNs:
+        """When the oldest open pulse is decided at the latest.
+
+        Pulses in a rhythm are decided at the end of the hold: by then the frames of the next ones have come, whose ids
+        tell why one is missing. A pulse from a hand waits for as many others as fire during the hold in a rhythm, if
+        they do not keep it waiting too long; so there are never more open pulses than in a rhythm.
+        """
+        pulse = self._open[0]
+        hold = HostNs(pulse.time + self._hold_ns)
+        if pulse.time <= self._hurry_until or self._train.rhythm_ns is not None:
+            return hold
+        if not any(track.will_tell and track.may_deliver(pulse.time) for track in self._lacking(pulse)):
+            return hold
+        patience = HostNs(pulse.time + _PATIENCE_NS)
+        if len(self._open) <= self._open_most:
+            return max(hold, patience)
+        return max(hold, min(patience, self._open[self._open_most].time))
 
     def _lacking(self, pulse: OpenPulse) -> Iterable[CameraTrack]:
         return (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)

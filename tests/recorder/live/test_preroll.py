@@ -371,3 +371,28 @@ def test_every_pulse_comes_once_and_in_order(
 
 def _number(time: int) -> int:
     return round((time - START) / PERIOD)
+
+
+@pytest.mark.parametrize("wind_up", [False, True])
+def test_pulses_by_hand_are_all_in_the_log_however_the_recording_ends(
+    tmp_path: Path, publisher: Publisher, wind_up: bool
+) -> None:
+    """An incomplete pulse waits for the next ones, which tell why; it does not wait beyond the end of its recording."""
+    presses = [10, 21, 47, 60, 88, 102]
+    with _recorder(tmp_path, publisher, seconds=1.0, limit=100) as recorder:
+        path = recorder.start(0)
+        for index, pulse in enumerate(presses):
+            recorder.expose(pulse, *((0, 1, 2) if index < 5 else (0, 2)))
+            recorder.step()
+        recorder.clock.advance_to(recorder.cameras.time(presses[-1]) + 2 * recorder.assembler.hold_ns)
+        recorder.step()
+        assert recorder.assembler.pairer.health().open == 1
+        if wind_up:
+            recorder.recordings.wind_up("test")
+            report = recorder.reports[-1]
+        else:
+            recorder.recordings.stop()
+            report = recorder.finish()
+    assert isinstance(report, RecordingFinished)
+    assert (report.counts.pulses, report.counts.complete, report.pauses) == (6, 5, ())
+    assert _pulses(path) == presses

@@ -388,7 +388,7 @@ def test_pulses_by_hand_are_all_in_the_log_however_the_recording_ends(
         recorder.step()
         assert recorder.assembler.pairer.health().open == 1
         if wind_up:
-            recorder.recordings.wind_up("test")
+            recorder.recordings.wind_up("test", 10.0)
             report = recorder.reports[-1]
         else:
             recorder.recordings.stop()

@@ -24,6 +24,12 @@ _MOST_DAMAGED: Final = 64
 FIRST_NS: Final = NS_PER_S // 2
 #: Whole frames may be held back this long behind a damaged one.
 HELD_BACK_NS: Final = NS_PER_S // 20
+#: A camera whose frames come late is not silent before it has sent nothing for this long.
+_SLOW_NS: Final = NS_PER_S
+#: So many late frames in a row are no accident.
+_LATE_RUN: Final = 2
+#: Pulses that are remembered because they were decided before the camera's frame came.
+_MOST_UNSEEN: Final = 10_000
 
 
 class CameraTrack:
@@ -41,6 +47,8 @@ class CameraTrack:
         silent: the camera is connected, but delivers nothing while others do.
         unanswered: pulses decided without this camera since its last sign of life.
         alive: host time of the last sign of life: a trigger time or the connection.
+        heard: host time at which the last whole frame came.
+        lag_ns: how much later than usual it came.
     """
 
     def __init__(self, train: PulseTrain, tolerance_ns: int) -> None:
@@ -50,7 +58,9 @@ class CameraTrack:
         self.connected = False
         self.silent = False
         self.unanswered = 0
-        self.alive = HostNs(0)
+        self.alive = self.heard = HostNs(0)
+        self.lag_ns = 0.0
+        self._late_run = 0  # whole frames in a row whose pulses were decided already
         self._train, self._tolerance_ns = train, tolerance_ns
         self._matcher = DamageMatcher(train.period_ns, self.counters)
         self._gaps: deque[Gap] = deque()
@@ -64,7 +74,7 @@ class CameraTrack:
         self._broken = False
         self._damaged: list[HostNs] = []
         self._settled_damaged = 0
-        self._settled_unseen = 0  # pulses decided as lost or absent at their deadline, without proof
+        self._unseen: deque[HostNs] = deque(maxlen=_MOST_UNSEEN)  # pulses decided at their deadline, without proof
 
     @property
     def latency_ns(self) -> float:
@@ -177,10 +187,18 @@ class CameraTrack:
         self._first = self._first or time
         self._known_until = self.alive = time
         self._seen = max(self._seen, time)
-        self._matcher.whole(record.host_time - time)
+        self._note_arrival(record.host_time, time)
         return True
 
     # -- decisions about pulses ----------------------------------------------------------------------------------
+
+    def is_slow(self, now: HostNs) -> bool:
+        """Whether its frames come, but much later than usual: it is neither silent nor in need of a new connection."""
+        return self.delivers and self.lag_ns > HELD_BACK_NS and now < self.heard + _SLOW_NS
+
+    def comes_late(self, now: HostNs) -> bool:
+        """Whether its frames come so late that their pulses are decided already."""
+        return self.is_slow(now) and self._late_run >= _LATE_RUN
 
     def may_deliver(self, time: HostNs) -> bool:
         """Whether a whole frame of a pulse at `time` may still come."""
@@ -202,9 +220,11 @@ class CameraTrack:
         if self._damaged and self._matcher.match(self._damaged, time, rivals):
             self._settled_damaged += 1
             return NO_FRAME[FrameStatus.DAMAGED]
-        self._settled_unseen += 1
         self.unanswered += time > self.alive
-        if self._last is None or self.silent:
+        if self.silent:
+            return NO_FRAME[FrameStatus.ABSENT]
+        self._unseen.append(time)
+        if self._last is None:
             return NO_FRAME[FrameStatus.ABSENT]
         self.counters.presumed += 1
         return NO_FRAME[FrameStatus.LOST]
@@ -255,6 +275,14 @@ class CameraTrack:
 
     # -- details -------------------------------------------------------------------------------------------------
 
+    def _note_arrival(self, host: HostNs, time: HostNs) -> None:
+        """Note how late a whole frame came, by its arrival and its trigger time; late ones do not become the usual."""
+        self.heard, self.lag_ns = host, host - time - self.latency_ns
+        decided = self._train.last is not None and time <= self._train.last + self._tolerance_ns
+        self._late_run = self._late_run + 1 if decided else 0
+        if not decided:
+            self._matcher.whole(host - time)
+
     def _implausible(self, record: Record) -> None:
         """Treat a frame from the future, or one older than the last, as damaged: its trigger time is not known."""
         self.counters.implausible += 1
@@ -262,17 +290,22 @@ class CameraTrack:
 
     def _begin_running_gap(self) -> None:
         self._damaged = []
-        self._settled_damaged = self._settled_unseen = self.unanswered = 0
+        self._unseen.clear()
+        self._settled_damaged = self.unanswered = 0
 
     def _end_running_gap(self, start: HostNs, end: HostNs, taken: int, *, anchored: bool) -> Gap:
         """The running gap, ended by the frame at `end`, with `taken` frames in it; a new gap begins there."""
-        left = taken - self._settled_damaged - self._settled_unseen
+        # Frames may come so late that later pulses are decided already; those lie in the gap that begins now.
+        unseen = sum(pulse < end - self._tolerance_ns for pulse in self._unseen)
+        later = [pulse for pulse in self._unseen if pulse > end + self._tolerance_ns]
+        left = taken - self._settled_damaged - unseen
         # Damaged arrivals are certain; pulses decided as lost without proof are not.
         least = max(0, min(len(self._damaged), taken - self._settled_damaged))
         if left < least and anchored:
-            self.counters.contradicted += min(least - left, self._settled_unseen)
+            self.counters.contradicted += min(least - left, unseen)
         gap = Gap(start, end, max(left, least), taken, self._damaged, self._broken, anchored)
         self._begin_running_gap()
+        self._unseen.extend(later)
         self._broken = False
         return gap
 

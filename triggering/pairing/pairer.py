@@ -167,9 +167,17 @@ class Pairer:
             since = max(since, HostNs(now - self._hold_ns))
             behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]
             late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + HELD_BACK_NS
-            if late and track.connected:
+            if late and track.connected and not track.is_slow(now):
                 overdue.append(camera)
         return tuple(overdue)
+
+    def slow(self, now: HostNs) -> tuple[int, ...]:
+        """The cameras whose frames come so late, at host time `now`, that their pulses are decided already."""
+        return tuple(camera for camera, track in enumerate(self._tracks) if track.comes_late(now))
+
+    def lag_ms(self, camera: int) -> float:
+        """How much later than usual the last frame of a camera came, ms."""
+        return self._tracks[camera].lag_ns / 1e6
 
     @property
     def counters(self) -> tuple[CameraCounters, ...]:
@@ -220,7 +228,7 @@ class Pairer:
         if pulse.missing == 0 or pulse.proven_by_ids or pulse.unwatched:
             return True
         if now >= self._deadline():
-            self._notice_silence(pulse)
+            self._notice_silence(pulse, now)
             return True
         return not any(track.may_deliver(pulse.time) for track in self._lacking(pulse))
 
@@ -245,11 +253,13 @@ class Pairer:
     def _lacking(self, pulse: OpenPulse) -> Iterable[CameraTrack]:
         return (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)
 
-    def _notice_silence(self, pulse: OpenPulse) -> None:
+    def _notice_silence(self, pulse: OpenPulse, now: HostNs) -> None:
         """At the deadline of a pulse, find which of the cameras that it lacks are silent."""
         for track in self._lacking(pulse):
             if not track.may_deliver(pulse.time) or track.alive > pulse.time:
                 continue
+            if track.is_slow(now) or track.heard > pulse.time + track.latency_ns + HELD_BACK_NS:
+                continue  # its frames are still coming
             periods, before = track.unanswered, pulse.time
             for other in self._open:
                 # Frames of younger pulses may be on their way. Pulses that no camera delivered count too.

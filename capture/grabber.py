@@ -83,14 +83,18 @@ class Grabber:
         next_latch = next_count = last_arrival = host_now()
         while not self._stopping():
             requests = self._ring.reconnect_requests()
-            arrival = camera.receive(_RECEIVE_S if requests == asked else self._last_look_s)
+            wanted = requests != asked
+            received = camera.bytes_received if wanted else 0
+            arrival = camera.receive(self._last_look_s if wanted else _RECEIVE_S)
             for text in camera.notices():
                 self._put(RecordKind.NOTICE, text=text)
             if arrival is not None:
                 self._put_arrival(arrival)
-            elif requests != asked:
+            elif wanted and camera.bytes_received == received:
                 # The recorder asked, then we looked once more and found nothing: the camera is silent, we are not late.
                 raise CameraError("no frame while the other cameras have theirs; connecting again")
+            elif wanted:
+                requests = asked  # its frame is on the way, slowly: look again
             asked = requests
             # Clock and counters are read just after a frame: the next one is farthest away, and the camera is sure to
             # answer (a dead one blocks for seconds). Without pulses they are read after a second of quiet.

@@ -80,6 +80,11 @@ class Camera(Protocol):
         """Messages since the last call that belong in the event log, one line each."""
         ...
 
+    @property
+    def bytes_received(self) -> int:
+        """Bytes that have come so far, of frames whole or not; 0 where no part of a frame comes before the rest."""
+        ...
+
     def close(self) -> None:
         """Stop and release the camera. Takes a bounded time and never raises."""
         ...

@@ -142,6 +142,11 @@ class AravisCamera:
         """None: Aravis reports nothing that is not counted."""
         return ()
 
+    @property
+    def bytes_received(self) -> int:
+        """See `capture.seam.Camera.bytes_received`."""
+        return int(self._stream.get_info_uint64_by_name("n_transferred_bytes"))
+
     def close(self) -> None:
         """Stop, leave control (or the next opening would wait for the heartbeat), and drop all Aravis objects."""
         try:

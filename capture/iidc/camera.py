@@ -141,6 +141,11 @@ class IidcCamera:
         notices, self._notices = self._notices, []
         return notices
 
+    @property
+    def bytes_received(self) -> int:
+        """See `capture.seam.Camera.bytes_received`."""
+        return 0
+
     def close(self) -> None:
         """Stop the camera, and close it and the library."""
         self._cleanup.close()

@@ -91,6 +91,11 @@ class SimCamera:
         """None: a simulated camera has nothing to report."""
         return ()
 
+    @property
+    def bytes_received(self) -> int:
+        """See `capture.seam.Camera.bytes_received`."""
+        return 0
+
     def close(self) -> None:
         """Give all slots back."""
         self._ring.reclaim()

@@ -27,6 +27,8 @@ _HOLD_PERIODS: Final = 4
 _HOLD_NS: Final = 130_000_000
 #: A grabber needs less than this from handing a slot over to queueing the record that names it.
 _STRANDED_NS: Final = NS_PER_S
+#: A camera whose link is too slow is told of so often at most.
+_TELL_SLOW_NS: Final = 10 * NS_PER_S
 
 
 def hold_ns(period_ns: int) -> int:
@@ -98,6 +100,7 @@ class Assembler:
         self._decided: deque[ClosedPulse] = deque()
         self._changes: list[CameraChanged] = []
         self._asked = [False] * len(rings)
+        self._slow_told = [HostNs(-_TELL_SLOW_NS)] * len(rings)
         self._heard = [False] * len(rings)
         # A recorder that died may have left slots that no record names, which nobody would ever free. A grabber may
         # just be about to queue the record of such a slot, so the slot is freed only if none has come until then.
@@ -127,6 +130,7 @@ class Assembler:
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
         self._decided.extend(self.pairer.advance(min(waiting, default=now)))
         self._ask_silent_cameras(now)
+        self._tell_slow_cameras(now)
         self._free_stranded_slots(now)
         ready = list(self._ready())
         self._settle(now)
@@ -297,3 +301,12 @@ class Assembler:
                 text = "three pulses behind the other cameras; looking after it"
                 self._changes.append(CameraChanged(camera=camera, news=CameraNews.SILENT, text=text))
             self._asked[camera] = camera in silent
+
+    def _tell_slow_cameras(self, now: HostNs) -> None:
+        """Say that a camera's frames come after their pulses are decided; people would look at its trigger cable."""
+        for camera in self.pairer.slow(now):
+            if now >= self._slow_told[camera] + _TELL_SLOW_NS:
+                self._slow_told[camera] = now
+                late_ms = self.pairer.lag_ms(camera)
+                text = f"its frames come too late, {late_ms:.0f} ms after the usual time: the link is too slow for them"
+                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, text=text))

@@ -1,0 +1,32 @@
+"""A camera whose cable carries too little: its frames come too late, and that is said, not that it is absent."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from recorder.checking.verify import verify
+from tests.capture.rigs import write_rig
+from tests.support.loopback import Loopback
+
+
+@pytest.mark.parametrize("mbit_s", [40.0, 15.0])
+def test_frames_of_a_slow_link_are_lost_not_absent(tmp_path: Path, loopback: Loopback, mbit_s: float) -> None:
+    """The camera sends 74 Mbit/s. At 15 Mbit/s a frame needs 160 ms."""
+    faults = [
+        {"kind": "slow_link", "camera": "K2", "at_pulse": pulse, "duration_s": 3.0, "mbit_s": mbit_s}
+        for pulse in range(240, 3000, 240)
+    ]
+    rig = write_rig(tmp_path, "aravis", loopback, faults=faults)
+    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "10", "--out", str(tmp_path)]
+    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=90, check=False)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["pulses"] == 300
+    assert result["causes"]["lost"] > 20
+    assert result["causes"]["absent"] == 0
+    said = [event.message for event in verify(Path(result["log"])).events if event.name == "K2"]
+    assert any("its frames come too late" in text and "the link is too slow" in text for text in said), said
+    assert not any(text.startswith("gone") for text in said), "a new connection would cost frames and mend nothing"

@@ -17,7 +17,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
-from rig.events import Event
+from rig.events import Event, Level
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
 from rig.transport.messages import (
@@ -69,7 +69,7 @@ class RecorderLoop:
             self._assembler, self._preroll, self._publisher, self._health.latency, self._health.underruns, self._tell
         )
         self._quit = False
-        self._warm = 0
+        self._warm = self._unreported = 0
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -100,6 +100,7 @@ class RecorderLoop:
         self._buffers.close()
 
     def _step(self, now: HostNs) -> None:
+        self._control.flush()
         for triplet in self._assembler.pump(now):
             self._take_in(triplet, now)
         for change in self._assembler.changes():
@@ -156,8 +157,16 @@ class RecorderLoop:
             preroll=self._preroll.health(now),
             recording=self._recordings.statistics(),
         )
-        self._control.send(RecorderHealth(health=health), or_drop=True)
+        self._tell(RecorderHealth(health=health))
+        self._own_up()
         self._recordings.health(wire.encode(health))
+
+    def _own_up(self) -> None:
+        """Tell of reports that the service process has left unread for so long that they were dropped."""
+        dropped, self._unreported = self._control.dropped - self._unreported, self._control.dropped
+        if dropped:
+            why = f"{dropped} reports are dropped: the service process does not read them; see whether it is stopped"
+            self._recordings.happened(Event.now(Level.WARNING, "recorder", why))
 
     def _sleep_ms(self, now: HostNs) -> float:
         deadlines = [self._next_report, self._next_health]

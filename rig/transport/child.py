@@ -1,5 +1,6 @@
 """The first thing that every child process does: set up its control channel, its signals and its lifeline."""
 
+import atexit
 import ctypes
 import os
 import select
@@ -17,6 +18,8 @@ from rig.transport.messages import Quit
 Config = TypeVar("Config")
 
 _CONFIG_S: Final = 10.0
+#: At the end of a process its last reports wait so long for a parent that does not read.
+_LAST_REPORTS_S: Final = 5.0
 _BAD_CONFIG: Final = 2
 _THREAD_FAILED: Final = 70  # EX_SOFTWARE of <sysexits.h>
 _PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
@@ -87,6 +90,7 @@ def begin(
         raise SystemExit(_BAD_CONFIG) from None
     if not isinstance(first, config):
         raise SystemExit(f"{name}: no configuration came; this program is started by svev")
+    atexit.register(control.drain, _LAST_REPORTS_S)
     context = ChildContext(name, control, first, grace_s)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if grace_s > 0:

@@ -7,7 +7,7 @@ channel (`rig.transport.channel`) encodes and checks messages by these types.
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 import msgspec
 
@@ -22,7 +22,13 @@ from rig.status import Counts
 
 
 class Message(msgspec.Struct, kw_only=True, tag=True):
-    """Base of all messages."""
+    """Base of all messages.
+
+    Attributes:
+        is_state: whether a message tells a state, so that only the latest of its type matters to a late reader.
+    """
+
+    is_state: ClassVar[bool] = False
 
 
 class Quit(Message):
@@ -211,6 +217,7 @@ class RecordingProgress(Message):
         pauses: stretches of time without a pulse.
     """
 
+    is_state: ClassVar[bool] = True
     counts: Counts
     first_pulse: UtcNs | None
     pauses: tuple[Pause, ...]
@@ -258,6 +265,7 @@ class RecordingFinished(RecordingProgress):
         trouble: frames that were lost because of the disk, in words; empty if none.
     """
 
+    is_state: ClassVar[bool] = False
     path: Path
     bytes: int
     unpublished: int
@@ -292,6 +300,7 @@ class RecorderEvent(Message):
 class RecorderHealth(Message):
     """The health record, once a second."""
 
+    is_state: ClassVar[bool] = True
     health: Health
 
 

@@ -134,7 +134,9 @@ class Child:
         Returns:
             Whether it had to be killed.
         """
-        in_time = self.wait(timeout_s)
+        deadline = time.monotonic() + timeout_s
+        self.control.drain(timeout_s)
+        in_time = self.wait(max(0.0, deadline - time.monotonic()))
         self.kill()
         return not in_time
 
@@ -156,19 +158,23 @@ class ProcessTable:
         return child
 
     def receive(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[tuple[str, Any]]:
-        """Messages of all children, waiting at most `timeout_s` seconds for the first.
+        """Messages of all children, waiting at most `timeout_s` seconds for the first; sends what waits for them.
 
         Args:
             timeout_s: s.
             wake: descriptors that end the waiting too when they become readable; they are not read.
         """
         alive = [child for child in self._children.values() if not child.control.ended]
-        watched: list[ControlChannel[Any] | int] = [*(child.control for child in alive), *wake]
-        ready = select.select(watched, [], [], timeout_s)[0]
+        poll = select.poll()
+        for child in alive:
+            poll.register(child.control, select.POLLIN | (select.POLLOUT if child.control.waiting else 0))
+        for fd in wake:
+            poll.register(fd, select.POLLIN)
+        ready = {fd for fd, _ in poll.poll(timeout_s * 1000)}
         return [
             (child.spec.name, message)
             for child in alive
-            if child.control in ready
+            if child.control.fileno() in ready
             for message in child.control.receive(0)
         ]
 

@@ -145,9 +145,14 @@ class RigProcesses:
         """When the recorder was started, on the monotonic clock, s."""
         return self._processes[RECORDER].started
 
-    def tell(self, command: RecorderCommand, *, or_drop: bool = False) -> None:
-        """Send a command to the recorder; `or_drop`: do not wait if it does not read."""
-        self._processes[RECORDER].control.send(command, or_drop=or_drop)
+    def tell(self, command: RecorderCommand) -> None:
+        """Send a command to the recorder, without waiting for it to read."""
+        control = self._processes[RECORDER].control
+        dropped = control.dropped
+        control.send(command)
+        if dropped == 0 < control.dropped:  # said once: a recorder that does not read for long is ended
+            text = "does not read its commands, and some are dropped; it is started again if it stays so"
+            self._on_event(Event.now(Level.ERROR, RECORDER, text))
 
     def kill_recorder(self) -> None:
         """Kill a recorder that does not answer; the next `turn` raises ProcessDiedError."""

@@ -68,7 +68,7 @@ class RigSession:
         """Pass on an event, also to the recorder, which publishes it and writes it into its log."""
         self._on_event(event)
         if self.processes is not None:
-            self.processes.tell(TellEvent(event=event), or_drop=True)
+            self.processes.tell(TellEvent(event=event))
 
     def begin_set_up(self) -> None:
         """Begin to start the simulated hill, if there is none yet, and the processes."""

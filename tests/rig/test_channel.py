@@ -2,13 +2,13 @@
 
 import socket
 import threading
-import time
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
 from rig.transport.channel import ControlChannel
+from rig.transport.messages import Message
 
 Channel = ControlChannel[dict[str, Any]]
 
@@ -19,6 +19,34 @@ def ends() -> Iterator[tuple[Channel, Channel]]:
     yield ours, theirs
     ours.close()
     theirs.close()
+
+
+class _State(Message):
+    """Tells a state."""
+
+    is_state: ClassVar[bool] = True
+    number: int
+    text: str = "x" * 3000
+
+
+class _OtherState(_State):
+    """Tells another one."""
+
+
+def _shrink(ends: tuple[Channel, Channel]) -> None:
+    for end in ends:
+        end._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
+        end._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+
+
+def _received(reader: Channel, writer: Channel) -> list[dict[str, Any]]:
+    """All that the writer has sent, while both of them turn as their processes do."""
+    writer.send({"end": True})
+    found: list[dict[str, Any]] = []
+    while not found or found[-1] != {"end": True}:
+        writer.flush()
+        found += reader.receive(0.001)
+    return found[:-1]
 
 
 def test_messages_come_whole_and_in_order(ends: tuple[Channel, Channel]) -> None:
@@ -36,13 +64,9 @@ def test_messages_come_whole_and_in_order(ends: tuple[Channel, Channel]) -> None
 def test_a_message_larger_than_the_buffers_comes_whole(ends: tuple[Channel, Channel]) -> None:
     ours, theirs = ends
     sent = [{"number": 1}, {"text": "x" * 3_000_000}, {"number": 2}]
-    writer = threading.Thread(target=lambda: [ours.send(message) for message in sent])
-    writer.start()
-    received: list[object] = []
-    while len(received) < len(sent):
-        received += theirs.receive(5.0)
-    writer.join()
-    assert received == sent
+    for message in sent:
+        ours.send(message)
+    assert _received(theirs, ours) == sent
 
 
 def test_the_end_of_the_other_side_is_noticed(ends: tuple[Channel, Channel]) -> None:
@@ -56,18 +80,83 @@ def test_the_end_of_the_other_side_is_noticed(ends: tuple[Channel, Channel]) -> 
     assert not theirs.send({"too": "late"})
 
 
-def test_a_sleeping_reader_costs_messages_but_no_time(ends: tuple[Channel, Channel]) -> None:
+def test_a_sleeping_reader_costs_no_time_and_no_event(ends: tuple[Channel, Channel]) -> None:
     ours, theirs = ends
-    message = {"report": "health", "text": "x" * 3000}
-    before = time.monotonic()
-    outcomes = [ours.send(message, or_drop=True) for _ in range(1000)]
-    assert time.monotonic() - before < 20.0  # a sender that waited would never get here
-    assert outcomes[0]
-    assert not outcomes[-1]
-    received: list[object] = []
-    while len(received) < sum(outcomes):
-        received += theirs.receive(1.0)
-    assert received == [message] * sum(outcomes), "what was sent came whole"
+    _shrink(ends)
+    sent = [{"event": number, "text": "x" * 500} for number in range(2000)]
+    assert all(ours.send(message) for message in sent), "a sender that waited would never get here"
+    assert ours.waiting
+    assert ours.dropped == 0
+    assert _received(theirs, ours) == sent
+
+
+def test_of_states_that_wait_the_latest_of_each_kind_is_kept(ends: tuple[Channel, Channel]) -> None:
+    ours, theirs = ends
+    _shrink(ends)
+    for number in range(1000):
+        ours.send(_State(number=number))
+        if number % 100 == 0:
+            ours.send({"event": number})
+            ours.send(_OtherState(number=number))
+    received = _received(theirs, ours)
+    states = [message["number"] for message in received if message.get("type") == "_State"]
+    assert states == sorted(set(states)), "in order, none torn, none twice"
+    assert len(states) < 20
+    assert states[-1] == 999
+    assert [message["event"] for message in received if "event" in message] == list(range(0, 1000, 100))
+    assert [message["number"] for message in received if message.get("type") == "_OtherState"][-1] == 900
+    assert ours.dropped == 0
+
+
+def test_a_full_queue_loses_its_oldest_messages_and_counts_them(ends: tuple[Channel, Channel]) -> None:
+    ours, theirs = ends
+    _shrink(ends)
+    message = {"text": "x" * 100_000}
+    for number in range(100):
+        ours.send(message | {"number": number})
+    assert 0 < ours.dropped < 100
+    received = [each["number"] for each in _received(theirs, ours)]
+    assert len(received) + ours.dropped == 100
+    assert received[0] == 0, "the one that was written in part"
+    assert received[1:] == list(range(ours.dropped + 1, 100))
+
+
+def test_what_waits_goes_out_while_its_sender_waits_for_an_answer(ends: tuple[Channel, Channel]) -> None:
+    ours, theirs = ends
+    _shrink(ends)
+    question = {"text": "x" * 300_000}
+
+    def answer() -> None:
+        assert theirs.next(30.0) == question
+        theirs.send({"answer": 42})
+
+    answerer = threading.Thread(target=answer)
+    answerer.start()
+    ours.send(question)
+    assert ours.next(30.0) == {"answer": 42}
+    answerer.join()
+
+
+def test_the_last_words_of_a_process_are_written(ends: tuple[Channel, Channel]) -> None:
+    ours, theirs = ends
+    _shrink(ends)
+    sent = [{"text": "x" * 10_000, "number": number} for number in range(30)]
+    received: list[dict[str, Any]] = []
+
+    def read() -> None:
+        while len(received) < len(sent):
+            received.extend(theirs.receive(30.0))
+
+    reader = threading.Thread(target=read)
+    for message in sent:
+        ours.send(message)
+    ours.drain(0.05)
+    assert ours.waiting, "nobody reads"
+    reader.start()
+    ours.drain(30.0)
+    assert not ours.waiting
+    reader.join()
+    assert received == sent
 
 
 def test_messages_one_by_one(ends: tuple[Channel, Channel]) -> None:

@@ -1,0 +1,92 @@
+"""No data process waits for a process that does not read, and a supervisor does not wait for a recorder."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from recorder.checking.verify import verify
+from recorder.reading.log_reader import LogReader
+from rig.clocks import host_now
+from rig.events import Event, Level
+from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording, StopRecording, TellEvent
+from service.processes.rig_processes import RECORDER, RigProcesses
+from tests.capture.rigs import make_rig, write_rig
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+WAIT_S = 60.0
+#: `svev record` whose channels hold a second of reports: they would take a minute to fill.
+SMALL_CHANNELS = """
+import socket, sys
+make = socket.socketpair
+def small():
+    pair = make()
+    for end in pair:
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
+    return pair
+socket.socketpair = small
+from svev.cli import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("backend", ["sim", "aravis"])
+def test_a_stopped_parent_costs_no_pulse(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+    rig, out = write_rig(tmp_path, backend, loopback), tmp_path / "logs"
+    options = ["record", "--rig", str(rig), "--seconds", "14", "--out", str(out), "--json"]
+    command = [sys.executable, "-c", SMALL_CHANNELS, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            wait_until(lambda: _size(out) > 5_000_000, "recording", WAIT_S)
+            process.send_signal(signal.SIGSTOP)
+            wait_until(lambda: _closed(out), "the recording goes on and ends while its parent stands still", WAIT_S)
+        finally:
+            process.send_signal(signal.SIGCONT)
+        said, complaints = process.communicate(timeout=WAIT_S)
+    result = json.loads(said)
+    assert (process.returncode, result["pulses"], result["complete"]) == (0, 420, 420), complaints
+    report = verify(Path(result["log"]))
+    assert report.verdict == "clean"
+    assert report.ledger.pulses == 420
+
+
+def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(tmp_path: Path, loopback: Loopback) -> None:
+    rig = make_rig(tmp_path, "sim", loopback)
+    options = RecorderOptions(directory=tmp_path)
+    path = tmp_path / "told.mcap"
+    texts = [f"{number} {'x' * 500}" for number in range(3000)]
+    with RigProcesses(rig, lambda _: None, epoch=host_now(), recorder=options) as processes:
+        wait_until(lambda: bool(processes.turn(0.05)) and processes.warm, "whole triplets come", WAIT_S, 0.0)
+        processes.tell(StartRecording(path=path, session={}, preroll_s=0.0))
+        recorder = processes.pids[RECORDER]
+        os.kill(recorder, signal.SIGSTOP)
+        for text in texts:
+            processes.tell(TellEvent(event=Event.now(Level.INFO, "test", text)))
+        processes.tell(StopRecording())
+        os.kill(recorder, signal.SIGCONT)
+        reports: list[object] = []
+
+        def finished() -> bool:
+            reports.extend(processes.turn(0.05))
+            return any(isinstance(report, RecordingFinished) for report in reports)
+
+        wait_until(finished, "the recording is over", WAIT_S, 0.0)
+    with LogReader(path) as reader:
+        events = [Event.from_protobuf(message.data or b"") for message in reader.messages("/events")]
+    assert [event.message for event in events if event.name == "test"] == texts
+
+
+def _size(out: Path) -> int:
+    return sum(log.stat().st_size for log in out.glob("*.mcap"))
+
+
+def _closed(out: Path) -> bool:
+    (log,) = out.glob("*.mcap")
+    with log.open("rb") as file:
+        file.seek(-8, os.SEEK_END)
+        return file.read() == b"\x89MCAP0\r\n"

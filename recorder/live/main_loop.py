@@ -162,11 +162,14 @@ class RecorderLoop:
         self._recordings.health(wire.encode(health))
 
     def _own_up(self) -> None:
-        """Tell of reports that the service process has left unread for so long that they were dropped."""
+        """Tell of reports that were dropped because the service does not read, and of refused subscribers."""
         dropped, self._unreported = self._control.dropped - self._unreported, self._control.dropped
         if dropped:
             why = f"{dropped} reports are dropped: the service process does not read them; see whether it is stopped"
             self._recordings.happened(Event.now(Level.WARNING, "recorder", why))
+        for fault, count in self._publisher.refused().items():
+            what = f"{count} connections are closed, of a program that {fault}: end it, or publish on another address"
+            self._recordings.happened(Event.now(Level.WARNING, "publisher", what))
 
     def _sleep_ms(self, now: HostNs) -> float:
         deadlines = [self._next_report, self._next_health]

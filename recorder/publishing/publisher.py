@@ -10,10 +10,12 @@ import threading
 import time
 import weakref
 from pathlib import Path
+from typing import Final
 
 import zmq
 
 from recorder.log.triplet_buffers import TripletBuffers
+from recorder.publishing.peers import Peers
 from rig.errors import BadInputError
 from rig.events import Event
 from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, TRIPLET, Topic
@@ -34,7 +36,15 @@ def live_topic(topic: Topic) -> bytes:
 _TRIPLET = live_topic(TRIPLET)
 _EVENT = live_topic(EVENTS)
 _HEALTH = live_topic(HEALTH)
-_SUBSCRIBE = b"\x01"
+_SUBSCRIBE, _CANCEL = b"\x01", b"\x00"
+#: Bytes of a message that a subscriber may send: a topic of ours is much shorter, the handshake with keys is 0.5 kB.
+_LONGEST_MESSAGE: Final = 1024
+#: Bytes of all different topics that are subscribed to; ZeroMQ takes 120 bytes of memory for each.
+_TOPICS_BYTES: Final = 64 * 1024
+#: Changes of subscriptions that are taken in at once; the next ones wait for the next message.
+_CHANGES_AT_ONCE: Final = 64
+_HANDSHAKE_MS: Final = 5000
+_PATIENCE_S: Final = 1.0
 #: At least so many slots are never held for subscribers: assembly and disk need them.
 _SPARE_SLOTS = 4
 _IPC = "ipc://"
@@ -71,9 +81,14 @@ class Publisher:
         self._held = 0
         self._lock = threading.Lock()
         self._subscriptions: set[bytes] = set()
+        self._topics_bytes = 0
+        self._next_complaint = 0.0
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.XPUB)
         self._socket.sndhwm = queue
+        self._socket.rcvhwm = _CHANGES_AT_ONCE
+        self._socket.handshake_ivl = _HANDSHAKE_MS
+        self._peers = Peers(self._socket)
         try:
             self.address = bind(self._socket, address)
             if ipc is not None:
@@ -91,6 +106,10 @@ class Publisher:
     def busy(self) -> bool:
         """Whether the queue of the slowest subscriber may be half full."""
         return self._held > self._queue // 2
+
+    def refused(self) -> dict[str, int]:
+        """The number of connections that were closed since the last call, by the reason in words."""
+        return self._peers.refused()
 
     def wait_for_subscriber(self, timeout_s: float) -> bool:
         """Wait until somebody subscribes to triplets; False if nobody has within `timeout_s`."""
@@ -148,17 +167,29 @@ class Publisher:
         Args:
             linger_s: wait so long for slow subscribers; they miss what they have not received by then.
         """
+        self._peers.close()
         self._context.destroy(linger=round(linger_s * 1000))
 
     def _wanted(self, topic: bytes) -> bool:
         """Whether anybody has subscribed to `topic`."""
-        while self._socket.poll(0):
-            change = self._socket.recv(zmq.DONTWAIT)
-            if change[:1] == _SUBSCRIBE:
-                self._subscriptions.add(change[1:])
-            else:
-                self._subscriptions.discard(change[1:])
-        return any(topic.startswith(prefix) for prefix in self._subscriptions)
+        for _ in range(_CHANGES_AT_ONCE):
+            if not self._socket.poll(0):
+                break
+            self._subscription_changed(self._socket.recv(zmq.DONTWAIT))
+        if self._topics_bytes > _TOPICS_BYTES and time.monotonic() > self._next_complaint:
+            self._next_complaint = time.monotonic() + _PATIENCE_S
+            self._peers.hang_up_on_loudest()
+        return any(topic[:length] in self._subscriptions for length in range(len(topic) + 1))
+
+    def _subscription_changed(self, change: bytes) -> None:
+        """Take in the first subscription to a topic, or the end of the last one."""
+        topic = change[1:]
+        if change[:1] == _SUBSCRIBE and topic not in self._subscriptions:
+            self._subscriptions.add(topic)
+            self._topics_bytes += len(topic) + 1
+        elif change[:1] == _CANCEL and topic in self._subscriptions:
+            self._subscriptions.remove(topic)
+            self._topics_bytes -= len(topic) + 1
 
     def _let_go(self, buffers: TripletBuffers, slot: int) -> None:
         """Called from ZeroMQ's own thread when it no longer needs the slot."""
@@ -178,6 +209,7 @@ def bind(socket: zmq.Socket[bytes], address: str) -> str:
     """
     if _somebody_listens(address):
         raise _in_use(address)
+    socket.maxmsgsize = _LONGEST_MESSAGE
     port = address.rpartition(":")[2]
     if port.isdecimal() and int(port) > _LAST_PORT:  # ZeroMQ would bind another one
         raise _not_bound(address, "no such port")

@@ -74,9 +74,9 @@ class _Peer:
         return not self._over and self.sent() > _ALLOWED_BYTES + _ALLOWED_BYTES_PER_S * (time.monotonic() - self._since)
 
     def has_left(self) -> bool:
-        """Whether the other side has closed the connection, rather than ZeroMQ or we."""
+        """Whether the connection has not been ended by ZeroMQ, but by the other side or by us."""
         try:
-            return not self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+            return self._over or not self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
             return False
         except OSError:

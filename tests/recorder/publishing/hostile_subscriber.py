@@ -10,6 +10,7 @@ import struct
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from itertools import repeat
 
 import zmq
 
@@ -45,23 +46,13 @@ def _subscribe(address: str, topics: Iterator[bytes]) -> None:
             sub.poll(50)
 
 
-def _pour(address: str, once: bytes) -> None:
-    """Send the same bytes without end, over a new connection whenever one is closed."""
+def _pour(address: str, pieces: Iterator[bytes]) -> None:
+    """Send as fast as it is taken, over a new connection whenever one is closed."""
     _say_done()
     while not _over(0.01):
         with suppress(OSError), _shaken(address) as sock:
-            while not _over(0.0):
-                sock.sendall(once)
-
-
-def _pour_once(address: str, frames: Iterator[bytes]) -> None:
-    """Send frames over one connection, as fast as they are taken."""
-    _say_done()
-    with suppress(OSError), _shaken(address) as sock:
-        for frame in frames:
-            sock.sendall(frame)
-    while not _over(1.0):
-        pass
+            for piece in pieces:
+                sock.sendall(piece)
 
 
 def _crowd(address: str, number: int) -> None:
@@ -89,11 +80,11 @@ def main(kind: str, address: str, number: int) -> None:
         case "long":
             _subscribe(address, iter([b"x" * number]))
         case "many":
-            _pour_once(address, (_frame(b"\x01topic %d" % each) for each in range(number)))
+            _pour(address, (_frame(b"\x01topic %d" % each) for each in range(number)))
         case "flood":
-            _pour(address, (_frame(b"\x01event") + _frame(b"\x00event")) * 2000)
+            _pour(address, repeat((_frame(b"\x01event") + _frame(b"\x00event")) * 2000))
         case "chatter":
-            _pour(address, _frame(b"x" * 200) * 500)
+            _pour(address, repeat(_frame(b"x" * 200) * 500))
         case "crowd":
             _crowd(address, number)
 

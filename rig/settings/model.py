@@ -89,7 +89,7 @@ class TriggerSettings(StrictModel):
     """The trigger pulses that expose all cameras at the same instant."""
 
     source: Literal["external"] = Field("external", description="who makes the pulses; external: not svev")
-    rate_hz: float = Field(30.0, gt=0, le=1000, description="pulses per second")
+    rate_hz: float = Field(30.0, ge=0.1, le=1000, description="pulses per second")
     settle_s: float = Field(5.0, gt=0, le=120, description="wait at most this long for the first pulses")
 
     @property

@@ -1,9 +1,11 @@
 """Reads TOML files strictly: an unknown, missing or impossible key is an error that names file, key and remedy."""
 
 import difflib
+import reprlib
 import tomllib
+import unicodedata
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
@@ -12,11 +14,20 @@ from rig.errors import BadInputError
 
 Model = TypeVar("Model", bound=BaseModel)
 
+_MOST_BYTES: Final = 1_000_000
+_LONGEST_TEXT: Final = 4096  # as long as a path may be
+#: Categories of characters that are not seen, or change how others are seen: controls, formats, half characters, ends.
+_UNSEEN: Final = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+_LAYOUT: Final = frozenset("\n\t")
+_SHORT: Final = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 60
+_SHORT.maxlevel = 2
+
 
 class StrictModel(BaseModel):
     """Base of models that are read from files: unknown keys are errors, instances are immutable."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def read_text(path: Path, format_name: str, existing: str) -> str:
@@ -46,12 +57,46 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
     Raises:
-        BadInputError: the file is missing, unreadable, not UTF-8 or not TOML; the message names line and column.
+        BadInputError: the file is missing, unreadable, not UTF-8, too large or not TOML, and then the message names
+            line and column; or a text in it is too long or holds a character that cannot be seen.
     """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise BadInputError(f"{path}: is no file, but a device or a pipe; name a TOML file")
+    if path.is_file() and path.stat().st_size > _MOST_BYTES:
+        raise BadInputError(f"{path}: is larger than 1 MB, which no rig file is; name another file")
     try:
-        return tomllib.loads(read_text(path, "TOML", "an existing one, e.g. config/rigs/sim.toml"))
-    except tomllib.TOMLDecodeError as error:
+        data = tomllib.loads(read_text(path, "TOML", "an existing one, e.g. config/rigs/sim.toml"))
+    except RecursionError:
+        raise BadInputError(f"{path}: not valid TOML: nested too deeply; correct it there") from None
+    except ValueError as error:  # TOMLDecodeError, or a number with too many digits
         raise BadInputError(f"{path}: not valid TOML: {error}; correct it there") from None
+    _check_texts(data, path)
+    return data
+
+
+def _check_texts(data: dict[str, Any], source: Path) -> None:
+    """Refuse texts and keys that are too long, or would do something to a terminal or a path instead of being read.
+
+    Raises:
+        BadInputError: there is one; the message names its key.
+    """
+    left: list[tuple[str, Any]] = [("", data)]
+    while left:
+        place, value = left.pop()
+        if isinstance(value, dict | list):
+            parts = value.items() if isinstance(value, dict) else enumerate(value, start=1)
+            below = [(f"{place}.{key}".lstrip("."), each) for key, each in parts]
+            left += [*below, *((name, name) for name, _ in below)]
+        elif isinstance(value, str) and len(value) > _LONGEST_TEXT:
+            raise BadInputError(f'{source}: key "{_shown(place)[1:-1]}" has {len(value)} characters; shorten it')
+        elif isinstance(value, str) and (unseen := next(filter(_cannot_be_seen, value), None)) is not None:
+            raise BadInputError(
+                f'{source}: key "{_shown(place)[1:-1]}" holds the character {unseen!r}, which cannot be seen; remove it'
+            )
+
+
+def _cannot_be_seen(character: str) -> bool:
+    return unicodedata.category(character) in _UNSEEN and character not in _LAYOUT
 
 
 def validate(model: type[Model], data: dict[str, Any], source: Path | str) -> Model:
@@ -88,7 +133,16 @@ def _word(model: type[BaseModel], error: ErrorDetails) -> str:
             where = f'"{place}": ' if place else ""
             return where + str(error.get("ctx", {}).get("error", error["msg"]))
         case _:
-            return f'key "{place}" = {error["input"]!r}: {error["msg"][0].lower()}{error["msg"][1:]}; correct it'
+            what = f"{error['msg'][0].lower()}{error['msg'][1:]}"
+            return f'key "{place}" = {_shown(error["input"])}: {what}; correct it'
+
+
+def _shown(value: object) -> str:
+    """A wrong value in an error message, cut where it is long."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # Python writes no integers of more than 4300 digits
+        return "a number of many digits"
 
 
 def _keys_beside(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

@@ -24,6 +24,8 @@ def _complaint(folder: Path, text: str) -> str:
         load_rig(path)
     line = str(caught.value)
     assert "\n" not in line
+    assert len(line) < 600
+    assert line.isprintable()
     assert line.startswith(f"{path}: ")
     return line.removeprefix(f"{path}: ")
 
@@ -133,6 +135,62 @@ def test_the_schema_is_a_schema() -> None:
             'key "network.publish" = \'127.0.0.1\': ',
             id="publish address",
         ),
+        pytest.param(
+            HEAD + "cameras = " + "[" * 10_000 + "]" * 10_000,
+            "not valid TOML: nested too deeply; correct it there",
+            id="deep arrays",
+        ),
+        pytest.param(
+            HEAD + "x" + ".x" * 10_000 + " = 1\n" + CAMERA, 'unknown key "x"; known keys here: ', id="deep tables"
+        ),
+        pytest.param(
+            HEAD + CAMERA + "exposure_us = " + "9" * 10_000 + "\n", "not valid TOML: Exceeds the limit", id="digits"
+        ),
+        pytest.param(
+            HEAD + CAMERA + "exposure_us = 0x" + "f" * 10_000 + "\n",
+            'key "cameras.1.exposure_us" = a number of many digits: ',
+            id="hexadecimal digits",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "exposure_us = " + "9" * 4000 + "\n", 'key "cameras.1.exposure_us" = 99999', id="4000 digits"
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nrate_hz = 1e-300\n",
+            'key "trigger.rate_hz" = 1e-300: input should be greater than or equal to 0.1; correct it',
+            id="rate almost 0",
+        ),
+        pytest.param(HEAD + CAMERA + "[trigger]\nrate_hz = nan\n", 'key "trigger.rate_hz" = nan: ', id="no number"),
+        pytest.param(HEAD + CAMERA + "gain_db = -inf\n", 'key "cameras.1.gain_db" = -inf: ', id="infinite"),
+        pytest.param(
+            HEAD + CAMERA + "[recorder]\npreroll_limit_mb = inf\n",
+            'key "recorder.preroll_limit_mb" = inf: input should be a finite number; correct it',
+            id="endless pre-roll",
+        ),
+        pytest.param(
+            HEAD + CAMERA.replace("192.168.11.2", "1" * 100_000),
+            'key "cameras.1.address" has 100000 characters; shorten it',
+            id="a long address",
+        ),
+        pytest.param(
+            HEAD + "x = '" + "x" * 2_000_000 + "'\n" + CAMERA,
+            "is larger than 1 MB, which no rig file is; name another file",
+            id="a large file",
+        ),
+        pytest.param(
+            HEAD + CAMERA + '[recorder]\ndirectory = "a\\u0000b"\n',
+            'key "recorder.directory" holds the character \'\\x00\', which cannot be seen; remove it',
+            id="NUL in a path",
+        ),
+        pytest.param(
+            'name = "\\u001b[31mred"\n' + CAMERA,
+            'key "name" holds the character \'\\x1b\', which cannot be seen; remove it',
+            id="terminal escape",
+        ),
+        pytest.param(
+            HEAD + '"\\u001b[2J" = 1\n' + CAMERA,
+            'key "\\x1b[2J" holds the character \'\\x1b\', which cannot be seen; remove it',
+            id="terminal escape in a key",
+        ),
     ],
 )  # fmt: skip
 def test_a_wrong_rig_file_is_one_line_with_key_and_remedy(tmp_path: Path, text: str, complaint: str) -> None:
@@ -159,6 +217,11 @@ def test_a_path_through_a_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BadInputError, match=r"cannot be read \(Not a directory\)"):
         load_rig(tmp_path / "file" / "rig.toml")
+
+
+def test_an_endless_file_is_no_rig_file() -> None:
+    with pytest.raises(BadInputError, match="/dev/zero: is no file, but a device or a pipe; name a TOML file"):
+        load_rig(Path("/dev/zero"))
 
 
 def test_a_picture_is_no_rig_file(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from rig.errors import BadInputError
 Model = TypeVar("Model", bound=BaseModel)
 
 _MOST_BYTES: Final = 1_000_000
+_DEEPEST: Final = 20
 _LONGEST_TEXT: Final = 4096  # as long as a path may be
 #: Categories of characters that are not seen, or change how others are seen: controls, formats, half characters, ends.
 _UNSEEN: Final = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
@@ -85,8 +86,11 @@ def _check_texts(data: dict[str, Any], source: Path) -> None:
         place, value = left.pop()
         if isinstance(value, dict | list):
             parts = value.items() if isinstance(value, dict) else enumerate(value, start=1)
-            below = [(f"{place}.{key}".lstrip("."), each) for key, each in parts]
-            left += [*below, *((name, name) for name, _ in below)]
+            if place.count(".") > _DEEPEST:
+                raise BadInputError(f"{source}: not valid TOML: nested too deeply; correct it there")
+            for key, each in parts:
+                name = f"{place}.{key}".lstrip(".")
+                left += [(name, each), (name, str(key))]
         elif isinstance(value, str) and len(value) > _LONGEST_TEXT:
             raise BadInputError(f'{source}: key "{_shown(place)[1:-1]}" has {len(value)} characters; shorten it')
         elif isinstance(value, str) and (unseen := next(filter(_cannot_be_seen, value), None)) is not None:

@@ -141,7 +141,9 @@ def test_the_schema_is_a_schema() -> None:
             id="deep arrays",
         ),
         pytest.param(
-            HEAD + "x" + ".x" * 10_000 + " = 1\n" + CAMERA, 'unknown key "x"; known keys here: ', id="deep tables"
+            HEAD + "x" + ".x" * 10_000 + " = 1\n" + CAMERA,
+            "not valid TOML: nested too deeply; correct it there",
+            id="deep tables",
         ),
         pytest.param(
             HEAD + CAMERA + "exposure_us = " + "9" * 10_000 + "\n", "not valid TOML: Exceeds the limit", id="digits"
@@ -152,7 +154,7 @@ def test_the_schema_is_a_schema() -> None:
             id="hexadecimal digits",
         ),
         pytest.param(
-            HEAD + CAMERA + "exposure_us = " + "9" * 4000 + "\n", 'key "cameras.1.exposure_us" = 99999', id="4000 digits"
+            HEAD + CAMERA + "exposure_us = " + "9" * 4000 + "\n", 'key "cameras.1.exposure_us" = 9999', id="4000 digits"
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nrate_hz = 1e-300\n",

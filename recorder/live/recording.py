@@ -14,6 +14,7 @@ import msgspec
 from recorder.live.assembler import Assembler
 from recorder.live.preroll import Held
 from recorder.log.extent import extent
+from recorder.log.tag_room import check_tag_fits
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
 from recorder.writing.log_writer import LogDescription, LogWriter
@@ -50,6 +51,9 @@ class Recording:
         assembler: makes the triplets.
         after: a recording whose log failed, and which this one continues.
 
+    Raises:
+        BadInputError: the names of session and recording are too long for the log.
+
     Attributes:
         commanded: when the command to start came.
         begin: time of the first pulse that may belong to the recording; may be before `commanded`.
@@ -61,7 +65,8 @@ class Recording:
     """
 
     def __init__(self, order: StartRecording, assembler: Assembler, after: "Recording | None" = None) -> None:
-        rig = assembler.rig
+        rig, session_name = assembler.rig, order.session.get("session", "")
+        check_tag_fits(assembler.buffers.layout, [camera.name for camera in rig.cameras], session_name, order.recording)
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
         self._anchor = UtcAnchor.take()
         self.continues = "" if after is None else after.id

@@ -39,6 +39,8 @@ FIRST_CALIBRATION_CHANNEL = 16
 #: Bytes before the pixels of a slot, for the head of the chunk; a tag of 8 cameras takes about 2.5 kB of them.
 HEAD_ROOM = 2 * PAGE
 
+_LATEST_NS = (1 << 63) - 1  # the time of which the text is longest
+
 RECORD = struct.Struct("<BQ")  # opcode, length of what follows
 #: opcode, length, start and end time, size and CRC of the records, no compression (0-byte name), size
 _CHUNK = struct.Struct("<BQQQQIIQ")
@@ -110,6 +112,7 @@ class SlotLayout:
         pixels: offset of the first pixel in the slot.
         end: offset of one past the last pixel.
         slot_bytes: size of a slot.
+        most_tag_bytes: longest tag that has room before the pixels.
     """
 
     def __init__(self, shape: tuple[int, int]):
@@ -128,6 +131,8 @@ class SlotLayout:
         self.end = HEAD_ROOM + shape[0] * shape[1]
         self.slot_bytes = round_up(self.end + 2 * _INDEX_OF_ONE.size + RECORD.size)
         combined_crc(0, 0, (1 << self.slot_bytes.bit_length()) - 1)  # makes its tables now, not with the first triplet
+        prefix = len(raw_image_prefix(shape, UtcNs(_LATEST_NS)))
+        self.most_tag_bytes = HEAD_ROOM - RECORD.size - _CHUNK.size - 2 * MESSAGE.size - prefix
 
     def complete(
         self, slot: memoryview, tag: bytes, pulse: PulseNumber, pulse_time: UtcNs, log_time: UtcNs

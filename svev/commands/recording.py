@@ -5,10 +5,13 @@ from typing import Annotated, Any
 
 import msgspec
 import typer
+from pydantic import TypeAdapter, ValidationError
 
 from rig.errors import PulsesPausedError
 from rig.pause import Pause
+from rig.errors import BadInputError
 from rig.settings.file import load_rig
+from rig.status import LONGEST_LINE, Line
 from service.headless import HeadlessRig
 from service.headless import record as record_with
 from service.recordings.storage import new_log_path
@@ -38,6 +41,7 @@ def record(
     Example: svev record --rig config/rigs/hill-gige.toml --seconds 10 --out recordings
     """
     settings = load_rig(rig)
+    _check_session(session)
     path = new_log_path(out)
     with HeadlessRig(settings, rig.read_text(encoding="utf-8"), _aside) as running:
         result, disk_error = record_with(
@@ -93,6 +97,21 @@ def demo(
     console.say(f"log                {result['log']} ({result['bytes'] / 1e6:.1f} MB), {result['verdict']}")
     console.say(f"contact sheet      {result['contact_sheet']}")
     console.say(f"truth              {result['truth']}")
+
+
+def _check_session(session: str) -> None:
+    """Refuse what the panel refuses as well.
+
+    Raises:
+        BadInputError: the name is too long, or holds control characters.
+    """
+    try:
+        TypeAdapter(Line).validate_python(session)
+    except ValidationError as error:
+        what = f"{len(session)} characters" if len(session) > LONGEST_LINE else "a control character"
+        raise BadInputError(
+            f"--session has {what}: give a name of at most {LONGEST_LINE} characters in one line"
+        ) from error
 
 
 def _aside(line: str) -> None:

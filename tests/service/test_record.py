@@ -216,6 +216,19 @@ def test_bad_input_is_one_line_and_exit_2(
     assert len(err.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("session", "has"),
+    [("x" * 9000, "9000 characters"), ("two\nlines", "a control character"), ("\x1b[2J", "a control")],
+)
+def test_a_session_that_no_log_holds_is_refused(tmp_path: Path, loopback: Loopback, session: str, has: str) -> None:
+    path = write_rig(tmp_path, "sim", loopback)
+    code, _, err = _result(_record(path, tmp_path / "logs", 1, "--session", session))
+    assert code == 2
+    assert err.startswith(f"svev: --session has {has}")
+    assert err.endswith("give a name of at most 200 characters in one line\n")
+    assert not (tmp_path / "logs").exists()
+
+
 def test_a_camera_that_is_not_there_is_named(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     path = write_rig(tmp_path, "aravis", loopback)
     path.write_text(path.read_text().replace('[simulation]\nscenario = "scenario.toml"\n', "settle_s = 1.0\n"))

@@ -13,7 +13,14 @@ from recorder.checking.verify import verify
 from recorder.reading.log_reader import LogReader
 from rig.clocks import host_now
 from rig.events import Event, Level
-from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording, StopRecording, TellEvent
+from rig.transport.messages import (
+    RecorderOptions,
+    RecordingFinished,
+    RecordingStarted,
+    StartRecording,
+    StopRecording,
+    TellEvent,
+)
 from service.processes.rig_processes import RECORDER, RigProcesses
 from tests.capture.rigs import make_rig, write_rig
 from tests.support.loopback import Loopback
@@ -61,21 +68,20 @@ def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(tmp_path
     path = tmp_path / "told.mcap"
     texts = [f"{number} {'x' * 500}" for number in range(3000)]
     with RigProcesses(rig, lambda _: None, epoch=host_now(), recorder=options) as processes:
+
+        def turned(kind: type) -> bool:
+            return any(isinstance(report, kind) for report in processes.turn(0.05))
+
         wait_until(lambda: bool(processes.turn(0.05)) and processes.warm, "whole triplets come", WAIT_S, 0.0)
         processes.tell(StartRecording(path=path, session={}, preroll_s=0.0))
+        wait_until(lambda: turned(RecordingStarted), "it records", WAIT_S, 0.0)
         recorder = processes.pids[RECORDER]
         os.kill(recorder, signal.SIGSTOP)
         for text in texts:
             processes.tell(TellEvent(event=Event.now(Level.INFO, "test", text)))
         processes.tell(StopRecording())
         os.kill(recorder, signal.SIGCONT)
-        reports: list[object] = []
-
-        def finished() -> bool:
-            reports.extend(processes.turn(0.05))
-            return any(isinstance(report, RecordingFinished) for report in reports)
-
-        wait_until(finished, "the recording is over", WAIT_S, 0.0)
+        wait_until(lambda: turned(RecordingFinished), "the recording is over", WAIT_S, 0.0)
     with LogReader(path) as reader:
         events = [Event.from_protobuf(message.data or b"") for message in reader.messages("/events")]
     assert [event.message for event in events if event.name == "test"] == texts

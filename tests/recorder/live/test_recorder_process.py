@@ -17,13 +17,14 @@ from recorder.checking.verify import verify
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.clocks import host_now
-from rig.errors import ProcessDiedError
+from rig.errors import BadInputError, ProcessDiedError
 from rig.frame import FrameStatus
 from rig.health import HEALTH_SCHEMA, Health
 from rig.settings.model import RigSettings
 from rig.transport.messages import (
     CameraChanged,
     CameraNews,
+    RecorderFailed,
     RecorderHealth,
     RecorderOptions,
     RecorderReport,
@@ -160,6 +161,23 @@ def test_the_last_three_seconds_are_saved_and_the_next_recording_goes_on(tmp_pat
     assert started.first_pulse == report.first_pulse == tags[0].time
     assert verify(both).ledger.pulses > 30 + 25
     assert next(triplets(both))[0].time > tags[-1].time, "no pulse is in two recordings"
+
+
+def test_names_that_are_too_long_for_the_log_are_refused_and_the_recorder_goes_on(
+    tmp_path: Path, loopback: Loopback
+) -> None:
+    with _running(tmp_path, loopback) as running:
+        long, path = tmp_path / "long.mcap", tmp_path / "short.mcap"
+        running.processes.tell(StartRecording(path=long, session={"session": "x" * 9000}, pulses=30))
+        running.until("it is refused", lambda: running.last(RecorderFailed))
+        failed = running.last(RecorderFailed)
+        assert failed is not None
+        assert isinstance(failed.error(), BadInputError)
+        assert "bytes too many for the tags of the log: shorten them" in failed.message
+        assert not long.exists()
+        running.processes.tell(StartRecording(path=path, session={"session": "𝄞" * 200}, pulses=30))
+        assert running.finished(path).counts.pulses >= 30
+    _is_sound(path)
 
 
 def test_subscribers_get_the_past_without_a_gap(tmp_path: Path, loopback: Loopback) -> None:

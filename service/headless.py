@@ -29,6 +29,7 @@ from rig.status import Counts, Recording, SessionFields, State
 from rig.transport import wire
 from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
 from service.processes.backends import check_backends
+from service.processes.memory import check_memory
 from service.recordings.control import Outcome
 from service.recordings.storage import check_room_for
 from service.status.event_hub import EventHub
@@ -66,6 +67,7 @@ class HeadlessRig:
                 on_event(f"{event.name} {event.message}")
 
         check_backends(rig)
+        check_memory(rig, preroll_s=0.0)
         self._rig = rig
         options = RecorderOptions(directory=rig.recorder.directory)
         self._supervisor = Supervisor(rig, rig_toml, EventHub(tell), options, hill=hill, enduring=False)

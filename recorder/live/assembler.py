@@ -41,6 +41,11 @@ def least_buffers(period_ns: int) -> int:
     return 2 * (hold_ns(period_ns) // period_ns + 1)
 
 
+def in_flight_triplets(rig: RigSettings) -> int:
+    """Number of triplet buffers for pulses on their way from the cameras to the disk."""
+    return max(least_buffers(rig.trigger.period_ns), round(rig.recorder.triplets_s * rig.trigger.rate_hz))
+
+
 #: Kinds of records that only a connected camera makes.
 _STREAMING: Final = (RecordKind.FRAME, RecordKind.DAMAGED, RecordKind.LATCH)
 

@@ -8,7 +8,7 @@ import select
 from collections.abc import Callable
 from typing import Final
 
-from recorder.live.assembler import Assembler, Triplet, least_buffers
+from recorder.live.assembler import Assembler, Triplet, in_flight_triplets
 from recorder.live.health import HealthMonitor
 from recorder.live.preroll import Preroll, preroll_triplets
 from recorder.live.recordings import Recordings
@@ -58,7 +58,7 @@ class RecorderLoop:
         rings = [CameraRing(fd) for fd in config.rings]
         self._rig, self._doorbell, self._control = rig, config.doorbell, control
         self._preview = None if config.options.preview is None else PreviewSlot(config.options.preview)
-        in_flight = max(least_buffers(rig.trigger.period_ns), round(rig.recorder.triplets_s * rig.trigger.rate_hz))
+        in_flight = in_flight_triplets(rig)
         held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape).slot_bytes)
         self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held)
         self._assembler = Assembler(rig, rings, self._buffers)

@@ -32,10 +32,10 @@ from rig.transport.messages import (
     RecorderWarm,
 )
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
-from rig.transport.ring import MAX_SLOTS, CameraRing
+from rig.transport.ring import CameraRing
 from service.processes.backends import check_backends
+from service.processes.memory import ring_slots
 
-_LEAST_SLOTS: Final = 16
 RECORDER: Final = "recorder"
 
 
@@ -115,7 +115,7 @@ class RigProcesses:
             self._doorbell = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
             stack.callback(os.close, self._doorbell)
             for camera in self._rig.cameras:
-                ring = CameraRing.create(camera.name, camera.frame_bytes, self._slots())
+                ring = CameraRing.create(camera.name, camera.frame_bytes, ring_slots(self._rig))
                 stack.callback(ring.close)
                 self._rings.append(ring)
             stack.callback(self._processes.stop)
@@ -227,10 +227,6 @@ class RigProcesses:
         elif now >= self._again[child]:
             del self._again[child]
             self._start_grabber(self._names.index(name))
-
-    def _slots(self) -> int:
-        wanted = round(self._rig.recorder.ring_s * self._rig.trigger.rate_hz)
-        return min(MAX_SLOTS, max(_LEAST_SLOTS, wanted))
 
     def _start_recorder(self) -> None:
         fds, options = tuple(ring.fd for ring in self._rings), self._options

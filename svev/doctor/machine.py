@@ -12,7 +12,9 @@ from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+from rig.memory import available_bytes
 from rig.settings.model import RigSettings
+from service.processes.memory import memory_needed
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 
 _UNSYNCHRONIZED = 0x0040  # STA_UNSYNC, sys/timex.h
@@ -69,23 +71,18 @@ def look_at_processor() -> Iterator[Finding]:
 
 _HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
 _MB = 1_000_000
+_LESS_MEMORY = "end other programs, or lower recorder.ring_s, recorder.triplets_s and recorder.preroll_limit_mb"
 _CAUTION = 0.5  # share of the available memory above which to warn, because other programs need memory, too
 
 
-def memory_needed(rig: RigSettings) -> int:
-    """Bytes of the cameras' rings and of the triplets that wait for the disk."""
-    per_pulse = sum(camera.frame_bytes for camera in rig.cameras)
-    return round(per_pulse * rig.trigger.rate_hz * (rig.recorder.ring_s + rig.recorder.triplets_s))
-
-
 def look_at_memory(rig: RigSettings) -> Iterator[Finding]:
-    """Do the rings and the triplet buffers fit into the available memory?"""
-    needed, free = memory_needed(rig), _available()
+    """Do the rings, the triplet buffers and the pre-roll fit into the available memory?"""
+    needed, free = sum(memory_needed(rig, rig.recorder.preroll_s).values()), available_bytes()
     what = f"buffers need {needed / _MB:.0f} MB, {free / _MB:.0f} MB are available"
     if needed > free:
-        yield failure(Topic.MEMORY, what, "end other programs, or lower recorder.ring_s and recorder.triplets_s")
+        yield failure(Topic.MEMORY, what, _LESS_MEMORY)
     elif needed > _CAUTION * free:
-        yield warning(Topic.MEMORY, what, "end other programs, or lower recorder.ring_s and recorder.triplets_s")
+        yield warning(Topic.MEMORY, what, _LESS_MEMORY)
     else:
         yield passed(Topic.MEMORY, what)
 
@@ -129,14 +126,6 @@ def _look_at_huge_pages(user: str, path: Path, advised: str, good: set[str]) -> 
     if chosen[1] in good:
         return passed(Topic.MEMORY, what)
     return warning(Topic.MEMORY, what, f"run: echo {advised} | sudo tee {path}")
-
-
-def _available() -> int:
-    """Memory that programs can still get, bytes."""
-    match = re.search(r"^MemAvailable:\s+(\d+) kB", Path("/proc/meminfo").read_text(), re.MULTILINE)
-    if match is None:
-        raise OSError("/proc/meminfo does not tell what memory is available")
-    return int(match[1]) * 1024
 
 
 #: A module of each Python package.

@@ -14,6 +14,7 @@ from rig.settings.file import load_rig
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
 from service.processes.backends import check_backends
+from service.processes.memory import check_memory
 from service.service import Service
 from service.status.event_hub import EventHub
 from service.supervision.supervisor import Supervisor
@@ -61,6 +62,7 @@ def serve(settings: ServiceSettings) -> None:
     check_backends(rig)
     data = settings.data or rig.recorder.directory
     preroll_s = rig.recorder.preroll_s if settings.preroll_s is None else settings.preroll_s
+    check_memory(rig, preroll_s)
     with ExitStack() as stack:
         stack.enter_context(data_lock(data))
         listener = stack.enter_context(listen(settings.access.host, settings.port))

@@ -203,6 +203,10 @@ def test_a_killed_parent_leaves_a_finished_log_and_no_process(
         (("rate_hz", "rate_herz"), 'unknown key "trigger.rate_herz"; did you mean "rate_hz"?'),
         (('"scenario.toml"', '"nowhere.toml"'), "nowhere.toml: no such file"),
         (("tcp://127", "tcp://300"), "cannot be bound"),
+        (
+            ('backend = "sim"', 'backend = "sim"\nregion = { width = 16384, height = 16384 }'),
+            "GB are available: lower recorder.triplets_s, which takes",
+        ),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(

@@ -9,7 +9,8 @@ import sys
 import traceback
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from typing import Final
+from io import StringIO
+from typing import Any, Final
 
 import typer
 
@@ -35,6 +36,10 @@ _COMMANDS: Final = {
     "plan": ("plan", "plan", "Predict the accuracy of planned cameras."),
     "bench": ("bench", "bench", "Measure how fast this computer records."),
 }
+
+
+#: The base of errors in the use of options and arguments, which Typer does not name.
+_USAGE_ERROR: Final[type[Exception]] = typer.BadParameter.__mro__[1]
 
 
 def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
@@ -73,9 +78,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in argv
     argv = [argument for argument in argv if argument != "--debug"]
     try:
-        command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)(argv, prog_name="svev")
-    except SystemExit as end:  # --help, a wrong option, or a command that ends with a code of its own
+        command = command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)
+        code = command(argv, prog_name="svev", standalone_mode=False)
+    except SystemExit as end:
         return end.code if isinstance(end.code, int) else 1
+    except _USAGE_ERROR as error:
+        return _explain_usage(error)
     except BrokenPipeError:
         # The reader of our output has gone: a message would reach nobody.
         sys.stderr.close()
@@ -85,7 +93,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
             traceback.print_exc()
         console.complain(_one_line(error))
         return error.exit_code if isinstance(error, SvevError) else 2
-    return 0
+    return code if isinstance(code, int) else 0  # a number: --help, or a command that ends with a code of its own
+
+
+def _explain_usage(error: Any) -> int:
+    """Print what is wrong with the command line.
+
+    Returns:
+        The exit code.
+    """
+    text = StringIO()
+    error.show(file=text)
+    for line in text.getvalue().rstrip("\n").split("\n"):
+        console.say(line, aside=True)
+    code: int = error.exit_code
+    return code
 
 
 def _one_line(error: SvevError | OSError) -> str:

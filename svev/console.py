@@ -1,28 +1,53 @@
-"""Prints what commands say: lines for people, a progress bar for long work, one JSON object with `--json`."""
+"""Prints what commands say: lines for people, a progress bar for long work, one JSON object with `--json`.
+
+Names of cameras, sessions and files come from elsewhere. Whatever they hold is shown and never obeyed by a terminal:
+everything that people read goes through `visible`.
+"""
 
 import json
 import sys
+import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 #: For people; with `--json` only the JSON object goes to standard output.
-_stderr = Console(stderr=True, highlight=False, soft_wrap=True)
-_stdout = Console(highlight=False, soft_wrap=True)
+_stderr = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+_stdout = Console(highlight=False, soft_wrap=True, emoji=False)
+
+#: Categories of characters that a terminal obeys or that change how others look: controls, formats, line ends; and
+#: half characters, which stand for bytes of file names that are no UTF-8.
+_OBEYED: Final = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+
+
+def visible(text: str) -> str:
+    """The text as one line in which characters that a terminal would obey are written out, e.g. `\\x1b`."""
+    if text.isprintable():
+        return text
+    return "".join(
+        each.encode("unicode_escape").decode("ascii") if unicodedata.category(each) in _OBEYED else each
+        for each in text
+    )
 
 
 def say(line: str, *, aside: bool = False) -> None:
     """Print one line for people; `aside`: on standard error, beside a result on standard output."""
-    (_stderr if aside else _stdout).print(line, markup=False)
+    (_stderr if aside else _stdout).print(visible(line), markup=False)
+
+
+def say_text(text: str) -> None:
+    """Print lines for people that are already put together."""
+    for line in text.split("\n"):
+        say(line)
 
 
 def say_marked(mark: str, style: str, line: str) -> None:
     """Print one indented line for people after a coloured mark, e.g. PASS."""
-    _stdout.print(Text.assemble("  ", (mark, style), "  ", line))
+    _stdout.print(Text.assemble("  ", (mark, style), "  ", visible(line)))
 
 
 def print_json(result: dict[str, Any]) -> None:
@@ -33,7 +58,7 @@ def print_json(result: dict[str, Any]) -> None:
 
 def complain(line: str) -> None:
     """Print an error as one line on standard error."""
-    _stderr.print(f"svev: {line}", style="bold red", markup=False)
+    _stderr.print(f"svev: {visible(line)}", style="bold red", markup=False)
 
 
 @contextmanager
@@ -47,7 +72,7 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[int], None]]:
     Yields:
         A function to call with the number of steps done so far.
     """
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=_stderr, disable=not _stderr.is_terminal, transient=True) as bar:
-        task = bar.add_task(label, total=total)
+        task = bar.add_task(visible(label), total=total)
         yield lambda done: bar.update(task, completed=done)

@@ -40,7 +40,8 @@ def bench(
         console.print_json(results)
     else:
         for name, lines in results.items():
-            console.say(f"\n{name}")
+            console.say_text(f"\n{name}")
             for line in lines["table"]:
                 console.say(f"  {line}")
-        console.say(f"\nresults in {out}")
+        console.say("")
+        console.say(f"results in {out}")

@@ -95,7 +95,7 @@ def start(
     """
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=preroll, duration_s=seconds)
-    _show(_call(context, "POST", "/api/recordings", order), _recording_line, as_json)
+    _show(_call(context, "POST", "/api/recordings", order), _recording_lines, as_json)
 
 
 @app.command()
@@ -115,7 +115,7 @@ def stop(
         if current is None:
             raise SvevError("no recording is in progress: see svev ctl list")
         recording = current["id"]
-    _show(_call(context, "POST", f"{_path(recording)}/stop"), _recording_line, as_json)
+    _show(_call(context, "POST", f"{_path(recording)}/stop"), _recording_lines, as_json)
 
 
 @app.command()
@@ -131,7 +131,7 @@ def save(
     Example: svev ctl save --seconds 5
     """
     recording = _call(context, "POST", "/api/recordings", _given(preroll_s=seconds, duration_s=0))
-    _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), _recording_line, as_json)
+    _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), _recording_lines, as_json)
 
 
 @app.command("list")
@@ -165,7 +165,7 @@ def session(
     Example: svev ctl session 2026-02-14T10-15-30Z --bib 18
     """
     change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
-    _show(_call(context, "PATCH", _path(recording), change), _recording_line, as_json)
+    _show(_call(context, "PATCH", _path(recording), change), _recording_lines, as_json)
 
 
 @app.command()
@@ -174,7 +174,7 @@ def delete(context: typer.Context, recording: Id, as_json: Json = False) -> None
 
     Example: svev ctl delete 2026-02-14T10-15-30Z
     """
-    _show(_call(context, "DELETE", _path(recording)), _recording_line, as_json)
+    _show(_call(context, "DELETE", _path(recording)), _recording_lines, as_json)
 
 
 @app.command()
@@ -183,7 +183,7 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
 
     Example: svev ctl restore 2026-02-14T10-15-30Z
     """
-    _show(_call(context, "POST", f"{_path(recording)}/restore"), _recording_line, as_json)
+    _show(_call(context, "POST", f"{_path(recording)}/restore"), _recording_lines, as_json)
 
 
 def _call(context: typer.Context, method: str, path: str, body: dict[str, object] | None = None) -> Any:
@@ -191,11 +191,12 @@ def _call(context: typer.Context, method: str, path: str, body: dict[str, object
     return client.call(method, path, body)
 
 
-def _show(answer: Any, words: Callable[[Any], str], as_json: bool) -> None:
+def _show(answer: Any, words: Callable[[Any], list[str]], as_json: bool) -> None:
     if as_json:
         console.print_json(answer)
-    else:
-        console.say(words(answer))
+        return
+    for line in words(answer):
+        console.say(line)
 
 
 def _awaited(context: typer.Context, answer: dict[str, Any], passing: str, wait_s: float) -> dict[str, Any]:
@@ -224,7 +225,7 @@ def _path(recording: str) -> str:
     return f"/api/recordings/{urllib.parse.quote(recording, safe='')}"
 
 
-def _status_lines(answer: dict[str, Any]) -> str:
+def _status_lines(answer: dict[str, Any]) -> list[str]:
     """The status, for people: state, cameras, disk, seconds held, recording in progress."""
     lines = [f"{answer['state']:10} {_said(answer['statement'])}"]
     for camera in answer["cameras"]:
@@ -235,7 +236,12 @@ def _status_lines(answer: dict[str, Any]) -> str:
         lines.append(f"held       the last {answer['preroll']['seconds']:.1f} s")
     if answer["recording"] is not None:
         lines.append(f"recording  {_recording_line(answer['recording'])}")
-    return "\n".join(lines)
+    return lines
+
+
+def _recording_lines(answer: dict[str, Any]) -> list[str]:
+    """One recording, for people."""
+    return [_recording_line(answer)]
 
 
 def _recording_line(answer: dict[str, Any]) -> str:
@@ -246,9 +252,9 @@ def _recording_line(answer: dict[str, Any]) -> str:
     return f"{answer['id']}  {size:22} {_said(answer['verdict'])}" + (f"  [{who}]" if who else "")
 
 
-def _recordings_lines(answer: dict[str, Any]) -> str:
+def _recordings_lines(answer: dict[str, Any]) -> list[str]:
     """Recordings, for people, one a line."""
-    return "\n".join(_recording_line(each) for each in answer["recordings"]) or "no recordings"
+    return [_recording_line(each) for each in answer["recordings"]] or ["no recordings"]
 
 
 def _said(statement: dict[str, Any]) -> str:

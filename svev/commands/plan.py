@@ -50,6 +50,6 @@ def plan(
     if as_json:
         console.print_json(plan_to_json(planned, predicted, simulated, samples))
     else:
-        console.say(as_text(tables))
+        console.say_text(as_text(tables))
     for line in written(lambda: tables, report):
         console.say(line, aside=as_json)

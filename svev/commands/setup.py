@@ -74,6 +74,6 @@ def schema(
     Example: svev schema -o rig.schema.json
     """
     if output is None:
-        console.say(rig_schema().rstrip())
+        console.say_text(rig_schema().rstrip())
     else:
         output.write_text(rig_schema(), encoding="utf-8")

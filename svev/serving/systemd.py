@@ -17,6 +17,7 @@ from sdnotify import SystemdNotifier  # type: ignore[import-untyped]
 
 from rig.clocks import NS_PER_S
 from rig.events import Event, Level
+from svev.console import visible
 
 #: Priorities of syslog, which the journal reads from the beginning of a line.
 _PRIORITIES: Final = {Level.FATAL: 2, Level.ERROR: 3, Level.WARNING: 4, Level.INFO: 6, Level.DEBUG: 7}
@@ -27,7 +28,7 @@ _FEEDS_PER_LIMIT: Final = 3
 
 def log_line(event: Event, *, journal: bool) -> str:
     """An event as one line: for the journal with a priority, for a terminal with time (UTC) and level."""
-    text = f"{event.name}: {event.message}".replace("\r", " ").replace("\n", " ")
+    text = visible(f"{event.name}: {event.message}")
     if journal:
         return f"<{_PRIORITIES[event.level]}>{text}"
     time_ = datetime.fromtimestamp(event.time / NS_PER_S, UTC)
@@ -80,7 +81,7 @@ class Notify:
 
     def status(self, text: str) -> None:
         """Set the line that `systemctl status` shows. Call it often: it also sends what is still due."""
-        line = text.replace("\n", " ")
+        line = visible(text)
         if line != self._status:
             self._status = line
             self._due["STATUS"] = line

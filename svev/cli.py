@@ -5,6 +5,9 @@ Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, `doctor` foun
 `--debug` anywhere on the command line shows the traceback of an error.
 """
 
+import errno
+import os
+import resource
 import sys
 import traceback
 from collections.abc import Iterable, Sequence
@@ -14,7 +17,7 @@ from typing import Any, Final
 
 import typer
 
-from rig.errors import SvevError
+from rig.errors import BadInputError, SvevError
 from svev import console
 
 #: Commands in the order of the help: module in `svev.commands`, function in it, one line of help. Only the module of
@@ -38,6 +41,9 @@ _COMMANDS: Final = {
 }
 
 
+#: Open files that are asked for, and the fewest that will do, beside those that are open already.
+_FILES: Final = 4096
+_LEAST_FILES: Final = 48
 #: The base of errors in the use of options and arguments, which Typer does not name.
 _USAGE_ERROR: Final[type[Exception]] = typer.BadParameter.__mro__[1]
 
@@ -78,6 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in argv
     argv = [argument for argument in argv if argument != "--debug"]
     try:
+        _allow_open_files()
         command = command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)
         code = command(argv, prog_name="svev", standalone_mode=False)
     except SystemExit as end:
@@ -94,6 +101,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         console.complain(_one_line(error))
         return error.exit_code if isinstance(error, SvevError) else 2
     return code if isinstance(code, int) else 0  # a number: --help, or a command that ends with a code of its own
+
+
+def _allow_open_files() -> None:
+    """Allow this process and its children as many open files as they may have.
+
+    Raises:
+        BadInputError: that is too few: sockets, shared memory and the files of Python modules would not fit.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    allowed = _FILES if hard == resource.RLIM_INFINITY else min(hard, _FILES)
+    if soft != resource.RLIM_INFINITY and soft < allowed:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
+    left = allowed - len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - a list of numbers, no paths
+    if left < _LEAST_FILES:
+        raise BadInputError(
+            f"only {left} more files may be opened here, and svev needs {_LEAST_FILES}: run `ulimit -n 1024` and call "
+            "again"
+        )
 
 
 def _explain_usage(error: Any) -> int:
@@ -114,4 +139,7 @@ def _one_line(error: SvevError | OSError) -> str:
     """The error as one line: what is wrong and what to do."""
     if isinstance(error, SvevError):
         return str(error)
+    if error.errno in {errno.EMFILE, errno.ENFILE}:
+        limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        return f"too many files are open ({limit} are allowed here): run `ulimit -n 4096` and call again"
     return f"{error.filename or 'system call'}: {error.strerror}; check the path and its permissions"

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, ExitStack, suppress
 from functools import partial
 
 from rig.clocks import HostNs, host_now
-from rig.errors import SvevError
+from rig.errors import ProcessDiedError, SvevError
 from rig.events import Event
 from rig.settings.model import RigSettings
 from rig.transport.messages import RecorderOptions, TellEvent
@@ -106,6 +106,18 @@ class RigSession:
         self._job.add_done_callback(lambda _: self._on_done())
 
     def _set_up(self) -> RigProcesses:
+        """Start everything.
+
+        Raises:
+            SvevError: something cannot be started.
+        """
+        try:
+            return self._started()
+        except OSError as error:
+            reason = f"{error.filename or 'the processes of the rig'}: cannot be started ({error.strerror})"
+            raise ProcessDiedError(f"{reason}; see what this login may use: ulimit -a") from error
+
+    def _started(self) -> RigProcesses:
         with ExitStack() as stack:
             if self._hill is None:
                 epoch = host_now()

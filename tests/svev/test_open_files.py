@@ -19,7 +19,7 @@ def _svev(files: int, *arguments: str, taken: int = 0) -> "subprocess.CompletedP
     try:
         return subprocess.run(
             [sys.executable, "-m", "svev", *arguments], capture_output=True, text=True, timeout=90, check=False,
-            pass_fds=given, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (files, files)),  # noqa: PLW1509
+            pass_fds=given, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (files, files)),
         )  # fmt: skip
     finally:
         for descriptor in given:
@@ -71,7 +71,7 @@ def test_what_runs_out_later_is_one_line_too(tmp_path: Path, loopback: Loopback)
     options = ["record", "--rig", str(rig), "--seconds", "1", "--out", str(tmp_path / "out")]
     done = subprocess.run(
         [sys.executable, "-c", program, *options], capture_output=True, text=True, timeout=90, check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)),  # noqa: PLW1509
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)),
     )  # fmt: skip
     assert done.returncode == 6
     assert done.stderr == (

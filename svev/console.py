@@ -25,7 +25,7 @@ _OBEYED: Final = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 def visible(text: str) -> str:
-    """The text as one line in which characters that a terminal would obey are written out, e.g. ESC as backslash x1b."""
+    """The text as one line; characters that a terminal would obey are written out, as Python does in literals."""
     if text.isprintable():
         return text
     return "".join(

@@ -15,6 +15,7 @@ import typer.main
 from _pytest.mark.structures import ParameterSet
 from typer.core import TyperGroup
 
+from recorder.publishing.keys import make_keys
 from svev import cli
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
@@ -177,9 +178,11 @@ def _run(example: re.Match[str], folder: Path, **given: str) -> None:
 def test_examples_run(example: re.Match[str], log: Path, loopback: Loopback, tmp_path: Path) -> None:
     address = loopback.endpoint()
     with ExitStack() as stack:
+        secret, public = make_keys(tmp_path / "hill")
         if example["replay"] is not None:
-            stack.enter_context(_replay(log, address, *example["replay"].split()))
-        _run(example, tmp_path, LOG=str(log), ADDRESS=address)
+            options = [str(secret) if word == secret.name else word for word in example["replay"].split()]
+            stack.enter_context(_replay(log, address, *options))
+        _run(example, tmp_path, LOG=str(log), ADDRESS=address, KEYS=str(public))
 
 
 @pytest.mark.parametrize("example", list(_examples(serve=True)))

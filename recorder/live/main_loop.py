@@ -14,6 +14,7 @@ from recorder.live.preroll import Preroll, preroll_triplets
 from recorder.live.recordings import Recordings
 from recorder.log.mcap_layout import SlotLayout
 from recorder.log.triplet_buffers import TripletBuffers
+from recorder.publishing.keys import load_keys
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
@@ -62,7 +63,9 @@ class RecorderLoop:
         held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape).slot_bytes)
         self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held)
         self._assembler = Assembler(rig, rings, self._buffers)
-        self._publisher = Publisher(rig.network.publish, rig.network.publish_ipc, queue=in_flight // 4)
+        network = rig.network
+        keys = None if network.curve_key_file is None else load_keys(network.curve_key_file)
+        self._publisher = Publisher(network.publish, network.publish_ipc, queue=in_flight // 4, keys=keys)
         self._preroll = Preroll(self._buffers, config.options.preroll_s, held)
         self._health = HealthMonitor(rig, rings, config.options.directory)
         self._recordings = Recordings(

@@ -15,6 +15,7 @@ from typing import Final
 import zmq
 
 from recorder.log.triplet_buffers import TripletBuffers
+from recorder.publishing.keys import Keys
 from recorder.publishing.peers import Peers
 from rig.errors import BadInputError
 from rig.events import Event
@@ -64,13 +65,14 @@ class Publisher:
         dropped: triplets that were wanted and that nobody got, because too many slots were still being sent.
     """
 
-    def __init__(self, address: str, ipc: str | None = None, *, queue: int = 8) -> None:
+    def __init__(self, address: str, ipc: str | None = None, *, queue: int = 8, keys: Keys | None = None) -> None:
         """Bind the socket.
 
         Args:
             address: `tcp://HOST:PORT` or `ipc://PATH`.
             ipc: a second address, `ipc://PATH`.
             queue: messages that may wait for one subscriber.
+            keys: serve only subscribers that have the public key; None: everybody.
 
         Raises:
             BadInputError: an address is in use, or not of this machine.
@@ -88,6 +90,8 @@ class Publisher:
         self._socket.sndhwm = queue
         self._socket.rcvhwm = _CHANGES_AT_ONCE
         self._socket.handshake_ivl = _HANDSHAKE_MS
+        if keys is not None:
+            keys.guard(self._socket)
         self._peers = Peers(self._socket)
         try:
             self.address = bind(self._socket, address)

@@ -9,6 +9,7 @@ from typing import Any
 
 import zmq
 
+from recorder.publishing.keys import Keys
 from recorder.publishing.publisher import Publisher, bind, live_topic
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
@@ -40,6 +41,7 @@ class ReplayOptions:
         loop: begin again at the end, until stopped.
         first, last: pulses to begin and to end with; None: all.
         wait_s: wait at most so long for the first subscriber or worker, s.
+        keys: serve only those who have the public key; None: everybody.
     """
 
     address: str = DEFAULT_PUBLISH
@@ -49,6 +51,7 @@ class ReplayOptions:
     first: int | None = None
     last: int | None = None
     wait_s: float = 10.0
+    keys: Keys | None = None
 
 
 @dataclass(slots=True)
@@ -110,7 +113,11 @@ def replay(
     """
     stop = stop or threading.Event()
     with LogReader(path) as reader:
-        sink = _PushSink(options.address) if options.reliable else _PublishSink(options.address)
+        sink = (
+            _PushSink(options.address, options.keys)
+            if options.reliable
+            else _PublishSink(options.address, options.keys)
+        )
         report = ReplayReport(str(path), sink.address, closed=reader.closed)
         try:
             if ready is not None:
@@ -137,8 +144,8 @@ class _PublishSink:
         address: where the socket is bound.
     """
 
-    def __init__(self, address: str) -> None:
-        self._publisher = Publisher(address, queue=_QUEUE)
+    def __init__(self, address: str, keys: Keys | None) -> None:
+        self._publisher = Publisher(address, queue=_QUEUE, keys=keys)
         self.address = self._publisher.address
 
     def has_listener(self, timeout_s: float) -> bool:
@@ -168,9 +175,11 @@ class _PushSink:
         address: where the socket is bound.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, keys: Keys | None) -> None:
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.PUSH)
+        if keys is not None:
+            keys.guard(self._socket)
         self._socket.sndhwm = 1
         self._socket.linger = 0
         try:

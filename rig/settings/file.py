@@ -12,7 +12,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
 def load_rig(path: Path) -> RigSettings:
-    """Read and check a rig file, and make the paths of scenario and calibration in it absolute.
+    """Read and check a rig file, and make the paths of scenario, calibration and keys in it absolute.
 
     Raises:
         BadInputError: the file is missing, is not TOML, or does not describe a rig.
@@ -24,6 +24,9 @@ def load_rig(path: Path) -> RigSettings:
         absolute["simulation"] = rig.simulation.model_copy(update={"scenario": scenario})
     if rig.calibration is not None:
         absolute["calibration"] = (path.parent / rig.calibration).resolve()
+    if rig.network.curve_key_file is not None:
+        keys = (path.parent / rig.network.curve_key_file).resolve()
+        absolute["network"] = rig.network.model_copy(update={"curve_key_file": keys})
     return rig.model_copy(update=absolute)
 
 

@@ -127,6 +127,11 @@ class NetworkSettings(StrictModel):
     publish_ipc: str | None = Field(
         None, pattern=r"^ipc://.+", description="a second ZeroMQ address, for workers on this machine"
     )
+    curve_key_file: Path | None = Field(
+        None,
+        description="secret keys of the publisher (svev keys makes them), relative to the rig file: only subscribers "
+        "that have the public key are served",
+    )
     packet_size: int = Field(
         9000,
         ge=576,

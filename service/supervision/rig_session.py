@@ -114,8 +114,10 @@ class RigSession:
         try:
             return self._started()
         except OSError as error:
-            reason = f"{error.filename or 'the processes of the rig'}: cannot be started ({error.strerror})"
-            raise ProcessDiedError(f"{reason}; see what this login may use: ulimit -a") from error
+            what = error.filename or "the processes of the rig"
+            raise ProcessDiedError(
+                f"{what}: cannot be started ({error.strerror}); see what this login may use: ulimit -a"
+            ) from error
 
     def _started(self) -> RigProcesses:
         with ExitStack() as stack:

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from rig.errors import PulsesPausedError
 from rig.pause import Pause
+from recorder.publishing.keys import check_publication
 from rig.errors import BadInputError
 from rig.settings.file import load_rig
 from rig.status import LONGEST_LINE, Line
@@ -42,6 +43,8 @@ def record(
     """
     settings = load_rig(rig)
     _check_session(session)
+    if exposed := check_publication(settings.network):
+        _aside(f"warning: {exposed}")
     path = new_log_path(out)
     with HeadlessRig(settings, rig.read_text(encoding="utf-8"), _aside) as running:
         result, disk_error = record_with(

@@ -1,9 +1,11 @@
 """`svev replay`: publishes a log as it was published live, or serves it to workers."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from recorder.publishing.keys import exposure, load_keys
 from recorder.publishing.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError, LogDamagedError
 from rig.topics import DEFAULT_PUBLISH
@@ -25,6 +27,9 @@ def replay_command(
     first: Annotated[int | None, typer.Option("--from", metavar="N", min=1, help="first pulse")] = None,
     last: Annotated[int | None, typer.Option("--to", metavar="N", min=1, help="last pulse")] = None,
     wait: Annotated[float, typer.Option(metavar="S", min=0, help="seconds to wait for the first listener")] = 10.0,
+    curve_key_file: Annotated[
+        Path | None, typer.Option(help="secret keys (svev keys): serve only those who have the public key")
+    ] = None,
     as_json: AlsoJson = False,
 ) -> None:
     """Send the triplets, events and health of a log over ZeroMQ, exactly as in live operation.
@@ -38,7 +43,10 @@ def replay_command(
 
     Example: svev replay recordings/jump.mcap --speed 0.5 --loop
     """
-    options = ReplayOptions(bind, _speed(speed), reliable, loop, first, last, wait)
+    keys = None if curve_key_file is None else load_keys(curve_key_file)
+    options = ReplayOptions(bind, _speed(speed), reliable, loop, first, last, wait, keys)
+    if exposed := exposure(bind, keys):
+        console.say(f"warning: {exposed}", aside=True)
     with console.progress("replaying", None) as done:
         report = replay(log, options, ready=lambda address: _announce(address, reliable=reliable), progress=done)
     if as_json:

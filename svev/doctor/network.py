@@ -14,6 +14,7 @@ from pathlib import Path
 import zmq
 
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, STALL_FRAMES, prefers_plain_socket
+from recorder.publishing.keys import exposure, load_keys
 from recorder.publishing.publisher import bind
 from rig.errors import BadInputError
 from rig.settings.model import CameraSettings, RigSettings
@@ -179,7 +180,17 @@ def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
             remedy = "end the program that uses it (another svev?), or correct network.publish"
             yield failure(Topic.NETWORK, f"triplets cannot be published: {error}", remedy)
             return
-    yield passed(Topic.NETWORK, f"triplets can be published at {address}")
+    try:
+        keys = None if rig.network.curve_key_file is None else load_keys(rig.network.curve_key_file)
+    except BadInputError as error:
+        yield failure(Topic.NETWORK, f"triplets cannot be published: {error}", "correct network.curve_key_file")
+        return
+    what = f"triplets can be published at {address}"
+    if exposed := exposure(address, keys):
+        reason, _, remedy = exposed.partition(": ")
+        yield warning(Topic.NETWORK, f"{what}; {reason}", remedy)
+    else:
+        yield passed(Topic.NETWORK, what + (", encrypted" if keys is not None else ""))
 
 
 def _prefers_plain_socket(rig: RigSettings, camera: CameraSettings) -> bool:

@@ -14,7 +14,7 @@ from recorder.live.preroll import Preroll, preroll_triplets
 from recorder.live.recordings import Recordings
 from recorder.log.mcap_layout import SlotLayout
 from recorder.log.triplet_buffers import TripletBuffers
-from recorder.publishing.keys import load_keys
+from recorder.publishing.keys import check_publication, load_keys
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
@@ -27,6 +27,7 @@ from rig.transport.messages import (
     Quit,
     RecorderCommand,
     RecorderConfig,
+    RecorderEvent,
     RecorderFailed,
     RecorderHealth,
     RecorderReady,
@@ -85,6 +86,8 @@ class RecorderLoop:
         if self._preview is not None:
             self._preview.take_over()
         self._tell(RecorderReady())
+        if exposed := check_publication(self._rig.network):
+            self._warn("publisher", exposed)
         poll = select.poll()
         poll.register(self._doorbell, select.POLLIN)
         poll.register(self._control, select.POLLIN)
@@ -169,10 +172,16 @@ class RecorderLoop:
         dropped, self._unreported = self._control.dropped - self._unreported, self._control.dropped
         if dropped:
             why = f"{dropped} reports are dropped: the service process does not read them; see whether it is stopped"
-            self._recordings.happened(Event.now(Level.WARNING, "recorder", why))
+            self._warn("recorder", why)
         for fault, count in self._publisher.refused().items():
             what = f"{count} connections are closed, of a program that {fault}: end it, or publish on another address"
-            self._recordings.happened(Event.now(Level.WARNING, "publisher", what))
+            self._warn("publisher", what)
+
+    def _warn(self, name: str, text: str) -> None:
+        """Tell people at once, and write it into the log."""
+        event = Event.now(Level.WARNING, name, text)
+        self._tell(RecorderEvent(event=event))
+        self._recordings.happened(event)
 
     def _sleep_ms(self, now: HostNs) -> float:
         deadlines = [self._next_report, self._next_health]

@@ -43,8 +43,7 @@ def record(
     """
     settings = load_rig(rig)
     _check_session(session)
-    if exposed := check_publication(settings.network):
-        _aside(f"warning: {exposed}")
+    check_publication(settings.network)
     path = new_log_path(out)
     with HeadlessRig(settings, rig.read_text(encoding="utf-8"), _aside) as running:
         result, disk_error = record_with(

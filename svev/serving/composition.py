@@ -64,7 +64,7 @@ def serve(settings: ServiceSettings) -> None:
     data = settings.data or rig.recorder.directory
     preroll_s = rig.recorder.preroll_s if settings.preroll_s is None else settings.preroll_s
     check_memory(rig, preroll_s)
-    exposed = check_publication(rig.network)
+    check_publication(rig.network)
     with ExitStack() as stack:
         stack.enter_context(data_lock(data))
         listener = stack.enter_context(listen(settings.access.host, settings.port))
@@ -72,8 +72,6 @@ def serve(settings: ServiceSettings) -> None:
         notify = stack.enter_context(closing(Notify()))
         slot = stack.enter_context(closing(PreviewSlot.create(rig.triplet_shape, len(rig.cameras))))
         hub, catalogue = EventHub(write_line), Catalogue(data)
-        if exposed:
-            hub.tell(Event.now(Level.WARNING, "publisher", exposed))
         options = RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
         supervisor = Supervisor(rig, rig_toml, hub, options)
         service = Service(supervisor, catalogue, slot, PanelDoctor(rig, data).report)

@@ -67,8 +67,8 @@ def test_a_listener_may_leave_while_it_is_woken() -> None:
 
 def test_log_lines_are_one_line_each() -> None:
     event = _event("lost\nfor good", Level.ERROR)
-    assert log_line(event, journal=True) == "<3>K2: lost for good"
-    assert log_line(event, journal=False).endswith(" error   K2: lost for good")
+    assert log_line(event, journal=True) == "<3>K2: lost\\nfor good"
+    assert log_line(event, journal=False).endswith(" error   K2: lost\\nfor good")
     assert [log_line(_event(level=level), journal=True)[:3] for level in Level] == ["<7>", "<6>", "<4>", "<3>", "<2>"]
 
 

@@ -134,6 +134,7 @@ def test_a_recording_with_keys_in_the_rig_file(tmp_path: Path, loopback: Loopbac
 def test_whoever_publishes_to_everybody_is_warned(tmp_path: Path, loopback: Loopback) -> None:
     rig = write_rig(tmp_path, "sim", loopback)
     rig.write_text(rig.read_text().replace(f"tcp://{loopback.host}:", "tcp://0.0.0.0:"))
-    assert "warning: whoever reaches tcp://0.0.0.0:" in _record(rig, tmp_path / "out").stderr
+    assert "publisher whoever reaches tcp://0.0.0.0:" in _record(rig, tmp_path / "out").stderr
     with serving(tmp_path, rig, loopback) as service:
+        service.arm()
         assert "publisher: whoever reaches tcp://0.0.0.0:" in service.log.read_text()

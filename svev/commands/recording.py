@@ -7,10 +7,9 @@ import msgspec
 import typer
 from pydantic import TypeAdapter, ValidationError
 
-from rig.errors import PulsesPausedError
-from rig.pause import Pause
 from recorder.publishing.keys import check_publication
-from rig.errors import BadInputError
+from rig.errors import BadInputError, PulsesPausedError
+from rig.pause import Pause
 from rig.settings.file import load_rig
 from rig.status import LONGEST_LINE, Line
 from service.headless import HeadlessRig

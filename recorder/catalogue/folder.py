@@ -11,14 +11,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from stat import S_ISDIR
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.catalogue.entry import Entry, LogCache, with_changes
+from recorder.catalogue.entry import Entry, with_changes
+from recorder.catalogue.log_cache import LogCache
 from recorder.log.session_changes import session_changes, session_path, write_session_changes
 from recorder.reading.log_reader import LogReader
+from recorder.reading.records import FileWindow
 from recorder.reading.triplets import pixels, tag_of, view_image
 from rig.errors import LogDamagedError, StorageError, UnknownRecordingError
 from rig.pulse import PulseNumber
@@ -34,8 +37,8 @@ _STEM_MAX: Final = 90
 class Catalogue:
     """All recordings of a folder, those in its trash included. Methods may be called from any thread.
 
-    The id of a recording is the name of its file without `.mcap`. Files with other names, and files that are no logs
-    of svev, are left out.
+    The id of a recording is the name of its file without `.mcap`. Everything of such a name is listed, also what cannot
+    be read: its entry says what is wrong.
 
     Attributes:
         directory: the folder.
@@ -44,15 +47,26 @@ class Catalogue:
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self._trash = directory / _TRASH
-        self._logs = LogCache()
+        self._logs = LogCache(directory)
         self._changing = threading.Lock()
 
     def entries(self, *, deleted: bool = False) -> list[Entry]:
-        """The recordings, newest first; those in the trash if `deleted`."""
-        found = []
-        for path in self._folder(deleted=deleted).glob(f"*{_SUFFIX}"):
-            if _ID.fullmatch(path.stem) and path.is_file() and (entry := self._entry(path)) is not None:
-                found.append(entry)
+        """The recordings, newest first; those in the trash if `deleted`.
+
+        Raises:
+            StorageError: the folder cannot be read.
+        """
+        folder = self._folder(deleted=deleted)
+        try:
+            paths = [path for path in folder.iterdir() if path.suffix == _SUFFIX and _ID.fullmatch(path.stem)]
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise StorageError(
+                f"{folder}: cannot be read ({error.strerror}); check the folder's permissions"
+            ) from error
+        found = [entry for path in paths if (entry := self._entry(path)) is not None]
+        self._logs.save()
         return sorted(found, key=lambda entry: (entry.started or entry.modified, entry.id), reverse=True)
 
     def entry(self, recording: str) -> Entry:
@@ -66,6 +80,17 @@ class Catalogue:
         if entry is None:
             raise _unknown(recording)
         return entry
+
+    def file(self, recording: str) -> Path:
+        """The log of a recording, to be read as a file.
+
+        Raises:
+            UnknownRecordingError: no recording has this id.
+            BadInputError: it may not be read, or is no regular file.
+        """
+        path = self._path(recording)
+        FileWindow(path, direct=False).close()
+        return path
 
     def tags(self, recording: str) -> tuple[TripletTag, ...]:
         """The tags of a recording, in the order of the log, without those in damaged parts.
@@ -147,7 +172,7 @@ class Catalogue:
         return self.entry(path.stem)
 
     def purge(self, older_than_s: float) -> list[str]:
-        """Remove for good what has been in the trash for more than `older_than_s`.
+        """Remove for good what has been in the trash for more than `older_than_s`; folders stay there.
 
         Returns:
             The ids.
@@ -159,7 +184,8 @@ class Catalogue:
         with self._change():
             for log in self._trash.glob(f"*{_SUFFIX}"):
                 # Nobody writes into a deleted log, so its inode changed last when it was moved here.
-                if os.stat(log).st_ctime <= time.time() - older_than_s:  # noqa: PTH116
+                stat = log.lstat()
+                if not S_ISDIR(stat.st_mode) and stat.st_ctime <= time.time() - older_than_s:
                     log.unlink()
                     session_path(log).unlink(missing_ok=True)
                     gone.append(log.stem)
@@ -185,23 +211,23 @@ class Catalogue:
         if _ID.fullmatch(recording):
             for deleted in (prefer_deleted, not prefer_deleted):
                 path = self._folder(deleted=deleted) / f"{recording}{_SUFFIX}"
-                if path.is_file():
+                if os.path.lexists(path):
                     return path
         raise _unknown(recording)
 
     def _entry(self, path: Path) -> Entry | None:
-        """The entry of a file, None if the file is no log of svev or has just been removed."""
+        """The entry of a file, None if the file has just been removed."""
         try:
             entry = self._logs.entry(path)
         except FileNotFoundError:
             return None
-        return entry and with_changes(entry, path, deleted=path.parent == self._trash)
+        return with_changes(entry, path, deleted=path.parent == self._trash)
 
     def _free_path(self, log: Path, target: Path) -> Path:
         """A path in `target` with the log's name or, if that is taken, the first number free in folder and trash."""
         name, numbers = log.name, count(2)
-        if (target / name).exists():
-            while (self.directory / name).exists() or (self._trash / name).exists():
+        if os.path.lexists(target / name):
+            while os.path.lexists(self.directory / name) or os.path.lexists(self._trash / name):
                 name = f"{log.stem[:_STEM_MAX]}-{next(numbers)}{_SUFFIX}"
         return target / name
 

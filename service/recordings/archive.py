@@ -64,11 +64,12 @@ class Archive(ABC):
 
         Raises:
             StillRecordingError: it has not.
+            BadInputError: the file may not be read, or is no regular file.
         """
         current = self.status().recording
         if current and current.id == recording_id:
             raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
-        return self._catalogue.entry(recording_id).path
+        return self._catalogue.file(recording_id)
 
     def pulses(self, recording_id: str) -> Pulses:
         """What became of each pulse of a recording."""

@@ -7,6 +7,7 @@ import pytest
 
 from rig.errors import StorageError, SvevError
 from rig.frame import FrameStatus
+from tests.recorder.catalogue.bad_files import GOOD, write_bad_files
 from tests.recorder.logs import ALL_OK
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused
@@ -156,6 +157,19 @@ def test_a_recording_is_deleted_and_restored(client: httpx.Client, service: Memo
     assert client.delete("/api/recordings/jump").json() == deleted.json()
     assert not client.post("/api/recordings/jump/restore").json()["deleted"]
     assert [each["id"] for each in client.get("/api/recordings").json()] == ["jump"]
+
+
+def test_a_bad_file_is_a_bad_row(client: httpx.Client, service: MemoryService) -> None:
+    bad = write_bad_files(service.catalogue.directory)
+    rows = {each["id"]: each for each in client.get("/api/recordings").raise_for_status().json()}
+    assert set(rows) == bad | {GOOD}
+    assert rows[GOOD]["verdict"]["code"] == "verdict_complete"
+    for name in bad:
+        assert client.get(f"/api/recordings/{name}").json() == rows[name]
+        assert rows[name]["verdict"]["level"] in {"warning", "error"}, rows[name]
+        for part in ("/pulses", "/pulses/1.jpg", "/thumbnail.jpg", "/file"):
+            with client.stream("GET", f"/api/recordings/{name}{part}") as answer:
+                assert answer.status_code in {200, 404, 422, 503}, (name, part)
 
 
 def test_the_verdict_names_camera_and_cause(client: httpx.Client, service: MemoryService) -> None:

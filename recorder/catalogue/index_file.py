@@ -1,0 +1,108 @@
+"""Keeps what was read from logs in one file beside them, so that a new service need not read them all again.
+
+The file is believed as a whole or not at all: if it is one of this program's version, owned by this process's user,
+writable by nobody else, and its checksum is right. A row is believed if its log is still the file that was read.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from stat import S_ISREG
+from typing import Final
+
+from isal.isal_zlib import crc32
+
+from recorder.catalogue.entry import Entry
+from rig.transport import wire
+
+NAME: Final = ".svev-catalogue"
+#: Some 100 000 rows; a larger file was not written by us.
+_BYTES_MAX: Final = 64 << 20
+
+#: What changes when a file does: inode, size, times of the last write and of the last change to its inode.
+FileKey = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class KeptEntry:
+    """What reading a log gave.
+
+    Attributes:
+        key: of the log's file when it was read.
+        entry: without the changes of its session.
+    """
+
+    key: FileKey
+    entry: Entry
+
+
+def file_key(path: Path) -> FileKey:
+    """The key of a file.
+
+    Raises:
+        OSError: the file is not there, or may not be looked at.
+    """
+    stat = path.stat()
+    return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
+
+
+def load_kept(directory: Path) -> dict[Path, KeptEntry]:
+    """The entries that were kept in a directory; none if the file is missing, or not to be believed."""
+    try:
+        text = _read_own(directory / NAME)
+    except OSError:
+        return {}
+    head, _, rows = text.partition(b"\n")
+    if head != _head(rows):
+        return {}
+    try:
+        kept = _DECODER.decode(rows)
+    except ValueError:
+        return {}
+    return {
+        path: replace(each, entry=replace(each.entry, path=path))
+        for name, each in kept.items()
+        if (path := directory / name).stem == each.entry.id and each.entry.bytes == each.key[1]
+    }
+
+
+def keep(directory: Path, entries: Mapping[Path, KeptEntry]) -> None:
+    """Replace the kept entries of a directory, by one rename.
+
+    A directory that cannot be written keeps none: then the next service reads its logs again, which takes longer.
+    """
+    rows = wire.encode({str(path.relative_to(directory)): each for path, each in entries.items()})
+    new = directory / f"{NAME}.new"
+    try:
+        new.unlink(missing_ok=True)
+        with open(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600), "wb") as file:  # noqa: PTH123
+            file.write(_head(rows) + b"\n" + rows)
+        new.replace(directory / NAME)
+    except OSError:
+        return
+
+
+def _head(rows: bytes) -> bytes:
+    return f"svev catalogue, version {version('svev')}.{_FORMAT}, checksum {crc32(rows):08x}".encode()
+
+
+def _read_own(path: Path) -> bytes:
+    """The file's content, empty if others than this process's user could have written it.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        stat = os.fstat(fd)
+        own = S_ISREG(stat.st_mode) and stat.st_uid == os.geteuid() and not stat.st_mode & 0o022
+        return os.read(fd, stat.st_size) if own and stat.st_size <= _BYTES_MAX else b""
+    finally:
+        os.close(fd)
+
+
+#: Counts up when entries of the same log become different ones.
+_FORMAT: Final = 1
+_DECODER: Final = wire.decoder(dict[str, KeptEntry])

@@ -7,11 +7,12 @@ slots are used over and over and stay in the processor's cache.
 The ids of a buffer whose status is not SUCCESS mean nothing: they may be those of its previous use.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import gi
 
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
+from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
@@ -30,6 +31,7 @@ _TIMESTAMP_FREQUENCY_HIGH, _TIMESTAMP_FREQUENCY_LOW = 0x093C, 0x0940
 _TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
 _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
 
+_STREAM_SOURCE_PORT = 0x0D1C
 _IDS_16_BIT = 65535
 _RETENTION_US = 50_000  # enough to ask for lost packets several times and to receive them
 # How many empty buffers stand in Aravis's queue: half a second of frames, but no more than stay in the cache.
@@ -53,14 +55,20 @@ class AravisCamera:
         self._buffers: dict[int, int] = {}
         self._of_slot: list[Aravis.Buffer] = []
         self._in_aravis = 0
+        self._frame_came = False
+        self._notices: list[str] = []
         wanted = min(round(_QUEUE_S * NS_PER_S / period_ns), _QUEUE_BYTES // settings.frame_bytes)
         self._depth = min(ring.slots, max(_QUEUE_LEAST, wanted))
+        sockets = open_sockets()
         try:
             self._camera = Aravis.Camera.new(settings.address)
         except GLib.Error as error:
             raise _opening_error(settings, error) from None
         try:
             self._device = self._camera.get_device()
+            if not self._device.is_controller():  # Aravis opens it all the same, to read only
+                raise _controlled_error(settings, "no control")
+            filter_control(sockets, self._camera_host())
             self._device.connect("control-lost", self._on_control_lost)
             self._configure(settings, network)
             self._tick_hz = self._timestamp_frequency()
@@ -70,6 +78,11 @@ class AravisCamera:
             raise CameraError(
                 f"camera {self._name} at {self._address} refuses its settings: {error.message}; "
                 "check the rig file against the camera's manual"
+            ) from None
+        except OSError as error:
+            self.close()
+            raise CameraError(
+                f"camera {self._name}: its packets cannot be told from others ({error}); run svev doctor"
             ) from None
         except CameraError:
             self.close()
@@ -99,6 +112,7 @@ class AravisCamera:
         self._top_up()
         buffer = self._stream.timeout_pop_buffer(round(timeout_s * 1e6))
         if buffer is None:
+            self._check_source()
             return None
         now = host_now()
         self._in_aravis -= 1
@@ -106,6 +120,7 @@ class AravisCamera:
         if buffer.get_status() != Aravis.BufferStatus.SUCCESS:
             self._ring.return_slot(slot)
             return Arrival(whole=False, host_time=now)
+        self._frame_came = True
         return Arrival(
             True, now, slot, buffer.get_frame_id(), self._id_modulus, DeviceNs(buffer.get_timestamp())
         )  # fmt: skip
@@ -139,8 +154,9 @@ class AravisCamera:
         return counted
 
     def notices(self) -> Sequence[str]:
-        """None: Aravis reports nothing that is not counted."""
-        return ()
+        """What is unusual about the camera's packets."""
+        notices, self._notices = self._notices, []
+        return notices
 
     @property
     def bytes_received(self) -> int:
@@ -155,7 +171,9 @@ class AravisCamera:
         except (AttributeError, GLib.Error):
             # The camera was never fully opened, or it is dead: then its heartbeat runs out by itself.
             pass
-        for name in ("_stream", "_device", "_camera"):
+        if "_source" in self.__dict__:
+            self._source.close()
+        for name in ("_source", "_stream", "_device", "_camera"):
             self.__dict__.pop(name, None)
         self._buffers.clear()
         self._of_slot.clear()
@@ -191,9 +209,11 @@ class AravisCamera:
             )
 
     def _open_stream(self, network: NetworkSettings) -> "Aravis.Stream":
+        sockets = open_sockets()
         stream = self._camera.create_stream(None, None)
         if stream is None:
             raise CameraError(f"camera {self._name}: no stream can be opened; check the network interface")
+        self._source = self._filter_source(stream, sockets)
         resend = Aravis.GvStreamPacketResend.ALWAYS if network.resend else Aravis.GvStreamPacketResend.NEVER
         # A packet socket hands packets over in blocks of up to 5 ms: a shorter timeout asks for packets that have
         # come already. A whole frame waits behind a damaged one for `frame-retention`.
@@ -213,6 +233,28 @@ class AravisCamera:
             self._buffers[hash(buffer)] = slot  # the hash is the address of the C object, which does not change
             self._of_slot.append(buffer)
         return stream
+
+    def _filter_source(self, stream: "Aravis.Stream", before: Collection[str]) -> SourceFilter:
+        """Refuse packets that are not from the camera's address and port."""
+        local = self._device.get_interface_address().get_address().to_string(), stream.get_port()
+        try:
+            port = self._read(_STREAM_SOURCE_PORT) & 0xFFFF
+        except GLib.Error:
+            port = 0  # cameras of GigE Vision 1.0 have no such register
+        return SourceFilter(before, local, (self._camera_host(), port))
+
+    def _camera_host(self) -> str:
+        """Address of the camera, numbers only."""
+        return str(self._device.get_device_address().get_address().to_string())
+
+    def _check_source(self) -> None:
+        """Give up asking for the source port, if the camera sends, but not from the port that it names."""
+        if self._frame_came or not self._source.doubt(self._stream.get_info_uint64_by_name("n_received_packets")):
+            return
+        self._notices.append(
+            f"camera {self._name} streams from another port than it says: packets from other ports of "
+            f"{self._address} are taken for its own"
+        )
 
     def _top_up(self) -> None:
         """Fill Aravis's queue of empty buffers, as far as the recorder leaves slots free."""
@@ -238,11 +280,15 @@ class AravisCamera:
 
 def _opening_error(settings: CameraSettings, error: GLib.Error) -> CameraError | CameraNotFoundError:
     if "denied" in error.message or "control" in error.message.lower():
-        return CameraError(
-            f"camera {settings.name} at {settings.address} is controlled by another program: close that program, "
-            f"or wait 3 s for its heartbeat to run out ({error.message})"
-        )
+        return _controlled_error(settings, error.message)
     return CameraNotFoundError(
         f"camera {settings.name} at {settings.address} does not answer: check power, cable and address, "
         f"then run: svev doctor ({error.message})"
+    )
+
+
+def _controlled_error(settings: CameraSettings, detail: str) -> CameraError:
+    return CameraError(
+        f"camera {settings.name} at {settings.address} is controlled by another program: close that program, "
+        f"or wait 3 s for its heartbeat to run out ({detail})"
     )

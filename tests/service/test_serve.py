@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from recorder.catalogue.index_file import NAME
 from recorder.checking.verify import verify
 from recorder.reading.info import info
 from recorder.reading.log_reader import LogReader
 from rig.topics import RIG_ATTACHMENT, TAG
 from tests.capture.rigs import write_rig
+from tests.recorder.catalogue.bad_files import GOOD, write_bad_files
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
@@ -190,3 +192,19 @@ def test_without_cameras_the_api_works_and_says_what_to_do(tmp_path: Path, loopb
         service.post("/api/disarm")
         service.await_state("idle")
         assert time.monotonic() - began < PATIENCE_S
+
+
+def test_bad_files_among_the_recordings_are_bad_rows_also_after_a_restart(tmp_path: Path, loopback: Loopback) -> None:
+    rig, data = write_rig(tmp_path, "sim", loopback), tmp_path / "data"
+    data.mkdir()
+    bad = write_bad_files(data)
+    lists = []
+    for _ in range(2):
+        with serving(tmp_path, rig, loopback) as service:
+            lists.append(service.get("/api/recordings"))
+    assert lists[0] == lists[1]
+    rows = {each["id"]: each for each in lists[0]}
+    assert set(rows) == bad | {GOOD}
+    assert rows[GOOD]["verdict"]["code"] == "verdict_complete"
+    assert {row["verdict"]["level"] for name, row in rows.items() if name != GOOD} <= {"warning", "error"}
+    assert (data / NAME).stat().st_uid == os.geteuid()

@@ -22,6 +22,9 @@ class Topic:
 
 
 TRIPLET: Final = Topic("/triplet", "foxglove.RawImage", "protobuf", "triplet")
+CAMERA_TOPIC: Final = (
+    "/camera/"  #: and the camera's name: its image, `foxglove.RawImage`, in place of /triplet on request
+)
 TAG: Final = Topic("/triplet/tag", "svev.TripletTag", "json", None)
 EVENTS: Final = Topic("/events", "foxglove.Log", "protobuf", "event")
 HEALTH: Final = Topic("/health", "svev.Health", "json", "health")

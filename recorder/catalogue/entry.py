@@ -128,8 +128,6 @@ def with_changes(entry: Entry, path: Path, *, deleted: bool) -> Entry:
     return replace(entry, session=session, trouble=trouble, deleted=deleted)
 
 
-
-
 def _state(found: LogInfo) -> LogState:
     unexplained = set(found.ledger.missing) - set(found.known_lost)
     unreadable_tags = found.messages.get(TAG.name, 0) - found.ledger.pulses - len(found.ledger.out_of_order)

@@ -22,7 +22,7 @@ from recorder.catalogue.log_cache import LogCache
 from recorder.log.session_changes import session_changes, session_path, write_session_changes
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
-from recorder.reading.triplets import pixels, tag_of, view_image
+from recorder.reading.triplets import stored_image, tag_of
 from rig.errors import LogDamagedError, StorageError, UnknownRecordingError
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
@@ -121,7 +121,7 @@ class Catalogue:
             raise UnknownRecordingError(f"recording {recording} has no image of pulse {pulse}: choose another pulse")
         with LogReader(path, skim=True) as reader:
             try:
-                return pixels(view_image(reader.read(*place))).copy()
+                return stored_image(reader, pulse, *place).copy()
             except ValueError as error:
                 raise LogDamagedError(
                     f"{path}: the image of pulse {pulse} is damaged ({error}); see the others with `svev verify`"

@@ -5,12 +5,21 @@ from collections.abc import Callable
 import msgspec
 
 from recorder.reading.items import Chunk, Message
-from recorder.reading.triplets import ImageView, event_of, is_json, pixels, read_tag, view_image
+from recorder.reading.triplets import (
+    ImageView,
+    camera_images_of,
+    event_of,
+    images_of,
+    is_json,
+    pixels,
+    read_tag,
+    view_image,
+)
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
-from rig.topics import EVENTS, HEALTH, TAG, TRIPLET
+from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, TAG, TRIPLET
 from triggering.ledger import Ledger
 
 _EVENTS_MAX = 1000
@@ -42,12 +51,16 @@ class PulseCheck:
 
     def take(self, chunk: Chunk) -> None:
         """Check a chunk's messages. A tag must stand before its image, in the same chunk or an earlier one."""
+        cameras = camera_images_of(chunk)
+        images = images_of(chunk) if cameras else {}
         for message in chunk.messages:
             match message.topic:
                 case TAG.name:
                     self._tag(message)
                 case TRIPLET.name:
                     self._image(message)
+                case topic if topic.startswith(CAMERA_TOPIC) and message.sequence in cameras:
+                    self._camera_images(cameras.pop(message.sequence), images.get(message.sequence))
                 case EVENTS.name:
                     self._event(message)
                 case HEALTH.name:
@@ -102,6 +115,20 @@ class PulseCheck:
         flaw = "it has an image, but no tag before it" if tag is None else _image_flaw(image, tag, message.publish_time)
         if flaw:
             self._report(f"pulse {message.sequence}: {flaw}")
+
+    def _camera_images(self, messages: list[Message], triplet: Message | None) -> None:
+        """Check the images of a pulse's cameras, left to right, and the triplet that they make."""
+        pulse = messages[0].sequence
+        tag = self._without_image.get(pulse)
+        if triplet is None:
+            self._report(f"pulse {pulse}: the images of its cameras cannot be read, or do not fit together")
+            return
+        if tag is not None:
+            said = [(CAMERA_TOPIC + camera.name, camera.columns[1] - camera.columns[0]) for camera in tag.cameras]
+            found = [(message.topic, view_image(message.data or memoryview(b"")).columns) for message in messages]
+            if found != said:
+                self._report(f"pulse {pulse}: its images are not those of the cameras in its tag")
+        self._image(triplet)
 
     def _event(self, message: Message) -> None:
         event = event_of(message)

@@ -278,10 +278,9 @@ class Assembler:
         self._rings[camera].release(record.slot)
 
     def _blocks_of(self, slot: int) -> list[NDArray[np.uint8]]:
-        """Views of the cameras' column blocks of one buffer, made once."""
+        """Views of the cameras' blocks of one buffer, made once."""
         if slot not in self._blocks:
-            pixels = self.buffers.pixels(slot)
-            self._blocks[slot] = [pixels[:, first:end] for first, end in self._columns]
+            self._blocks[slot] = [self.buffers.block(slot, columns) for columns in self._columns]
         return self._blocks[slot]
 
     def _blacken(self, pulse: ClosedPulse, slot: int) -> None:

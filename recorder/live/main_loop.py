@@ -60,9 +60,9 @@ class RecorderLoop:
         rings = [CameraRing(fd) for fd in config.rings]
         self._rig, self._doorbell, self._control = rig, config.doorbell, control
         self._preview = None if config.options.preview is None else PreviewSlot(config.options.preview)
-        in_flight = in_flight_triplets(rig)
-        held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape).slot_bytes)
-        self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held)
+        in_flight, topics = in_flight_triplets(rig), rig.own_topics()
+        held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape, topics).slot_bytes)
+        self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held, topics)
         self._assembler = Assembler(rig, rings, self._buffers)
         network = rig.network
         keys = None if network.curve_key_file is None else load_keys(network.curve_key_file)

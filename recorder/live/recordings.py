@@ -462,7 +462,7 @@ class Recordings:
         # No frame came at all: a black triplet, unless no camera was there, which may last for hours.
         black = self._buffers.acquire() if slot is None and not pulse.unwatched else None
         if black is not None:
-            self._buffers.pixels(black).fill(0)
+            self._buffers.write(black, 0)
             slot = black
         tag = recording.tag(pulse)
         encoded = tag.encode()

@@ -1,7 +1,7 @@
 """Schemas and channels of a log, made from the table of topics."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
@@ -16,19 +16,23 @@ from recorder.log.mcap_layout import (
     HEALTH_CHANNEL,
     TAG_CHANNEL,
     TRIPLET_CHANNEL,
+    SlotImage,
 )
 from rig.health import HEALTH_SCHEMA
 from rig.tag import TAG_SCHEMA
-from rig.topics import EVENTS, HEALTH, TAG, TRIPLET, Topic
+from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, TAG, TRIPLET, Topic
 
 CALIBRATION_TOPIC = "/calibration/"
 
 
-def schemas_and_channels(calibrated: Iterable[str] = ()) -> tuple[list[Schema], list[Channel]]:
+def schemas_and_channels(
+    calibrated: Iterable[str] = (), images: Sequence[SlotImage] = ()
+) -> tuple[list[Schema], list[Channel]]:
     """Everything a log declares before its first message.
 
     Args:
         calibrated: names of the cameras that get a channel `/calibration/<camera>`.
+        images: the image messages of a slot; without them, that of the triplet is declared.
     """
     schemas = [
         _protobuf(1, RawImage),
@@ -36,10 +40,14 @@ def schemas_and_channels(calibrated: Iterable[str] = ()) -> tuple[list[Schema], 
         _protobuf(3, Log),
         _json(4, HEALTH, HEALTH_SCHEMA),
     ]
-    channels = [
+    shown = [
+        (image.channel, TRIPLET.name if image.channel == TRIPLET_CHANNEL else CAMERA_TOPIC + image.frame)
+        for image in images
+    ]
+    channels = [Channel(id_, name, TRIPLET.encoding, {}, 1) for id_, name in shown or [(TRIPLET_CHANNEL, TRIPLET.name)]]
+    channels += [
         Channel(id_, topic.name, topic.encoding, {}, schema)
         for id_, topic, schema in (
-            (TRIPLET_CHANNEL, TRIPLET, 1),
             (TAG_CHANNEL, TAG, 2),
             (EVENTS_CHANNEL, EVENTS, 3),
             (HEALTH_CHANNEL, HEALTH, 4),

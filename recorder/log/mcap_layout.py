@@ -6,12 +6,15 @@ chunk, so that the pixels start and the write ends on a page boundary, as direct
 
     | padding | chunk: [tag message][image message: prefix | pixels ... ] | message indexes | padding |
               ^ somewhere in the first page(s)              ^ page boundary                          ^ page boundary
+
+On request each camera has an image message of its own instead; they stand one after the other in the same chunk.
 """
 
 import mmap
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import count, repeat
 
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from isal.isal_zlib import crc32
@@ -20,7 +23,7 @@ from mcap.opcode import Opcode
 from mcap.records import McapRecord
 
 from recorder.log.crc import combined_crc
-from rig.clocks import UtcNs
+from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 
@@ -35,6 +38,7 @@ TAG_CHANNEL = 2
 EVENTS_CHANNEL = 3
 HEALTH_CHANNEL = 4
 FIRST_CALIBRATION_CHANNEL = 16
+FIRST_CAMERA_CHANNEL = 64
 
 #: Bytes before the pixels of a slot, for the head of the chunk; a tag of 8 cameras takes about 2.5 kB of them.
 HEAD_ROOM = 2 * PAGE
@@ -105,18 +109,43 @@ def chunk_of_one(
     )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class SlotImage:
+    """An image message in a slot.
+
+    Attributes:
+        frame: name of what it shows: "triplet", or a camera.
+        channel: of the message.
+        columns: first column in the triplet, and one past the last.
+        start: offset of its first pixel in the slot.
+        end: offset of one past its last pixel.
+    """
+
+    frame: str
+    channel: int
+    columns: tuple[int, int]
+    start: int
+    end: int
+
+
 class SlotLayout:
     """Where pixels and log records stand in a slot; completes a slot whose pixels are in place.
 
     Attributes:
+        shape: rows and columns of the triplet.
+        images: the image messages: one of the triplet or, on request, one of each camera.
         pixels: offset of the first pixel in the slot.
         end: offset of one past the last pixel.
         slot_bytes: size of a slot.
         most_tag_bytes: longest tag that has room before the pixels.
     """
 
-    def __init__(self, shape: tuple[int, int]):
+    def __init__(self, shape: tuple[int, int], cameras: Sequence[tuple[str, tuple[int, int]]] = ()):
         """Lay out a slot.
+
+        Args:
+            shape: rows and columns of the triplet.
+            cameras: name and columns of each camera, if each gets an image message of its own.
 
         Raises:
             BadInputError: the triplet is larger than a chunk may be.
@@ -127,9 +156,16 @@ class SlotLayout:
                 "make the cameras' regions smaller"
             )
         self.shape = shape
-        self.pixels = HEAD_ROOM
-        self.end = HEAD_ROOM + shape[0] * shape[1]
-        self.slot_bytes = round_up(self.end + 2 * _INDEX_OF_ONE.size + RECORD.size)
+        self.pixels = start = HEAD_ROOM
+        images = []
+        for place, (name, (first, end)) in enumerate(cameras or [("triplet", (0, shape[1]))]):
+            channel = FIRST_CAMERA_CHANNEL + place if cameras else TRIPLET_CHANNEL
+            start += len(self._image_head(channel, name, end - first, PulseNumber(1), UtcNs(0), UtcNs(0))) * (place > 0)
+            images.append(SlotImage(name, channel, (first, end), start, start + shape[0] * (end - first)))
+            start = images[-1].end
+        self.images = tuple(images)
+        self.end = start
+        self.slot_bytes = round_up(self.end + (1 + len(images)) * _INDEX_OF_ONE.size + RECORD.size)
         combined_crc(0, 0, (1 << self.slot_bytes.bit_length()) - 1)  # makes its tables now, not with the first triplet
         prefix = len(raw_image_prefix(shape, UtcNs(_LATEST_NS)))
         self.most_tag_bytes = HEAD_ROOM - RECORD.size - _CHUNK.size - 2 * MESSAGE.size - prefix
@@ -142,9 +178,9 @@ class SlotLayout:
         Args:
             slot: the slot's bytes, the pixels in place.
             tag: the encoded tag.
-            pulse: sequence of both messages.
-            pulse_time: publish time of both messages.
-            log_time: log time of both messages.
+            pulse: sequence of all messages.
+            pulse_time: publish time of all messages.
+            log_time: log time of all messages.
 
         Returns:
             The part of the slot to be written (whole pages) and where the chunk stands in it.
@@ -153,11 +189,17 @@ class SlotLayout:
             ValueError: the tag does not fit before the pixels.
         """
         tag_message = _message_head(TAG_CHANNEL, pulse, len(tag), pulse_time, log_time) + tag
-        prefix = raw_image_prefix(self.shape, pulse_time)
+        before = tag_message
+        positions = []  # of the image messages in the slot
+        for image in self.images:
+            columns = image.columns[1] - image.columns[0]
+            message = self._image_head(image.channel, image.frame, columns, pulse, pulse_time, log_time)
+            positions.append(image.start - len(message))
+            if image.start == self.pixels:
+                before += message
+            else:
+                slot[positions[-1] : image.start] = message
         pixels = self.end - self.pixels
-        before = tag_message + _message_head(
-            TRIPLET_CHANNEL, pulse, len(prefix) + pixels, pulse_time, log_time
-        ) + prefix  # fmt: skip
         size = len(before) + pixels
         content_crc = crc32(slot[self.pixels : self.end], crc32(before))
         head = _chunk_head(log_time, size, content_crc) + before
@@ -167,25 +209,53 @@ class SlotLayout:
         chunk = self.pixels - len(head)
         lead = padding(chunk - start)
         slot[start : self.pixels] = lead + head
-        tail = _index(TAG_CHANNEL, log_time, 0) + _index(TRIPLET_CHANNEL, log_time, len(tag_message))
+        offsets = (0, *(position - (self.pixels - len(before)) for position in positions))
+        channels = (TAG_CHANNEL, *(image.channel for image in self.images))
+        tail = b"".join(map(_index, channels, repeat(log_time), offsets))
         slot[self.end : self.slot_bytes] = rest = tail + padding(self.slot_bytes - self.end - len(tail))
-        tag_index = self.end - start
         crc = combined_crc(crc32(head[: -len(before)], crc32(lead)), content_crc, size)  # the pixels are read once
+        indexes = zip(channels, count(self.end - start, _INDEX_OF_ONE.size), strict=False)
         return slot[start : self.slot_bytes], ChunkPlan(
-            chunk - start, len(head) + pixels, size, log_time,
-            ((TAG_CHANNEL, tag_index), (TRIPLET_CHANNEL, tag_index + _INDEX_OF_ONE.size)), len(tail),
+            chunk - start, len(head) + pixels, size, log_time, tuple(indexes), len(tail),
             self.slot_bytes - start, crc32(rest, crc),
         )  # fmt: skip
+
+    def _image_head(
+        self, channel: int, frame: str, columns: int, pulse: PulseNumber, pulse_time: UtcNs, log_time: UtcNs
+    ) -> bytes:
+        """What stands before the pixels of an image message; of a camera's image it is always as long."""
+        shape = (self.shape[0], columns)
+        own = channel != TRIPLET_CHANNEL
+        prefix = camera_image_prefix(shape, pulse_time, frame) if own else raw_image_prefix(shape, pulse_time)
+        return _message_head(channel, pulse, len(prefix) + shape[0] * columns, pulse_time, log_time) + prefix
 
 
 def raw_image_prefix(shape: tuple[int, int], time: UtcNs) -> bytes:
     """A serialized `foxglove.RawImage` up to the pixels, which come last: mono8, rows without gaps."""
-    rows, columns = shape
-    image = RawImage(frame_id="triplet", width=columns, height=rows, encoding="mono8", step=columns)
+    image = _raw_image(shape, "triplet")
     image.timestamp.FromNanoseconds(time)
-    data_field = RawImage.DATA_FIELD_NUMBER << 3 | 2  # wire type 2: length, then bytes
     head: bytes = image.SerializeToString()
-    return head + bytes([data_field]) + _varint(rows * columns)
+    return head + _data_field(shape)
+
+
+def camera_image_prefix(shape: tuple[int, int], time: UtcNs, frame: str) -> bytes:
+    """The same for the image of a camera; as long whatever the time, because other pixels stand right before it.
+
+    The numbers of the time stamp are filled up with zero bits, which protobuf allows.
+    """
+    seconds, nanoseconds = divmod(time, NS_PER_S)
+    stamp = b"".join(bytes([field << 3]) + _varint(number, 5) for field, number in ((1, seconds), (2, nanoseconds)))
+    timestamp = bytes([RawImage.TIMESTAMP_FIELD_NUMBER << 3 | 2, len(stamp)]) + stamp
+    head: bytes = _raw_image(shape, frame).SerializeToString()
+    return timestamp + head + _data_field(shape)
+
+
+def _raw_image(shape: tuple[int, int], frame: str) -> RawImage:
+    return RawImage(frame_id=frame, width=shape[1], height=shape[0], encoding="mono8", step=shape[1])
+
+
+def _data_field(shape: tuple[int, int]) -> bytes:
+    return bytes([RawImage.DATA_FIELD_NUMBER << 3 | 2]) + _varint(shape[0] * shape[1])  # type 2: length, then bytes
 
 
 def join_pages(parts: Iterable[bytes]) -> mmap.mmap:
@@ -210,10 +280,10 @@ def _index(channel: int, log_time: UtcNs, offset: int) -> bytes:
     return _INDEX_OF_ONE.pack(Opcode.MESSAGE_INDEX, _INDEX_OF_ONE.size - RECORD.size, channel, 16, log_time, offset)
 
 
-def _varint(number: int) -> bytes:
-    """Protobuf's variable-length integer: seven bits per byte, lowest first."""
+def _varint(number: int, least: int = 1) -> bytes:
+    """Protobuf's variable-length integer: seven bits per byte, lowest first, in at least `least` bytes."""
     out = bytearray()
-    while number > 0x7F:
+    while number > 0x7F or len(out) < least - 1:
         out.append(number & 0x7F | 0x80)
         number >>= 7
     out.append(number)

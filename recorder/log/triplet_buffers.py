@@ -3,6 +3,7 @@
 import mmap
 import threading
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +26,17 @@ class TripletBuffers:
         layout: where pixels and log records stand in a slot.
     """
 
-    def __init__(self, shape: tuple[int, int], count: int):
+    def __init__(self, shape: tuple[int, int], count: int, cameras: Sequence[tuple[str, tuple[int, int]]] = ()):
+        """Reserve the memory.
+
+        Args:
+            shape: rows and columns of the triplet.
+            count: number of slots.
+            cameras: name and columns of each camera, if the pixels of each stand together.
+        """
         self.shape = shape
         self.count = count
-        self.layout = SlotLayout(shape)
+        self.layout = SlotLayout(shape, cameras)
         slot_bytes = self.layout.slot_bytes
         memory = mmap.mmap(
             -1, round_up(count * slot_bytes, _HUGE_PAGE) + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
@@ -41,7 +49,7 @@ class TripletBuffers:
         everything[first : first + count * slot_bytes : PAGE] = 0  # touched now, not while recording
         self._slots = [everything[first + slot * slot_bytes : first + (slot + 1) * slot_bytes] for slot in range(count)]
         self._bytes = [slot.data for slot in self._slots]
-        self._pixels = [slot[self.layout.pixels : self.layout.end].reshape(shape) for slot in self._slots]
+        self._images = [self._images_in(slot) for slot in self._slots]
         self._freed = threading.Condition()
         self._holders = [0] * count
         self._free = deque(range(count))
@@ -90,8 +98,31 @@ class TripletBuffers:
                 self._freed.notify()
 
     def pixels(self, slot: int) -> NDArray[np.uint8]:
-        """The slot's pixels in place, (rows, columns), uint8, C-contiguous; always the same view."""
-        return self._pixels[slot]
+        """The slot's triplet, (rows, columns), uint8, C-contiguous.
+
+        In place, always the same view; a new copy if the pixels of each camera stand together.
+        """
+        images = self._images[slot]
+        return images[0] if len(images) == 1 else np.hstack(images)
+
+    def block(self, slot: int, columns: tuple[int, int]) -> NDArray[np.uint8]:
+        """A camera's pixels of the slot in place, (rows, columns), uint8.
+
+        Args:
+            slot: which slot.
+            columns: first column in the triplet, and one past the last.
+        """
+        for layout, image in zip(self.layout.images, self._images[slot], strict=True):
+            first, end = layout.columns
+            if first <= columns[0] and columns[1] <= end:
+                return image[:, columns[0] - first : columns[1] - first]
+        raise ValueError(f"columns {columns} are not those of a camera")
+
+    def write(self, slot: int, triplet: NDArray[np.uint8] | int) -> None:
+        """Copy a triplet, (rows, columns), uint8, into the slot, or fill it with a grey value."""
+        for layout, image in zip(self.layout.images, self._images[slot], strict=True):
+            first, end = layout.columns
+            np.copyto(image, triplet if isinstance(triplet, int) else triplet[:, first:end])
 
     def memory(self, slot: int) -> memoryview:
         """All bytes of the slot, page-aligned; always the same view."""
@@ -102,5 +133,8 @@ class TripletBuffers:
         with self._freed:
             self._free.clear()
         self._bytes.clear()
-        self._pixels.clear()
+        self._images.clear()
         self._slots.clear()
+
+    def _images_in(self, slot: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+        return [slot[image.start : image.end].reshape(self.shape[0], -1) for image in self.layout.images]

@@ -14,7 +14,7 @@ from recorder.publishing.publisher import Publisher, bind, live_topic
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
-from recorder.reading.triplets import event_of, is_json, pixels, tag_of, view_image
+from recorder.reading.triplets import event_of, images_of, is_json, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, TAG, TRIPLET
@@ -301,7 +301,7 @@ class _Replay:
 
         What cannot be read is left out and counted.
         """
-        images = chunk.images
+        images = images_of(chunk)
         for message in chunk.messages:
             if message.topic == TRIPLET.name:
                 continue

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from recorder.log.mcap_layout import RECORD
 from recorder.reading.records import Damage
 from rig.clocks import UtcNs
-from rig.topics import TRIPLET
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +74,6 @@ class Chunk:
     flaw: str
     crc: int
     checked: bool
-
-    @property
-    def images(self) -> dict[int, Message]:
-        """The image messages in it, by pulse."""
-        return {message.sequence: message for message in self.messages if message.topic == TRIPLET.name}
 
 
 Item = Chunk | SmallRecord | Damage

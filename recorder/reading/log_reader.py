@@ -13,13 +13,14 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata
 
 from recorder.log.channels import schemas_and_channels
-from recorder.log.mcap_layout import MAGIC, MESSAGE, PADDING_OPCODE, RECORD
+from recorder.log.mcap_layout import FIRST_CAMERA_CHANNEL, MAGIC, MESSAGE, PADDING_OPCODE, RECORD
 from recorder.reading.items import Chunk, Item, Message, SmallRecord, printable
 from recorder.reading.records import CHUNK_HEAD, Damage, FileWindow, RawRecord, chunks_anywhere, is_closed, walk
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
+    CAMERA_TOPIC,
     EVENTS,
     HEALTH,
     PROFILE,
@@ -36,6 +37,7 @@ _CHANNELS_MAX, _RECORDS_MAX, _SMALL_MAX = 1000, 1 << 16, 1 << 16
 _NAME_MAX = 1000
 _SMALL_TOPICS = (TAG.name, EVENTS.name, HEALTH.name)
 
+_CAMERAS_MAX = 8
 #: What the `mcap` library raises on bytes that are not the record that it is asked to read.
 UNREADABLE = (struct.error, ValueError, OverflowError, McapError)
 
@@ -52,6 +54,7 @@ class LogReader:
         size: bytes of the file when it was opened.
         closed: the log was closed properly: it ends in a footer.
         truncated: the log ends in the middle of a record; known only when it has been read to its end.
+        has_camera_topics: the log declares images of single cameras, as far as it has been read.
         library: the program that wrote it, empty if `salvage`.
         metadata: fields of our metadata records by name, the last of each, as far as the log has been read.
         attachments: contents of our attachments by name, as far as the log has been read, if it is read in full.
@@ -76,7 +79,8 @@ class LogReader:
         self.attachments: dict[str, bytes] = {}
         self.truncated = False
         self.data_crc: int | None = None
-        self._assumed = {channel.id: channel.topic for channel in schemas_and_channels()[1]} if salvage else {}
+        self.has_camera_topics = False
+        self._assumed = _usual_channels() if salvage else {}
         self._topics = dict(self._assumed)
         self._window = FileWindow(path, direct=not skim)
         self.size = self._window.size
@@ -144,7 +148,9 @@ class LogReader:
         return (message for chunk in self.sound_chunks() for message in chunk.messages if message.topic in topics)
 
     def chunk(self, offset: int, length: int) -> Chunk:
-        """A chunk that `items` has handed out before, once more: with the data of all its messages, and checked."""
+        """A chunk that `items` has handed out, by this reader or another: with all its data, and checked."""
+        if not self._topics:  # channels are declared before the first chunk
+            next((item for item in self.items(only=()) if isinstance(item, Chunk)), None)
         return self._chunk(RawRecord(Opcode.CHUNK, offset, length), None)
 
     def read(self, offset: int, length: int) -> memoryview:
@@ -207,6 +213,7 @@ class LogReader:
                         raise ValueError(f"more than {_CHANNELS_MAX} channels")
                     _check_name(channel.topic)
                     self._topics[channel.id] = self._assumed.get(channel.id, channel.topic)
+                    self.has_camera_topics |= channel.topic.startswith(CAMERA_TOPIC)
                 case Opcode.METADATA:
                     metadata = Metadata.read(stream(body))
                     _check_name(metadata.name)
@@ -322,3 +329,9 @@ def _check_name(*names: str) -> None:
     """
     if any(len(name) > _NAME_MAX for name in names):
         raise ValueError(f"a name of more than {_NAME_MAX} letters")
+
+
+def _usual_channels() -> dict[int, str]:
+    """Topics by channel in all our logs; cameras by their places, because only their log knows their names."""
+    usual = {channel.id: channel.topic for channel in schemas_and_channels()[1]}
+    return usual | {FIRST_CAMERA_CHANNEL + place: f"{CAMERA_TOPIC}{place + 1}" for place in range(_CAMERAS_MAX)}

@@ -1,7 +1,8 @@
 """Reads the triplets of a log: tag and image of every pulse in order, or single ones; copies no pixels."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -10,13 +11,13 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
-from recorder.log.mcap_layout import CHUNK_MAX
-from recorder.reading.items import Message
+from recorder.log.mcap_layout import CHUNK_MAX, raw_image_prefix
+from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.tag import TripletTag
-from rig.topics import TAG
+from rig.topics import CAMERA_TOPIC, TAG, TRIPLET
 
 #: Pulse numbers are 32 bits in MCAP; times are below 2**63 ns (year 2262).
 _SEQUENCE_MAX, _TIME_MAX = (1 << 32) - 1, (1 << 63) - 1
@@ -37,7 +38,7 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
     """
     with LogReader(path) as reader:
         for chunk in reader.sound_chunks():
-            images = {pulse: image.data for pulse, image in chunk.images.items()}
+            images = {pulse: image.data for pulse, image in images_of(chunk).items()}
             for message in chunk.messages:
                 if message.topic == TAG.name and message.data is not None:
                     tag = read_tag(message.data)
@@ -47,7 +48,7 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
 
 @dataclass(frozen=True, slots=True)
 class StoredTriplet:
-    """Where the image message of a pulse stands in the file: `length` bytes from `offset` on."""
+    """Where the chunk of a pulse stands in the file: `length` bytes from `offset` on."""
 
     tag: TripletTag
     offset: int
@@ -57,9 +58,60 @@ class StoredTriplet:
         """The pixels, (rows, columns), uint8, valid until anything else is read.
 
         Raises:
-            ValueError: the message is no image, or not one of ours.
+            ValueError: the chunk is damaged, or holds no image of ours.
         """
-        return pixels(view_image(reader.read(self.offset, self.length)))
+        return stored_image(reader, self.tag.pulse, self.offset, self.length)
+
+
+def stored_image(reader: LogReader, pulse: int, offset: int, length: int) -> NDArray[np.uint8]:
+    """The pixels of a pulse, (rows, columns), uint8, from a chunk; valid until anything else is read.
+
+    Raises:
+        ValueError: the chunk is damaged, or holds no image of ours.
+    """
+    chunk = reader.chunk(offset, length)
+    image = images_of(chunk).get(pulse)
+    if chunk.flaw or image is None or image.data is None:
+        raise ValueError(chunk.flaw or "its chunk holds no whole image")
+    return pixels(view_image(image.data))
+
+
+def images_of(chunk: Chunk) -> dict[int, Message]:
+    """The images of triplets in a chunk, by pulse: as they stand there, or put together from those of the cameras.
+
+    The images of a pulse's cameras make a triplet only if all are of the same time and height.
+    """
+    images = {message.sequence: message for message in chunk.messages if message.topic == TRIPLET.name}
+    for pulse, messages in camera_images_of(chunk).items():
+        if (triplet := _side_by_side(messages)) is not None:
+            images.setdefault(pulse, triplet)
+    return images
+
+
+def camera_images_of(chunk: Chunk) -> dict[int, list[Message]]:
+    """The images of single cameras in a chunk, left to right, by pulse; none in a log with images of triplets."""
+    cameras: dict[int, list[Message]] = defaultdict(list)
+    for message in sorted(chunk.messages, key=lambda message: message.channel):
+        if message.topic.startswith(CAMERA_TOPIC):
+            cameras[message.sequence].append(message)
+    return cameras
+
+
+def _side_by_side(messages: Sequence[Message]) -> Message | None:
+    """The image message of a triplet, made from those of its cameras; None if they do not fit together."""
+    first = messages[0]
+    if first.data is None:
+        return replace(first, topic=TRIPLET.name)  # nobody has asked for pixels
+    try:
+        views = [view_image(message.data or memoryview(b"")) for message in messages]
+        blocks = [pixels(view) for view in views]
+    except ValueError:
+        return None
+    if len({(view.time, view.rows) for view in views}) > 1:
+        return None
+    whole = np.hstack(blocks)
+    data = raw_image_prefix((whole.shape[0], whole.shape[1]), views[0].time) + whole.tobytes()
+    return replace(first, topic=TRIPLET.name, data=memoryview(data))
 
 
 def stored_triplets(reader: LogReader) -> list[StoredTriplet]:
@@ -67,7 +119,7 @@ def stored_triplets(reader: LogReader) -> list[StoredTriplet]:
     found = []
     for chunk in reader.sound_chunks(only=(TAG.name,)):
         tags = {m.sequence: tag for m in chunk.messages if (tag := tag_of(m)) is not None}
-        found += [StoredTriplet(tags[pulse], m.offset, m.length) for pulse, m in chunk.images.items() if pulse in tags]
+        found += [StoredTriplet(tags[pulse], chunk.offset, chunk.length) for pulse in images_of(chunk) if pulse in tags]
     return found
 
 

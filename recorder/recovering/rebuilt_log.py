@@ -1,6 +1,6 @@
 """The log that `recover` writes: removed again if recovery fails."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, Self
 
@@ -22,13 +22,20 @@ _DISK_S: Final = 60.0
 class RebuiltLog:
     """A new log; a context manager."""
 
-    def __init__(self, path: Path, description: LogDescription, shape: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        description: LogDescription,
+        shape: tuple[int, int],
+        own_topics: Sequence[tuple[str, tuple[int, int]]] = (),
+    ) -> None:
         """Create the log.
 
         Args:
             path: the new log; must not exist.
             description: what it says before its first message.
             shape: rows and columns of its triplets.
+            own_topics: name and columns of each camera whose images have a topic of their own.
 
         Raises:
             BadInputError: the new log exists already, or cannot be made.
@@ -36,7 +43,7 @@ class RebuiltLog:
         """
         self._path = path
         self._closed = False
-        self._buffers = TripletBuffers(shape, _SLOTS)
+        self._buffers = TripletBuffers(shape, _SLOTS, own_topics)
         try:
             self._writer = LogWriter(path, description, self._buffers)
         except BaseException:
@@ -72,7 +79,7 @@ class RebuiltLog:
         slot = self._buffers.acquire(_DISK_S)
         if slot is None:
             raise StorageError(f"{self._path}: the disk has taken nothing for {_DISK_S:g} s; look at `dmesg`")
-        np.copyto(self._buffers.pixels(slot), picture)
+        self._buffers.write(slot, picture)
         self._writer.write_pulse(tag, slot, ready, encoded)
 
     def other(self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:

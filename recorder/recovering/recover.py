@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from recorder.log.session_changes import session_changes
 from recorder.reading.items import Message
 from recorder.reading.log_reader import LogReader
-from recorder.reading.triplets import read_tag, tag_of
+from recorder.reading.triplets import images_of, read_tag, tag_of
 from recorder.recovering.rebuilt_log import RebuiltLog
 from recorder.recovering.scan import Scan, picture_of
 from recorder.recovering.sightings import Chain, Rank, Sighting, chain_of
@@ -118,7 +118,8 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
             calibration_json=attachments.get(CALIBRATION_ATTACHMENT),
             calibrations=scan.calibrations,
         )
-        with RebuiltLog(target, description, chain.constants.shape) as rebuilt:
+        own_topics = chain.constants.cameras if reader.has_camera_topics else ()
+        with RebuiltLog(target, description, chain.constants.shape, own_topics) as rebuilt:
             recovery = _Recovery(reader, rebuilt, chain, scan)
             recovery.write(lambda share: done(reader.size // 2 + round(reader.size / 2 * share)))
             size = recovery.finish()
@@ -217,7 +218,7 @@ class _Recovery:
         for message in chunk.messages:
             tag = tag_of(message)
             if tag is not None and (tag.pulse, tag.time) == (sighting.pulse, sighting.time) and chunk.checked:
-                image = chunk.images.get(tag.pulse)
+                image = images_of(chunk).get(tag.pulse)
                 return tag, None if image is None else picture_of(image, tag), message
         raise BadInputError(
             f"{self._reader.path}: pulse {sighting.pulse} was read once and not a second time; look at `dmesg`"

@@ -20,12 +20,12 @@ from recorder.log.mcap_layout import MAGIC, PADDING_OPCODE, PAGE, RECORD
 from recorder.reading.items import Chunk, Message, SmallRecord
 from recorder.reading.log_reader import LogReader, stream
 from recorder.reading.records import Damage
-from recorder.reading.triplets import pixels, tag_of, view_image
+from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from recorder.recovering.salvage import pulse_of, tags_in
 from recorder.recovering.sightings import Constants, Rank, Sighting
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
-from rig.topics import EVENTS, HEALTH, TAG, TRIPLET
+from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, TAG, TRIPLET
 
 #: An unfinished record of these kinds, at most so long, at the end of a log held no data.
 _WITHOUT_DATA: Final = (PADDING_OPCODE, Opcode.MESSAGE_INDEX, Opcode.DATA_END)
@@ -74,7 +74,7 @@ class Scan:
                 return
 
     def _chunk(self, chunk: Chunk) -> None:
-        images, others = chunk.images, False
+        images, others = images_of(chunk), False
         for message in chunk.messages:
             if message.topic == TAG.name:
                 tag = tag_of(message)
@@ -89,7 +89,7 @@ class Scan:
             elif message.topic.startswith(CALIBRATION_TOPIC):
                 camera = message.topic.removeprefix(CALIBRATION_TOPIC)
                 self.calibrations.setdefault(camera, bytes(message.data or b""))
-            elif message.topic != TRIPLET.name:
+            elif message.topic != TRIPLET.name and not message.topic.startswith(CAMERA_TOPIC):
                 self.findings.add(f"a message on {message.topic}, which no log of this version has, is left out")
         if others:
             self.others.append((chunk.offset, chunk.length))

@@ -94,7 +94,7 @@ class LogWriter:
         self._metadata = {SESSION_METADATA: dict(description.session), RIG_METADATA: dict(description.rig)}
         self._written_metadata: dict[str, dict[str, str]] = {}
         self._sequences = dict.fromkeys(_CHANNELS, 0)
-        schemas, channels = schemas_and_channels(description.calibrations)
+        schemas, channels = schemas_and_channels(description.calibrations, buffers.layout.images)
         self._index = LogIndex(schemas, channels)
         self._file = AppendFile(path)
         try:

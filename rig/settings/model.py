@@ -118,6 +118,11 @@ class RecorderSettings(StrictModel):
     preroll_limit_mb: float = Field(1024.0, ge=0, description="memory for that at most, 10^6 bytes")
     jump_s: float = Field(10.0, gt=0, le=3600, description="length of a jump, for how many more fit on the disk")
     reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
+    per_camera_topics: bool = Field(
+        False,
+        description="logs hold an image of each camera on /camera/NAME, with which Foxglove shows its "
+        "/calibration/NAME, in place of /triplet",
+    )
 
 
 class NetworkSettings(StrictModel):
@@ -204,6 +209,11 @@ class RigSettings(StrictModel):
     def triplet_shape(self) -> tuple[int, int]:
         """Rows and columns of the triplet: the frames side by side (paper, Fig. 3)."""
         return self.cameras[0].region.height, sum(camera.region.width for camera in self.cameras)
+
+    def own_topics(self) -> tuple[tuple[str, tuple[int, int]], ...]:
+        """Name and columns of each camera whose images have a topic of their own; none if triplets have one."""
+        names = (camera.name for camera in self.cameras)
+        return tuple(zip(names, self.columns(), strict=True)) if self.recorder.per_camera_topics else ()
 
     def columns(self) -> tuple[tuple[int, int], ...]:
         """For each camera: first column and one past the last column of its block."""

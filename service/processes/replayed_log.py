@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import UNREADABLE, LogReader
-from recorder.reading.triplets import pixels, tag_of, view_image
+from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, CameraError
 from rig.settings.model import CameraSettings, RigSettings
 from rig.tag import CameraTag, TripletTag
-from rig.topics import TAG, TRIPLET
+from rig.topics import TAG
 
 #: The kernel fetches frames this number of pulses ahead, so that a busy disk delays none.
 _FETCH_AHEAD: Final = 8
@@ -67,10 +67,10 @@ class ReplayedLog:
         first, end = self.tags[place].columns
         try:
             chunk = self._reader.chunk(self._offsets[place], self._lengths[place])
-            data = next((message.data for message in chunk.messages if message.topic == TRIPLET.name), None)
-            if chunk.flaw or data is None:
+            image = next(iter(images_of(chunk).values()), None)
+            if chunk.flaw or image is None or image.data is None:
                 return False
-            np.copyto(out, pixels(view_image(data))[:, first:end])
+            np.copyto(out, pixels(view_image(image.data))[:, first:end])
         except BadInputError as error:
             raise CameraError(str(error)) from None
         except UNREADABLE:  # the chunk holds something else, or frames of another size

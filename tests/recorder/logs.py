@@ -20,6 +20,8 @@ OK, LOST, MISSED, DAMAGED, ABSENT = FrameStatus
 ALL_OK = (OK, OK, OK)
 
 SHAPE = (24, 90)
+#: Name and columns of each camera, for logs with a topic for each.
+OWN_TOPICS = (("K1", (0, 30)), ("K2", (30, 60)), ("K3", (60, 90)))
 START = UtcNs(1_795_216_434_399_239_000)
 PERIOD_NS = 33_333_333
 READY_NS = 5_000_000
@@ -86,18 +88,22 @@ def write_pulse(log: LogWriter, buffers: TripletBuffers, tag: TripletTag) -> Wri
         return Written(tag, None, log_time)
     image = make_image(tag)
     slot = acquire(buffers)
-    buffers.pixels(slot)[:] = image
+    buffers.write(slot, image)
     log.write_pulse(tag, slot, log_time)
     return Written(tag, image, log_time)
 
 
 def write_log(
-    path: Path, pulses: Sequence[Sequence[FrameStatus]] = (ALL_OK,) * 4, shape: tuple[int, int] = SHAPE
+    path: Path,
+    pulses: Sequence[Sequence[FrameStatus]] = (ALL_OK,) * 4,
+    shape: tuple[int, int] = SHAPE,
+    cameras: Sequence[tuple[str, tuple[int, int]]] = (),
+    description: LogDescription = DESCRIPTION,
 ) -> list[Written]:
-    """A closed log with these pulses, a start and a stop event and one health record."""
-    buffers = TripletBuffers(shape, 4)
+    """A closed log with these pulses, a start and a stop event and one health record; `cameras`: with own topics."""
+    buffers = TripletBuffers(shape, 4, cameras)
     now = UtcNs(time.time_ns())
-    with open_writer(path, buffers) as log:
+    with open_writer(path, buffers, description) as log:
         log.write_event(Event(START, Level.INFO, "recorder", "recording started"))
         written = [
             write_pulse(log, buffers, make_tag(pulse, statuses, shape)) for pulse, statuses in enumerate(pulses, 1)

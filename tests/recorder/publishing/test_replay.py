@@ -14,7 +14,7 @@ from recorder.publishing.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError
 from rig.transport import wire
 from tests.recorder.hostile.builder import Builder, event, image
-from tests.recorder.logs import ALL_OK, LOST, OK, PERIOD_NS, Written, write_log
+from tests.recorder.logs import ALL_OK, LOST, OK, OWN_TOPICS, PERIOD_NS, Written, write_log
 from tests.support.loopback import Loopback
 
 PULSES = (ALL_OK, (OK, LOST, OK), (LOST,) * 3, ALL_OK, ALL_OK)
@@ -80,11 +80,12 @@ def _check(messages: list[list[bytes]], written: list[Written]) -> None:
         assert pixels == (b"" if w.image is None else w.image.tobytes())
 
 
+@pytest.mark.parametrize("cameras", [(), OWN_TOPICS], ids=["triplets", "cameras"])
 @pytest.mark.parametrize(("kind", "reliable"), [(zmq.SUB, False), (zmq.PULL, True)])
 def test_all_messages_are_those_of_live_operation(
-    tmp_path: Path, loopback: Loopback, kind: int, *, reliable: bool
+    tmp_path: Path, loopback: Loopback, kind: int, *, reliable: bool, cameras: tuple[tuple[str, tuple[int, int]], ...]
 ) -> None:
-    written = write_log(tmp_path / "log.mcap", PULSES)
+    written = write_log(tmp_path / "log.mcap", PULSES, cameras=cameras)
     with _listening(kind) as listener:
         report, messages = _replayed(
             tmp_path / "log.mcap", listener, ReplayOptions(loopback.endpoint(), speed=None, reliable=reliable)

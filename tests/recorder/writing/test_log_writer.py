@@ -135,10 +135,16 @@ def _node(mode: str, path: Path) -> dict[str, Any]:
     return found
 
 
+_OWN_TOPICS = (("K1", (0, 64)), ("K2", (64, 128)), ("K3", (128, 192)))
+
+
+@pytest.mark.parametrize("cameras", [(), _OWN_TOPICS], ids=["triplets", "cameras"])
 @pytest.mark.parametrize("mode", ["indexed", "stream"])
-def test_the_typescript_library_reads_every_bit(tmp_path: Path, mode: str) -> None:
+def test_the_typescript_library_reads_every_bit(
+    tmp_path: Path, mode: str, cameras: tuple[tuple[str, tuple[int, int]], ...]
+) -> None:
     path = tmp_path / "log.mcap"
-    written = write_log(path, PULSES, (64, 192))
+    written = write_log(path, PULSES, (64, 192), cameras)
     found = _node(mode, path)
     assert found["profile"] == "svev"
     with path.open("rb") as file:
@@ -151,7 +157,8 @@ def test_the_typescript_library_reads_every_bit(tmp_path: Path, mode: str) -> No
     assert [m["sequence"] for m in tags] == [w.tag.pulse for w in written]
     assert tags[0]["sha256"] == hashlib.sha256(written[0].tag.encode()).hexdigest()
     if mode == "indexed":
-        assert found["counts"] == {"/triplet": 4, "/triplet/tag": 5, "/events": 2, "/health": 1}
+        images = {f"/camera/{name}": 4 for name, _ in cameras} or {"/triplet": 4}
+        assert found["counts"] == {**images, "/triplet/tag": 5, "/events": 2, "/health": 1}
         assert found["metadata"] == [["svev.session", SESSION], ["svev.rig", RIG]]
         assert found["attachments"] == [["rig.toml", RIG_TOML.decode()]]
 

@@ -158,17 +158,19 @@ class SlotLayout:
         self.shape = shape
         self.pixels = start = HEAD_ROOM
         images = []
-        for place, (name, (first, end)) in enumerate(cameras or [("triplet", (0, shape[1]))]):
+        for place, (name, (begin, end)) in enumerate(cameras or [("triplet", (0, shape[1]))]):
             channel = FIRST_CAMERA_CHANNEL + place if cameras else TRIPLET_CHANNEL
-            start += len(self._image_head(channel, name, end - first, PulseNumber(1), UtcNs(0), UtcNs(0))) * (place > 0)
-            images.append(SlotImage(name, channel, (first, end), start, start + shape[0] * (end - first)))
+            start += len(self._image_head(channel, name, end - begin, PulseNumber(1), UtcNs(0), UtcNs(0))) * (place > 0)
+            images.append(SlotImage(name, channel, (begin, end), start, start + shape[0] * (end - begin)))
             start = images[-1].end
         self.images = tuple(images)
         self.end = start
         self.slot_bytes = round_up(self.end + (1 + len(images)) * _INDEX_OF_ONE.size + RECORD.size)
         combined_crc(0, 0, (1 << self.slot_bytes.bit_length()) - 1)  # makes its tables now, not with the first triplet
-        prefix = len(raw_image_prefix(shape, UtcNs(_LATEST_NS)))
-        self.most_tag_bytes = HEAD_ROOM - RECORD.size - _CHUNK.size - 2 * MESSAGE.size - prefix
+        first = images[0]
+        width, latest = first.columns[1] - first.columns[0], UtcNs(_LATEST_NS)
+        head = self._image_head(first.channel, first.frame, width, PulseNumber(1), latest, latest)
+        self.most_tag_bytes = HEAD_ROOM - RECORD.size - _CHUNK.size - MESSAGE.size - len(head)
 
     def complete(
         self, slot: memoryview, tag: bytes, pulse: PulseNumber, pulse_time: UtcNs, log_time: UtcNs

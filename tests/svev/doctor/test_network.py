@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import zmq
 
+from recorder.publishing.keys import make_keys
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from svev.doctor import network
@@ -131,6 +132,20 @@ def test_an_address_that_is_taken_cannot_be_published_at(tmp_path: Path, loopbac
         (taken,) = network.look_at_publication(rig)
     assert taken.level is Level.FAIL
     assert f"{rig.network.publish}: address in use" in taken.what
+
+
+def test_an_address_that_others_reach_wants_keys(tmp_path: Path, loopback: Loopback) -> None:
+    everywhere = f"tcp://0.0.0.0:{loopback.free_port()}"
+    (open_,) = network.look_at_publication(rig_with(tmp_path, loopback, publish=everywhere))
+    assert (open_.level, "sees the images" in open_.what) == (Level.WARN, True)
+    assert "svev keys" in open_.remedy
+    secret, _ = make_keys(tmp_path / "hill")
+    guarded = rig_with(tmp_path, loopback, publish=everywhere, curve_key_file=secret)
+    (safe,) = network.look_at_publication(guarded)
+    assert (safe.level, safe.what.endswith(", encrypted")) == (Level.PASS, True)
+    secret.chmod(0o644)
+    (readable,) = network.look_at_publication(guarded)
+    assert (readable.level, "run: chmod 600" in readable.what) == (Level.FAIL, True)
 
 
 def test_a_port_with_small_packets_is_found_in_a_network_of_its_own(tmp_path: Path, loopback: Loopback) -> None:

@@ -48,7 +48,7 @@ class Spread:
         """Enter the offset of a frame, us."""
         size = abs(offset_us)
         self._largest = max(self._largest, size)
-        self._counts[min(round(size * _STEPS_PER_US), _STEPS_MAX)] += 1
+        self._counts[round(min(size * _STEPS_PER_US, _STEPS_MAX))] += 1
 
     def figures(self) -> dict[str, float] | None:
         """Median (to 0.1 us) and maximum, us; None without any offset."""

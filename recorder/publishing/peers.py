@@ -30,6 +30,7 @@ _JOIN_S: Final = 5.0
 
 _BYTES_RECEIVED: Final = struct.Struct("=128xQ")  # tcpi_bytes_received of struct tcp_info, linux/tcp.h
 _EVENT: Final = struct.Struct("=Hi")  # zmq_socket_monitor(3): event, value
+_ESTABLISHED: Final = 1  # TCP_ESTABLISHED, in the first byte of struct tcp_info
 _EVENTS: Final = zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED | zmq.EVENT_MONITOR_STOPPED
 
 
@@ -76,6 +77,8 @@ class _Peer:
     def has_left(self) -> bool:
         """Whether the connection has not been ended by ZeroMQ, but by the other side or by us."""
         try:
+            if self.host and self._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != _ESTABLISHED:
+                return True  # there may be bytes left that it sent before
             return self._over or not self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
             return False

@@ -18,6 +18,7 @@ from mcap.reader import make_reader
 from recorder.catalogue.folder import Catalogue
 from recorder.checking.verify import verify
 from recorder.log.mcap_layout import PAGE
+from recorder.log.extent import extent
 from recorder.log.session_changes import write_session_changes
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.info import info
@@ -29,7 +30,7 @@ from rig.errors import BadInputError, StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
-from rig.topics import RECOVERY_METADATA, RIG_ATTACHMENT, RIG_METADATA
+from rig.topics import RECORDING_METADATA, RECOVERY_METADATA, RIG_ATTACHMENT, RIG_METADATA
 from tests.recorder.logs import (
     ABSENT,
     ALL_OK,
@@ -115,6 +116,19 @@ def test_the_session_is_the_one_that_was_corrected(whole: tuple[Path, list[Writt
     write_session_changes(path, {"bib": "3"})
     recover(path, tmp_path / "out.mcap")
     assert info(tmp_path / "out.mcap").session == SESSION | {"bib": "3"}
+
+
+def test_a_pause_at_the_end_is_not_forgotten(tmp_path: Path) -> None:
+    buffers = TripletBuffers(SHAPE, 4)
+    with open_writer(tmp_path / "old.mcap", buffers) as log:
+        for pulse in range(1, 6):
+            write_pulse(log, buffers, make_tag(pulse))
+        log.set_metadata(RECORDING_METADATA, extent(make_tag(1).time, make_tag(60).time))
+    buffers.close()
+    recover(tmp_path / "old.mcap", tmp_path / "new.mcap")
+    old, new = verify(tmp_path / "old.mcap"), verify(tmp_path / "new.mcap")
+    assert old.ledger.pauses() == new.ledger.pauses()
+    assert (old.verdict, new.verdict) == ("partial", "partial")
 
 
 @pytest.mark.parametrize("tail", [0, 5, 9, 60])

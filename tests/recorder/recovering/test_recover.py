@@ -17,8 +17,8 @@ from mcap.reader import make_reader
 
 from recorder.catalogue.folder import Catalogue
 from recorder.checking.verify import verify
-from recorder.log.mcap_layout import PAGE
 from recorder.log.extent import extent
+from recorder.log.mcap_layout import PAGE
 from recorder.log.session_changes import write_session_changes
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.info import info

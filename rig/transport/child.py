@@ -65,7 +65,8 @@ def begin(
 ) -> ChildContext[Config]:
     """Read the command line `NAME CONTROL_FD` and the configuration; install signal handlers and lifeline.
 
-    Ctrl-C in a terminal goes to every process of the group. Children ignore it: the parent tells them what to do.
+    Ctrl-C and Ctrl-Z in a terminal go to every process of the group. Children ignore them: the parent tells them what
+    to do, and while it is stopped, they go on.
 
     Args:
         config: type of the configuration, which is the first message.
@@ -92,7 +93,8 @@ def begin(
         raise SystemExit(f"{name}: no configuration came; this program is started by svev")
     atexit.register(control.drain, _LAST_REPORTS_S)
     context = ChildContext(name, control, first, grace_s)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for of_the_terminal in (signal.SIGINT, signal.SIGTSTP):
+        signal.signal(of_the_terminal, signal.SIG_IGN)
     if grace_s > 0:
         signal.signal(signal.SIGTERM, context.ask_to_stop)
     threading.Thread(target=_lifeline, args=(fd, grace_s), daemon=True, name="lifeline").start()

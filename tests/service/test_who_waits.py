@@ -42,15 +42,23 @@ sys.exit(main())
 """
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis"])
-def test_a_stopped_parent_costs_no_pulse(tmp_path: Path, loopback: Loopback, backend: str) -> None:
+@pytest.mark.parametrize(
+    ("backend", "ctrl_z"), [("sim", False), ("aravis", False), ("sim", True)], ids=["sim", "aravis", "Ctrl-Z"]
+)
+def test_a_stopped_parent_costs_no_pulse(tmp_path: Path, loopback: Loopback, backend: str, *, ctrl_z: bool) -> None:
     rig, out = write_rig(tmp_path, backend, loopback), tmp_path / "logs"
     options = ["record", "--rig", str(rig), "--seconds", "14", "--out", str(out), "--json"]
     command = [sys.executable, "-c", SMALL_CHANNELS, *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0
+    ) as process:
         try:
             wait_until(lambda: _size(out) > 5_000_000, "recording", WAIT_S)
-            process.send_signal(signal.SIGSTOP)
+            if ctrl_z:
+                os.killpg(process.pid, signal.SIGTSTP)  # as a terminal does
+            else:
+                process.send_signal(signal.SIGSTOP)
+            wait_until(lambda: _state(process.pid) == "T", "it stands still", WAIT_S)
             wait_until(lambda: _closed(out), "the recording goes on and ends while its parent stands still", WAIT_S)
         finally:
             process.send_signal(signal.SIGCONT)
@@ -86,6 +94,10 @@ def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(tmp_path
     with LogReader(path) as reader:
         events = [Event.from_protobuf(message.data or b"") for message in reader.messages("/events")]
     assert [event.message for event in events if event.name == "test"] == texts
+
+
+def _state(pid: int) -> str:
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
 
 
 def _size(out: Path) -> int:

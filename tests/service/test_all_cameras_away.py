@@ -1,6 +1,7 @@
 """All cameras go, or freeze, during a recording: every pulse has a tag, or the recording says that there is a pause."""
 
 import json
+import re
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -18,12 +19,16 @@ from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import make_rig, write_rig
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 
 NAMES = ("K1", "K2", "K3")
+BUSES = {"aravis": "GigE Vision", "iidc": "FireWire"}
 
 
 @pytest.mark.parametrize("come_back", [True, False])
-def test_pulses_without_any_camera_are_tagged_absent(tmp_path: Path, loopback: Loopback, come_back: bool) -> None:
+def test_pulses_without_any_camera_are_tagged_absent(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, come_back: bool
+) -> None:
     rig, epoch = make_rig(tmp_path, "aravis", loopback), host_now()
     path, gone = tmp_path / "log.mcap", set[str]()
     with simulated_hill(rig, epoch) as hill:
@@ -54,11 +59,18 @@ def test_pulses_without_any_camera_are_tagged_absent(tmp_path: Path, loopback: L
     last = report.ledger.incomplete[-1]
     assert (last.last < 420) if come_back else (last.last, len(last.cameras)) == (420, 3)
     assert report.ledger.rate_hz == pytest.approx(30, abs=0.05)
+    fault_table.tell(
+        "Cameras and pulses",
+        f"all cameras lose their power{', and come back' if come_back else ''}",
+        lost=f"none: {report.ledger.causes[FrameStatus.ABSENT]} frames, absent",
+        said=f"K1 gone: (why), and so on; svev verify: {report.verdict}",
+        code="-",
+    )
 
 
 @pytest.mark.parametrize("backend", ["aravis", "iidc"])
 def test_a_recording_in_which_all_cameras_froze_is_never_called_clean(
-    tmp_path: Path, loopback: Loopback, backend: str
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str
 ) -> None:
     """Nobody can tell this from a trigger that pauses: the frame numbers go on without a hole."""
     faults = [
@@ -78,3 +90,6 @@ def test_a_recording_in_which_all_cameras_froze_is_never_called_clean(
     report, said = verify(Path(result["log"])), info(Path(result["log"])).to_json()
     assert report.verdict == "partial"
     assert len(said["pauses"]) == len(report.to_json()["pauses"]) == len(result["pauses"])
+    last = re.sub(r" after pulse.*?; ", "; ", re.sub(r", and \d+ more pauses", "", done.stderr.splitlines()[-1]))
+    fault = f"all cameras freeze together ({BUSES[backend]})"
+    fault_table.tell("Cameras and pulses", fault, lost="a pause", said=last, code=5)

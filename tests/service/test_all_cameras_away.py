@@ -86,7 +86,9 @@ def test_a_recording_in_which_all_cameras_froze_is_never_called_clean(
     assert "look at the trigger" in done.stderr
     result = json.loads(done.stdout)
     assert result["pauses"]
-    assert all(pause["seconds"] > 1.3 for pause in result["pauses"])
+    assert (
+        max(pause["seconds"] for pause in result["pauses"]) > 1.3
+    )  # others may be cut off by the beginning or the end
     report, said = verify(Path(result["log"])), info(Path(result["log"])).to_json()
     assert report.verdict == "partial"
     assert len(said["pauses"]) == len(report.to_json()["pauses"]) == len(result["pauses"])

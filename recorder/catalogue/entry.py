@@ -47,6 +47,7 @@ class Entry:
         cameras: names, left to right.
         shape: rows and columns of the triplets, None if there is no pulse.
         session: the session's fields, with later changes applied.
+        disk: frames that were lost because of the disk, in one line; empty if none.
         trouble: what could not be read, and what to do, in one line; empty if all could be read.
     """
 
@@ -67,6 +68,7 @@ class Entry:
     cameras: tuple[str, ...] = ()
     shape: tuple[int, int] | None = None
     session: Mapping[str, str] = field(default_factory=dict)
+    disk: str = ""
     trouble: str = ""
 
     @property
@@ -111,6 +113,7 @@ def read_entry(path: Path) -> Entry:
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session,
+        disk=found.trouble,
     )  # fmt: skip
 
 

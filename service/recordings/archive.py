@@ -111,7 +111,7 @@ def verdict(entry: Entry) -> Statement:
     values: dict[str, str | int | float] = {
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
         "failures": _failures(entry), "pauses": len(entry.pauses),
-        "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1),
+        "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1), "disk": entry.disk,
     }  # fmt: skip
     return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
 
@@ -138,6 +138,8 @@ def _judge_account(entry: Entry) -> tuple[Level, str, str, str]:
         if entry.partial:
             return Level.WARNING, "partial_paused", f"{lacking}; {paused}", advice
         return Level.WARNING, "paused", f"{entry.pulses} pulses, all complete, but {paused}", advice
+    if entry.partial and entry.disk:
+        return Level.WARNING, "partial_disk", lacking, entry.disk
     if entry.partial:
         return Level.WARNING, "partial", lacking, ""
     return Level.GOOD, "complete", f"Complete: all {entry.pulses} pulses", ""

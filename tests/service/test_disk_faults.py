@@ -175,6 +175,20 @@ def let_pass(seconds: float) -> None:
     wait_until(lambda: time.monotonic() > until, f"{seconds} s pass", seconds + 10)
 
 
+def test_the_page_says_that_the_disk_was_too_slow(tmp_path: Path, loopback: Loopback, disk: FaultyDisk) -> None:
+    rig = _rig(tmp_path, loopback, "ring_s = 0.5\ntriplets_s = 0.5\npreroll_s = 0")
+    with serving(tmp_path, rig, loopback, environment=disk.environment) as service:
+        service.arm()
+        disk.slow(8_000_000)
+        recording = service.post("/api/recordings", {"duration_s": 4})
+        service.await_state("armed")
+        found = service.get(f"/api/recordings/{recording['id']}")
+        live = service.log.read_text()
+    assert found["verdict"]["code"] == "verdict_partial_disk"
+    assert "disk too slow: it took" in found["verdict"]["advice"]
+    assert "the disk falls behind" in live
+
+
 @pytest.mark.parametrize("megabytes_per_s", [10, 20])
 def test_a_slow_disk_is_called_slow_and_every_pulse_has_its_tag(
     tmp_path: Path, loopback: Loopback, disk: FaultyDisk, fault_table: FaultTable, megabytes_per_s: int

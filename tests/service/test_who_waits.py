@@ -24,6 +24,7 @@ from rig.transport.messages import (
 from service.processes.rig_processes import RECORDER, RigProcesses
 from tests.capture.rigs import make_rig, write_rig
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
 WAIT_S = 60.0
@@ -45,7 +46,9 @@ sys.exit(main())
 @pytest.mark.parametrize(
     ("backend", "ctrl_z"), [("sim", False), ("aravis", False), ("sim", True)], ids=["sim", "aravis", "Ctrl-Z"]
 )
-def test_a_stopped_parent_costs_no_pulse(tmp_path: Path, loopback: Loopback, backend: str, *, ctrl_z: bool) -> None:
+def test_a_stopped_parent_costs_no_pulse(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str, *, ctrl_z: bool
+) -> None:
     rig, out = write_rig(tmp_path, backend, loopback), tmp_path / "logs"
     options = ["record", "--rig", str(rig), "--seconds", "14", "--out", str(out), "--json"]
     command = [sys.executable, "-c", SMALL_CHANNELS, *options]
@@ -69,9 +72,14 @@ def test_a_stopped_parent_costs_no_pulse(tmp_path: Path, loopback: Loopback, bac
     report = verify(Path(result["log"]))
     assert not report.damaged
     assert report.ledger.pulses == 420
+    what = "Ctrl-Z" if ctrl_z else f"SIGSTOP to `svev record` ({backend})"
+    said = "nothing: the recording goes on and ends, and the log is closed"
+    fault_table.tell("Processes", what, lost=0, said=said, code=process.returncode)
 
 
-def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     rig = make_rig(tmp_path, "sim", loopback)
     options = RecorderOptions(directory=tmp_path)
     path = tmp_path / "told.mcap"
@@ -94,6 +102,8 @@ def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(tmp_path
     with LogReader(path) as reader:
         events = [Event.from_protobuf(message.data or b"") for message in reader.messages("/events")]
     assert [event.message for event in events if event.name == "test"] == texts
+    said = "all commands are obeyed when it goes on"
+    fault_table.tell("Processes", "SIGSTOP to the recorder, and SIGCONT", lost=0, said=said)
 
 
 def _state(pid: int) -> str:

@@ -11,6 +11,7 @@ import pytest
 from tests.capture.rigs import write_rig
 from tests.service.serving import serving
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 
 
 def _svev(files: int, *arguments: str, taken: int = 0) -> "subprocess.CompletedProcess[str]":
@@ -28,7 +29,9 @@ def _svev(files: int, *arguments: str, taken: int = 0) -> "subprocess.CompletedP
 
 @pytest.mark.parametrize("command", ["record", "serve", "demo", "info", "doctor", "ctl"])
 @pytest.mark.parametrize(("files", "taken"), [(16, 0), (64, 45)])
-def test_too_few_files_are_one_line(command: str, files: int, taken: int, tmp_path: Path, loopback: Loopback) -> None:
+def test_too_few_files_are_one_line(
+    command: str, files: int, taken: int, tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     rig, out = str(write_rig(tmp_path, "sim", loopback)), str(tmp_path / "out")
     options = {
         "record": ["--rig", rig, "--seconds", "1", "--out", out],
@@ -45,6 +48,8 @@ def test_too_few_files_are_one_line(command: str, files: int, taken: int, tmp_pa
         "more files may be opened here, and svev needs 48: run `ulimit -n 1024` and call again\n"
     )
     assert not Path(out).exists()
+    if command == "record" and not taken:
+        fault_table.tell("Processes", f"`ulimit -n {files}`", lost="all", said=done.stderr, code=done.returncode)
 
 
 def test_the_fewest_files_are_enough_to_record(tmp_path: Path, loopback: Loopback) -> None:

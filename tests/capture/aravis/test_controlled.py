@@ -11,6 +11,7 @@ import pytest
 from rig.errors import CameraError
 from tests.capture.aravis.camera import one_camera
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 
 #: Another program: a viewer with the camera open.
 _VIEWER = """
@@ -35,11 +36,18 @@ def _viewed(address: str) -> Iterator[None]:
         yield
 
 
-def test_a_camera_that_another_program_holds_is_called_so(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_camera_that_another_program_holds_is_called_so(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     with one_camera(tmp_path, loopback) as one:
         with _viewed(one.address):
             for _ in range(2):
-                with pytest.raises(CameraError, match=r"K2 at .* is controlled by another program: close that program"):
+                with pytest.raises(
+                    CameraError, match=r"K2 at .* is controlled by another program: close that program"
+                ) as held:
                     one.open()
         with one.opened() as camera:
             one.frames(camera, 3)
+    said = str(held.value).replace(one.address, "ADDRESS")
+    what = "another program controls a camera"
+    fault_table.tell("Network and other programs", what, lost="none: its frames, absent", said=said)

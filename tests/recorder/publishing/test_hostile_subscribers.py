@@ -20,6 +20,7 @@ from rig.transport.messages import RecorderOptions, RecordingFinished, StartReco
 from service.processes.rig_processes import RECORDER, RigProcesses
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
+from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
 WAIT_S = 60.0
@@ -103,7 +104,9 @@ def test_many_ordinary_subscribers_are_welcome_again_and_again(loopback: Loopbac
         assert publisher.refused() == {}
 
 
-def test_a_recording_loses_nothing_to_hostile_subscribers(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_recording_loses_nothing_to_hostile_subscribers(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
     rig, path = make_rig(tmp_path, "sim", loopback), tmp_path / "attacked.mcap"
     with (
         RigProcesses(rig, lambda _: None, epoch=host_now(), recorder=RecorderOptions(directory=tmp_path)) as processes,
@@ -144,4 +147,7 @@ def test_a_recording_loses_nothing_to_hostile_subscribers(tmp_path: Path, loopba
     with LogReader(path) as reader:
         events = [Event.from_protobuf(message.data or b"") for message in reader.messages("/events")]
     said = [event.message for event in events if event.name == "publisher"]
-    assert any("connections are closed, of a program that sent too much" in text for text in said), said
+    closed = [text for text in said if "connections are closed, of a program that sent too much" in text]
+    assert closed, said
+    what = "subscribers that send megabytes, or subscribe to thousands of topics"
+    fault_table.tell("Network and other programs", what, lost=0, said=f"{closed[0]} (event)")

@@ -31,6 +31,7 @@ export const statements = {
   recording_paused: ["tar opp: {pulses} pulser, {partial} mangler et bilde; {pauses} ganger kom det ingen pulser en stund"],
   verdict_complete: ["Komplett: alle {pulses} pulser"],
   verdict_partial: ["{partial} av {pulses} pulser mangler et bilde"],
+  verdict_partial_disk: ["{partial} av {pulses} pulser mangler et bilde", "Disken var for treg: {disk}"],
   verdict_paused: ["{pulses} pulser, alle komplette, men i {paused_s} s kom det ingen", "Se på triggeren og på hva kameraene meldte da: svev verify sier når"],
   verdict_partial_paused: ["{partial} av {pulses} pulser mangler et bilde, og i {paused_s} s kom det ingen", "Se på triggeren og på hva kameraene meldte da: svev verify sier når"],
   verdict_empty: ["Det kom ingen puls", "Se på triggeren"],

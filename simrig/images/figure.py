@@ -1,32 +1,32 @@
-"""Draws the jumper: shaded capsules for the limbs, thin ones for the skis, bright markers on dark patches.
+"""Draws the jumper: shaded capsules for the limbs, thin ones for the skis, markers on patches.
 
-Patches and markers are drawn last, so that no limb hides one and every marker can be measured in every camera. The
-patches are large enough for a uniform local background.
+Without occlusion, patches and markers are drawn last, so that no limb hides one and every marker can be measured in
+every camera. With occlusion, everything is drawn from far to near (`simrig.world.body`). The patches are large enough
+for a uniform local background.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.arrays import Floats
 from simrig.images.drawing import Blob, Image, stroke
+from simrig.world import body
+from simrig.world.body import BOOT, FACE, GLOVE, SKI_RADIUS_M, Part
 from simrig.world.jumper import Pose
 from simrig.world.projection import Projection
-from simrig.world.scenario import BRIGHTEST, Scenario, SceneCamera
+from simrig.world.scenario import Scenario
 
 Pixels = Floats  #: x, y in px, shape (..., 2)
+Worn = tuple[bool, bool, bool, bool]  #: which of P1..P4 the jumper wears
 
-PATCH = 34.0  #: radiance of the dark patches below the markers
-_SUIT, _SUIT_LIGHT, _BOOT, _GLOVE, _FACE = 44.0, 66.0, 38.0, 120.0, 150.0
-_SKI = 222.0
-_SKI_RADIUS_M = 0.04  #: a ski is a thin capsule, whose middle line is the ski line in every view
+ALL_WORN: Worn = (True, True, True, True)
 _PATCH_MARGIN_PX = 2.6  #: width of the patch around the image of a marker; its border fades over half of that
 _PATCH_RADIUS_M = 0.16
-_THIGH_M = _SHANK_M = 0.45
-_HIP_ASIDE_M, _SHOULDER_ASIDE_M, _HAND_ASIDE_M = 0.11, 0.19, 0.3
-_ANKLE_UP_M = 0.1
 _PADDING_M = 0.3
 _NEAREST_M = 1.0  #: nothing nearer than this is drawn
 
@@ -48,54 +48,112 @@ class Figure:
     """Draws poses as one camera sees them.
 
     Args:
-        scenario: gives length of the skis, radius of the markers, blur and black level.
-        camera: gives the gain.
-        projection: projection of that camera.
-        clean: the image without jumper and noise, grey values, shape (h, w).
+        scenario: gives the sizes and radiances of body, skis and markers, and the blur.
+        projection: projection of that camera as it was set up.
+        black: grey value of radiance 0.
+        gain: grey values per radiance.
     """
 
-    def __init__(
-        self, scenario: Scenario, camera: SceneCamera, projection: Projection, clean: NDArray[np.uint8]
-    ) -> None:
-        self._projection = projection
-        self._clean = clean
+    def __init__(self, scenario: Scenario, projection: Projection, black: float, gain: float) -> None:
+        self._jumper = scenario.jumper
         self._half_ski_m = scenario.jumper.ski_length_m / 2
-        self._black, self._gain = scenario.image.black_level, camera.gain
+        self._black, self._gain = black, gain
         self._middle_m = float(projection.distance((10.0, 0.0, -1.8)))
         px_per_m = projection.c / self._middle_m
         self._marker = Blob(scenario.jumper.marker_radius_m * px_per_m, scenario.image.blur_sigma_px)
 
-    def draw(self, pose: Pose) -> tuple[slice, slice, Image] | None:
-        """Draw a pose.
+    def draw(
+        self, poses: Sequence[Pose], projection: Projection, backdrop: NDArray[Any], worn: Worn = ALL_WORN
+    ) -> tuple[slice, slice, Image] | None:
+        """Draw the average of some poses.
+
+        Args:
+            poses: one or more.
+            projection: of the camera at that time.
+            backdrop: the image without the jumper, in grey values, shape (h, w).
+            worn: the markers that are there.
 
         Returns:
             Rows and columns of the image that change, and their grey values without noise; None if out of sight.
         """
-        joints = _joints(pose, self._half_ski_m)
-        if float(self._projection.distance(joints).min()) < _NEAREST_M:
+        figures = np.stack([body.joints(pose, self._half_ski_m) for pose in poses])
+        if float(projection.distance(figures).min()) < _NEAREST_M:
             return None
-        pixels = self._projection.pixels(joints)
-        px_per_m = self._projection.c / float(self._projection.distance(pose.origin))
-        box = self._box(pixels, _PADDING_M * px_per_m)
+        pixels = projection.pixels(figures)
+        px_per_m = projection.c / float(projection.distance(poses[0].origin))
+        box = self._box(pixels.reshape(-1, 2), _PADDING_M * px_per_m, projection)
         if box is None:
             return None
         rows, columns = box
-        sprite = self._clean[rows, columns].astype(np.float32)
         pixels -= (columns.start, rows.start)
-        self._draw_person(sprite, pose, pixels, px_per_m)
-        self._draw_markers(sprite, pose, pixels[:4], px_per_m)
-        return rows, columns, sprite
+        behind = backdrop[rows, columns].astype(np.float32)
+        if len(poses) == 1:
+            self._draw_one(behind, poses[0], figures[0], pixels[0], projection, worn)
+            return rows, columns, behind
+        total = np.zeros_like(behind)
+        for pose, points, places in zip(poses, figures, pixels, strict=True):
+            sprite = behind.copy()
+            self._draw_one(sprite, pose, points, places, projection, worn)
+            total += sprite
+        total /= len(poses)
+        return rows, columns, total
 
-    def _draw_person(self, sprite: Image, pose: Pose, pixels: Pixels, px_per_m: float) -> None:
+    def _draw_one(
+        self, sprite: Image, pose: Pose, points: Floats, pixels: Pixels, projection: Projection, worn: Worn
+    ) -> None:
+        px_per_m = projection.c / float(projection.distance(pose.origin))
+        if self._jumper.occlusion or projection.lens is not None:
+            corner = projection.pixels(points[0]) - pixels[0]
+            self._draw_in_order(sprite, pose, points, corner, projection, worn)
+        else:
+            self._draw_person(sprite, pose, pixels, px_per_m, projection)
+        if not self._jumper.occlusion:
+            self._draw_markers(sprite, pose, pixels[:4], px_per_m, projection, worn)
+
+    def _draw_in_order(
+        self, sprite: Image, pose: Pose, points: Floats, corner: Pixels, projection: Projection, worn: Worn
+    ) -> None:
+        """Everything from far to near; `corner` is the sprite's place in the image, (x, y)."""
+        near = int(np.argmin(projection.distance(pose.markers[2:])))
+        spots = projection.pixels(pose.markers) - corner
+        scales = self._middle_m / projection.distance(pose.markers)
+        px_per_m = projection.c / float(projection.distance(pose.origin))
+        for thing in body.in_order(body.parts(points, self._jumper, near), pose.markers, projection):
+            if thing.part is not None:
+                self._draw_part(sprite, thing.part, corner, projection)
+            elif self._jumper.occlusion and worn[thing.marker]:
+                self._draw_marker(sprite, spots, thing.marker, float(scales[thing.marker]), px_per_m)
+
+    def _draw_part(self, sprite: Image, part: Part, corner: Pixels, projection: Projection) -> None:
+        ends = np.stack((part.a, part.b))
+        a, b = projection.pixels(ends) - corner
+        scale = projection.c / projection.distance(ends)
+        ra, rb = float(part.radius_a * scale[0]), float(part.radius_b * scale[1])
+        stroke(sprite, a, b, ra, rb, self._grey(part.radiance))
+        if part.lit:
+            up, light = np.array((0.0, -0.35)), self._grey(body.stripe(part.radiance))
+            stroke(sprite, a + up * ra, b + up * rb, 0.45 * ra, 0.45 * rb, light)
+
+    def _draw_marker(self, sprite: Image, spots: Pixels, i: int, scale: float, px_per_m: float) -> None:
+        """A marker on its patch, which ends before it reaches another marker."""
+        x, y = spots[i]
+        reach = self._marker.reach_px * scale
+        others = np.hypot(*(np.delete(spots, i, axis=0) - spots[i]).T).min()
+        patch = max(_PATCH_RADIUS_M * px_per_m, reach + _PATCH_MARGIN_PX)
+        patch = min(patch, max(reach / 2, float(others) - reach))
+        self._disc(sprite, spots[i], patch, self._jumper.patch)
+        self._marker.draw(sprite, x, y, self._grey(self._jumper.marker), scale)
+
+    def _draw_person(self, sprite: Image, pose: Pose, pixels: Pixels, px_per_m: float, projection: Projection) -> None:
         """Skis and limbs from far to near; the skis hide the body if they are seen from below."""
-        far, near = sorted((0, 1), key=lambda i: -float(self._projection.distance(pose.markers[2 + i])))
+        far, near = sorted((0, 1), key=lambda i: -float(projection.distance(pose.markers[2 + i])))
         sides = _side(pixels, far), _side(pixels, near)
-        from_below = pose.axes[2] @ (self._projection.X0 - pose.origin) < 0
+        from_below = pose.axes[2] @ (projection.X0 - pose.origin) < 0
         if from_below:
             self._draw_body(sprite, pixels, *sides, px_per_m)
-        thick = _SKI_RADIUS_M * px_per_m
+        thick = SKI_RADIUS_M * px_per_m
         for side in sides:
-            stroke(sprite, side.tail, side.tip, thick, thick, self._grey(_SKI))
+            stroke(sprite, side.tail, side.tip, thick, thick, self._grey(self._jumper.skis))
         if not from_below:
             self._draw_body(sprite, pixels, *sides, px_per_m)
 
@@ -103,44 +161,49 @@ class Figure:
         helmet, hip, neck = pixels[0], pixels[1], pixels[4]
         self._draw_limbs(sprite, far, px_per_m, 0.8)
         self._limb(sprite, hip, neck, (0.15, 0.19), px_per_m, 1.0)
-        stroke(sprite, neck, helmet, 0.06 * px_per_m, 0.08 * px_per_m, self._grey(_FACE))
-        self._disc(sprite, helmet, 0.145 * px_per_m, PATCH)
+        stroke(sprite, neck, helmet, 0.06 * px_per_m, 0.08 * px_per_m, self._grey(FACE))
+        self._disc(sprite, helmet, 0.145 * px_per_m, self._jumper.patch)
         self._draw_limbs(sprite, near, px_per_m, 1.0)
 
     def _draw_limbs(self, sprite: Image, side: _Side, px_per_m: float, light: float) -> None:
         self._limb(sprite, side.ankle, side.knee, (0.07, 0.085), px_per_m, light)
         self._limb(sprite, side.knee, side.hip, (0.085, 0.12), px_per_m, light)
-        self._disc(sprite, side.ankle, 0.09 * px_per_m, _BOOT)
+        self._disc(sprite, side.ankle, 0.09 * px_per_m, BOOT)
         self._limb(sprite, side.shoulder, side.hand, (0.075, 0.05), px_per_m, light)
-        self._disc(sprite, side.hand, 0.06 * px_per_m, _GLOVE)
+        self._disc(sprite, side.hand, 0.06 * px_per_m, GLOVE)
 
     def _limb(
         self, sprite: Image, a: Pixels, b: Pixels, radii_m: tuple[float, float], px_per_m: float, light: float
     ) -> None:
         """A capsule with a lighter stripe where the sky lights it."""
         ra, rb = radii_m[0] * px_per_m, radii_m[1] * px_per_m
-        stroke(sprite, a, b, ra, rb, self._grey(_SUIT * light))
+        stroke(sprite, a, b, ra, rb, self._grey(self._jumper.suit * light))
         up = np.array((0.0, -0.35))
-        stroke(sprite, a + up * ra, b + up * rb, 0.45 * ra, 0.45 * rb, self._grey(_SUIT_LIGHT * light))
+        stroke(
+            sprite, a + up * ra, b + up * rb, 0.45 * ra, 0.45 * rb, self._grey(body.stripe(self._jumper.suit * light))
+        )
 
     def _disc(self, sprite: Image, centre: Pixels, radius: float, radiance: float) -> None:
         stroke(sprite, centre, centre, radius, radius, self._grey(radiance))
 
-    def _draw_markers(self, sprite: Image, pose: Pose, markers: Pixels, px_per_m: float) -> None:
+    def _draw_markers(
+        self, sprite: Image, pose: Pose, markers: Pixels, px_per_m: float, projection: Projection, worn: Worn
+    ) -> None:
         """Draw all patches first, so that none covers the marker of another."""
-        scales = self._middle_m / self._projection.distance(pose.markers)
-        for marker, scale in zip(markers, scales, strict=True):
-            patch = max(_PATCH_RADIUS_M * px_per_m, self._marker.reach_px * float(scale) + _PATCH_MARGIN_PX)
-            self._disc(sprite, marker, patch, PATCH)
-        for (x, y), scale in zip(markers, scales, strict=True):
-            self._marker.draw(sprite, x, y, self._grey(BRIGHTEST), float(scale))
+        scales = self._middle_m / projection.distance(pose.markers)
+        there = [(*place, float(scale)) for place, scale, on in zip(markers, scales, worn, strict=True) if on]
+        for x, y, scale in there:
+            patch = max(_PATCH_RADIUS_M * px_per_m, self._marker.reach_px * scale + _PATCH_MARGIN_PX)
+            self._disc(sprite, np.array((x, y)), patch, self._jumper.patch)
+        for x, y, scale in there:
+            self._marker.draw(sprite, x, y, self._grey(self._jumper.marker), scale)
 
-    def _box(self, pixels: Pixels, padding: float) -> tuple[slice, slice] | None:
+    def _box(self, pixels: Pixels, padding: float, projection: Projection) -> tuple[slice, slice] | None:
         """Rows and columns of the image that the figure may touch; None if there are none."""
         padding += self._marker.reach_px + 2 * _PATCH_MARGIN_PX
         left, top = (max(0, math.floor(v)) for v in pixels.min(axis=0) - padding)
         right, bottom = (math.ceil(v) for v in pixels.max(axis=0) + padding)
-        right, bottom = min(self._projection.width, right + 1), min(self._projection.height, bottom + 1)
+        right, bottom = min(projection.width, right + 1), min(projection.height, bottom + 1)
         if left >= right or top >= bottom:
             return None
         return slice(top, bottom), slice(left, right)
@@ -152,32 +215,3 @@ class Figure:
 def _side(pixels: Pixels, i: int) -> _Side:
     """Half `i` (0 right, 1 left) of the projected joints."""
     return _Side(*pixels[5 + 7 * i : 12 + 7 * i])
-
-
-def _joints(pose: Pose, half_ski_m: float) -> Floats:
-    """All points of the figure, m, shape (19, 3).
-
-    P1..P4, neck, then for the right and for the left half: tip and tail of the ski, ankle, knee, hip, shoulder, hand.
-    """
-    helmet, hip = pose.markers[0], pose.markers[1]
-    forward, side, up = pose.axes
-    trunk = helmet - hip
-    neck = hip + 0.76 * trunk
-    points = [*pose.markers, neck]
-    for i, outward in ((0, -side), (1, side)):
-        middle, along = pose.markers[2 + i], pose.skis[i]
-        ankle = middle + _ANKLE_UP_M * up
-        thigh = hip + _HIP_ASIDE_M * outward
-        hand = hip + _HAND_ASIDE_M * outward - 0.12 * trunk + 0.02 * up
-        points += [middle + half_ski_m * along, middle - half_ski_m * along]
-        points += [ankle, _knee(ankle, thigh, forward), thigh, neck + _SHOULDER_ASIDE_M * outward, hand]
-    return np.stack(points)
-
-
-def _knee(ankle: Floats, hip: Floats, forward: Floats) -> Floats:
-    """Knee between ankle and hip; it bends forward as far as the lengths of shank and thigh ask."""
-    leg = hip - ankle
-    length = math.sqrt(leg @ leg)
-    aside = forward - (forward @ leg) / length**2 * leg
-    bend = math.sqrt(max(0.0, _SHANK_M * _THIGH_M - (length / 2) ** 2))
-    return np.asarray(ankle + leg / 2 + bend * aside / math.sqrt(aside @ aside))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.pulse import HillPulse
-from simrig.images import stamp
+from simrig.images import exposure, stamp
 from simrig.images.background import paint
 from simrig.images.figure import Figure
 from simrig.world.jumper import JumpSeries
@@ -50,7 +50,9 @@ class CameraView:
         if image.noise_sigma:
             self._noisy = [_with_noise(clean, image.noise_sigma, rng) for _ in range(_NOISES)]
         self._snow = Snowfall(image.snow_flakes, width, height, rng)
-        self._figure = Figure(scenario, settings, projection, self._clean)
+        self._projection = projection
+        self._exposure_s = settings.exposure_us / 1e6
+        self._figure = Figure(scenario, projection, image.black_level, settings.gain)
 
     def render_into(self, out: NDArray[np.uint8], pulse: HillPulse) -> None:
         """Render the image of hill pulse `pulse` into `out`, shape (height, width); its rows may lie apart."""
@@ -63,8 +65,12 @@ class CameraView:
 
     def _draw_jumper(self, out: NDArray[np.uint8], pulse: HillPulse, other: NDArray[np.uint8]) -> None:
         """Draw the jumper with the noise of another realisation than the background's around it."""
-        there = self._jumps.at_pulse(pulse, self._rate_hz)
-        drawn = there and self._figure.draw(there[0].pose(there[1]))
+        there = self._jumps.at(self._scenario.cameras[self._camera].middle_s(pulse, self._rate_hz))
+        if there is None:
+            return
+        jump, time_s = there
+        poses = exposure.poses(jump, time_s, self._exposure_s, self._projection)
+        drawn = self._figure.draw(poses, self._projection, self._clean, self._scenario.jumper.worn(jump.number))
         if not drawn:
             return
         rows, columns, sprite = drawn

@@ -1,7 +1,7 @@
 """Central projection of object points into a camera's image: Eq. (A1) of the paper.
 
 Conventions are those of the network file: the columns of R are r1, r2, r3; pixel frame x right, y down, (0, 0) = centre
-of the top-left pixel; principal point = image centre; no distortion. The simulated world has its own projection and
+of the top-left pixel; distortion acts on the projected side. The simulated world has its own projection and
 shares no code with `photogrammetry`, so that it can judge what that computes.
 """
 
@@ -14,8 +14,53 @@ from rig.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
+class Lens:
+    """Principal point and distortion (Luhmann et al. 2006); metric frame: x right, y up, px.
+
+    Attributes:
+        x0: principal point, px from the image centre.
+        y0: likewise, upwards.
+        a1: radial distortion, px^-2; a2, px^-4; a3, px^-6.
+        a2: see `a1`.
+        a3: see `a1`.
+        r0: radius at which the radial distortion is balanced, px; 0: unbalanced.
+        b1: decentring, px^-1.
+        b2: decentring, px^-1.
+        c1: affinity.
+        c2: shear.
+    """
+
+    x0: float
+    y0: float
+    a1: float
+    a2: float
+    a3: float
+    r0: float
+    b1: float
+    b2: float
+    c1: float
+    c2: float
+
+    def scaled(self, by: float) -> "Lens":
+        """The same lens in an image that is `by` times as wide in px."""
+        return Lens(
+            self.x0 * by, self.y0 * by, self.a1 / by**2, self.a2 / by**4, self.a3 / by**6, self.r0 * by, self.b1 / by,
+            self.b2 / by, self.c1, self.c2,
+        )  # fmt: skip
+
+    def bend(self, ideal: Floats) -> Floats:
+        """Image points, metric, px, of ideal points without distortion; shape (..., 2)."""
+        x, y = ideal[..., 0], ideal[..., 1]
+        r2, p2 = x * x + y * y, self.r0**2
+        radial = self.a1 * (r2 - p2) + self.a2 * (r2**2 - p2**2) + self.a3 * (r2**3 - p2**3)
+        dx = x * radial + self.b1 * (r2 + 2 * x * x) + 2 * self.b2 * x * y + self.c1 * x + self.c2 * y
+        dy = y * radial + self.b2 * (r2 + 2 * y * y) + 2 * self.b1 * x * y
+        return np.asarray(ideal + np.stack((self.x0 + dx, self.y0 + dy), axis=-1))
+
+
+@dataclass(frozen=True, slots=True)
 class Projection:
-    """A camera without distortion, with its place and orientation.
+    """A camera with its place and orientation.
 
     Attributes:
         X0: projection centre, m, shape (3,).
@@ -23,6 +68,7 @@ class Projection:
         c: principal distance, px.
         width: columns of the image.
         height: rows of the image.
+        lens: principal point and distortion; None: image centre, none.
     """
 
     X0: Floats
@@ -30,6 +76,7 @@ class Projection:
     c: float
     width: int
     height: int
+    lens: Lens | None = None
 
     def pixels(self, points: ArrayLike) -> Floats:
         """Pixel coordinates (x, y) of object points by Eq. (A1); shape (..., 3) to (..., 2).
@@ -38,6 +85,8 @@ class Projection:
         """
         along = (np.asarray(points, float) - self.X0) @ self.R
         metric = -self.c * along[..., :2] / along[..., 2:]
+        if self.lens is not None:
+            metric = self.lens.bend(metric)
         return np.stack(((self.width - 1) / 2 + metric[..., 0], (self.height - 1) / 2 - metric[..., 1]), axis=-1)
 
     def distance(self, points: ArrayLike) -> Floats:

@@ -10,28 +10,24 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.settings.strict_toml import StrictModel, read_toml, validate
+from rig.pulse import HillPulse
+from rig.settings.strict_toml import read_toml, validate
 from rig.viewing import look_at
+from simrig.world.effects import FiniteModel, LensErrors, Light, MissingMarker, Move, Surroundings, Vector, Weather
 from simrig.world.faults import Fault
 from simrig.world.keyframes import Keyframes
-from simrig.world.projection import Projection
+from simrig.world.projection import Lens, Projection
 
 REFERENCE_WIDTH = 640  #: px; principal distances in a scenario belong to images of this width
 #: Radiance of the brightest things (markers, balls, skis): grey values at gain 1, above the black level.
 BRIGHTEST = 225.0
 
-Vector = tuple[float, float, float]
 
-
-class _Finite(StrictModel):
-    model_config = ConfigDict(allow_inf_nan=False)
-
-
-class Hill(_Finite):
+class Hill(FiniteModel):
     """Profile of the hill: take-off table, knoll, landing slope. The defaults are those of a K120 hill.
 
     The table is straight. The knoll is the cubic of the FIS standards for the construction of jumping hills. It begins
@@ -68,7 +64,7 @@ class Hill(_Finite):
         return float(self.ground(x)) + (0.12 if y > 0 else -0.05) * beside
 
 
-class Jumper(_Finite):
+class Jumper(FiniteModel):
     """The jumper: flight by gravity, lift and drag, posture by keyframes [time_s, value]."""
 
     takeoff_speed_m_s: float = Field(26.0, gt=5, le=40)
@@ -87,9 +83,22 @@ class Jumper(_Finite):
     torso_length_m: float = Field(0.72, gt=0.2, le=1.5, description="from hip to helmet marker")
     torso_angle_deg: Keyframes = ((-0.35, 12.0), (0.0, 41.0), (0.25, 31.0), (0.55, 22.0), (0.9, 19.0))
     marker_radius_m: float = Field(0.05, gt=0.01, le=0.1)
+    marker: float = Field(BRIGHTEST, ge=0, le=BRIGHTEST, description="radiance of the markers")
+    patch: float = Field(34.0, ge=0, le=BRIGHTEST, description="radiance of helmet and suit around the markers")
+    suit: float = Field(44.0, ge=0, le=BRIGHTEST, description="radiance of the suit where no sky lights it")
+    skis: float = Field(222.0, ge=0, le=BRIGHTEST, description="radiance of the skis")
+    occlusion: bool = Field(False, description="body and skis hide markers behind them; else no marker is ever hidden")
+    missing_markers: tuple[MissingMarker, ...] = ()
+    ski_mass_kg: float = Field(3.6, ge=0, le=10, description="one ski with its binding")
+    boot_mass_kg: float = Field(1.4, ge=0, le=5, description="one boot")
+
+    def worn(self, jump: int) -> tuple[bool, bool, bool, bool]:
+        """Which of the markers P1..P4 the jumper of jump number `jump` wears."""
+        missing = {m.marker for m in self.missing_markers if m.jump in (None, jump)}
+        return "P1" not in missing, "P2" not in missing, "P3" not in missing, "P4" not in missing
 
 
-class Variation(_Finite):
+class Variation(FiniteModel):
     """Standard deviations by which the jumps of one scenario differ. All zero: every jump is the same."""
 
     speed_m_s: float = Field(0.2, ge=0, le=2)
@@ -100,16 +109,26 @@ class Variation(_Finite):
     yaw_deg: float = Field(0.8, ge=0, le=5)
 
 
-class ImageEffects(_Finite):
+class ImageEffects(FiniteModel):
     """How radiance becomes grey values: grey = black_level + gain * radiance + noise."""
 
     black_level: float = Field(8.0, ge=0, le=100)
     noise_sigma: float = Field(2.5, ge=0, le=20, description="grey values")
     blur_sigma_px: float = Field(0.55, ge=0.4, le=3, description="of the lens")
     snow_flakes: int = Field(60, ge=0, le=5000, description="in the image at any time")
+    electrons_per_grey: float = Field(
+        0.0, ge=0, le=1000, description="electrons that make one grey value; their number scatters; 0: no such noise"
+    )
+    background_scale: float = Field(1.0, ge=0, le=2, description="radiance of the hill is multiplied by it ...")
+    background_offset: float = Field(0.0, ge=-225, le=225, description="... and this is added; balls stay as they are")
+
+    def noise_at(self, grey: float) -> float:
+        """Standard deviation of the noise where the image has the grey value `grey` without noise."""
+        electrons = max(0.0, grey - self.black_level) * self.electrons_per_grey
+        return math.hypot(self.noise_sigma, math.sqrt(electrons) / (self.electrons_per_grey or 1.0))
 
 
-class SceneCamera(_Finite):
+class SceneCamera(FiniteModel):
     """One camera of the hill: its place, its optics, the error of its clock."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$")
@@ -124,6 +143,15 @@ class SceneCamera(_Finite):
     exposure_jitter_us: float = Field(
         1.0, ge=0, le=5000, description="scatter of the exposure's device time about the pulse; the image is not moved"
     )
+    exposure_us: float = Field(
+        0.0, ge=0, le=100_000, description="the jumper is blurred over so long a time, which begins at the pulse"
+    )
+    late_ms: float = Field(
+        0.0, ge=0, le=1000, description="the image shows the scene so much later than the camera says (a fault)"
+    )
+    lens: LensErrors = LensErrors()
+    shake_deg: float = Field(0.0, ge=0, le=1, description="root mean square of the shake about r1 and r2")
+    moves: tuple[Move, ...] = Field((), max_length=20, description="drift and knocks")
 
     @model_validator(mode="after")
     def _one_orientation(self) -> "SceneCamera":
@@ -147,19 +175,26 @@ class SceneCamera(_Finite):
 
     def projection(self, width: int, height: int) -> Projection:
         """The camera with an image of `width` x `height` px: the field of view is the same at every width."""
-        c = self.c * width / REFERENCE_WIDTH
-        return Projection(np.array(self.X0, float), self.rotation(), c, width, height)
+        scale = width / REFERENCE_WIDTH
+        lens = Lens(**self.lens.model_dump()).scaled(scale) if self.lens != LensErrors() else None
+        return Projection(np.array(self.X0, float), self.rotation(), self.c * scale, width, height, lens)
+
+    def middle_s(self, pulse: HillPulse, rate_hz: float) -> float:
+        """Scene time of the middle of the exposure that shows hill pulse `pulse`."""
+        return pulse / rate_hz + self.exposure_us / 2e6 + self.late_ms / 1e3
 
 
-class Ball(_Finite):
+class Ball(FiniteModel):
     """One signalised static point: a reflective handball on a black plate."""
 
     name: str = Field(min_length=1, max_length=16)
     role: Literal["control", "tie"] = Field(description="control: surveyed reference ball; tie: unknown")
     X: Vector
+    covered: float = Field(0.0, ge=0, le=1, description="share of its height that snow hides, from below")
+    gone: bool = Field(False, description="it fell: the survey knows it, but there is nothing to see")
 
 
-class Scenario(_Finite):
+class Scenario(FiniteModel):
     """One simulated session on the hill."""
 
     name: str = Field(min_length=1, max_length=80)
@@ -172,6 +207,9 @@ class Scenario(_Finite):
     jumper: Jumper = Jumper()
     variation: Variation = Variation()
     image: ImageEffects = ImageEffects()
+    light: Light = Light()
+    weather: Weather = Weather()
+    surroundings: Surroundings = Surroundings()
     cameras: Annotated[tuple[SceneCamera, ...], Field(min_length=1, max_length=8)]
     balls: tuple[Ball, ...] = ()
     ball_radius_m: float = Field(0.095, gt=0.02, le=0.3)
@@ -190,7 +228,8 @@ class Scenario(_Finite):
             if not 0 <= first < end:
                 raise ValueError(f"pauses: [{first}, {end}] is empty: give a first pulse of at least 0 and a later end")
         for camera in self.cameras:
-            top = self.image.black_level + camera.gain * BRIGHTEST + 4 * self.image.noise_sigma
+            brightest = self.image.black_level + camera.gain * BRIGHTEST
+            top = brightest + 4 * self.image.noise_at(brightest)
             if top > 255:
                 raise ValueError(
                     f"camera {camera.name} saturates at grey value {top:.0f}: lower gain, black_level or noise_sigma"

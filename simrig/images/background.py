@@ -1,4 +1,4 @@
-"""Renders what never moves (sky, forest, snow, take-off table, balls), once per camera."""
+"""Renders what never moves (sky, forest, snow, take-off table, poles of the balls), once per camera."""
 
 import math
 from itertools import pairwise
@@ -8,19 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.arrays import Floats
-from simrig.images.drawing import Blob, Canvas, Image, stroke
+from simrig.images.balls import put_poles
+from simrig.images.drawing import Canvas, Image
 from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, REFERENCE_WIDTH, Scenario
 
-PLATE = 36.0  #: radiance of the black plates behind the balls
-PLATE_MARGIN_PX = 5.0  #: width of the plate around the image of a ball
-_POLE = 92.0
 _NEAREST_M = 2.0
 _TABLE_END_M = -45.0
 
 
 def paint(scenario: Scenario, projection: Projection) -> Image:
-    """Radiance of the empty hill as this camera sees it, without noise; shape (h, w)."""
+    """Radiance of the empty hill as this camera sees it, without balls and noise; shape (h, w)."""
     rng = np.random.default_rng((scenario.seed, 77))  # the same forest for all cameras
     painter = _Painter(scenario, projection, rng)
     painter.paint_land_and_forest()
@@ -28,8 +26,11 @@ def paint(scenario: Scenario, projection: Projection) -> Image:
     image = painter.canvas.image()
     image += _texture(image.shape, projection.width / REFERENCE_WIDTH, rng)
     image = cv2.GaussianBlur(image, (0, 0), scenario.image.blur_sigma_px).astype(np.float32)
-    _put_balls(image, scenario, projection)
-    return np.clip(image, 0, BRIGHTEST)
+    effects = scenario.image
+    if (effects.background_scale, effects.background_offset) != (1.0, 0.0):
+        image = np.clip(image * effects.background_scale + effects.background_offset, 0, BRIGHTEST).astype(np.float32)
+    put_poles(image, scenario, projection)
+    return image
 
 
 class _Painter:
@@ -39,6 +40,7 @@ class _Painter:
         self._hill = scenario.hill
         self._projection = projection
         self._rng = rng
+        self._left = projection.X0[1] > 0  #: the camera stands left of the hill and looks to the other side
         self.canvas = Canvas(_sky(projection))
 
     def paint_land_and_forest(self) -> None:
@@ -68,6 +70,8 @@ class _Painter:
     def _land(self) -> list[tuple[Floats, float]]:
         """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest."""
         xs, ys = np.arange(-60.0, 150.0, 3.0), np.arange(-27.0, 75.0, 3.0)
+        if self._left:
+            ys = -3.0 - ys
         quads = []
         for x in xs:
             for y in ys:
@@ -85,7 +89,7 @@ class _Painter:
         trees = []
         for y, gap, mist in ((70.0, 2.0, 128.0), (52.0, 2.2, 116.0), (38.0, 2.6, 106.0), (26.0, 4.0, 98.0)):
             for x in np.arange(-60.0, 150.0, gap):
-                where = (x + self._rng.uniform(-1, 1), y + self._rng.uniform(-3, 3))
+                where = (x + self._rng.uniform(-1, 1), (y + self._rng.uniform(-3, 3)) * (-1 if self._left else 1))
                 trees.append(self._spruce(*where, self._rng.uniform(7, 15), mist + self._rng.normal(0, 4)))
         return trees
 
@@ -123,18 +127,3 @@ def _texture(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> 
         field = cv2.GaussianBlur(field, (0, 0), sigma).astype(np.float32)
         texture += strength / field.std() * cv2.resize(field, (width, height), interpolation=cv2.INTER_LINEAR)
     return texture
-
-
-def _put_balls(image: Image, scenario: Scenario, projection: Projection) -> None:
-    """Thin poles, then each ball on its plate, far ones first."""
-    blur = scenario.image.blur_sigma_px
-    seen = [(float(projection.distance(ball.X)), ball.X) for ball in scenario.balls]
-    balls = sorted(((distance, X) for distance, X in seen if distance > _NEAREST_M), reverse=True)
-    for _, (x, y, z) in balls:
-        top, foot = projection.pixels([(x, y, z), (x, y, min(scenario.hill.snow(x, y), z))])
-        stroke(image, top, foot, 0.4, 0.4, _POLE)
-    for distance, X in balls:  # noqa: N806
-        x, y = projection.pixels(X)
-        radius = scenario.ball_radius_m * projection.c / distance
-        Blob(radius + PLATE_MARGIN_PX, blur).draw(image, x, y, PLATE)
-        Blob(radius, blur).draw(image, x, y, BRIGHTEST)

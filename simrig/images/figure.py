@@ -118,17 +118,19 @@ class Figure:
         spots = projection.pixels(pose.markers) - corner
         scales = self._middle_m / projection.distance(pose.markers)
         px_per_m = projection.c / float(projection.distance(pose.origin))
-        for thing in body.in_order(body.parts(points, self._jumper, near), pose.markers, projection):
+        order = body.in_order(body.parts(points, self._jumper, near), pose.markers, projection)
+        shapes = [thing.part for thing in order if thing.part is not None]
+        images = zip(shapes, *body.outlines(shapes, projection), strict=True)
+        for thing in order:
             if thing.part is not None:
-                self._draw_part(sprite, thing.part, corner, projection)
+                part, ends, radii = next(images)
+                self._draw_part(sprite, part, ends - corner, radii.tolist())
             elif self._jumper.occlusion and worn[thing.marker]:
                 self._draw_marker(sprite, spots, thing.marker, float(scales[thing.marker]), px_per_m)
 
-    def _draw_part(self, sprite: Image, part: Part, corner: Pixels, projection: Projection) -> None:
-        ends = np.stack((part.a, part.b))
-        a, b = projection.pixels(ends) - corner
-        scale = projection.c / projection.distance(ends)
-        ra, rb = float(part.radius_a * scale[0]), float(part.radius_b * scale[1])
+    def _draw_part(self, sprite: Image, part: Part, ends: Pixels, radii: list[float]) -> None:
+        a, b = ends
+        ra, rb = radii
         stroke(sprite, a, b, ra, rb, self._grey(part.radiance))
         if part.lit:
             up, light = np.array((0.0, -0.35)), self._grey(body.stripe(part.radiance))
@@ -138,9 +140,9 @@ class Figure:
         """A marker on its patch, which ends before it reaches another marker."""
         x, y = spots[i]
         reach = self._marker.reach_px * scale
-        others = np.hypot(*(np.delete(spots, i, axis=0) - spots[i]).T).min()
+        others = min(math.dist(spots[i], spot) for k, spot in enumerate(spots) if k != i)
         patch = max(_PATCH_RADIUS_M * px_per_m, reach + _PATCH_MARGIN_PX)
-        patch = min(patch, max(reach / 2, float(others) - reach))
+        patch = min(patch, max(reach / 2, others - reach))
         self._disc(sprite, spots[i], patch, self._jumper.patch)
         self._marker.draw(sprite, x, y, self._grey(self._jumper.marker), scale)
 

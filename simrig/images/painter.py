@@ -28,7 +28,7 @@ class _TestPattern:
 class Painter:
     """One camera's images, of which a frame holds the part of the sensor that is read out.
 
-    Exposure time and gain do not change the picture.
+    Exposure time and gain that the camera is set to do not change the picture: the scenario decides both.
 
     Args:
         scenario: what there is to see.

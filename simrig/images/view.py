@@ -1,20 +1,15 @@
 """What one camera of the simulated hill sees: the image of every hill pulse."""
 
-import struct
-import zlib
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.pulse import HillPulse
-from simrig.images import exposure, stamp
-from simrig.images.background import paint
-from simrig.images.figure import Figure
-from simrig.world.jumper import JumpSeries
+from simrig.images import stamp
+from simrig.images.live_view import LiveView
+from simrig.images.still_view import StillView
+from simrig.world.camera_motion import CameraMotion
 from simrig.world.scenario import REFERENCE_WIDTH, Scenario
 
-_NOISES = 6  #: realisations of the noise on the background
-_NOISE_KEY = struct.Struct(">IBQ")
 _FLAKE_HALF = 3  #: a flake is drawn in a square of 2 * 3 + 1 px
 _FLAKE_GREY = 215.0
 
@@ -22,61 +17,44 @@ _FLAKE_GREY = 215.0
 class CameraView:
     """Renders one camera's images. Deterministic: seed, camera and pulse decide every pixel.
 
-    The constructor renders the empty hill once, with a handful of noise realisations. A frame is a copy of one of
-    them, with the jumper and the snow drawn in small patches. Not for use by two threads at once.
+    What the scenario does not ask for costs nothing. Not for use by two threads at once.
 
     Args:
         scenario: what there is to see.
         camera: index of the camera in the scenario.
         width: width of the image, px; the field of view is the same at every width.
         height: height of the image, px.
-        rate_hz: rate of the pulses; hill pulse n shows scene time n / rate_hz.
+        rate_hz: rate of the pulses; hill pulse n shows scene time n / rate_hz, or a little later if it is exposed for
+            some time.
 
     Raises:
         IndexError: the scenario has no such camera.
     """
 
     def __init__(self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float) -> None:
-        self._scenario = scenario
-        self._camera = camera
+        self._stamped = camera if scenario.stamp else None
         self._rate_hz = rate_hz
-        self._jumps = JumpSeries(scenario)
-        settings, image = scenario.cameras[camera], scenario.image
-        projection = settings.projection(width, height)
-        clean = image.black_level + settings.gain * paint(scenario, projection)
-        self._clean = np.rint(clean).astype(np.uint8)
         rng = np.random.default_rng((scenario.seed, camera, 99))
-        self._noisy = [self._clean]
-        if image.noise_sigma:
-            self._noisy = [_with_noise(clean, image.noise_sigma, rng) for _ in range(_NOISES)]
-        self._snow = Snowfall(image.snow_flakes, width, height, rng)
-        self._projection = projection
-        self._exposure_s = settings.exposure_us / 1e6
-        self._figure = Figure(scenario, projection, image.black_level, settings.gain)
+        self._view: StillView | LiveView
+        if _is_live(scenario, camera):
+            self._view = LiveView(scenario, camera, width, height, rate_hz)
+        else:
+            self._view = StillView(scenario, camera, width, height, rate_hz, rng)
+        self._snow = Snowfall(scenario.image.snow_flakes, width, height, rng)
 
     def render_into(self, out: NDArray[np.uint8], pulse: HillPulse) -> None:
         """Render the image of hill pulse `pulse` into `out`, shape (height, width); its rows may lie apart."""
-        noise = zlib.crc32(_NOISE_KEY.pack(self._scenario.seed, self._camera, pulse)) % len(self._noisy)
-        np.copyto(out, self._noisy[noise])
-        self._draw_jumper(out, pulse, self._noisy[noise - 1])
+        self._view.render_into(out, pulse)
         self._snow.draw(out, pulse / self._rate_hz)
-        if self._scenario.stamp:
-            stamp.write(out, self._camera, pulse)
+        if self._stamped is not None:
+            stamp.write(out, self._stamped, pulse)
 
-    def _draw_jumper(self, out: NDArray[np.uint8], pulse: HillPulse, other: NDArray[np.uint8]) -> None:
-        """Draw the jumper with the noise of another realisation than the background's around it."""
-        there = self._jumps.at(self._scenario.cameras[self._camera].middle_s(pulse, self._rate_hz))
-        if there is None:
-            return
-        jump, time_s = there
-        poses = exposure.poses(jump, time_s, self._exposure_s, self._projection)
-        drawn = self._figure.draw(poses, self._projection, self._clean, self._scenario.jumper.worn(jump.number))
-        if not drawn:
-            return
-        rows, columns, sprite = drawn
-        sprite += other[rows, columns]
-        sprite -= self._clean[rows, columns]
-        out[rows, columns] = np.clip(np.rint(sprite, out=sprite), 0, 255, out=sprite)
+
+def _is_live(scenario: Scenario, camera: int) -> bool:
+    """Whether more than jumper and noise change in the images of this camera."""
+    tables = scenario.light, scenario.weather, scenario.surroundings
+    moving = not CameraMotion(scenario, camera).still
+    return moving or any(table.changes for table in tables) or scenario.image.electrons_per_grey > 0
 
 
 class Snowfall:
@@ -112,10 +90,3 @@ class Snowfall:
         where = rows[:, :, None], columns[:, None, :]
         below = image[where]
         image[where] = below + cover * (_FLAKE_GREY - below)
-
-
-def _with_noise(clean: NDArray[np.float32], sigma: float, rng: np.random.Generator) -> NDArray[np.uint8]:
-    noisy = rng.standard_normal(clean.shape, np.float32)
-    noisy *= sigma
-    noisy += clean
-    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)

@@ -5,6 +5,7 @@ of their middles. A marker is painted on its carriers, which never hide it.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,13 +110,20 @@ def parts(points: Floats, jumper: Jumper, near: int) -> list[Part]:
 
 def in_order(body: list[Part], markers: Floats, projection: Projection) -> list[Ordered]:
     """Parts and markers, shape (4, 3), from far to near; each marker after the parts that carry it."""
-    middles = np.stack([(part.a + part.b) / 2 for part in body])
+    middles = np.array([(part.a + part.b) / 2 for part in body])
     far = projection.distance(middles)
     things = [(float(distance), 1, Ordered(part)) for distance, part in zip(far, body, strict=True)]
     for i, own in enumerate(projection.distance(markers)):
         carriers = [float(distance) for distance, part in zip(far, body, strict=True) if i in part.carries]
         things.append((min(float(own), *carriers), 0, Ordered(None, i)))
     return [thing for _, _, thing in sorted(things, key=lambda thing: (-thing[0], -thing[1]))]
+
+
+def outlines(shapes: Sequence[Part], projection: Projection) -> tuple[Floats, Floats]:
+    """Images of parts: centres of both balls, px, shape (n, 2, 2), and their radii, px, shape (n, 2)."""
+    ends = np.array([(part.a, part.b) for part in shapes]).reshape(len(shapes), 2, 3)
+    radii = np.array([(part.radius_a, part.radius_b) for part in shapes]).reshape(len(shapes), 2)
+    return projection.pixels(ends), radii * projection.c / projection.distance(ends)
 
 
 def stripe(radiance: float) -> float:

@@ -131,6 +131,10 @@ class JumpSeries:
             return None
         return jump, time_s
 
+    def first(self) -> Jump:
+        """The first jump."""
+        return self._jump(0)
+
     def at_pulse(self, pulse: HillPulse, rate_hz: float) -> tuple[Jump, float] | None:
         """See `at`; the scene time of hill pulse `pulse` is pulse / rate."""
         return self.at(pulse / rate_hz)

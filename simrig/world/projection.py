@@ -5,6 +5,7 @@ of the top-left pixel; distortion acts on the projected side. The simulated worl
 shares no code with `photogrammetry`, so that it can judge what that computes.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,9 +49,15 @@ class Lens:
             self.b2 / by, self.c1, self.c2,
         )  # fmt: skip
 
-    def bend(self, ideal: Floats) -> Floats:
-        """Image points, metric, px, of ideal points without distortion; shape (..., 2)."""
-        x, y = ideal[..., 0], ideal[..., 1]
+    def bend(self, ideal: Floats, reach: float) -> Floats:
+        """Image points, metric, px, of ideal points without distortion; shape (..., 2).
+
+        Beyond the radius `reach`, far outside of the image, the distortion grows no more: a polynomial would fold the
+        world back into the image there.
+        """
+        away = np.hypot(ideal[..., 0], ideal[..., 1])
+        near = ideal * np.minimum(1.0, reach / np.maximum(away, reach))[..., None]
+        x, y = near[..., 0], near[..., 1]
         r2, p2 = x * x + y * y, self.r0**2
         radial = self.a1 * (r2 - p2) + self.a2 * (r2**2 - p2**2) + self.a3 * (r2**3 - p2**3)
         dx = x * radial + self.b1 * (r2 + 2 * x * x) + 2 * self.b2 * x * y + self.c1 * x + self.c2 * y
@@ -86,7 +93,7 @@ class Projection:
         along = (np.asarray(points, float) - self.X0) @ self.R
         metric = -self.c * along[..., :2] / along[..., 2:]
         if self.lens is not None:
-            metric = self.lens.bend(metric)
+            metric = self.lens.bend(metric, reach=0.75 * math.hypot(self.width, self.height))
         return np.stack(((self.width - 1) / 2 + metric[..., 0], (self.height - 1) / 2 - metric[..., 1]), axis=-1)
 
     def distance(self, points: ArrayLike) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.arrays import Flags, Floats
 from simrig.world import body
-from simrig.world.body import Part
+from simrig.world.body import Ordered, Part
 from simrig.world.jumper import Pose
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario
@@ -34,15 +34,14 @@ def visible_shares(
         jump: number of the jump.
         fronts: what stands between camera and jumper.
     """
-    points = body.joints(pose, scenario.jumper.ski_length_m / 2)
-    order = body.in_order(body.parts(points, scenario.jumper, 0), pose.markers, projection)
+    order = _order(scenario, pose, projection) if scenario.jumper.occlusion else []
     distances = projection.distance(pose.markers)
     shares = []
     for i, spot in enumerate(projection.pixels(pose.markers)):
         if not scenario.jumper.worn(jump)[i] or distances[i] <= 0 or not projection.sees(spot):
             shares.append(0.0)
             continue
-        later = order[[thing.marker for thing in order].index(i) + 1 :] if scenario.jumper.occlusion else []
+        later = order[[thing.marker for thing in order].index(i) + 1 :] if order else []
         covers = [thing.part for thing in later if thing.part is not None and i not in thing.part.carries]
         disc = _disc(spot, scenario.jumper.marker_radius_m * projection.c / float(distances[i]))
         hidden = np.zeros(len(disc), bool)
@@ -67,6 +66,11 @@ def inside(polygon: Floats, points: Floats) -> Flags:
     return np.asarray((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1))
 
 
+def _order(scenario: Scenario, pose: Pose, projection: Projection) -> list[Ordered]:
+    points = body.joints(pose, scenario.jumper.ski_length_m / 2)
+    return body.in_order(body.parts(points, scenario.jumper, 0), pose.markers, projection)
+
+
 def _disc(centre: Floats, radius: float) -> Floats:
     """Points spread evenly over a disc, shape (n, 2)."""
     k = np.arange(_SAMPLES)
@@ -76,15 +80,12 @@ def _disc(centre: Floats, radius: float) -> Floats:
 
 def _covered(points: Floats, part: Part, projection: Projection) -> Flags:
     """Whether points, px, shape (n, 2), lie in the image of a capsule."""
-    ends = np.stack((part.a, part.b))
-    a, b = projection.pixels(ends)
-    scale = projection.c / projection.distance(ends)
-    radius_a, radius_b = part.radius_a * scale[0], part.radius_b * scale[1]
-    along = b - a
+    ends, radii = body.outlines([part], projection)
+    a, along = ends[0, 0], ends[0, 1] - ends[0, 0]
     square = float(along @ along)
-    along_share = np.clip((points - a) @ along / square, 0, 1) if square > 0 else np.zeros(len(points))
-    away = np.hypot(*(points - a - along_share[:, None] * along).T)
-    covered: Flags = away < radius_a + (radius_b - radius_a) * along_share
+    share = np.clip((points - a) @ along / square, 0, 1) if square > 0 else np.zeros(len(points))
+    away = np.hypot(*(points - a - share[:, None] * along).T)
+    covered: Flags = away < radii[0, 0] + (radii[0, 1] - radii[0, 0]) * share
     return covered
 
 

@@ -12,6 +12,13 @@ point and a direction (tail to tip) of each ski line, and its parameters by Eq. 
 - gamma: between the two skis, the opening of the V;
 - dphi: slope of the right ski minus slope of the left one;
 - phi: slope of X' above the horizontal.
+
+Of a pulse: `time_s` is the scene time at which it fires; `state_s` is the middle of the exposure that it starts (of
+several exposure times the mean), at which points, skis, angles, height, speed, landmarks and centre of mass are true.
+`images` are true at the middle of each camera's own exposure, `middle_s`, with its distortion and in its pose of that
+moment, which `poses` gives for cameras that move. `visible` says which share of each marker's disc is in sight,
+`in_sight` whether that is half of it or more; `light` is the share of the full light. `takeoff_s` is the scene time at
+which O passes the edge, `takeoff_pulse` the same in pulses.
 """
 
 import math
@@ -23,9 +30,14 @@ import numpy as np
 
 from rig.arrays import Floats
 from rig.pulse import HillPulse
+from simrig.world import body, surroundings
+from simrig.world.camera_motion import CameraMotion
+from simrig.world.daylight import Daylight
 from simrig.world.jumper import FLIGHT_X_M, Jump, JumpSeries, Pose
-from simrig.world.projection import Projection
-from simrig.world.scenario import Scenario
+from simrig.world.mass import centre_of_mass, landmarks
+from simrig.world.projection import Lens, Projection
+from simrig.world.scenario import Ball, Scenario, SceneCamera
+from simrig.world.sight import IN_SIGHT, inside, visible_shares
 
 FORMAT = "svev-truth/1"
 MARKERS = ("P1", "P2", "P3", "P4")
@@ -63,8 +75,9 @@ def truth(
         rate_hz: pulses per second.
         size: width and height of the images, px.
     """
-    projections = {camera.name: camera.projection(*size) for camera in scenario.cameras}
+    seers = {camera.name: _Seer(scenario, index, size) for index, camera in enumerate(scenario.cameras)}
     jumps = JumpSeries(scenario)
+    states = [_pulse(scenario, jumps, seers, pulse, rate_hz) for pulse in pulses]
     return {
         "format": FORMAT,
         "scenario": scenario.name,
@@ -73,14 +86,53 @@ def truth(
         "length_unit": "m",
         "image_frame": "pixel",
         "ski_length": scenario.jumper.ski_length_m,
-        "cameras": {name: _camera(projection) for name, projection in projections.items()},
-        "balls": {ball.name: {"role": ball.role, "X": list(ball.X)} for ball in scenario.balls},
-        "ball_images": {
-            name: {ball.name: _seen(projection, np.array(ball.X)) for ball in scenario.balls}
-            for name, projection in projections.items()
+        "cameras": {name: _camera(seer.settings, seer.projection) for name, seer in seers.items()},
+        "balls": {
+            ball.name: {"role": ball.role, "X": list(ball.X), "covered": ball.covered, "gone": ball.gone}
+            for ball in scenario.balls
         },
-        "pulses": [_pulse(jumps, projections, pulse, rate_hz) for pulse in pulses],
+        "ball_images": {
+            name: {ball.name: _seen(seer.projection, np.array(ball.X)) for ball in scenario.balls}
+            for name, seer in seers.items()
+        },
+        "ball_visible": {
+            name: {ball.name: _ball_share(scenario, ball, seer.projection) for ball in scenario.balls}
+            for name, seer in seers.items()
+        },
+        "pulses": states,
     }
+
+
+class _Seer:
+    """One camera of the scenario, at any time."""
+
+    def __init__(self, scenario: Scenario, index: int, size: tuple[int, int]) -> None:
+        self.settings = scenario.cameras[index]
+        self.projection = self.settings.projection(*size)
+        self._scenario = scenario
+        self._people = surroundings.walkers(scenario)
+        self._motion = CameraMotion(scenario, index)
+        self._daylight = Daylight(scenario.light, scenario.seed)
+
+    def moment(self, pulse: HillPulse, rate_hz: float) -> dict[str, Any]:
+        """What holds for the camera at a pulse, whoever jumps."""
+        middle_s = self.settings.middle_s(pulse, rate_hz)
+        now = {"middle_s": middle_s, "light": self._daylight.at(middle_s, self.settings.exposure_us / 1e6)}
+        if self._motion.still:
+            return now
+        moved = self._motion.at(self.projection, middle_s)
+        return {**now, "X0": moved.X0.tolist(), "R": moved.R.tolist()}
+
+    def see(self, jump: Jump, pulse: HillPulse, rate_hz: float) -> tuple[dict[str, Any], dict[str, float]]:
+        """Pixel coordinates of the markers, and the share of each that is in sight."""
+        scene_s = self.settings.middle_s(pulse, rate_hz)
+        projection = self._motion.at(self.projection, scene_s)
+        pose = jump.pose(scene_s - jump.takeoff_s)
+        distance = float(projection.distance(pose.origin))
+        fronts = surroundings.fronts(self._scenario, self._people, projection, scene_s, distance)
+        shares = visible_shares(self._scenario, pose, projection, jump.number, fronts)
+        spots = {marker: _seen(projection, point) for marker, point in zip(MARKERS, pose.markers, strict=True)}
+        return spots, dict(zip(MARKERS, shares, strict=True))
 
 
 def angles(pose: Pose) -> Angles:
@@ -103,27 +155,59 @@ def ski_line(point: Floats, direction: Floats) -> SkiLine:
     return SkiLine(alpha, beta, float(point[2] - alpha * point[0]), float(point[1] - beta * point[0]))
 
 
-def _camera(projection: Projection) -> dict[str, Any]:
-    nothing = dict.fromkeys(("x0", "y0", "a1", "a2", "a3", "r0", "b1", "b2", "c1", "c2"), 0.0)
+def _camera(settings: SceneCamera, projection: Projection) -> dict[str, Any]:
+    lens = projection.lens or Lens(*[0.0] * 10)
     return {
         "size": [projection.width, projection.height],
         "c": projection.c,
-        **nothing,
+        **asdict(lens),
         "distortion": "projected",
         "X0": projection.X0.tolist(),
         "R": projection.R.tolist(),
+        "exposure_us": settings.exposure_us,
+        "late_ms": settings.late_ms,
     }
 
 
-def _pulse(jumps: JumpSeries, projections: dict[str, Projection], pulse: HillPulse, rate_hz: float) -> dict[str, Any]:
-    there = jumps.at_pulse(pulse, rate_hz)
-    state = {"pulse": pulse, "time_s": pulse / rate_hz, "jumper_present": there is not None}
-    return state if there is None else {**state, **_jumper(*there, projections)}
+def _pulse(
+    scenario: Scenario, jumps: JumpSeries, seers: dict[str, _Seer], pulse: HillPulse, rate_hz: float
+) -> dict[str, Any]:
+    time_s = pulse / rate_hz
+    state_s = time_s + float(np.mean([camera.exposure_us for camera in scenario.cameras])) / 2e6
+    moments = {name: seer.moment(pulse, rate_hz) for name, seer in seers.items()}
+    there = jumps.at(state_s)
+    state = {
+        "pulse": pulse,
+        "time_s": time_s,
+        "state_s": state_s,
+        "middle_s": {name: moment.pop("middle_s") for name, moment in moments.items()},
+        "light": {name: moment.pop("light") for name, moment in moments.items()},
+        "poses": {name: moment for name, moment in moments.items() if moment},
+        "jumper_present": there is not None,
+    }
+    if there is None:
+        return state
+    jump, since_s = there
+    seen = {name: seer.see(jump, pulse, rate_hz) for name, seer in seers.items()}
+    return {
+        **state,
+        **_jumper(scenario, jump, since_s),
+        "takeoff_s": jump.takeoff_s,
+        "takeoff_pulse": jump.takeoff_s * rate_hz,
+        "images": {name: spots for name, (spots, _) in seen.items()},
+        "visible": {name: shares for name, (_, shares) in seen.items()},
+        "in_sight": {
+            name: {marker: share >= IN_SIGHT for marker, share in shares.items()}
+            for name, (_, shares) in seen.items()
+        },
+    }  # fmt: skip
 
 
-def _jumper(jump: Jump, time_s: float, projections: dict[str, Projection]) -> dict[str, Any]:
+def _jumper(scenario: Scenario, jump: Jump, time_s: float) -> dict[str, Any]:
     pose = jump.pose(time_s)
     velocity = jump.velocity(time_s)
+    joints = body.joints(pose, scenario.jumper.ski_length_m / 2)
+    alone, together = centre_of_mass(joints, scenario.jumper)
     skis = zip(("right", "left"), pose.markers[2:], pose.skis, strict=True)
     return {
         "jump": jump.number,
@@ -139,11 +223,18 @@ def _jumper(jump: Jump, time_s: float, projections: dict[str, Projection]) -> di
         "height": float(pose.origin[2]),
         "velocity": velocity.tolist(),
         "speed": float(np.linalg.norm(velocity)),
-        "images": {
-            name: {marker: _seen(p, point) for marker, point in zip(MARKERS, pose.markers, strict=True)}
-            for name, p in projections.items()
-        },
+        "landmarks": {name: place.tolist() for name, place in landmarks(joints).items()},
+        "centre_of_mass": {"body": alone.tolist(), "with_equipment": together.tolist()},
     }
+
+
+def _ball_share(scenario: Scenario, ball: Ball, projection: Projection) -> float:
+    """Share of a ball's height that is in sight of a camera as it was set up."""
+    spot = projection.pixels(ball.X)
+    hidden = any(bool(inside(shape, spot[None])[0]) for shape in surroundings.tower_outlines(scenario, projection))
+    if ball.gone or hidden or _seen(projection, np.array(ball.X)) is None:
+        return 0.0
+    return 1.0 - ball.covered
 
 
 def _seen(projection: Projection, point: Floats) -> list[float] | None:

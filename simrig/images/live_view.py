@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from rig.pulse import HillPulse
 from simrig.images import exposure
-from simrig.images.background import paint
-from simrig.images.balls import Balls
-from simrig.images.drawing import Image
-from simrig.images.figure import Figure
-from simrig.images.light import Reflections, glare
+from simrig.images.scene.background import paint
+from simrig.images.scene.balls import Balls
+from simrig.images.scene.drawing import Image
+from simrig.images.scene.figure import Figure
+from simrig.images.scene.light import Reflections, glare
+from simrig.images.scene.surroundings import Around
+from simrig.images.scene.weather import LENS_SNOW, DenseSnow, lens_snow
 from simrig.images.sensor import Sensor
-from simrig.images.surroundings import Around
-from simrig.images.weather import LENS_SNOW, DenseSnow, lens_snow
-from simrig.world.camera_motion import CameraMotion
-from simrig.world.daylight import Daylight
+from simrig.world.conditions.camera_motion import CameraMotion
+from simrig.world.conditions.daylight import Daylight
 from simrig.world.jumper import JumpSeries
 from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, Scenario

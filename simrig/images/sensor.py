@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.pulse import HillPulse
-from simrig.images.drawing import Image
+from simrig.images.scene.drawing import Image
 from simrig.world.scenario import ImageEffects
 
 _KEY = struct.Struct(">IBQ")

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from rig.pulse import HillPulse
 from simrig.images import exposure
-from simrig.images.background import paint
-from simrig.images.balls import Balls
-from simrig.images.figure import Figure
+from simrig.images.scene.background import paint
+from simrig.images.scene.balls import Balls
+from simrig.images.scene.figure import Figure
 from simrig.world.jumper import JumpSeries
 from simrig.world.scenario import BRIGHTEST, Scenario
 

@@ -7,7 +7,7 @@ from rig.pulse import HillPulse
 from simrig.images import stamp
 from simrig.images.live_view import LiveView
 from simrig.images.still_view import StillView
-from simrig.world.camera_motion import CameraMotion
+from simrig.world.conditions.camera_motion import CameraMotion
 from simrig.world.scenario import REFERENCE_WIDTH, Scenario
 
 _FLAKE_HALF = 3  #: a flake is drawn in a square of 2 * 3 + 1 px

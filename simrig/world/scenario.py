@@ -17,7 +17,16 @@ from rig.errors import BadInputError
 from rig.pulse import HillPulse
 from rig.settings.strict_toml import read_toml, validate
 from rig.viewing import look_at
-from simrig.world.effects import FiniteModel, LensErrors, Light, MissingMarker, Move, Surroundings, Vector, Weather
+from simrig.world.conditions.effects import (
+    FiniteModel,
+    LensErrors,
+    Light,
+    MissingMarker,
+    Move,
+    Surroundings,
+    Vector,
+    Weather,
+)
 from simrig.world.faults import Fault
 from simrig.world.keyframes import Keyframes
 from simrig.world.projection import Lens, Projection

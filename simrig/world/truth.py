@@ -30,14 +30,15 @@ import numpy as np
 
 from rig.arrays import Floats
 from rig.pulse import HillPulse
-from simrig.world import body, surroundings
-from simrig.world.camera_motion import CameraMotion
-from simrig.world.daylight import Daylight
+from simrig.world.conditions import surroundings
+from simrig.world.conditions.camera_motion import CameraMotion
+from simrig.world.conditions.daylight import Daylight
+from simrig.world.figure import body
+from simrig.world.figure.mass import centre_of_mass, landmarks
+from simrig.world.figure.sight import IN_SIGHT, inside, visible_shares
 from simrig.world.jumper import FLIGHT_X_M, Jump, JumpSeries, Pose
-from simrig.world.mass import centre_of_mass, landmarks
 from simrig.world.projection import Lens, Projection
 from simrig.world.scenario import Ball, Scenario, SceneCamera
-from simrig.world.sight import IN_SIGHT, inside, visible_shares
 
 FORMAT = "svev-truth/1"
 MARKERS = ("P1", "P2", "P3", "P4")

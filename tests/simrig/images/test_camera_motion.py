@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.pulse import HillPulse
-from simrig.world.camera_motion import CameraMotion
+from simrig.world.conditions.camera_motion import CameraMotion
 from simrig.world.scenario import Scenario
 from simrig.world.truth import truth
 from tests.simrig.images.measuring import centroid

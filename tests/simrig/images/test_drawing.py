@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from simrig.images.drawing import Blob, Canvas, stroke
+from simrig.images.scene.drawing import Blob, Canvas, stroke
 from simrig.images.view import Snowfall
 from tests.simrig.images.measuring import centroid
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from simrig.world.daylight import Daylight
-from simrig.world.effects import Light
+from simrig.world.conditions.daylight import Daylight
+from simrig.world.conditions.effects import Light
 from simrig.world.scenario import Scenario
 from tests.simrig.images.scenes import Renderer, with_keys
 

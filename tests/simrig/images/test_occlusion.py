@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from simrig.world.figure.sight import IN_SIGHT, visible_shares
 from simrig.world.jumper import JumpSeries
 from simrig.world.scenario import Scenario
-from simrig.world.sight import IN_SIGHT, visible_shares
 from tests.simrig.images.measuring import centroid
 from tests.simrig.images.scenes import RATE_HZ, Renderer, with_keys
 

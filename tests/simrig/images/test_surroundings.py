@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from rig.pulse import HillPulse
-from simrig.world import surroundings
+from simrig.world.conditions import surroundings
 from simrig.world.scenario import Scenario
 from simrig.world.truth import truth
 from tests.simrig.images.measuring import centroid

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from rig.pulse import HillPulse
 from simrig.images import stamp
-from simrig.images.balls import PLATE_MARGIN_PX
+from simrig.images.scene.balls import PLATE_MARGIN_PX
 from simrig.images.view import CameraView
 from simrig.world.scenario import Scenario
 from simrig.world.truth import truth

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from simrig.images.drawing import Image
-from simrig.images.weather import DenseSnow, lens_snow
+from simrig.images.scene.drawing import Image
+from simrig.images.scene.weather import DenseSnow, lens_snow
 from simrig.world.scenario import Scenario
 from tests.simrig.images.scenes import Renderer, with_keys
 

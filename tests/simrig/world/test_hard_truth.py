@@ -8,8 +8,8 @@ import pytest
 
 from rig.pulse import HillPulse
 from rig.settings.file import CONFIG
+from simrig.world.figure.mass import LANDMARKS
 from simrig.world.jumper import JumpSeries
-from simrig.world.mass import LANDMARKS
 from simrig.world.scenario import Scenario, load_scenario
 from simrig.world.truth import truth
 from tests.simrig.images.scenes import with_keys

@@ -21,7 +21,7 @@ _TRUNK_CENTRE = 0.4486
 
 
 def landmarks(joints: Floats) -> dict[str, Floats]:
-    """Landmarks, m, shape (3,) each, by name ("right shoulder", ...), of the joints of `simrig.world.body`."""
+    """Landmarks, m, shape (3,) each, by name ("right shoulder", ...), of the joints of `simrig.world.figure.body`."""
     found: dict[str, Floats] = {}
     for i, side in enumerate(("right", "left")):
         _, _, ankle, knee, hip, shoulder, hand = joints[5 + 7 * i : 12 + 7 * i]

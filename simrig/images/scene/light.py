@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simrig.images.drawing import Blob, Image
+from simrig.images.scene.drawing import Blob, Image
 from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, Scenario
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.arrays import Floats
-from simrig.images.drawing import Blob, Image, stroke
+from simrig.images.scene.drawing import Blob, Image, stroke
 from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, Ball, Scenario
 

@@ -5,13 +5,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from rig.arrays import Floats
-from simrig.images.drawing import Image, cut, fill, stroke
-from simrig.world import surroundings
-from simrig.world.body import Part, outlines
-from simrig.world.effects import Tower
+from simrig.images.scene.drawing import Image, cut, fill, stroke
+from simrig.world.conditions import surroundings
+from simrig.world.conditions.effects import Tower
+from simrig.world.conditions.surroundings import Swaying
+from simrig.world.figure.body import Part, outlines
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario
-from simrig.world.surroundings import Swaying
 
 _NEAREST_M = 2.0
 _TIERS = 4

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from rig.arrays import Flags, Floats
-from simrig.world import body
-from simrig.world.body import Ordered, Part
+from simrig.world.figure import body
+from simrig.world.figure.body import Ordered, Part
 from simrig.world.jumper import Pose
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario

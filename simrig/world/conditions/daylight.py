@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simrig.world.effects import Light
+from simrig.world.conditions.effects import Light
 
 _PERIODS = (1.0, 0.63, 0.41)  #: of the waves that clouds are made of, in periods of the scenario
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.images.drawing import Image
+from simrig.images.scene.drawing import Image
 from simrig.world.scenario import REFERENCE_WIDTH
 
 _FLAKE = 205.0  #: radiance

@@ -10,11 +10,11 @@ from itertools import product
 import numpy as np
 
 from rig.arrays import Floats
-from simrig.world.body import Part
-from simrig.world.effects import Tower
+from simrig.world.conditions.effects import Tower
+from simrig.world.figure.body import Part
+from simrig.world.figure.sight import Front, outline
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario
-from simrig.world.sight import Front, outline
 
 FLIGHT_MIDDLE = (10.0, 0.0, -1.8)
 _NEAREST_M = 2.0

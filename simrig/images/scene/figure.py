@@ -1,8 +1,8 @@
 """Draws the jumper: shaded capsules for the limbs, thin ones for the skis, markers on patches.
 
 Without occlusion, patches and markers are drawn last, so that no limb hides one and every marker can be measured in
-every camera. With occlusion, everything is drawn from far to near (`simrig.world.body`). The patches are large enough
-for a uniform local background.
+every camera. With occlusion, everything is drawn from far to near (`simrig.world.figure.body`). The patches are large
+enough for a uniform local background.
 """
 
 import math
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.arrays import Floats
-from simrig.images.drawing import Blob, Image, stroke
-from simrig.world import body
-from simrig.world.body import BOOT, FACE, GLOVE, SKI_RADIUS_M, Part
+from simrig.images.scene.drawing import Blob, Image, stroke
+from simrig.world.figure import body
+from simrig.world.figure.body import BOOT, FACE, GLOVE, SKI_RADIUS_M, Part
 from simrig.world.jumper import Pose
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.arrays import Floats
-from simrig.images.balls import put_poles
-from simrig.images.drawing import Canvas, Image
+from simrig.images.scene.balls import put_poles
+from simrig.images.scene.drawing import Canvas, Image
 from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, REFERENCE_WIDTH, Scenario
 

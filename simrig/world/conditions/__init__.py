@@ -1,0 +1,1 @@
+"""What makes images harder to measure: light, surroundings, cameras that move; and the tables of a scenario for it."""

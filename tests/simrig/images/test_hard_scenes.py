@@ -65,7 +65,6 @@ def test_the_hard_day_is_the_training_session_otherwise(hard: Scenario, training
     assert [ball.X for ball in hard.balls] == [ball.X for ball in training.balls]
     assert [camera.X0 for camera in hard.cameras] == [camera.X0 for camera in training.cameras]
     assert hard.jumper.takeoff_speed_m_s == training.jumper.takeoff_speed_m_s
-    assert not hard.stamp
 
 
 def ring(calm: Scenario, count: int) -> Scenario:

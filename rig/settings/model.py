@@ -5,7 +5,7 @@
 
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -13,6 +13,10 @@ from rig.settings.strict_toml import StrictModel
 from rig.topics import DEFAULT_PUBLISH
 
 Backend = Literal["aravis", "iidc", "sim", "replay"]
+
+
+#: Less than a chunk of a log holds (`recorder.log.mcap_layout.CHUNK_MAX`), with room for the tag.
+_TRIPLET_BYTES_MAX: Final = 255 << 20
 
 
 class Region(StrictModel):
@@ -187,6 +191,16 @@ class RigSettings(StrictModel):
             raise ValueError("cameras differ in region.height: frames stand side by side, so make the heights equal")
         if self.simulation is None and any(camera.backend == "sim" for camera in self.cameras):
             raise ValueError('backend "sim" needs a [simulation] table: add scenario = "../scenarios/training.toml"')
+        return self
+
+    @model_validator(mode="after")
+    def _triplets_fit_into_a_log(self) -> "RigSettings":
+        rows, columns = self.triplet_shape
+        if rows * columns > _TRIPLET_BYTES_MAX:
+            raise ValueError(
+                f"a triplet of {columns} x {rows} px: a log takes 256 MB per pulse at most; make the cameras' regions "
+                "smaller"
+            )
         return self
 
     @model_validator(mode="after")

@@ -81,7 +81,7 @@ def test_a_library_that_the_rig_needs_fails_and_another_is_a_warning(monkeypatch
 
 def test_buffers_that_do_not_fit_fail() -> None:
     assert [finding.level for finding in machine.look_at_memory(SIM)] == [Level.PASS]
-    huge = SIM.cameras[0].region.model_copy(update={"width": 16384, "height": 16384})
+    huge = SIM.cameras[0].region.model_copy(update={"width": 4096, "height": 8000})
     camera = SIM.cameras[0].model_copy(update={"region": huge})
     large = SIM.model_copy(
         update={

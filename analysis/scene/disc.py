@@ -1,0 +1,233 @@
+"""Fits a blurred disc to grey values: centre with covariance, radius, contrast. For balls and for the jumper's markers.
+
+The image of a uniform disc of radius R through a lens (a Gaussian of standard deviation s, which integration over a
+pixel widens by 1/12 px^2) is the noncentral chi-squared distribution with two degrees of freedom:
+
+    cover(r) = P(|N((r, 0), s^2 I)| <= R).
+
+A small ellipse is the same in stretched coordinates. The fit is weighted least squares of ten unknowns: centre, log R,
+log s, two of stretch, contrast, and a plane as background. Signalised features should be spherical so that their centre
+of gravity can be found (paper, section 3); the model is symmetric, so the errors of its shape do not move the centre.
+
+The sigma of the centre is that of the adjustment a posteriori: the residuals around this very disc tell how large the
+noise is there, whatever made it (sensor, texture, compression).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chndtr, erfc, ive
+
+from rig.arrays import Floats
+
+_UNKNOWNS = 10
+_MARGIN = 3.6  # px beyond the disc that are fitted
+_WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one that is approximate more is needed
+_SHARP = 8.0  # R / s: from there on the border is that of a half plane, with the curvature's first term
+_BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and blur of a small disc go together
+_STRETCH_SPREAD = 0.2  # weak prior of the stretch
+_STEPS, _ENOUGH = 25, 1e-4  # iterations, px
+_POOR_START = 0.4  # residuals over contrast, before the first step
+_RADII = (0.75, 1.0, 1.33)  # times the approximate radius, to start from
+_LARGEST_STEP = 0.5  # of log R, log s and stretch
+_SMALLEST_SIGMA = 5e-4  # px
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disc:
+    """A fitted disc; pixel frame.
+
+    Attributes:
+        xy: (2,) centre, px.
+        covariance: (2, 2) of the centre, px^2, a posteriori.
+        radius: of the disc before the blur, px: geometric mean of both axes.
+        blur: standard deviation of the blur, px.
+        stretch: log of the ratio of the axes, >= 0.
+        contrast: grey value of the disc minus background; negative: dark.
+        rms: root mean square of the residuals, grey values.
+        factor: a-posteriori / a-priori standard deviation.
+    """
+
+    xy: Floats
+    covariance: Floats
+    radius: float
+    blur: float
+    stretch: float
+    contrast: float
+    rms: float
+    factor: float
+
+    @property
+    def sigma(self) -> Floats:
+        """(2,) standard deviations of x and y, px."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+
+def fit_disc(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None = None) -> Disc | None:
+    """Fit a disc near a place.
+
+    Args:
+        grey: (rows, columns) image.
+        sigma: (rows, columns) standard deviations of its grey values; their scale does not matter.
+        xy: (2,) approximate centre, px.
+        radius: approximate radius, px.
+        mask: (rows, columns) where the image may be used; everywhere if left out.
+
+    Returns:
+        The disc; None if nothing there is one: no convergence, it leaves the place, or the image ends.
+    """
+    theta = np.array([xy[0], xy[1], np.log(max(radius, 0.7)), np.log(_BLUR), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    window = None
+    for again in range(2):  # the second time with a window of the radius that was found
+        window = _window(grey, sigma, theta[:2], float(np.exp(theta[2])), mask)
+        if window is None:
+            return None
+        start = _started(theta, window, _RADII if not again else (1.0,))
+        fitted = None if start is None else _fitted(start, *window)
+        if fitted is None or np.hypot(*(fitted[:2] - xy)) > max(1.5, radius):
+            return None
+        wider = abs(fitted[2] - theta[2]) > 0.15
+        theta = fitted
+        if not wider or again:
+            break
+    return None if window is None else _result(theta, *window)
+
+
+def cover(r: Floats, radius: float, blur: float) -> tuple[Floats, Floats, Floats]:
+    """Blurred disc at distances r (n,): value, derivative by r, derivative by the radius."""
+    if radius / blur > _SHARP:
+        u = (r - radius + blur**2 / (2 * radius)) / blur
+        edge = np.exp(-0.5 * u**2) / (np.sqrt(2 * np.pi) * blur)
+        return np.asarray(0.5 * erfc(u / np.sqrt(2))), -edge, edge
+    a, b = r / blur, radius / blur
+    value = chndtr(b * b, 2.0, a * a)
+    common = (b / blur) * np.exp(-0.5 * (a - b) ** 2)
+    return np.asarray(value), np.asarray(-common * ive(1, a * b)), np.asarray(common * ive(0, a * b))
+
+
+_Window = tuple[Floats, Floats, Floats]
+
+
+def _window(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None) -> _Window | None:
+    """Places (n, 2), grey values (n,) and sigmas (n,) around a disc; None if too much of it is outside."""
+    reach = max(radius + _MARGIN, _WIDER * radius + _MARGIN_OF_WIDER)
+    rows, columns = grey.shape
+    left, right = int(np.ceil(xy[0] - reach)), int(np.floor(xy[0] + reach))
+    top, bottom = int(np.ceil(xy[1] - reach)), int(np.floor(xy[1] + reach))
+    if not (radius < xy[0] < columns - 1 - radius and radius < xy[1] < rows - 1 - radius):
+        return None
+    y, x = np.mgrid[max(0, top) : min(rows, bottom + 1), max(0, left) : min(columns, right + 1)]
+    inside = (x - xy[0]) ** 2 + (y - xy[1]) ** 2 <= reach**2
+    if mask is not None:
+        inside &= mask[y, x] > 0
+    y, x = y[inside], x[inside]
+    if len(x) < 2 * _UNKNOWNS:
+        return None
+    return np.column_stack((x, y)).astype(float), grey[y, x].astype(float), sigma[y, x].astype(float)
+
+
+def _started(theta: Floats, window: _Window, factors: tuple[float, ...]) -> Floats | None:
+    """Start values with the best of some radii; None if no disc is near: no fit would mend such residuals."""
+    best, least = None, np.inf
+    for factor in factors:
+        start = theta.copy()
+        start[2] += np.log(factor)
+        start[6:] = _linear(start, *window)
+        _, grey, sigma = window
+        v = (grey - _model(start, window[0])[0]) / sigma
+        misfit = float(np.sqrt(np.mean(v**2)) * np.median(sigma))
+        if misfit < least:
+            best, least = start, misfit
+    return None if best is None or least > _POOR_START * abs(float(best[6])) else best
+
+
+def _linear(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Floats:
+    """Contrast and background for the other unknowns."""
+    design = _model(theta, places)[1][:, 6:]
+    return np.asarray(np.linalg.lstsq(design / sigma[:, None], grey / sigma, rcond=None)[0], float)
+
+
+def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Floats | None:
+    """Levenberg-Marquardt; None if it does not converge."""
+    damping, cost = 1e-3, np.inf
+    normal, gradient = np.eye(_UNKNOWNS), np.zeros(_UNKNOWNS)
+    best = theta
+    for _ in range(_STEPS):
+        new_cost, new_normal, new_gradient = _normal_equations(theta, places, grey, sigma)
+        if new_cost <= cost:
+            gain = cost - new_cost
+            best, cost, normal, gradient, damping = theta, new_cost, new_normal, new_gradient, damping / 8
+            if gain < 1e-6 * cost:
+                return best
+        else:
+            damping *= 10
+            if damping > 1e8:
+                return best
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), gradient)
+        step[2:6] = np.clip(step[2:6], -_LARGEST_STEP, _LARGEST_STEP)
+        if not np.isfinite(step).all():
+            return None
+        theta = best + step
+        if np.abs(step[:2]).max() < _ENOUGH and np.abs(step[2:6]).max() < 1e-3:
+            return theta
+        if not (np.log(0.2) < theta[2] < np.log(40) and np.log(0.15) < theta[3] < np.log(8)):
+            return None
+    return None
+
+
+def _normal_equations(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> tuple[float, Floats, Floats]:
+    """Cost, normal matrix and right-hand side, priors included."""
+    value, design = _model(theta, places)
+    v, j = (grey - value) / sigma, design / sigma[:, None]
+    normal, gradient, cost = j.T @ j, j.T @ v, float(v @ v)
+    for i, mean, spread in ((3, np.log(_BLUR), _BLUR_SPREAD), (4, 0.0, _STRETCH_SPREAD), (5, 0.0, _STRETCH_SPREAD)):
+        off = mean - theta[i]
+        normal[i, i] += spread**-2
+        gradient[i] += off / spread**2
+        cost += (off / spread) ** 2
+    return cost, normal, gradient
+
+
+def _model(theta: Floats, places: Floats) -> tuple[Floats, Floats]:
+    """Grey values (n,) and their derivatives (n, 10)."""
+    x, y, log_r, log_s, p, q, contrast, *plane = theta
+    radius, blur = float(np.exp(log_r)), float(np.exp(log_s))
+    dx, dy = places[:, 0] - x, places[:, 1] - y
+    # stretched coordinates (I + [[p, q], [q, -p]]) d
+    u, w = (1 + p) * dx + q * dy, q * dx + (1 - p) * dy
+    r = np.sqrt(u * u + w * w) + 1e-9
+    value, by_r, by_radius = cover(r, radius, blur)
+    nu, nw = u / r, w / r
+    design = np.empty((len(r), _UNKNOWNS))
+    design[:, 0] = -by_r * (nu * (1 + p) + nw * q)
+    design[:, 1] = -by_r * (nu * q + nw * (1 - p))
+    design[:, 2] = by_radius * radius
+    design[:, 3] = -(r * by_r + radius * by_radius)  # the cover depends on the ratios of r, R and s alone
+    design[:, 4] = by_r * (nu * dx - nw * dy)
+    design[:, 5] = by_r * (nu * dy + nw * dx)
+    design[:, :6] *= contrast
+    design[:, 6] = value
+    design[:, 7] = 1.0
+    design[:, 8], design[:, 9] = dx, dy
+    # the plane hangs on the centre, whose derivative it therefore has too
+    design[:, 0] -= plane[1]
+    design[:, 1] -= plane[2]
+    return contrast * value + plane[0] + plane[1] * dx + plane[2] * dy, design
+
+
+def _result(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Disc | None:
+    _, normal, _ = _normal_equations(theta, places, grey, sigma)
+    value, _ = _model(theta, places)
+    v = (grey - value) / sigma
+    factor = float(np.sqrt(v @ v / (len(v) - _UNKNOWNS)))
+    try:
+        covariance = np.linalg.inv(normal)[:2, :2] * factor**2
+    except np.linalg.LinAlgError:
+        return None
+    if not (np.isfinite(covariance).all() and (np.diagonal(covariance) > 0).all()):
+        return None
+    covariance = covariance + _SMALLEST_SIGMA**2 * np.eye(2)
+    stretch = 2 * float(np.arctanh(min(0.99, float(np.hypot(theta[4], theta[5])))))
+    rms = float(np.sqrt(np.mean((grey - value) ** 2)))
+    shape = float(np.exp(theta[2])), float(np.exp(theta[3])), stretch
+    return Disc(theta[:2].copy(), covariance, *shape, float(theta[6]), rms, factor)

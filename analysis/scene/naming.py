@@ -1,0 +1,247 @@
+"""Names the balls in one image from the survey's coordinates and the interior orientation alone, and orients the image.
+
+Hypotheses (`analysis.scene.hypotheses`) are refined by least squares with all covariances, and every other surveyed
+ball is looked for where the pose puts it, within a chi-squared gate. A hypothesis is believed if chance would not have
+made it: the sum over the balls of log10(probability density of the residual / density of detections in the image), less
+that of the number of hypotheses that were possible, must exceed a limit. The three balls that agree best do not
+count, because three points fit some pose always. The best hypothesis must also be clearly better than any other that
+puts the camera elsewhere; otherwise naming is refused.
+
+The same as the paper's step 2A (resection from reference points), where a person had named the points.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb, log, log10, pi
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2
+
+from analysis.scene.hypotheses import Approximate, Hypothesis, Search, spread_triples
+from analysis.scene.single_pose import SinglePose, fit_pose, predict
+from analysis.scene.survey import KnownPoints
+from photogrammetry.geometry.camera_model import undistort
+from photogrammetry.network.model import Camera
+from rig.arrays import Floats, Integers
+from rig.errors import BadInputError
+
+GATE: Final = float(chi2.ppf(0.999, 2))
+MODEL_SIGMA: Final = 0.1  #: px; what the interior orientation and the balls' shape may leave out
+FEWEST: Final = 4  #: balls of an image
+_TIERS = ((14, 8), (26, 24), (60, 14))  # detections, the best ones, and triples of balls tried on them
+_BELIEVED = 3.0  # decades by which chance is ruled out
+_CLEARLY = 2.0  # decades by which the second best is worse
+_OVERWHELMING = 12.0  # decades: such a hypothesis ends the search after a few more triples
+_MORE = 4  # triples, in search of a rival
+_ROUNDS = 8
+_RIVALS = 6  # namings that are kept
+_SAME_PLACE = 5.0  # sigmas between the projection centres of two namings that are one
+_SAME_IMAGE = 0.01  # of the image's width, by which the balls move between them
+_DISTANCE_SIGMA, _ANGLE_SIGMA = 0.05, 0.02  # of the distance; rad: with larger ones the balls do not fix the pose
+
+
+class NotNamedError(BadInputError):
+    """The balls of an image cannot be named; the message says why, without the camera's name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spots:
+    """Detections in the metric frame (x right, y up, origin at the image centre).
+
+    Attributes:
+        xy: (n, 2), best first.
+        covariance: (n, 2, 2).
+    """
+
+    xy: Floats
+    covariance: Floats
+
+    def __len__(self) -> int:
+        return len(self.xy)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Naming:
+    """Named balls of one image.
+
+    Attributes:
+        pose: from these balls.
+        points: (k,) indices of the known points.
+        spots: (k,) of the detections.
+        expected: number of known points that should be in sight.
+        decades: by which chance is ruled out, apart from the number of hypotheses.
+    """
+
+    pose: SinglePose
+    points: Integers
+    spots: Integers
+    expected: int
+    decades: float
+
+
+def name_balls(camera: Camera, spots: Spots, known: KnownPoints, approximate: Approximate | None = None) -> Naming:
+    """Find out which detection is which ball.
+
+    Args:
+        camera: with its size.
+        spots: what was detected, best first.
+        known: surveyed balls.
+        approximate: limits the search, and makes it faster.
+
+    Raises:
+        NotNamedError: too few detections, known points on a line, no convincing hypothesis, or several.
+        BadInputError: the camera has no size.
+    """
+    if camera.size is None:
+        raise BadInputError(f'camera {camera.name}: key "size" is missing; give [width, height]')
+    if len(spots) < FEWEST:
+        raise NotNamedError(f"{len(spots)} balls found, at least {FEWEST} are needed; clear or light more balls")
+    if not spread_triples(known.xyz, 1):
+        raise NotNamedError("the surveyed balls lie on a line: survey one beside it")
+    return _Image(camera, camera.size, spots, known).named(approximate)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Image:
+    """One image, its detections, and the known points."""
+
+    camera: Camera
+    size: tuple[int, int]
+    spots: Spots
+    known: KnownPoints
+
+    def named(self, approximate: Approximate | None) -> Naming:
+        """Try hypotheses with the best detections first, then with more of them."""
+        ideal = undistort(self.camera.lens(), self.spots.xy)
+        ideal = np.where(np.isfinite(ideal), ideal, self.spots.xy - self.camera.interior[1:3])
+        search = Search(self.known.xyz, ideal, float(self.camera.interior[0]), self.size, approximate)
+        found: list[Naming] = []
+        for most, triples in _TIERS:
+            found = self._tried(search, most, triples, found)
+            if (found and found[0].decades - self._chances(search) > _BELIEVED) or most >= len(self.spots):
+                break
+        return self._judged(found, self._chances(search))
+
+    def _tried(self, search: Search, most: int, triples: int, found: list[Naming]) -> list[Naming]:
+        """The best distinct namings after more triples of balls; an overwhelming one ends the search soon."""
+        left = triples
+        for triple in spread_triples(self.known.xyz, triples):
+            refined = [self._refined(hypothesis) for hypothesis in search.of_triple(triple, most)]
+            found = self._distinct([*found, *(naming for naming in refined if naming)])
+            if found and found[0].decades - self._chances(search) > _OVERWHELMING:
+                left = min(left, _MORE + 1)
+            left -= 1
+            if left <= 0:
+                break
+        return found
+
+    def _chances(self, search: Search) -> float:
+        """Decades of the number of poses that an exhaustive search would compare."""
+        per_triple = max(1.0, search.tried / max(1, search.triples))
+        return log10(per_triple) + log10(comb(len(self.known.names), 3))
+
+    def _refined(self, start: Hypothesis) -> Naming | None:
+        """Fit the pose and look for all balls again, until the same ones are found; None if it falls apart."""
+        points, hits = start.points, start.detections
+        pose: SinglePose | None = SinglePose(start.position, start.rotation, np.zeros((6, 6)))
+        for _ in range(_ROUNDS):
+            pose = self._fitted(pose, points, hits) if pose is not None and len(points) >= FEWEST else None
+            if pose is None:
+                return None
+            before = points, hits
+            points, hits = self._matched(pose)
+            if np.array_equal(points, before[0]) and np.array_equal(hits, before[1]):
+                break
+        return self._weighed(pose, points, hits) if pose is not None and len(points) >= FEWEST else None
+
+    def _fitted(self, pose: SinglePose, points: Integers, hits: Integers) -> SinglePose | None:
+        xyz, covariance = self.known.xyz[points], self.known.covariance[points]
+        return fit_pose(self.camera.lens(), pose, xyz, covariance, self.spots.xy[hits], self._covariance()[hits])
+
+    def _covariance(self) -> Floats:
+        """(n, 2, 2) of the detections with what the model leaves out."""
+        return self.spots.covariance + MODEL_SIGMA**2 * np.eye(2)
+
+    def _matched(self, pose: SinglePose) -> tuple[Integers, Integers]:
+        """Known points and the detections on which they fall: mutually nearest, and within the gate."""
+        xy, from_point, from_pose = predict(self.camera.lens(), pose, self.known.xyz, self.known.covariance)
+        sight = np.flatnonzero(np.isfinite(xy).all(axis=1))
+        if not len(sight):
+            return sight, sight
+        off = self.spots.xy[None] - xy[sight, None]
+        total = (from_point + from_pose)[sight, None] + self._covariance()[None]
+        squares = np.einsum("pdi,pdij,pdj->pd", off, np.linalg.inv(total), off)
+        nearest, back = squares.argmin(axis=1), squares.argmin(axis=0)
+        rows = np.arange(len(sight))
+        good = (back[nearest] == rows) & (squares[rows, nearest] < GATE)
+        return sight[good], nearest[good]
+
+    def _weighed(self, pose: SinglePose, points: Integers, hits: Integers) -> Naming | None:
+        """The naming with its evidence."""
+        fitted = self._fitted(pose, points, hits)
+        if fitted is None:
+            return None
+        xy, from_point, _ = predict(self.camera.lens(), fitted, self.known.xyz, self.known.covariance)
+        off = self.spots.xy[hits] - xy[points]
+        if not np.isfinite(off).all():
+            return None
+        total = from_point[points] + self._covariance()[hits]
+        squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(total), off)
+        density = len(self.spots) / (self.size[0] * self.size[1])
+        gain = -np.log10(2 * pi * density * np.sqrt(np.linalg.det(total))) - squares / (2 * log(10))
+        expected = int((np.abs(xy) < np.array(self.size) / 2).all(axis=1).sum())
+        ways = comb(max(expected, len(points)) - 3, len(points) - 3)
+        decades = float(np.sort(gain)[:-3].sum()) - log10(ways)
+        return Naming(fitted, points, hits, expected, decades)
+
+    def _distinct(self, namings: Sequence[Naming]) -> list[Naming]:
+        """The best naming of each pose, best first, and not many of them."""
+        kept: list[Naming] = []
+        for naming in sorted(namings, key=lambda n: -n.decades):
+            if not any(self._same_pose(naming, other) for other in kept):
+                kept.append(naming)
+        return kept[:_RIVALS]
+
+    def _same_pose(self, one: Naming, other: Naming) -> bool:
+        """Whether both put the camera at one place: then the balls move little, and so does the camera."""
+        apart = float(np.linalg.norm(one.pose.position - other.pose.position))
+        sigma = np.sqrt(np.trace(one.pose.covariance[:3, :3]) + np.trace(other.pose.covariance[:3, :3]))
+        if apart > _SAME_PLACE * sigma:
+            return False
+        xy, other_xy = (
+            predict(self.camera.lens(), naming.pose, self.known.xyz, self.known.covariance)[0]
+            for naming in (one, other)
+        )
+        off = np.linalg.norm(xy - other_xy, axis=1)
+        return bool(np.isfinite(off).any() and np.nanmedian(off) < _SAME_IMAGE * self.size[0])
+
+    def _judged(self, found: Sequence[Naming], chances: float) -> Naming:
+        """The best hypothesis, if it is convincing, alone and determined."""
+        n, spots = len(self.known.names), f"{len(self.spots)} round spots found"
+        if not found or found[0].decades - chances < _BELIEVED:
+            best = f"at best {len(found[0].points)} by some pose, which may be chance" if found else "none by any pose"
+            raise NotNamedError(
+                f"{spots}, which do not fit the {n} surveyed balls ({best}); check survey and interior orientation, "
+                "clear the balls, or give an approximate pose"
+            )
+        best_one = found[0]
+        if len(found) > 1 and found[1].decades > best_one.decades - _CLEARLY:
+            raise NotNamedError(
+                f"{spots}, which fit the surveyed balls in two ways ({len(best_one.points)} and "
+                f"{len(found[1].points)} balls, X0 {_words(best_one)} and {_words(found[1])}), so names are ambiguous; "
+                "show more balls, or give an approximate pose"
+            )
+        centre = self.known.xyz[best_one.points].mean(axis=0)
+        distance = float(np.linalg.norm(best_one.pose.position - centre))
+        sigma = np.sqrt(np.diagonal(best_one.pose.covariance))
+        if sigma[:3].max() > _DISTANCE_SIGMA * distance or sigma[3:].max() > _ANGLE_SIGMA:
+            raise NotNamedError(
+                f"the {len(best_one.points)} balls named do not fix the pose, because they lie nearly on a line; "
+                "show balls beside it"
+            )
+        return best_one
+
+
+def _words(naming: Naming) -> str:
+    return "(" + ", ".join(f"{value:.1f}" for value in naming.pose.position) + ")"

@@ -1,0 +1,259 @@
+"""Orients the cameras of a log from the balls in its own images and the survey: the paper's step 2, without a hand.
+
+Static images, detection, names by geometry, tie balls, then the network with all measurements and the three stages of
+the search for gross errors (`photogrammetry.procedures.orientation`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import radians
+from pathlib import Path
+
+import numpy as np
+
+from analysis.scene.detection import detect_balls
+from analysis.scene.hypotheses import Approximate
+from analysis.scene.measured_network import View, measured_network
+from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
+from analysis.scene.static_image import StaticImage, static_images
+from analysis.scene.survey import KnownPoints, Survey
+from analysis.scene.ties import Station, Tie, ball_size, find_ties
+from photogrammetry.network.file import pixel_to_metric
+from photogrammetry.network.model import Camera, Image, Network, Role
+from photogrammetry.procedures.orientation import Orientation, orient
+from rig.arrays import Floats
+from rig.errors import BadInputError
+
+_FEWEST_CAMERAS = 2
+#: How far off an approximate pose may be that says nothing about it: part of the distance to the balls, and an angle.
+_OFF_DISTANCE, _OFF_ANGLE = 0.15, radians(12.0)
+_SIGMAS = 4.0  # of an approximate pose that says how good it is
+_MIRROR = np.array([1.0, -1.0])  # pixel frame to metric frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OrientedCamera:
+    """The pose of a camera.
+
+    Attributes:
+        name: of the camera.
+        position: (3,) X0.
+        rotation: (3, 3), columns are the camera's axes.
+        covariance: (6, 6) a posteriori, of X0 and of turns about the camera's own axes (rad).
+    """
+
+    name: str
+    position: Floats
+    rotation: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ball:
+    """A ball.
+
+    Attributes:
+        name: in the survey, or T1, T2, ...
+        role: in the adjustment.
+        xyz: (3,) adjusted coordinates.
+        sigma: (3,) a posteriori.
+        images: per camera (4,) x, y, sigma x, sigma y in the pixel frame.
+    """
+
+    name: str
+    role: Role
+    xyz: Floats
+    sigma: Floats
+    images: Mapping[str, Floats]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Oriented cameras and balls of a log.
+
+    Attributes:
+        cameras: by name.
+        balls: by name.
+        network: everything that was measured, as `svev orient` takes it.
+        orientation: the adjustment with its three stages; holds the joint covariance of all poses.
+        static: the static images.
+        failures: cameras that could not be oriented, and why.
+        messages: what a person should know, one line each.
+    """
+
+    cameras: Mapping[str, OrientedCamera]
+    balls: Mapping[str, Ball]
+    network: Network
+    orientation: Orientation
+    static: Mapping[str, StaticImage]
+    failures: Mapping[str, str]
+    messages: tuple[str, ...]
+
+
+def orient_log(log: Path, survey: Survey, pulses: range | None = None) -> Scene:
+    """Orient the cameras of a log.
+
+    Args:
+        log: the log.
+        survey: balls and interior orientations.
+        pulses: use only these; all if left out.
+
+    Raises:
+        BadInputError: the survey does not belong to the log (camera missing, other image size), or fewer than two
+            cameras can be oriented; the message says why for each.
+        LogDamagedError: the log has no images there, or damaged ones.
+        NotSolvableError, NotConvergedError: of the adjustment.
+    """
+    return orient_images(static_images(log, pulses), survey)
+
+
+def orient_images(static: Mapping[str, StaticImage], survey: Survey) -> Scene:
+    """Orient cameras from their static images; see `orient_log`."""
+    cameras = {name: _checked(image, survey.camera(name), survey) for name, image in static.items()}
+    known = survey.surveyed()
+    views = {name: _view(camera, static[name], survey, known) for name, camera in cameras.items()}
+    namings, failures = _named(views, known)
+    ties = _ties(views, namings, known)
+    if failures and len(namings) >= _FEWEST_CAMERAS:
+        more, failures = _named({name: views[name] for name in failures}, _with_ties(known, ties))
+        if more:
+            surveyed = len(known.names)
+            namings |= {name: _only_first(naming, surveyed) for name, naming in more.items()}
+            ties = _ties(views, namings, known)
+    if len(namings) < _FEWEST_CAMERAS:
+        reasons = "; ".join(f"camera {name}: {reason}" for name, reason in failures.items())
+        raise BadInputError(
+            reasons or f"{survey.source}: the log has one camera; two at least are needed to measure in space"
+        )
+    network, notes = measured_network(views, namings, ties, survey, known)
+    orientation = orient(network)
+    messages = [f"camera {name} is not oriented: {reason}" for name, reason in failures.items()]
+    missing = [camera.name for camera in survey.network.cameras if camera.name not in static]
+    messages += [f"camera {name} of the survey has no image in the log" for name in missing]
+    messages += notes
+    messages += [finding.message for stage in orientation.stages for finding in stage.findings]
+    return _scene(network, orientation, static, failures, messages)
+
+
+def _checked(image: StaticImage, camera: Camera, survey: Survey) -> Camera:
+    """The camera, if it is calibrated for images of this size."""
+    if camera.size != image.size:
+        size = "unknown size" if camera.size is None else f"{camera.size[0]} x {camera.size[1]} px"
+        raise BadInputError(
+            f"{survey.source}: camera {camera.name} is calibrated for images of {size}, those of the log have "
+            f"{image.size[0]} x {image.size[1]} px; give the interior orientation of this image size"
+        )
+    return camera
+
+
+def _view(camera: Camera, image: StaticImage, survey: Survey, known: KnownPoints) -> View:
+    detections = detect_balls(image)
+    mirror = np.outer(_MIRROR, _MIRROR)
+    spots = Spots(pixel_to_metric(detections.xy, np.array(image.size, float)), detections.covariance * mirror)
+    return View(camera, detections, spots, _approximate(survey.image(camera.name), known))
+
+
+def _approximate(image: Image | None, known: KnownPoints) -> Approximate | None:
+    """How far the approximate pose of a survey can be trusted."""
+    if image is None or image.position is None or image.rotation is None:
+        return None
+    distance = float(np.linalg.norm(image.position - known.xyz.mean(axis=0)))
+    off, angle = _OFF_DISTANCE * distance, _OFF_ANGLE
+    if image.sigma_position is not None:
+        off = _SIGMAS * float(np.linalg.norm(image.sigma_position))
+    if image.sigma_angles is not None:
+        angle = _SIGMAS * float(np.linalg.norm(image.sigma_angles))
+    return Approximate(image.position, image.rotation, off, angle)
+
+
+def _named(views: Mapping[str, View], known: KnownPoints) -> tuple[dict[str, Naming], dict[str, str]]:
+    """Names per camera, and why there are none."""
+    namings: dict[str, Naming] = {}
+    failures: dict[str, str] = {}
+    for name, view in views.items():
+        try:
+            namings[name] = _named_view(view, known)
+        except NotNamedError as error:
+            failures[name] = str(error)
+    return namings, failures
+
+
+def _named_view(view: View, known: KnownPoints) -> Naming:
+    """Names near the approximate pose; if there are none, without it."""
+    if view.approximate is not None:
+        try:
+            return name_balls(view.camera, view.spots, known, view.approximate)
+        except NotNamedError:
+            pass  # the approximate pose may be worse than it says: the balls decide
+    return name_balls(view.camera, view.spots, known)
+
+
+def _only_first(naming: Naming, n: int) -> Naming:
+    """The naming without the points from index n on."""
+    first = naming.points < n
+    return replace(naming, points=naming.points[first], spots=naming.spots[first])
+
+
+def _with_ties(known: KnownPoints, ties: Sequence[Tie]) -> KnownPoints:
+    if not ties:
+        return known
+    names = tuple(f"tie {i}" for i in range(len(ties)))
+    return known.joined(KnownPoints(names, np.array([t.xyz for t in ties]), np.array([t.covariance for t in ties])))
+
+
+def _stations(views: Mapping[str, View], namings: Mapping[str, Naming]) -> list[Station]:
+    return [
+        Station(
+            views[name].camera,
+            naming.pose,
+            views[name].spots,
+            views[name].detections.radius,
+            np.setdiff1d(np.arange(len(views[name].spots)), naming.spots),
+        )
+        for name, naming in namings.items()
+    ]
+
+
+def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: KnownPoints) -> list[Tie]:
+    if len(namings) < _FEWEST_CAMERAS:
+        return []
+    stations = _stations(views, namings)
+    named = [
+        (station, int(spot), known.xyz[point])
+        for station, naming in enumerate(namings.values())
+        for point, spot in zip(naming.points, naming.spots, strict=True)
+    ]
+    return find_ties(stations, ball_size(stations, named))
+
+
+def _scene(
+    network: Network,
+    orientation: Orientation,
+    static: Mapping[str, StaticImage],
+    failures: Mapping[str, str],
+    messages: Sequence[str],
+) -> Scene:
+    a = orientation.outcome.adjustment
+    unknowns = a.problem.unknowns
+    cameras = {
+        image.name: OrientedCamera(image.name, a.state.position[i], a.state.rotation[i], a.covariance(unknowns.pose[i]))
+        for i, image in enumerate(a.network.images)
+    }
+    sigma = a.sigmas(unknowns.point)
+    balls = {
+        point.name: Ball(point.name, point.role, a.state.xyz[i], sigma[i], _measured(network, point.name))
+        for i, point in enumerate(a.network.points)
+    }
+    return Scene(cameras, balls, network, orientation, static, failures, tuple(messages))
+
+
+def _measured(network: Network, name: str) -> dict[str, Floats]:
+    """Where the images show a point, pixel frame, with sigmas."""
+    o = network.observations
+    place = [point.name for point in network.points].index(name)
+    found = {}
+    for row in np.flatnonzero(o.point == place):
+        image = network.images[int(o.image[row])]
+        size = np.array(network.cameras[image.camera].size, float)
+        found[image.name] = np.concatenate((o.xy[row] * _MIRROR + (size - 1) / 2, o.sigma[row]))
+    return found

@@ -8,6 +8,7 @@ Nothing is drawn at random: the same input gives the same result.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, permutations
 
 import numpy as np
@@ -97,16 +98,31 @@ class Search:
         self._first, self._at_first = (others[::2], 1) if len(others) >= _ENOUGH_OTHERS else (others, 0)
         found: list[tuple[int, int, Hypothesis]] = []
         for chosen in self._image_triples(triple, most):
-            position, rotation, _ = poses_from_three_points(self._points[triple], self._rays[chosen])
+            position, rotation, _ = poses_from_three_points(self._points[triple][None], self._rays[chosen])
             found += self._promising(position, rotation, len(found))
             found.sort(key=lambda entry: entry[:2])
             del found[_KEPT:]
         return [hypothesis for _, _, hypothesis in found]
 
+    def of_detections(self, detections: Integers) -> list[Hypothesis]:
+        """The best hypotheses in which three detections (3,) are any three surveyed balls; not counted in `tried`."""
+        tried = self.tried
+        self._first, self._at_first = np.arange(len(self._points)), 4
+        found: list[tuple[int, int, Hypothesis]] = []
+        every = _ordered_triples(len(self._points))
+        for first in range(0, len(every), _CHUNK):
+            points = self._points[every[first : first + _CHUNK]]
+            position, rotation, _ = poses_from_three_points(points, self._rays[detections][None])
+            found += self._promising(position, rotation, len(found))
+            found.sort(key=lambda entry: entry[:2])
+            del found[_KEPT:]
+        self.tried = tried
+        return [hypothesis for _, _, hypothesis in found]
+
     def _image_triples(self, triple: Integers, most: int) -> Iterator[Integers]:
         """Ordered triples of detections (k, 3), in chunks, without those that cannot be."""
         n = min(most, len(self._xy))
-        allowed = np.array(list(permutations(range(n), 3)), np.intp).reshape(-1, 3)
+        allowed = _ordered_triples(n)
         far = np.linalg.norm(self._xy[:n, None] - self._xy[None, :n], axis=2) > _APART * self._width
         i, j, k = allowed.T
         keep = far[i, j] & far[j, k] & far[i, k]
@@ -193,6 +209,11 @@ def spread_triples(points: Floats, most: int) -> list[Integers]:
         used[triples[best]] += 1
         triples, area = np.delete(triples, best, axis=0), np.delete(area, best)
     return chosen
+
+
+@lru_cache(maxsize=4)
+def _ordered_triples(n: int) -> Integers:
+    return np.array(list(permutations(range(n), 3)), np.intp).reshape(-1, 3)
 
 
 def _map(xy: Floats, size: tuple[int, int]) -> NDArray[np.int16]:

@@ -29,11 +29,12 @@ from rig.errors import BadInputError
 GATE: Final = float(chi2.ppf(0.999, 2))
 MODEL_SIGMA: Final = 0.1  #: px; what the interior orientation and the balls' shape may leave out
 FEWEST: Final = 4  #: balls of an image
-_TIERS = ((14, 8), (26, 24), (60, 14))  # detections, the best ones, and triples of balls tried on them
+_TIERS = ((14, 8), (26, 60), (60, 14))  # detections, the best ones, and triples of balls tried on them
+_TIERS_NEAR = ((26, 600), (60, 60))  # the same near an approximate pose, which leaves few hypotheses of each triple
 _BELIEVED = 3.0  # decades by which chance is ruled out
 _CLEARLY = 2.0  # decades by which the second best is worse
-_OVERWHELMING = 12.0  # decades: such a hypothesis ends the search after a few more triples
-_MORE = 4  # triples, in search of a rival
+_OVERWHELMING = 8.0  # decades: such a hypothesis ends the search
+_RIVAL_TRIPLES = 3  # of named detections, on which all surveyed balls are tried in search of a rival
 _ROUNDS = 8
 _RIVALS = 6  # namings that are kept
 _SAME_PLACE = 5.0  # sigmas between the projection centres of two namings that are one
@@ -117,23 +118,35 @@ class _Image:
         ideal = np.where(np.isfinite(ideal), ideal, self.spots.xy - self.camera.interior[1:3])
         search = Search(self.known.xyz, ideal, float(self.camera.interior[0]), self.size, approximate)
         found: list[Naming] = []
-        for most, triples in _TIERS:
-            found = self._tried(search, most, triples, found)
-            if (found and found[0].decades - self._chances(search) > _BELIEVED) or most >= len(self.spots):
+        before = (0, 0)
+        for limit, triples in _TIERS if approximate is None else _TIERS_NEAR:
+            most = min(limit, len(self.spots))
+            begin = before[1] if most == before[0] else 0  # these triples were tried on the same detections
+            found = self._tried(search, most, slice(begin, triples), found)
+            before = most, max(begin, triples)
+            if found and found[0].decades - self._chances(search) > _BELIEVED:
+                found = self._with_rivals(search, found)
                 break
         return self._judged(found, self._chances(search))
 
-    def _tried(self, search: Search, most: int, triples: int, found: list[Naming]) -> list[Naming]:
-        """The best distinct namings after more triples of balls; an overwhelming one ends the search soon."""
-        left = triples
-        for triple in spread_triples(self.known.xyz, triples):
-            refined = [self._refined(hypothesis) for hypothesis in search.of_triple(triple, most)]
-            found = self._distinct([*found, *(naming for naming in refined if naming)])
+    def _tried(self, search: Search, most: int, triples: slice, found: list[Naming]) -> list[Naming]:
+        """The best distinct namings after more triples of balls; an overwhelming one ends the search."""
+        for triple in spread_triples(self.known.xyz, triples.stop)[triples]:
+            found = self._with(found, search.of_triple(triple, most))
             if found and found[0].decades - self._chances(search) > _OVERWHELMING:
-                left = min(left, _MORE + 1)
-            left -= 1
-            if left <= 0:
                 break
+        return found
+
+    def _with(self, found: Sequence[Naming], hypotheses: Sequence[Hypothesis]) -> list[Naming]:
+        refined = (self._refined(hypothesis) for hypothesis in hypotheses)
+        return self._distinct([*found, *(naming for naming in refined if naming)])
+
+    def _with_rivals(self, search: Search, found: list[Naming]) -> list[Naming]:
+        """Other namings of the same detections: what is as good as the best one must name some of these three, too."""
+        places = np.column_stack((self.spots.xy, np.zeros(len(self.spots))))
+        named = found[0].spots
+        for triple in spread_triples(places[named], _RIVAL_TRIPLES):
+            found = self._with(found, search.of_detections(named[triple]))
         return found
 
     def _chances(self, search: Search) -> float:
@@ -192,7 +205,8 @@ class _Image:
         gain = -np.log10(2 * pi * density * np.sqrt(np.linalg.det(total))) - squares / (2 * log(10))
         expected = int((np.abs(xy) < np.array(self.size) / 2).all(axis=1).sum())
         ways = comb(max(expected, len(points)) - 3, len(points) - 3)
-        decades = float(np.sort(gain)[:-3].sum()) - log10(ways)
+        # a set of k balls is found from each of its triples, so there are fewer independent chances by their number
+        decades = float(np.sort(gain)[:-3].sum()) - log10(ways) + log10(comb(len(points), 3))
         return Naming(fitted, points, hits, expected, decades)
 
     def _distinct(self, namings: Sequence[Naming]) -> list[Naming]:

@@ -10,6 +10,7 @@ from math import radians
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import chi2
 
 from analysis.scene.detection import detect_balls
 from analysis.scene.hypotheses import Approximate
@@ -26,8 +27,9 @@ from rig.errors import BadInputError
 
 _FEWEST_CAMERAS = 2
 #: How far off an approximate pose may be that says nothing about it: part of the distance to the balls, and an angle.
-_OFF_DISTANCE, _OFF_ANGLE = 0.15, radians(12.0)
+_OFF_DISTANCE, _OFF_ANGLE = 0.1, radians(8.0)
 _SIGMAS = 4.0  # of an approximate pose that says how good it is
+_MISFIT_RISK = 1e-4  # chance that sound data are reported not to fit
 _MIRROR = np.array([1.0, -1.0])  # pixel frame to metric frame
 
 
@@ -126,11 +128,11 @@ def orient_images(static: Mapping[str, StaticImage], survey: Survey) -> Scene:
             reasons or f"{survey.source}: the log has one camera; two at least are needed to measure in space"
         )
     network, notes = measured_network(views, namings, ties, survey, known)
-    orientation = orient(network)
+    orientation = orient(network, uncertain_interior=True)
     messages = [f"camera {name} is not oriented: {reason}" for name, reason in failures.items()]
     missing = [camera.name for camera in survey.network.cameras if camera.name not in static]
     messages += [f"camera {name} of the survey has no image in the log" for name in missing]
-    messages += notes
+    messages += [*notes, *_misfit(orientation)]
     messages += [finding.message for stage in orientation.stages for finding in stage.findings]
     return _scene(network, orientation, static, failures, messages)
 
@@ -224,6 +226,22 @@ def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: Known
         for point, spot in zip(naming.points, naming.spots, strict=True)
     ]
     return find_ties(stations, ball_size(stations, named))
+
+
+def _misfit(orientation: Orientation) -> list[str]:
+    """A line if the residuals are larger than their sigmas explain, which gross errors of single balls do not do."""
+    a = orientation.outcome.adjustment
+    if a.redundancy < 1 or a.ratio**2 * a.redundancy < chi2.ppf(1 - _MISFIT_RISK, a.redundancy):
+        return []
+    o = a.network.observations
+    squares = (a.image_residuals() / o.sigma) ** 2
+    rms = {image.name: float(np.sqrt(squares[o.image == i].mean())) for i, image in enumerate(a.network.images)}
+    words = ", ".join(f"{name} {value:.1f}" for name, value in rms.items())
+    line = (
+        f"the residuals are {a.ratio:.1f} times as large as their sigmas say (image points, by camera: {words}); the "
+        "sigmas of the result are larger by as much; check the interior orientations and the sigmas of the survey"
+    )
+    return [line]
 
 
 def _scene(

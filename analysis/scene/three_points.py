@@ -17,24 +17,26 @@ def poses_from_three_points(points: Floats, rays: Floats) -> tuple[Floats, Float
     """Poses in which three object points lie on three rays.
 
     Args:
-        points: (3, 3) object coordinates, not on a line.
-        rays: (n, 3, 3) n triples of unit rays in the camera system.
+        points: (n, 3, 3) triples of object points, not on a line; or (1, 3, 3), the same for all.
+        rays: (n, 3, 3) triples of unit rays in the camera system; or (1, 3, 3).
 
     Returns:
         Projection centres (m, 3), rotations (m, 3, 3) with columns r1, r2, r3, and to which triple each belongs (m,).
     """
+    points, rays = np.broadcast_arrays(points, rays)
     with np.errstate(all="ignore"):
         distances, triple = _distances(points, rays)
     in_camera = rays[triple] * distances[:, :, None]
-    rotation = _frames(points[None]) @ _frames(in_camera).transpose(0, 2, 1)
-    position = points[0] - (rotation @ in_camera[:, 0, :, None])[:, :, 0]
+    in_space = points[triple]
+    rotation = _frames(in_space) @ _frames(in_camera).transpose(0, 2, 1)
+    position = in_space[:, 0] - (rotation @ in_camera[:, 0, :, None])[:, :, 0]
     sound = np.isfinite(position).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2))
     return position[sound], rotation[sound], triple[sound]
 
 
 def _distances(points: Floats, rays: Floats) -> tuple[Floats, Integers]:
     """Distances (m, 3) from the projection centre, and the triple of each solution."""
-    a, b, c = (float(((points[i] - points[j]) ** 2).sum()) for i, j in ((1, 2), (0, 2), (0, 1)))
+    a, b, c = (((points[:, i] - points[:, j]) ** 2).sum(axis=1) for i, j in ((1, 2), (0, 2), (0, 1)))
     cos_a, cos_b, cos_c = (np.einsum("ni,ni->n", rays[:, i], rays[:, j]) for i, j in ((1, 2), (0, 2), (0, 1)))
     p, q, s, t = (a - c) / b, (a + c) / b, c / b, a / b
     coefficients = np.stack(
@@ -51,8 +53,8 @@ def _distances(points: Floats, rays: Floats) -> tuple[Floats, Integers]:
     roots = _quartic_roots(coefficients)
     v = roots.real
     square, divisor = 1 + v * v - 2 * v * cos_b[:, None], 2 * (cos_c[:, None] - v * cos_a[:, None])
-    u = ((p - 1) * v * v - 2 * p * cos_b[:, None] * v + 1 + p) / divisor
-    first = np.sqrt(b / square)
+    u = ((p - 1)[:, None] * v * v - 2 * (p * cos_b)[:, None] * v + (1 + p)[:, None]) / divisor
+    first = np.sqrt(b[:, None] / square)
     real = np.abs(roots.imag) <= _NEARLY_REAL * np.abs(roots)
     good = real & (v > 0) & (u > 0) & np.isfinite(first) & np.isfinite(u)
     triple, root = np.nonzero(good)

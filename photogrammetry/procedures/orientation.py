@@ -119,20 +119,26 @@ class Orientation:
     notes: tuple[str, ...]
 
 
-def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orientation:
-    """Estimate the poses of all images; interior orientations are constant.
+def orient(
+    network: Network, alternative: int = 2, moving: str = "H*", *, uncertain_interior: bool = False
+) -> Orientation:
+    """Estimate the poses of all images; interior orientations are constant, unless they are uncertain.
 
     Args:
-        network: images, reference points and tie points. Interior parameters that its cameras estimate are held.
+        network: images, reference points and tie points.
         alternative: 1: static tie points alone; 2: moving ones too.
         moving: pattern of the moving points' names (`*` and `?`).
+        uncertain_interior: interior parameters that a camera estimates and whose given value has a sigma are weighted
+            observations, so that their uncertainty is in that of the poses. All others are held in any case.
 
     Raises:
         BadInputError: the network has no images, a constant pose, or no moving point where alternative 1 leaves
             them out.
         NotSolvableError, NotConvergedError: of the constrained adjustment.
     """
+    network, held = _with_interior(network, uncertain_interior)
     network, notes = _prepared(network, alternative, moving)
+    notes = held + notes
     free, removed, stage = _free_stage(network)
     stages = [stage]
     cleaned = _cleaned(network, removed)
@@ -152,15 +158,24 @@ def orient(network: Network, alternative: int = 2, moving: str = "H*") -> Orient
     return Orientation(replace(outcome, removed=(*removed, *outcome.removed)), tuple(stages), tuple(notes))
 
 
+def _with_interior(network: Network, uncertain: bool) -> tuple[Network, list[str]]:
+    """The network with the interior parameters that are constant held."""
+    cameras, held = [], []
+    for camera in network.cameras:
+        open_ones = tuple(name for name in camera.estimate if uncertain and name in camera.sigma)
+        if open_ones != camera.estimate:
+            held.append(camera.name)
+        sigma = {name: camera.sigma[name] for name in open_ones}
+        cameras.append(replace(camera, estimate=open_ones, sigma=sigma))
+    words = f"interior orientation held as it is given, although the file estimates it: {', '.join(held)}"
+    return replace(network, cameras=tuple(cameras)), [words] if held else []
+
+
 def _prepared(network: Network, alternative: int, moving: str) -> tuple[Network, list[str]]:
-    """The network with constant interior orientations and the tie points of the alternative."""
+    """The network with the tie points of the alternative."""
     notes = []
     require_unknown_poses(network, "orientation")
-    held = [camera.name for camera in network.cameras if camera.estimate]
-    if held:
-        notes.append(f"interior orientation held as it is given, although the file estimates it: {', '.join(held)}")
-    cameras = tuple(replace(camera, estimate=(), sigma={}) for camera in network.cameras)
-    network = replace(network, cameras=cameras, datum=Datum())
+    network = replace(network, datum=Datum())
     moves = np.array([p.role is Role.TIE and fnmatchcase(p.name, moving) for p in network.points], dtype=bool)
     if alternative == 1:
         if not moves.any():

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from analysis.scene.detection import detect_balls
+from analysis.scene.detection import Detections, detect_balls
 from analysis.scene.hypotheses import Approximate
 from analysis.scene.measured_network import View, measured_network
 from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
@@ -109,11 +109,20 @@ def orient_log(log: Path, survey: Survey, pulses: range | None = None) -> Scene:
     return orient_images(static_images(log, pulses), survey)
 
 
-def orient_images(static: Mapping[str, StaticImage], survey: Survey) -> Scene:
-    """Orient cameras from their static images; see `orient_log`."""
+def orient_images(
+    static: Mapping[str, StaticImage], survey: Survey, detections: Mapping[str, Detections] | None = None
+) -> Scene:
+    """Orient cameras from their static images; see `orient_log`.
+
+    Args:
+        static: the static images.
+        survey: balls and interior orientations.
+        detections: what `detect_balls` finds in them, if that is known already.
+    """
     cameras = {name: _checked(image, survey.camera(name), survey) for name, image in static.items()}
     known = survey.surveyed()
-    views = {name: _view(camera, static[name], survey, known) for name, camera in cameras.items()}
+    found = detections or {name: detect_balls(image) for name, image in static.items()}
+    views = {name: _view(camera, found[name], survey, known) for name, camera in cameras.items()}
     namings, failures = _named(views, known)
     ties = _ties(views, namings, known)
     if failures and len(namings) >= _FEWEST_CAMERAS:
@@ -148,10 +157,9 @@ def _checked(image: StaticImage, camera: Camera, survey: Survey) -> Camera:
     return camera
 
 
-def _view(camera: Camera, image: StaticImage, survey: Survey, known: KnownPoints) -> View:
-    detections = detect_balls(image)
+def _view(camera: Camera, detections: Detections, survey: Survey, known: KnownPoints) -> View:
     mirror = np.outer(_MIRROR, _MIRROR)
-    spots = Spots(pixel_to_metric(detections.xy, np.array(image.size, float)), detections.covariance * mirror)
+    spots = Spots(pixel_to_metric(detections.xy, np.array(camera.size, float)), detections.covariance * mirror)
     return View(camera, detections, spots, _approximate(survey.image(camera.name), known))
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.scene.orientation import Scene
+from analysis.scene.detection import Detections, detect_balls
+from analysis.scene.orientation import Scene, orient_images
 from analysis.scene.static_image import StaticImage, static_image
 from analysis.scene.survey import Survey
 from photogrammetry.geometry.rotation import vector_from_rotation
@@ -47,6 +48,17 @@ def hill_images(scenario: Scenario, size: tuple[int, int] = SIZE, frames: int = 
 def training_images() -> dict[str, StaticImage]:
     """Those of the training scenario; not to be changed."""
     return hill_images(training())
+
+
+@cache
+def training_detections() -> dict[str, Detections]:
+    """What is found in them."""
+    return {name: detect_balls(image) for name, image in training_images().items()}
+
+
+def oriented(data: dict[str, Any]) -> Scene:
+    """The training scenario, oriented with a survey file's object."""
+    return orient_images(training_images(), survey_of(data), training_detections())
 
 
 def survey_json(

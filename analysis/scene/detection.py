@@ -26,6 +26,8 @@ _RADII = (0.8, 16.0)  # px
 _STRETCH = 0.5  # log of the ratio of the axes
 _MISFIT = 0.2  # residuals over contrast
 _WORST_SIGMA = 0.35  # px
+_SPOILT = 1.5  # times the noise: with larger residuals something lies close around a ball
+_TIGHT = 1.8  # px around a ball that are fitted then
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,8 +69,8 @@ def detect_balls(image: StaticImage, most: int = MOST) -> Detections:
     grey = np.asarray(image.grey, float)
     discs = []
     for x, y, radius in _blobs(image.grey, float(np.median(sigma))):
-        disc = fit_disc(grey, sigma, np.array([x, y]), radius)
-        if disc is not None and _is_ball(disc):
+        disc = _fitted(grey, sigma, np.array([x, y]), radius)
+        if disc is not None:
             discs.append(disc)
     return collected(_apart(discs)[:most])
 
@@ -82,6 +84,16 @@ def collected(discs: Sequence[Disc]) -> Detections:
         np.array([disc.contrast for disc in discs], float),
         np.array([_quality(disc) for disc in discs], float),
     )
+
+
+def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: float) -> Disc | None:
+    """The ball at a place; None if there is none. What lies close around it is left out if it spoils the fit."""
+    wide = fit_disc(grey, sigma, xy, radius)
+    if wide is not None and wide.factor < _SPOILT:
+        return wide if _is_ball(wide) else None
+    tight = fit_disc(grey, sigma, xy, radius, margin=_TIGHT)
+    balls = [disc for disc in (wide, tight) if disc is not None and _is_ball(disc)]
+    return min(balls, key=lambda disc: disc.factor, default=None)
 
 
 def _quality(disc: Disc) -> float:

@@ -14,6 +14,7 @@ noise is there, whatever made it (sensor, texture, compression).
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from scipy.special import chndtr, erfc, ive
@@ -21,12 +22,14 @@ from scipy.special import chndtr, erfc, ive
 from rig.arrays import Floats
 
 _UNKNOWNS = 10
-_MARGIN = 3.6  # px beyond the disc that are fitted
+MARGIN: Final = 3.6  #: px beyond the disc that are fitted
 _WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one that is approximate more is needed
 _SHARP = 8.0  # R / s: from there on the border is that of a half plane, with the curvature's first term
 _BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and blur of a small disc go together
 _STRETCH_SPREAD = 0.2  # weak prior of the stretch
 _STEPS, _ENOUGH = 25, 1e-4  # iterations, px
+_SETTLED = 2e-5  # relative decrease of the square sum: a twentieth of a sigma or less
+_TRIAL_STEPS, _POOR = 4, 0.25  # steps after which the residuals over the contrast must be smaller than that
 _POOR_START = 0.4  # residuals over contrast, before the first step
 _RADII = (0.75, 1.0, 1.33)  # times the approximate radius, to start from
 _LARGEST_STEP = 0.5  # of log R, log s and stretch
@@ -63,7 +66,9 @@ class Disc:
         return np.sqrt(np.diagonal(self.covariance))
 
 
-def fit_disc(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None = None) -> Disc | None:
+def fit_disc(
+    grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None = None, margin: float = MARGIN
+) -> Disc | None:
     """Fit a disc near a place.
 
     Args:
@@ -72,6 +77,7 @@ def fit_disc(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Float
         xy: (2,) approximate centre, px.
         radius: approximate radius, px.
         mask: (rows, columns) where the image may be used; everywhere if left out.
+        margin: so far beyond the disc its surroundings are one plane, px.
 
     Returns:
         The disc; None if nothing there is one: no convergence, it leaves the place, or the image ends.
@@ -79,7 +85,7 @@ def fit_disc(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Float
     theta = np.array([xy[0], xy[1], np.log(max(radius, 0.7)), np.log(_BLUR), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     window = None
     for again in range(2):  # the second time with a window of the radius that was found
-        window = _window(grey, sigma, theta[:2], float(np.exp(theta[2])), mask)
+        window = _window(grey, sigma, theta[:2], float(np.exp(theta[2])), mask, margin)
         if window is None:
             return None
         start = _started(theta, window, _RADII if not again else (1.0,))
@@ -108,9 +114,11 @@ def cover(r: Floats, radius: float, blur: float) -> tuple[Floats, Floats, Floats
 _Window = tuple[Floats, Floats, Floats]
 
 
-def _window(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None) -> _Window | None:
+def _window(
+    grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None, margin: float
+) -> _Window | None:
     """Places (n, 2), grey values (n,) and sigmas (n,) around a disc; None if too much of it is outside."""
-    reach = max(radius + _MARGIN, _WIDER * radius + _MARGIN_OF_WIDER)
+    reach = max(radius + margin, _WIDER * radius + min(margin, _MARGIN_OF_WIDER))
     rows, columns = grey.shape
     left, right = int(np.ceil(xy[0] - reach)), int(np.floor(xy[0] + reach))
     top, bottom = int(np.ceil(xy[1] - reach)), int(np.floor(xy[1] + reach))
@@ -128,23 +136,21 @@ def _window(grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats
 
 def _started(theta: Floats, window: _Window, factors: tuple[float, ...]) -> Floats | None:
     """Start values with the best of some radii; None if no disc is near: no fit would mend such residuals."""
+    places, grey, sigma = window
+    dx, dy = places[:, 0] - theta[0], places[:, 1] - theta[1]
+    r = np.hypot(dx, dy)
     best, least = None, np.inf
     for factor in factors:
-        start = theta.copy()
-        start[2] += np.log(factor)
-        start[6:] = _linear(start, *window)
-        _, grey, sigma = window
-        v = (grey - _model(start, window[0])[0]) / sigma
-        misfit = float(np.sqrt(np.mean(v**2)) * np.median(sigma))
+        radius = factor * float(np.exp(theta[2]))
+        # the border as that of a half plane is near enough for a start
+        value = 0.5 * erfc((r - radius) / (np.sqrt(2) * np.exp(theta[3])))
+        design = np.column_stack((value, np.ones(len(r)), dx, dy))
+        linear = np.linalg.lstsq(design / sigma[:, None], grey / sigma, rcond=None)[0]
+        misfit = float(np.sqrt(np.mean(((grey - design @ linear) / sigma) ** 2)) * np.median(sigma))
         if misfit < least:
-            best, least = start, misfit
-    return None if best is None or least > _POOR_START * abs(float(best[6])) else best
-
-
-def _linear(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Floats:
-    """Contrast and background for the other unknowns."""
-    design = _model(theta, places)[1][:, 6:]
-    return np.asarray(np.linalg.lstsq(design / sigma[:, None], grey / sigma, rcond=None)[0], float)
+            least = misfit
+            best = np.concatenate((theta[:2], [np.log(radius)], theta[3:6], linear))
+    return None if best is None or least >= _POOR_START * abs(float(best[6])) else best
 
 
 def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Floats | None:
@@ -152,27 +158,32 @@ def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Float
     damping, cost = 1e-3, np.inf
     normal, gradient = np.eye(_UNKNOWNS), np.zeros(_UNKNOWNS)
     best = theta
-    for _ in range(_STEPS):
+    for step_number in range(_STEPS):
         new_cost, new_normal, new_gradient = _normal_equations(theta, places, grey, sigma)
         if new_cost <= cost:
             gain = cost - new_cost
             best, cost, normal, gradient, damping = theta, new_cost, new_normal, new_gradient, damping / 8
-            if gain < 1e-6 * cost:
-                return best
+            if gain < _SETTLED * cost:
+                break
+            if step_number >= _TRIAL_STEPS and cost > len(grey) * (_POOR * theta[6] / np.median(sigma)) ** 2:
+                return None
         else:
             damping *= 10
             if damping > 1e8:
-                return best
+                break
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), gradient)
         step[2:6] = np.clip(step[2:6], -_LARGEST_STEP, _LARGEST_STEP)
         if not np.isfinite(step).all():
             return None
         theta = best + step
         if np.abs(step[:2]).max() < _ENOUGH and np.abs(step[2:6]).max() < 1e-3:
-            return theta
+            best = theta
+            break
         if not (np.log(0.2) < theta[2] < np.log(40) and np.log(0.15) < theta[3] < np.log(8)):
             return None
-    return None
+    else:
+        return None
+    return best
 
 
 def _normal_equations(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> tuple[float, Floats, Floats]:

@@ -28,7 +28,7 @@ _COMMANDS: Final = {
     "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
     "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
     "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
-    "keys": ("keys", "keys", "Make keys that protect published images."),
+    "keys": ("setup", "keys", "Make keys that protect published images."),
     "info": ("logs", "info_command", "Say what a log holds."),
     "recover": ("logs", "recover_command", "Repair a log that was not closed or is damaged."),
     "replay": ("replay", "replay_command", "Publish a log again, as it was published live."),

@@ -8,8 +8,7 @@ from typing import Any, Final
 
 from rig.clocks import NS_PER_S, UtcNs
 from rig.frame import FrameStatus
-from rig.pause import Pause
-from rig.pulse import PulseNumber
+from rig.pulse import Pause, PulseNumber
 from rig.status import Causes, Counts
 from rig.tag import TripletTag
 from triggering.timeline.pauses import PauseFinder, pause_of_margin

@@ -13,7 +13,7 @@ from recorder.reading.log_reader import ForeignFileError
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
-from rig.pause import Pause
+from rig.pulse import Pause
 from rig.topics import TAG
 
 

@@ -29,7 +29,7 @@ from rig.errors import BadInputError, FileVanishedError, StorageError, SvevError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.health import WritingHealth
-from rig.pause import Pause
+from rig.pulse import Pause
 from rig.status import Counts
 from rig.tag import TripletTag
 from rig.transport.messages import (

@@ -16,7 +16,7 @@ from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.health import Health
-from rig.pause import Pause
+from rig.pulse import Pause
 from rig.settings.model import RigSettings
 from rig.status import Counts
 

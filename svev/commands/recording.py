@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from recorder.publishing.keys import check_publication
 from rig.errors import BadInputError, PulsesPausedError
-from rig.pause import Pause
+from rig.pulse import Pause
 from rig.settings.file import load_rig
 from rig.status import LONGEST_LINE, Line
 from service.headless import HeadlessRig

@@ -1,4 +1,4 @@
-"""`svev doctor` and `svev schema`: help with setting up a computer and its rig file."""
+"""`svev doctor`, `svev schema` and `svev keys`: help with setting up a computer and its rig file."""
 
 from dataclasses import asdict
 from itertools import groupby
@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 
 import typer
 
+from recorder.publishing.keys import make_keys
 from rig.settings.file import CONFIG, load_rig, rig_schema
 from svev import console
 from svev.doctor.examination import firewire_probes, probes, run_probe
@@ -77,3 +78,24 @@ def schema(
         console.say_text(rig_schema().rstrip())
     else:
         output.write_text(rig_schema(), encoding="utf-8")
+
+
+def keys(
+    name: Annotated[Path, typer.Argument(help="beginning of the names of both files, e.g. /etc/svev/hill")],
+    as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
+) -> None:
+    """Make a pair of keys (ZeroMQ CURVE), so that only programs that have one of them can take published images.
+
+    NAME.key_secret stays on this computer: name it in the rig file, `curve_key_file` in `[network]`. NAME.key is for
+    subscribers; whoever has it may subscribe. Existing files are never overwritten.
+
+    Exit codes: 0; 2 a file exists already or cannot be written.
+
+    Example: svev keys hill
+    """
+    secret, public = make_keys(name)
+    if as_json:
+        console.print_json({"secret": str(secret), "public": str(public)})
+        return
+    console.say(f'{secret}: for the publisher; in the rig file: [network] curve_key_file = "{secret}"')
+    console.say(f"{public}: for subscribers; give it only to those who may see the images")

@@ -12,9 +12,8 @@ from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 
-from rig.memory import available_bytes
 from rig.settings.model import RigSettings
-from service.processes.memory import memory_needed
+from service.processes.memory import available_bytes, memory_needed
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
 
 _UNSYNCHRONIZED = 0x0040  # STA_UNSYNC, sys/timex.h

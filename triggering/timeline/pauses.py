@@ -11,8 +11,7 @@ from typing import Final
 
 from rig.clocks import NS_PER_S, UtcNs
 from rig.frame import FrameStatus
-from rig.pause import Pause
-from rig.pulse import PulseNumber
+from rig.pulse import Pause, PulseNumber
 from rig.tag import CameraTag, TripletTag
 
 #: Intervals on either side of the one that is judged.

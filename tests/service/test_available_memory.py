@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.memory import available_bytes
+from service.processes.memory import available_bytes
 
 MB = 1024 * 1024
 

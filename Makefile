@@ -30,7 +30,7 @@ bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)
 
 test: setup $(NPM) ## all tests
-	@$(BIN)/pytest -n 2 $(ARGS) || { status=$$?; test $$status = 1 || exit $$status; \
+	@$(BIN)/pytest -n 2 --dist worksteal $(ARGS) || { status=$$?; test $$status = 1 || exit $$status; \
 	  echo "what failed is tried once more, one test at a time, on the now quiet machine"; \
 	  $(BIN)/pytest --last-failed --last-failed-no-failures none $(ARGS); }
 

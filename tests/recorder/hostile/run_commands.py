@@ -67,8 +67,14 @@ def _run(command: Callable[[], int]) -> dict[str, object]:
         "complaints": complaints.getvalue(),
         "traceback": raised,
         "seconds": round(time.monotonic() - begin, 3),
-        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
+        "peak_mb": _peak_mb(),
     }
+
+
+def _peak_mb() -> int:
+    """The most memory that this program has used so far; getrusage also counts that of the process that started it."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) // 1024
 
 
 def run_all(folder: Path, names: list[str]) -> None:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 
-def free_bytes(place: Path | int) -> int | None:
+def ask_free_bytes(place: Path | int) -> int:
     """Bytes that we may still write on the disk of a directory or an open file.
 
     The blocks that a file system keeps for root do not count.
@@ -14,14 +14,19 @@ def free_bytes(place: Path | int) -> int | None:
     Args:
         place: the directory, or the descriptor of the file.
 
-    Returns:
-        The bytes; None while the directory is not there (an unplugged disk, say).
+    Raises:
+        OSError: the disk does not say.
     """
+    disk = os.statvfs(place)
+    return disk.f_bavail * disk.f_frsize
+
+
+def free_bytes(place: Path | int) -> int | None:
+    """As `ask_free_bytes`; None while the directory is not there (an unplugged disk, say)."""
     try:
-        disk = os.statvfs(place)
+        return ask_free_bytes(place)
     except OSError:
         return None
-    return disk.f_bavail * disk.f_frsize
 
 
 def set_direct(descriptor: int, *, wanted: bool) -> bool:

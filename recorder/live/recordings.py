@@ -42,6 +42,7 @@ from rig.transport.messages import (
     RecordingStarted,
     StartRecording,
 )
+from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
 
 _SLICE_NS: Final = NS_PER_S // 200
@@ -299,17 +300,20 @@ class Recordings:
         )
         self._earlier.clear()
 
+    def _ledgers(self, recording: Recording) -> list[Ledger]:
+        """The accounts of all logs that are there."""
+        return [each.ledger for each in (*self._earlier, recording) if each.is_there]
+
     def _counts(self, recording: Recording) -> Counts:
-        """Of all logs that are there."""
-        return Counts.sum(each.ledger.counts() for each in (*self._earlier, recording) if each.is_there)
+        return Counts.sum(ledger.counts() for ledger in self._ledgers(recording))
 
     def _first_pulse(self, recording: Recording) -> UtcNs | None:
-        times = (each.ledger.first_time for each in (*self._earlier, recording) if each.is_there)
+        times = (ledger.first_time for ledger in self._ledgers(recording))
         return next((time_ for time_ in times if time_ is not None), None)
 
     def _pauses(self, recording: Recording) -> tuple[Pause, ...]:
-        """Of all logs that are there, each with the pulse numbers of its own log."""
-        return tuple(p for each in (*self._earlier, recording) if each.is_there for p in each.ledger.pauses())
+        """Each with the pulse numbers of its own log."""
+        return tuple(pause for ledger in self._ledgers(recording) for pause in ledger.pauses())
 
     # -- failures ------------------------------------------------------------------------------------------------
 
@@ -369,18 +373,21 @@ class Recordings:
 
         After a file has vanished its own folder is as good as before; it is made again if need be.
         """
-        fallback, own = self._assembler.rig.recorder.fallback_directory, recording.path.parent
+        folder: Path | None = None
         if isinstance(error, FileVanishedError):
-            folder: Path | None = own
-        elif isinstance(error, StorageError) and fallback is not None and fallback != own:
-            folder = fallback
-        else:
-            folder = None
+            folder = recording.path.parent
+        elif isinstance(error, StorageError):
+            folder = self._other_folder(recording)
         part = len(self._earlier) + 2
         if folder is None or part > _PARTS_MAX:
             return None
         first = self._earlier[0] if self._earlier else recording
         return folder / f"{first.id}-part{part}{recording.path.suffix}"
+
+    def _other_folder(self, recording: Recording) -> Path | None:
+        """The folder on another disk; None if there is none, or if the log is there already."""
+        fallback = self._assembler.rig.recorder.fallback_directory
+        return None if fallback == recording.path.parent else fallback
 
     def _look_at_disk(self, now: HostNs) -> None:
         recording = self._recording
@@ -391,9 +398,9 @@ class Recordings:
         for event in self._watch.look(now, recording.log, behind=behind, underruns=self._underruns()):
             self.happened(event)
             self._report(RecorderEvent(event=event))
-        stalled, fallback = recording.log.stalled_s(), self._assembler.rig.recorder.fallback_directory
-        elsewhere = fallback is not None and fallback != recording.path.parent
-        if self._recording is recording and stalled > (_HUNG_WITH_FALLBACK_S if elsewhere else _HUNG_S):
+        stalled = recording.log.stalled_s()
+        patience_s = _HUNG_S if self._other_folder(recording) is None else _HUNG_WITH_FALLBACK_S
+        if self._recording is recording and stalled > patience_s:
             text = f"the disk has taken nothing for {stalled:.0f} s; look at `dmesg`, record to another disk"
             self._give_up(recording, StorageError(f"{recording.path}: {text}"), may_continue=True)
 

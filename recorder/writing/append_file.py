@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from recorder.log.mcap_layout import PAGE
-from rig.disk import set_direct
+from rig.disk import ask_free_bytes, set_direct
 from rig.errors import BadInputError, FileVanishedError, StorageError
 
 _REMEDIES = {
@@ -137,8 +137,7 @@ class AppendFile:
         if there is None or (there.st_dev, there.st_ino) != (own.st_dev, own.st_ino):
             what = "was deleted while it was recorded" if own.st_nlink == 0 else "was moved away while it was recorded"
             raise FileVanishedError(f"{self.path}: {what}; leave the folder of the recordings alone meanwhile")
-        disk = os.fstatvfs(self._fd)
-        return disk.f_bavail * disk.f_frsize
+        return ask_free_bytes(self._fd)
 
     def discard(self) -> None:
         """Close and remove the file."""

@@ -1,0 +1,1 @@
+"""What may be a marker or a ski in single images."""

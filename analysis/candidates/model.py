@@ -1,0 +1,89 @@
+"""What may be a marker or a ski in single images: places with covariance, not yet named.
+
+Image coordinates are px, pixel frame of `svev-network/1` (x right, y down, (0, 0) = centre of the top-left pixel).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.arrays import Floats
+from rig.clocks import UtcNs
+from rig.pulse import PulseNumber
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spots:
+    """n spots that may be markers.
+
+    Attributes:
+        xy: (n, 2) centres, px.
+        covariance: (n, 2, 2) px^2.
+        radius: (n,) px.
+        contrast: (n,) grey values against what is around it; negative: darker.
+        strength: (n,) how sure it is that a spot is there: contrast over its own standard deviation.
+    """
+
+    xy: Floats
+    covariance: Floats
+    radius: Floats
+    contrast: Floats
+    strength: Floats
+
+    def __len__(self) -> int:
+        return len(self.xy)
+
+    @classmethod
+    def none(cls) -> "Spots":
+        """No spot."""
+        return cls(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """A long thin straight thing that may be a ski, or a part of one.
+
+    Attributes:
+        xy: (k, 2) points on its axis, midway between its two edges, from one end to the other, px.
+        sigma: (k,) px, standard deviation of each across the axis; errors of different points are independent.
+        common: px, standard deviation of an error across the axis that all points share.
+        ends: (2, 2) px, where it visibly ends; a body, the other ski or a low contrast may hide more of it.
+        width: px, from edge to edge.
+        contrast: grey values against what is around it; negative: darker.
+    """
+
+    xy: Floats
+    sigma: Floats
+    common: float
+    ends: Floats
+    width: float
+    contrast: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageCandidates:
+    """Candidates of one image.
+
+    Attributes:
+        spots: that may be markers.
+        traces: that may be skis.
+    """
+
+    spots: Spots
+    traces: tuple[Trace, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PulseCandidates:
+    """Candidates of all images of a pulse.
+
+    Attributes:
+        pulse: its number in the recording.
+        time: when it fired, UTC.
+        images: by camera; a camera that delivered no frame is left out.
+    """
+
+    pulse: PulseNumber
+    time: UtcNs
+    images: Mapping[str, ImageCandidates]

@@ -1,0 +1,1 @@
+"""The measured jump: its model, and the file `jumper.json`."""

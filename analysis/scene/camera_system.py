@@ -1,0 +1,169 @@
+"""The oriented cameras as measurements of the jumper need them: projection, derivatives, and one joint covariance.
+
+All cameras of a recording were oriented together, so their errors are correlated, and all pulses share them. The joint
+covariance of every pose and of every uncertain interior parameter goes with the cameras, so that each result can carry
+it. Image coordinates are those of the log: px, pixel frame of `svev-network/1` (x right, y down).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogrammetry.geometry.camera_model import camera_coordinates, image_point, linearise, undistort
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.network.file import pixel_to_metric
+from photogrammetry.network.model import Camera
+from photogrammetry.procedures.orientation import Orientation
+from rig.arrays import Flags, Floats, Integers
+
+_MIRROR = np.array([1.0, -1.0])  # pixel frame to metric frame
+_POSE = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedCamera:
+    """A camera with its interior and exterior orientation.
+
+    Attributes:
+        camera: interior orientation; its name is that in the log.
+        position: (3,) X0.
+        rotation: (3, 3), columns are the camera's axes (Eq. A1).
+        interior: (k,) indices into `camera_model.INTERIOR` of the parameters that are uncertain.
+        columns: (6 + k,) where X0, the turns about the camera's own axes and these parameters stand in the joint
+            covariance.
+    """
+
+    camera: Camera
+    position: Floats
+    rotation: Floats
+    interior: Integers
+    columns: Integers
+
+    @property
+    def name(self) -> str:
+        """Name of the camera, as in the log."""
+        return self.camera.name
+
+    @property
+    def size(self) -> Floats:
+        """(2,) width and height of its images, px."""
+        return np.array(self.camera.size, float)
+
+    def ideal(self) -> IdealCamera:
+        """The camera without distortion, for closed solutions with `reduced` coordinates."""
+        return IdealCamera(float(self.camera.interior[0]), self.position, self.rotation)
+
+    def reduced(self, xy: ArrayLike) -> Floats:
+        """Image coordinates (..., 2) without distortion and principal point, metric frame, from px (..., 2)."""
+        return np.asarray(undistort(self.camera.lens(), pixel_to_metric(np.asarray(xy, float), self.size)), float)
+
+    def project(self, xyz: ArrayLike) -> Floats:
+        """Where object points (..., 3) appear, px (..., 2); NaN behind the camera."""
+        xyz = np.asarray(xyz, float)
+        with np.errstate(all="ignore"):
+            metric = np.asarray(image_point(self.camera.lens(), self.rotation, self.position, xyz), float)
+        px = metric * _MIRROR + (self.size - 1) / 2
+        return np.where(self.in_front(xyz)[..., None], px, np.nan)
+
+    def in_front(self, xyz: ArrayLike) -> Flags:
+        """Whether object points (..., 3) lie before the camera."""
+        return np.asarray(camera_coordinates(self.rotation, self.position, np.asarray(xyz, float))[..., 2] < 0)
+
+    def linearised(self, xyz: Floats, xy: Floats) -> tuple[Floats, Floats, Floats]:
+        """Residuals of image points and their derivatives, px, pixel frame.
+
+        Args:
+            xyz: (n, 3) object points.
+            xy: (n, 2) measured image points.
+
+        Returns:
+            v: (n, 2) computed - observed; derivatives by the object point (n, 2, 3), and by the camera's parameters
+            (n, 2, 6 + k) in the order of `columns`.
+        """
+        n = len(xyz)
+        lens = self.camera.lens()
+        lens = replace(
+            lens,
+            interior=np.broadcast_to(lens.interior, (n, len(self.camera.interior))),
+            balance=np.broadcast_to(lens.balance, (n,)),
+            measured=np.broadcast_to(lens.measured, (n,)),
+        )
+        there = np.broadcast_to(self.position, (n, 3)), np.broadcast_to(self.rotation, (n, 3, 3))
+        equations = linearise(lens, there[1], there[0], xyz, pixel_to_metric(np.asarray(xy, float), self.size))
+        by_parameters = np.concatenate((equations.by_pose, equations.by_interior[..., self.interior]), axis=-1)
+        mirror = _MIRROR[:, None]
+        return equations.v * _MIRROR, equations.by_point * mirror, by_parameters * mirror
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraSystem:
+    """The oriented cameras of a recording.
+
+    Attributes:
+        cameras: by name, in the order of the log.
+        covariance: (p, p) of all their uncertain parameters; see `PlacedCamera.columns`.
+    """
+
+    cameras: Mapping[str, PlacedCamera]
+    covariance: Floats
+
+    def __getitem__(self, name: str) -> PlacedCamera:
+        return self.cameras[name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cameras."""
+        return tuple(self.cameras)
+
+    def moved(self, step: Floats) -> "CameraSystem":
+        """The cameras with all uncertain parameters (p,) changed by `step`; the covariance stays.
+
+        For draws of the calibration, and for adjustments that estimate the parameters.
+        """
+        return replace(self, cameras={name: _moved(placed, step) for name, placed in self.cameras.items()})
+
+
+def camera_system(orientation: Orientation, order: Sequence[str]) -> CameraSystem:
+    """The cameras of an orientation that has one image of each camera, with their a-posteriori covariance.
+
+    Args:
+        orientation: the adjusted network.
+        order: names of the cameras in the log; those that are not oriented are left out.
+    """
+    a = orientation.outcome.adjustment
+    unknowns = a.problem.unknowns
+    images = {a.network.cameras[image.camera].name: i for i, image in enumerate(a.network.images)}
+    placed: dict[str, PlacedCamera] = {}
+    columns: list[Integers] = []
+    for name in order:
+        if name not in images:
+            continue
+        image = images[name]
+        index = a.network.images[image].camera
+        of_camera = unknowns.camera[index]
+        uncertain = of_camera >= 0
+        first = sum(len(c) for c in columns)
+        columns.append(np.concatenate((unknowns.pose[image], of_camera[uncertain])))
+        placed[name] = PlacedCamera(
+            replace(a.network.cameras[index], interior=a.state.interior[index]),
+            a.state.position[image],
+            a.state.rotation[image],
+            unknowns.selection[uncertain],
+            np.arange(first, first + len(columns[-1])),
+        )
+    return CameraSystem(placed, a.covariance(np.concatenate(columns)))
+
+
+def _moved(placed: PlacedCamera, step: Floats) -> PlacedCamera:
+    own = step[placed.columns]
+    interior = placed.camera.interior.copy()
+    interior[placed.interior] += own[_POSE:]
+    return replace(
+        placed,
+        camera=replace(placed.camera, interior=interior),
+        position=placed.position + own[:3],
+        rotation=placed.rotation @ rotation_from_vector(own[3:_POSE]),
+    )

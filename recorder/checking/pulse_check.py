@@ -18,8 +18,9 @@ from recorder.reading.triplets import (
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
+from rig.jumper import JumperState
 from rig.tag import TripletTag
-from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, TAG, TRIPLET
+from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
 from triggering.ledger import Ledger
 
 _EVENTS_MAX = 1000
@@ -65,6 +66,8 @@ class PulseCheck:
                     self._event(message)
                 case HEALTH.name:
                     self._health(message)
+                case JUMPER.name:
+                    self._jumper(message)
 
     def finish(self) -> None:
         """Report what can be known only at the end of the log: images that never came, pulses out of order."""
@@ -140,6 +143,15 @@ class PulseCheck:
     def _health(self, message: Message) -> None:
         if not is_json(message.data or b""):
             self._report(f"health record {message.sequence}: cannot be read")
+
+    def _jumper(self, message: Message) -> None:
+        try:
+            pulse = JumperState.decode(message.data or b"").pulse
+        except ValueError as error:
+            self._report(f"jumper at pulse {message.sequence}: cannot be read ({error})")
+            return
+        if pulse != message.sequence:
+            self._report(f"jumper at pulse {pulse}: stands in the message of pulse {message.sequence}")
 
 
 def _side_by_side(columns: list[tuple[int, int]], width: int) -> bool:

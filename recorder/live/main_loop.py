@@ -36,6 +36,7 @@ from rig.transport.messages import (
     StartRecording,
     StopRecording,
     TellEvent,
+    TellResult,
 )
 from rig.transport.preview import PreviewSlot
 from rig.transport.ring import CameraRing
@@ -145,6 +146,8 @@ class RecorderLoop:
                 self._assembler.disconnected(command.camera, command.reason, host_now())
             case TellEvent():
                 self._recordings.happened(command.event)
+            case TellResult():
+                self._recordings.result(command)
             case Quit():
                 self._quit = True
 

@@ -25,7 +25,7 @@ from rig.health import WritingHealth
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
-from rig.transport.messages import LogPart, StartRecording
+from rig.transport.messages import LogPart, StartRecording, TellResult
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
 
@@ -250,6 +250,14 @@ class Recording:
             StorageError: writing has ended.
         """
         self._writer.write_health(health, self._anchor.utc(time))
+
+    def result(self, result: TellResult, time: HostNs) -> None:
+        """Write a result of the analysis that came at `time`.
+
+        Raises:
+            StorageError: writing has ended.
+        """
+        self._writer.write_message(result.topic, result.data, result.time, self._anchor.utc(time), result.pulse)
 
     def statistics(self) -> WritingHealth | None:
         """How writing goes; None until the log is open."""

@@ -32,6 +32,7 @@ from rig.health import WritingHealth
 from rig.pulse import Pause
 from rig.status import Counts
 from rig.tag import TripletTag
+from rig.topics import JUMPER
 from rig.transport.messages import (
     RecorderEvent,
     RecorderFailed,
@@ -41,6 +42,7 @@ from rig.transport.messages import (
     RecordingProgress,
     RecordingStarted,
     StartRecording,
+    TellResult,
 )
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
@@ -188,6 +190,18 @@ class Recordings:
         self._note(health, host_now())
         if self._recording is not None and self._phase is _Phase.RUNNING:
             self._keep_reserve(self._recording)
+
+    def result(self, result: TellResult) -> None:
+        """Publish a result of the analysis, and write it into its recording while that runs."""
+        if result.topic == JUMPER.name:
+            self._publisher.jumper(result.data)
+        recording = self._recording
+        if recording is None or recording.id != result.recording or self._phase is not _Phase.RUNNING:
+            return
+        try:
+            recording.result(result, host_now())
+        except StorageError as error:
+            self._fail(recording, error)
 
     def wind_up(self, why: str, patience_s: float) -> None:
         """End a running recording now, with all pulses that are decided, and wait for the disk.

@@ -7,6 +7,7 @@ from typing import Any
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.records import Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
@@ -14,13 +15,16 @@ from recorder.log.mcap_layout import (
     EVENTS_CHANNEL,
     FIRST_CALIBRATION_CHANNEL,
     HEALTH_CHANNEL,
+    JUMPER_CHANNEL,
+    JUMPER_SCENE_CHANNEL,
     TAG_CHANNEL,
     TRIPLET_CHANNEL,
     SlotImage,
 )
 from rig.health import HEALTH_SCHEMA
+from rig.jumper import JUMPER_SCHEMA
 from rig.tag import TAG_SCHEMA
-from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, TAG, TRIPLET, Topic
+from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, JUMPER_SCENE, TAG, TRIPLET, Topic
 
 CALIBRATION_TOPIC = "/calibration/"
 
@@ -39,6 +43,8 @@ def schemas_and_channels(
         _json(2, TAG, TAG_SCHEMA),
         _protobuf(3, Log),
         _json(4, HEALTH, HEALTH_SCHEMA),
+        _json(6, JUMPER, JUMPER_SCHEMA),
+        _protobuf(7, SceneUpdate),
     ]
     shown = [
         (image.channel, TRIPLET.name if image.channel == TRIPLET_CHANNEL else CAMERA_TOPIC + image.frame)
@@ -51,6 +57,8 @@ def schemas_and_channels(
             (TAG_CHANNEL, TAG, 2),
             (EVENTS_CHANNEL, EVENTS, 3),
             (HEALTH_CHANNEL, HEALTH, 4),
+            (JUMPER_CHANNEL, JUMPER, 6),
+            (JUMPER_SCENE_CHANNEL, JUMPER_SCENE, 7),
         )
     ]
     cameras = list(calibrated)

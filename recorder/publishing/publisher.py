@@ -19,7 +19,7 @@ from recorder.publishing.keys import Keys
 from recorder.publishing.peers import Peers
 from rig.errors import BadInputError
 from rig.events import Event
-from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, TRIPLET, Topic
+from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, JUMPER, TRIPLET, Topic
 from rig.transport import wire
 
 
@@ -37,6 +37,7 @@ def live_topic(topic: Topic) -> bytes:
 _TRIPLET = live_topic(TRIPLET)
 _EVENT = live_topic(EVENTS)
 _HEALTH = live_topic(HEALTH)
+_JUMPER = live_topic(JUMPER)
 _SUBSCRIBE, _CANCEL = b"\x01", b"\x00"
 #: Bytes of a message that a subscriber may send: a topic of ours is much shorter, the handshake with keys is 0.5 kB.
 _LONGEST_MESSAGE: Final = 1024
@@ -164,6 +165,10 @@ class Publisher:
     def health(self, health: bytes) -> None:
         """Publish an encoded health record."""
         self.parts([_HEALTH, health])
+
+    def jumper(self, state: bytes) -> None:
+        """Publish an encoded state of the jumper."""
+        self.parts([_JUMPER, state])
 
     def close(self, linger_s: float = 0.0) -> None:
         """Unbind and release all slots; a second call does nothing.

@@ -17,10 +17,10 @@ from recorder.reading.records import Damage
 from recorder.reading.triplets import event_of, images_of, is_json, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
-from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, TAG, TRIPLET
+from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
 from rig.transport import wire
 
-_TRIPLET, _EVENT, _HEALTH = live_topic(TRIPLET), live_topic(EVENTS), live_topic(HEALTH)
+_TRIPLET, _EVENT, _HEALTH, _JUMPER = (live_topic(topic) for topic in (TRIPLET, EVENTS, HEALTH, JUMPER))
 _Parts = list[bytes | memoryview]
 _POLL_S = 0.1
 _LINGER_S = 5.0
@@ -308,7 +308,7 @@ class _Replay:
             parts = _parts(message, images)
             if parts is not None:
                 yield message.log_time, parts
-            elif message.topic in (TAG.name, EVENTS.name, HEALTH.name):
+            elif message.topic in (TAG.name, EVENTS.name, HEALTH.name, JUMPER.name):
                 self.damaged_bytes += message.length
 
 
@@ -326,6 +326,8 @@ def _parts(message: Message, images: Mapping[int, Message]) -> _Parts | None:
             return None if event is None else [_EVENT, wire.encode(event)]
         case HEALTH.name:
             return [_HEALTH, bytes(data)] if is_json(data) else None
+        case JUMPER.name:
+            return [_JUMPER, bytes(data)] if is_json(data) else None
     return None
 
 

@@ -21,9 +21,9 @@ from rig.errors import BadInputError
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
     CAMERA_TOPIC,
-    EVENTS,
-    HEALTH,
+    NOTES,
     PROFILE,
+    RESULTS,
     RIG_ATTACHMENT,
     TAG,
 )
@@ -35,7 +35,7 @@ _ATTACHMENTS = (RIG_ATTACHMENT, CALIBRATION_ATTACHMENT)
 #: the memory; ours have a few.
 _CHANNELS_MAX, _RECORDS_MAX, _SMALL_MAX = 1000, 1 << 16, 1 << 16
 _NAME_MAX = 1000
-_SMALL_TOPICS = (TAG.name, EVENTS.name, HEALTH.name)
+_SMALL_TOPICS = (TAG.name, *NOTES, *RESULTS)
 
 _CAMERAS_MAX = 8
 #: What the `mcap` library raises on bytes that are not the record that it is asked to read.

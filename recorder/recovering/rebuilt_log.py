@@ -82,13 +82,13 @@ class RebuiltLog:
         self._buffers.write(slot, picture)
         self._writer.write_pulse(tag, slot, ready, encoded)
 
-    def other(self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
-        """Write an event or a health record.
+    def other(self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs, sequence: int | None = None) -> None:
+        """Write an event, a health record, or a result of the analysis (with `sequence`, the number of its pulse).
 
         Raises:
             StorageError: the disk refuses.
         """
-        self._writer.write_message(topic, data, publish_time, log_time)
+        self._writer.write_message(topic, data, publish_time, log_time, sequence)
 
     def close(self, metadata: Mapping[str, Mapping[str, str]], event: Event) -> int:
         """Finish the log.

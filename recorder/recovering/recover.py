@@ -30,9 +30,9 @@ from rig.frame import FrameStatus
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
-    EVENTS,
-    HEALTH,
+    NOTES,
     RECOVERY_METADATA,
+    RESULTS,
     RIG_ATTACHMENT,
     RIG_METADATA,
     SESSION_METADATA,
@@ -225,14 +225,15 @@ class _Recovery:
         )
 
     def _others_before(self, offset: int) -> None:
-        """Write events and health records from chunks before a place of the old log, each once."""
+        """Write events, health records and results from chunks before a place of the old log, each once."""
         while self._next_other is not None and self._next_other[0] < offset:
             for message in self._reader.chunk(*self._next_other).messages:
                 key = message.topic, message.sequence, message.log_time
-                if message.topic in (EVENTS.name, HEALTH.name) and key not in self._written:
+                if message.topic in (*NOTES, *RESULTS) and key not in self._written:
                     self._written.add(key)
                     data = bytes(message.data or b"")
-                    self._rebuilt.other(message.topic, data, message.publish_time, message.log_time)
+                    sequence = message.sequence if message.topic in RESULTS else None
+                    self._rebuilt.other(message.topic, data, message.publish_time, message.log_time, sequence)
             self._next_other = next(self._others, None)
 
 

@@ -25,7 +25,7 @@ from recorder.recovering.salvage import pulse_of, tags_in
 from recorder.recovering.sightings import Constants, Rank, Sighting
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
-from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, TAG, TRIPLET
+from rig.topics import CAMERA_TOPIC, NOTES, RESULTS, TAG, TRIPLET
 
 #: An unfinished record of these kinds, at most so long, at the end of a log held no data.
 _WITHOUT_DATA: Final = (PADDING_OPCODE, Opcode.MESSAGE_INDEX, Opcode.DATA_END)
@@ -84,7 +84,7 @@ class Scan:
                     self._see(tag, Rank.WHOLE, chunk.offset, chunk.length, chunk.crc)
                 else:
                     self._see(tag, Rank.TAG, message.offset, message.length)
-            elif message.topic in (EVENTS.name, HEALTH.name):
+            elif message.topic in (*NOTES, *RESULTS):
                 others = True
             elif message.topic.startswith(CALIBRATION_TOPIC):
                 camera = message.topic.removeprefix(CALIBRATION_TOPIC)

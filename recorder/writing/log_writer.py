@@ -14,6 +14,8 @@ from recorder.log.mcap_layout import (
     EVENTS_CHANNEL,
     FIRST_CALIBRATION_CHANNEL,
     HEALTH_CHANNEL,
+    JUMPER_CHANNEL,
+    JUMPER_SCENE_CHANNEL,
     MAGIC,
     TAG_CHANNEL,
     chunk_of_one,
@@ -28,10 +30,25 @@ from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.health import WritingHealth
 from rig.tag import TripletTag
-from rig.topics import CALIBRATION_ATTACHMENT, EVENTS, HEALTH, PROFILE, RIG_ATTACHMENT, RIG_METADATA, SESSION_METADATA
+from rig.topics import (
+    CALIBRATION_ATTACHMENT,
+    EVENTS,
+    HEALTH,
+    JUMPER,
+    JUMPER_SCENE,
+    PROFILE,
+    RIG_ATTACHMENT,
+    RIG_METADATA,
+    SESSION_METADATA,
+)
 
 CLOSE_TIMEOUT_S = 60.0
-_CHANNELS = {EVENTS.name: EVENTS_CHANNEL, HEALTH.name: HEALTH_CHANNEL}
+_CHANNELS = {
+    EVENTS.name: EVENTS_CHANNEL,
+    HEALTH.name: HEALTH_CHANNEL,
+    JUMPER.name: JUMPER_CHANNEL,
+    JUMPER_SCENE.name: JUMPER_SCENE_CHANNEL,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,15 +175,25 @@ class LogWriter:
         """
         self.write_message(HEALTH.name, health, time_utc, time_utc)
 
-    def write_message(self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs) -> None:
-        """Queue the data of an event or a health record as it stands in a log.
+    def write_message(
+        self, topic: str, data: bytes, publish_time: UtcNs, log_time: UtcNs, sequence: int | None = None
+    ) -> None:
+        """Queue the data of an event, a health record or a result of the analysis as it stands in a log.
+
+        Args:
+            topic: its channel.
+            data: the encoded message.
+            publish_time: of a result the time of its pulse.
+            log_time: when it was ready.
+            sequence: of a result the number of its pulse; others are counted.
 
         Raises:
             StorageError: writing has ended; the message says why and what to do.
-            KeyError: the topic is neither that of events nor that of health records.
+            KeyError: no such messages stand on this topic.
         """
         self._sequences[topic] += 1
-        self._write_small(_CHANNELS[topic], self._sequences[topic], data, publish_time, log_time)
+        number = self._sequences[topic] if sequence is None else sequence
+        self._write_small(_CHANNELS[topic], number, data, publish_time, log_time)
 
     def set_metadata(self, name: str, fields: Mapping[str, str]) -> None:
         """Add or replace a metadata record; it is written when the log is closed, unless the file says the same."""

@@ -16,7 +16,7 @@ from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.health import Health
-from rig.pulse import Pause
+from rig.pulse import Pause, PulseNumber
 from rig.settings.model import RigSettings
 from rig.status import Counts
 
@@ -151,7 +151,25 @@ class TellEvent(Message):
     event: Event
 
 
-RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | Quit
+class TellResult(Message):
+    """To the recorder: a result of the analysis, for the log if that recording still runs, and for subscribers.
+
+    Attributes:
+        recording: id of the recording that it belongs to.
+        topic: name of the channel, one of `rig.topics.RESULTS`.
+        pulse: number of the pulse in the recording.
+        time: of the pulse.
+        data: the encoded message.
+    """
+
+    recording: str
+    topic: str
+    pulse: PulseNumber
+    time: UtcNs
+    data: bytes
+
+
+RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | TellResult | Quit
 
 
 class CameraNews(StrEnum):

@@ -13,6 +13,7 @@ from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import DeviceNs, UtcNs
 from rig.events import Event, Level
 from rig.frame import FrameStatus
+from rig.jumper import JumperPoint, JumperState, Measured
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 
@@ -112,3 +113,20 @@ def write_log(
         log.write_event(Event(now, Level.INFO, "recorder", "recording stopped"))
     buffers.close()
     return written
+
+
+def jumper_state(pulse: int, recording: str = "jump-1") -> JumperState:
+    """A measured jumper at a pulse."""
+    variance = ((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4))
+    point = JumperPoint((1.0, 2.0, 3.0), variance, ("K1", "K2"), "two rays")
+    return JumperState(
+        recording=recording,
+        jump=1,
+        pulse=PulseNumber(pulse),
+        time=UtcNs(START + pulse * PERIOD_NS),
+        points={"P1": point, "P2": None, "P3": None, "P4": None},
+        skis={"right": None, "left": None},
+        angles={"alpha": Measured(44.1, 1.0)},
+        height=None,
+        speed=Measured(26.1, 0.3),
+    )

@@ -20,7 +20,10 @@ from rig.clocks import host_now
 from rig.errors import BadInputError, ProcessDiedError
 from rig.frame import FrameStatus
 from rig.health import HEALTH_SCHEMA, Health
+from rig.jumper import JumperState
+from rig.pulse import PulseNumber
 from rig.settings.model import RigSettings
+from rig.topics import JUMPER
 from rig.transport.messages import (
     CameraChanged,
     CameraNews,
@@ -32,12 +35,14 @@ from rig.transport.messages import (
     RecordingProgress,
     RecordingStarted,
     StartRecording,
+    TellResult,
 )
 from rig.transport.preview import PreviewSlot
 from service.processes.rig_processes import RECORDER, RigProcesses
 from service.processes.simulation import simulated_hill
 from svev.demo import hill_pulses
 from tests.capture.rigs import make_rig
+from tests.recorder.logs import jumper_state
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -198,6 +203,36 @@ def test_subscribers_get_the_past_without_a_gap(tmp_path: Path, loopback: Loopba
             got.append(json.loads(tag)["pulse"])
             assert len(image) == 480 * 1920
     assert got == list(range(1, pulses + 1))
+
+
+def test_results_reach_the_log_of_their_recording_and_subscribers(tmp_path: Path, loopback: Loopback) -> None:
+    with (
+        _running(tmp_path, loopback) as running,
+        zmq.Context() as context,
+        context.socket(zmq.SUB) as socket,
+    ):
+        socket.subscribe(b"jumper")
+        socket.subscribe(b"health")
+        socket.connect(running.rig.network.publish)
+        assert socket.poll(10_000), "a first message proves the subscription"
+        path = running.start("jump", pulses=45)
+        running.until("the log is open", lambda: running.last(RecordingStarted) is not None)
+        for recording in ("jump", "another"):
+            state = jumper_state(7, recording)
+            running.processes.tell(
+                TellResult(
+                    recording=recording, topic=JUMPER.name, pulse=PulseNumber(7), time=state.time, data=state.encode()
+                )
+            )
+        running.finished(path)
+        got: list[bytes] = []
+        while len(got) < 2 and socket.poll(10_000):
+            topic, data = socket.recv_multipart()
+            got += [data] if topic == b"jumper" else []
+    assert [JumperState.decode(data).recording for data in got] == ["jump", "another"]
+    with LogReader(path) as reader:
+        kept = [JumperState.decode(message.data or b"") for message in reader.messages("/jumper")]
+    assert kept == [jumper_state(7, "jump")]
 
 
 def test_health_says_everything_and_keeps_its_schema(tmp_path: Path, loopback: Loopback) -> None:

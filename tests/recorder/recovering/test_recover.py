@@ -30,7 +30,7 @@ from rig.errors import BadInputError, StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
-from rig.topics import RECORDING_METADATA, RECOVERY_METADATA, RIG_ATTACHMENT, RIG_METADATA
+from rig.topics import JUMPER, RECORDING_METADATA, RECOVERY_METADATA, RIG_ATTACHMENT, RIG_METADATA
 from tests.recorder.logs import (
     ABSENT,
     ALL_OK,
@@ -42,6 +42,7 @@ from tests.recorder.logs import (
     SESSION,
     SHAPE,
     Written,
+    jumper_state,
     make_tag,
     open_writer,
     write_log,
@@ -386,3 +387,22 @@ def test_holes_anywhere(
         _check(report, written)
         assert sum(1 for _, image in triplets(report.path) if image.any()) >= unhurt - 2
         assert report.ledger.pulses == 7 or not report.lossless
+
+
+def test_results_of_the_analysis_are_kept_under_the_numbers_of_their_pulses(tmp_path: Path) -> None:
+    path, buffers = tmp_path / "log.mcap", TripletBuffers(SHAPE, 4)
+    states = [jumper_state(pulse) for pulse in (1, 3)]
+    with open_writer(path, buffers) as log:
+        for pulse in range(1, 5):
+            write_pulse(log, buffers, make_tag(pulse))
+        for state in states:
+            log.write_message(JUMPER.name, state.encode(), state.time, state.time, state.pulse)
+    buffers.close()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[: path.stat().st_size - 4 * PAGE])
+    report = recover(cut, tmp_path / "recovered.mcap")
+    with report.path.open("rb") as file:
+        found = [(m.sequence, m.data) for _, _, m in make_reader(file).iter_messages(topics=["/jumper"])]
+    kept = [(state.pulse, state.encode()) for state in states]
+    assert found
+    assert found == kept[: len(found)]

@@ -17,6 +17,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.reader import McapReader, NonSeekingReader, make_reader
 from mcap.records import DataEnd
 from mcap.stream_reader import StreamReader
@@ -30,7 +31,8 @@ from recorder.writing.append_file import AppendFile
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, StorageError
 from rig.events import Event, Level
-from rig.topics import RIG_METADATA, SESSION_METADATA
+from rig.jumper import JumperState
+from rig.topics import JUMPER, JUMPER_SCENE, RIG_METADATA, SESSION_METADATA
 from rig.transport import wire
 from tests.recorder.logs import (
     ALL_OK,
@@ -44,6 +46,7 @@ from tests.recorder.logs import (
     START,
     Written,
     acquire,
+    jumper_state,
     make_tag,
     open_writer,
     write_log,
@@ -222,6 +225,23 @@ def test_events_and_health_are_in_the_file_within_a_second(tmp_path: Path) -> No
         log.write_event(Event(START, Level.ERROR, "K2", "gone"))
         log.write_health(b'{"free":3}', START)
         wait_until(lambda: b'{"free":3}' in path.read_bytes() and b"gone" in path.read_bytes(), "both there", 1.0)
+
+
+def test_results_stand_on_their_channels_under_the_number_of_their_pulse(tmp_path: Path) -> None:
+    buffers = TripletBuffers((8, 16), 1)
+    path, state = tmp_path / "log.mcap", jumper_state(94)
+    with open_writer(path, buffers) as log:
+        log.write_message(JUMPER.name, state.encode(), state.time, START, state.pulse)
+        log.write_message(JUMPER_SCENE.name, SceneUpdate().SerializeToString(), state.time, START, state.pulse)
+    with path.open("rb") as file:
+        found = {channel.topic: (schema, message) for schema, channel, message in make_reader(file).iter_messages()}
+    schema, message = found["/jumper"]
+    assert (message.sequence, message.publish_time) == (94, state.time)
+    assert schema is not None
+    jsonschema.validate(json.loads(message.data), json.loads(schema.data))
+    assert JumperState.decode(message.data) == state
+    assert found["/jumper/scene"][1].sequence == 94
+    assert verify(path).verdict == "clean"
 
 
 def test_slots_come_back_only_when_nobody_else_holds_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

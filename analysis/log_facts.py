@@ -1,0 +1,92 @@
+"""What the analysis must know of a log before it looks at an image: cameras, rate, exposure times, session."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analysis.measurements.model import MeasuredCamera
+from recorder.reading.info import LogInfo, info
+from recorder.reading.log_reader import LogReader
+from rig.errors import BadInputError
+from rig.settings.model import CameraSettings
+from rig.topics import RIG_ATTACHMENT
+
+_EXPOSURE_US = float(CameraSettings.model_fields["exposure_us"].default)
+
+
+@dataclass(frozen=True, slots=True)
+class LogFacts:
+    """What a log says about itself.
+
+    Attributes:
+        path: the log.
+        recording: its id.
+        session: fields of the session.
+        rate_hz: pulses per second.
+        columns: first and one past the last column of each camera's block, by name, left to right.
+        cameras: image size and exposure time by name.
+        messages: what a person should know, one line each.
+    """
+
+    path: Path
+    recording: str
+    session: Mapping[str, str]
+    rate_hz: float
+    columns: Mapping[str, tuple[int, int]]
+    cameras: Mapping[str, MeasuredCamera]
+    messages: tuple[str, ...]
+
+
+def log_facts(path: Path) -> LogFacts:
+    """Read what a log says about itself.
+
+    Raises:
+        BadInputError: no such file, no log of ours, or a log without pulses.
+    """
+    about = info(path)
+    if about.first is None:
+        raise BadInputError(f"{path}: holds no pulse, so there is nothing to analyze; choose another recording")
+    exposures = _exposures_us(path)
+    tags = about.first.cameras
+    unknown = [tag.name for tag in tags if tag.name not in exposures]
+    messages = [f"exposure time of {', '.join(unknown)} is unknown: taken as {_EXPOSURE_US:g} us"] if unknown else []
+    rows = about.first.shape[0]
+    cameras = {
+        tag.name: MeasuredCamera((tag.columns[1] - tag.columns[0], rows), exposures.get(tag.name, _EXPOSURE_US) / 1e6)
+        for tag in tags
+    }
+    columns = {tag.name: (int(tag.columns[0]), int(tag.columns[1])) for tag in tags}
+    return LogFacts(path, about.recording, about.session, _rate_hz(about), columns, cameras, tuple(messages))
+
+
+def _rate_hz(about: LogInfo) -> float:
+    """Pulses per second, as measured; of a log with a single pulse, as the rig was set up."""
+    if about.ledger.rate_hz is not None:
+        return float(about.ledger.rate_hz)
+    try:
+        return float(about.rig["rate_hz"])
+    except (KeyError, ValueError):
+        raise BadInputError(
+            f"{about.path}: has one pulse and does not say its rate; a jump needs many pulses: choose another recording"
+        ) from None
+
+
+def _exposures_us(path: Path) -> dict[str, float]:
+    """Exposure times as the rig file in the log gives them; those it leaves out are the default of rig files."""
+    with LogReader(path) as reader:
+        for _ in reader.items():
+            if RIG_ATTACHMENT in reader.attachments:
+                break
+        text = reader.attachments.get(RIG_ATTACHMENT, b"")
+    try:
+        cameras = tomllib.loads(text.decode("utf-8")).get("cameras", [])
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError):
+        return {}
+    return {str(camera.get("name")): _exposure_us(camera) for camera in cameras if isinstance(camera, dict)}
+
+
+def _exposure_us(camera: dict[str, Any]) -> float:
+    given = camera.get("exposure_us", _EXPOSURE_US)
+    return float(given) if isinstance(given, (int, float)) and given >= 0 else _EXPOSURE_US

@@ -1,1 +1,1 @@
-"""What other programs read of our results: camera calibrations for Foxglove and OpenCV."""
+"""What other programs read of our results: CSV, C3D, TRC; camera calibrations for Foxglove and OpenCV."""

@@ -118,6 +118,16 @@ class CameraSystem:
         """Names of the cameras."""
         return tuple(self.cameras)
 
+    def only(self, names: Sequence[str]) -> "CameraSystem":
+        """Some of the cameras, in this order, with their part of the covariance."""
+        columns = np.concatenate([self[name].columns for name in names])
+        placed, first = {}, 0
+        for name in names:
+            end = first + len(self[name].columns)
+            placed[name] = replace(self[name], columns=np.arange(first, end))
+            first = end
+        return CameraSystem(placed, self.covariance[np.ix_(columns, columns)])
+
     def moved(self, step: Floats) -> "CameraSystem":
         """The cameras with all uncertain parameters (p,) changed by `step`; the covariance stays.
 

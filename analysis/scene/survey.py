@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Survey:
 
 
 def read_survey(path: Path) -> Survey:
-    """Read a survey.
+    """Read a survey; interior parameters with a sigma are uncertain, and their uncertainty counts.
 
     Raises:
         BadInputError: no network file, observations in it, metric image frame, several images of a camera, or fewer
@@ -91,6 +92,7 @@ def read_survey(path: Path) -> Survey:
         raise BadInputError(
             f'{path}: has "observations", so it is a measured network and no survey; remove them, or use svev orient'
         )
+    data = data | {"cameras": _with_uncertain_estimated(data.get("cameras"))}
     network = network_from_json({"images": {}, "observations": [], **data}, str(path))
     if network.image_frame is not ImageFrame.PIXEL:
         raise BadInputError(f'{path}: "image_frame" is "metric"; a survey for a log needs c, x0, y0 in px: "pixel"')
@@ -106,3 +108,17 @@ def read_survey(path: Path) -> Survey:
             f"{path}: has {count} surveyed balls (control or fixed); a camera needs at least {_FEWEST} in sight"
         )
     return Survey(network, str(path))
+
+
+def _with_uncertain_estimated(cameras: Any) -> Any:
+    """Cameras of a file in which each parameter with a sigma is an unknown, whether or not "estimate" names it."""
+    if not isinstance(cameras, dict):
+        return cameras
+    return {
+        name: body | {"estimate": [*given, *(key for key in body.get("sigma", {}) if key not in given)]}
+        if isinstance(body, dict)
+        and isinstance(given := body.get("estimate", []), list)
+        and isinstance(body.get("sigma", {}), dict)
+        else body
+        for name, body in cameras.items()
+    }

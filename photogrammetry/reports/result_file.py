@@ -19,6 +19,8 @@ from photogrammetry.network.model import AXES, Reweight, Role
 from rig.arrays import Floats
 
 FORMAT = "svev-adjustment/1"
+#: The elements of a pose: projection centre, and turns (rad) about the camera's own axes.
+POSE = ("X0", "Y0", "Z0", "angle1", "angle2", "angle3")
 _WEIGHTS = {
     Reweight.NONE: "",
     Reweight.HELMERT: "; the weights are estimated from the residuals, group by group",
@@ -65,6 +67,8 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "n_unknowns": a.problem.unknowns.count,
         "n_conditions": a.free.defect,
         "redundancy": a.redundancy,
+        "length_unit": network.length_unit,
+        "image_frame": network.image_frame.value,
         "cameras": _cameras(a),
         "images": _images(a),
         "points": _points(a),
@@ -81,6 +85,8 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         },
         "diagnosis": [],
     }
+    if a.network.images and len({image.camera for image in network.images}) == len(network.images):
+        result["calibration"] = _calibration(a)
     if outcome.removed:
         result["removed"] = [blunder_to_json(gone.network, gone.blunder) for gone in outcome.removed]
     return result
@@ -118,6 +124,7 @@ def _cameras(a: Adjustment) -> dict[str, Any]:
             **dict(zip(INTERIOR, a.state.interior[i].tolist(), strict=True)),
             "r0": camera.balance,
             "distortion": camera.distortion.value,
+            **({} if camera.size is None else {"size": list(camera.size)}),
             "sigma": {p.name: p.sigma for p in parameters},
             "correlations": {
                 f"{one.name}|{other.name}": _number(correlations[j, k])
@@ -143,6 +150,25 @@ def _images(a: Adjustment) -> dict[str, Any]:
         }
         for i, image in enumerate(a.network.images)
     }
+
+
+def _calibration(a: Adjustment) -> dict[str, Any]:
+    """The joint covariance of all poses and interior parameters that were estimated, of one image of each camera."""
+    unknowns, network = a.problem.unknowns, a.network
+    named: list[tuple[dict[str, str], int]] = []
+    for image, columns in zip(network.images, unknowns.pose, strict=True):
+        named += [
+            ({"image": image.name, "parameter": p}, c) for p, c in zip(POSE, columns.tolist(), strict=True) if c >= 0
+        ]
+    for camera, columns in zip(network.cameras, unknowns.camera, strict=True):
+        parameters = [INTERIOR[i] for i in unknowns.selection]
+        named += [
+            ({"camera": camera.name, "parameter": p}, c)
+            for p, c in zip(parameters, columns.tolist(), strict=True)
+            if c >= 0
+        ]
+    columns = np.array([column for _, column in named], dtype=np.intp)
+    return {"parameters": [name for name, _ in named], "covariance": a.covariance(columns).tolist()}
 
 
 def _points(a: Adjustment) -> dict[str, Any]:
@@ -174,6 +200,7 @@ def _observations(a: Adjustment) -> list[dict[str, Any]]:
     v = in_file_frame(network, a.image_residuals())[back].tolist()
     w = in_file_frame(network, a.image_w())[back]
     r = a.controlled.image_numbers[back].tolist()
+    sigma = a.problem.sigma[back].tolist()
     return [
         {
             "image": network.images[image].name,
@@ -184,6 +211,7 @@ def _observations(a: Adjustment) -> list[dict[str, Any]]:
             "ry": r[i][1],
             "wx": _number(w[i, 0]),
             "wy": _number(w[i, 1]),
+            "sigma": sigma[i],
         }
         for i, (image, point) in enumerate(zip(network.observations.image, network.observations.point, strict=True))
     ]
@@ -219,7 +247,7 @@ def _weighted_parameters(a: Adjustment) -> list[dict[str, Any]]:
     out = []
     for kind, of, parts, named in (
         (Kind.CAMERA, "camera", INTERIOR, a.network.cameras),
-        (Kind.POSE, "image", ("X0", "Y0", "Z0", "angle1", "angle2", "angle3"), a.network.images),
+        (Kind.POSE, "image", POSE, a.network.images),
     ):
         for item, part, v, r, w in a.relation_tests(kind):
             out.append({of: named[item].name, "parameter": parts[part], "v": v, "r": r, "w": _number(w)})

@@ -28,7 +28,7 @@ PaperOption = Annotated[bool, typer.Option("--paper", help="estimate the weights
 #: Exit codes.
 NOT_SOLVABLE: Final = 3
 NOT_CONVERGED: Final = 4
-_LISTS: Final = ("observations", "points", "images")  # too long for a screen
+_LISTS: Final = ("observations", "points", "images", "calibration")  # too long for a screen
 
 
 def written(make: Callable[[], Report], folder: Path | None) -> list[str]:

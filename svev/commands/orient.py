@@ -7,7 +7,6 @@ from typing import Annotated, Any
 import typer
 
 from photogrammetry.network.file import read_network
-from photogrammetry.network.model import Network
 from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
 from photogrammetry.procedures.orientation import orient as orient_network
 from photogrammetry.reports.procedures import orientation_lines, orientation_report, orientation_to_json
@@ -41,6 +40,13 @@ def orient(
         Alternative, typer.Option("--alternative", help="1: static tie points only; 2: moving tie points too")
     ] = Alternative.MOVING_TOO,
     moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names (* and ?)")] = "H*",
+    uncertain_interior: Annotated[
+        bool,
+        typer.Option(
+            "--uncertain-interior",
+            help='interior parameters in "estimate" that have a "sigma" are weighted observations instead of constants',
+        ),
+    ] = False,
     reweight: ReweightOption = False,
     paper: PaperOption = False,
     report: ReportOption = None,
@@ -56,11 +62,11 @@ def orient(
     if calibration is not None:
         given = with_calibration(given, read_calibration(calibration))
     given = with_weights(given, reweight=reweight, paper=paper)
-    deliver(lambda: _oriented(given, int(alternative), moving, report), output, as_json=as_json)
 
+    def oriented() -> tuple[dict[str, Any], list[str]]:
+        orientation = orient_network(given, int(alternative), moving, uncertain_interior=uncertain_interior)
+        lines = orientation_lines(orientation)
+        lines += written(lambda: orientation_report(orientation), report)
+        return orientation_to_json(orientation), lines
 
-def _oriented(network: Network, alternative: int, moving: str, report: Path | None) -> tuple[dict[str, Any], list[str]]:
-    orientation = orient_network(network, alternative, moving)
-    lines = orientation_lines(orientation)
-    lines += written(lambda: orientation_report(orientation), report)
-    return orientation_to_json(orientation), lines
+    deliver(oriented, output, as_json=as_json)

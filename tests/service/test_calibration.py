@@ -11,9 +11,9 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from photogrammetry.network.file_writer import write_network
 from svev.cli import main
 from tests.capture.rigs import write_rig
-from tests.photogrammetry.network_writer import write_network
 from tests.photogrammetry.synthetic import lab_frame
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback

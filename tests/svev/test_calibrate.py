@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from photogrammetry.network.file_writer import write_network
 from photogrammetry.network.model import Network
 from svev.cli import main
-from tests.photogrammetry.network_writer import write_network
 from tests.photogrammetry.synthetic import hill, lab_frame
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from photogrammetry.network.file_writer import network_to_json, write_network
 from photogrammetry.network.model import Datum, ImageFrame, Network, Reweight, Role
 from svev.cli import main
-from tests.photogrammetry.network_writer import network_to_json, write_network
 from tests.photogrammetry.synthetic import hill, lab_frame, rods
 
 Run = Callable[..., tuple[int, dict[str, Any]]]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from photogrammetry.network.file_writer import write_network
 from photogrammetry.network.model import Datum, DatumType, Network
 from svev.cli import main
-from tests.photogrammetry.network_writer import write_network
 from tests.photogrammetry.synthetic import hill, lab_frame, rods
 
 Run = Callable[..., dict[str, Any]]

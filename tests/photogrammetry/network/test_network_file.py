@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from photogrammetry.network.file import network_from_json, read_network
+from photogrammetry.network.file_writer import network_to_json, write_network
 from photogrammetry.network.model import Network, Reweight, Role
 from rig.errors import BadInputError
-from tests.photogrammetry.network_writer import network_to_json, write_network
 from tests.photogrammetry.synthetic import rods
 
 _GOOD: dict[str, Any] = {

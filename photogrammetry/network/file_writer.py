@@ -1,4 +1,4 @@
-"""Writes `svev-network/1` files, for tests of the programs that read them."""
+"""Writes `svev-network/1` files."""
 
 import json
 from pathlib import Path

@@ -3,12 +3,12 @@
 Image coordinates are px, pixel frame of `svev-network/1` (x right, y down, (0, 0) = centre of the top-left pixel).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from rig.arrays import Floats
+from rig.arrays import Flags, Floats, Integers
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
 
@@ -38,6 +38,25 @@ class Spots:
     def none(cls) -> "Spots":
         """No spot."""
         return cls(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0), np.empty(0))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Spots"]) -> "Spots":
+        """All spots of several parts of an image."""
+        if not parts:
+            return cls.none()
+        return cls(
+            np.concatenate([part.xy for part in parts]),
+            np.concatenate([part.covariance for part in parts]),
+            np.concatenate([part.radius for part in parts]),
+            np.concatenate([part.contrast for part in parts]),
+            np.concatenate([part.strength for part in parts]),
+        )
+
+    def only(self, chosen: Integers | Flags) -> "Spots":
+        """Some of them."""
+        return Spots(
+            self.xy[chosen], self.covariance[chosen], self.radius[chosen], self.contrast[chosen], self.strength[chosen]
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,160 @@
+"""What stands before the static scene: each image is compared with the static image in the light of its moment.
+
+Clouds and floodlights change gain and offset of a whole image, wind and a slow drift shift it by parts of a pixel. All
+four are estimated robustly from a grid of pixels (image = gain * static + offset + shift * gradient), so that neither
+light nor shake looks like a movement. What differs by more than the noise of its pixel is in front.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.scene.static_image import GreyImage, StaticImage
+from rig.arrays import Floats
+
+_SAMPLES = 8_000  # pixels of the grid
+_ROUNDS, _CLIP = 4, 3.0  # of the robust adjustment; sigmas
+_SHIFT_SIGMA = 0.07  # px by which a frame may still be off: lenses, rolling air, a turn about the axis
+_FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
+_SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
+_THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
+_JOIN = 9  # px: what is nearer to each other belongs together
+_MARGIN = 10  # px around what moves
+_MOST = 8  # regions of an image, the largest ones
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """A part of an image in which something is in front of the static scene.
+
+    Attributes:
+        x, y: column and row of its first pixel in the image.
+        grey: (rows, columns) grey values.
+        behind: (rows, columns) what the static scene shows there in the light of the moment.
+        sigma: (rows, columns) noise of the difference.
+        front: (rows, columns) which pixels are in front.
+    """
+
+    x: int
+    y: int
+    grey: GreyImage
+    behind: GreyImage
+    sigma: GreyImage
+    front: NDArray[np.bool_]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory."""
+        return self.grey.nbytes + self.behind.nbytes + self.sigma.nbytes + self.front.nbytes
+
+    def holds(self, xy: Floats) -> bool:
+        """Whether a place of the image, px (2,), lies in it."""
+        rows, columns = self.grey.shape
+        return bool(self.x <= xy[0] <= self.x + columns - 1 and self.y <= xy[1] <= self.y + rows - 1)
+
+
+class Background:
+    """The static scene of one camera, to compare its images with.
+
+    Args:
+        static: of this camera.
+    """
+
+    def __init__(self, static: StaticImage) -> None:
+        grey = np.ascontiguousarray(static.grey, np.float32)
+        self._grey = grey
+        self._right = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=1 / 8)
+        self._down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=1 / 8)
+        steep = self._right**2 + self._down**2
+        own = np.asarray(static.noise, np.float32) ** 2 * np.float32(1 + 1 / static.frames)
+        self._sigma = np.sqrt(own + np.float32(_SHIFT_SIGMA**2) * steep).astype(np.float32)
+        step = max(1, int(np.sqrt(grey.size / _SAMPLES)))
+        self._grid = slice(step // 2, None, step), slice(step // 2, None, step)
+        sampled = [layer[self._grid].ravel().astype(float) for layer in (grey, self._right, self._down, self._sigma)]
+        self._design = np.column_stack((sampled[0], np.ones(len(sampled[0])), sampled[1], sampled[2]))
+        self._weight = 1 / sampled[3]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self._grey.shape[0], self._grey.shape[1]
+
+    def regions(self, image: NDArray[np.uint8], stamped: tuple[int, int, int] | None = None) -> list[Region]:
+        """Where something is in front, the largest region first.
+
+        Args:
+            image: (rows, columns) of this camera.
+            stamped: row, first column and count of pixels that are no picture.
+        """
+        behind, factor = self._moment(image)
+        grey = image.astype(np.float32)
+        limit = self._sigma * np.float32(_FRONT * factor)
+        front = np.asarray(cv2.compare(cv2.absdiff(grey, behind), limit, cv2.CMP_GT), np.uint8)
+        if stamped is not None:
+            front[stamped[0], stamped[1] : stamped[1] + stamped[2]] = 0
+        sigma = np.float32(factor)
+        return [
+            Region(box[0], box[1], grey[part].copy(), behind[part].copy(), self._sigma[part] * sigma, front[part] > 0)
+            for box in _boxes(front)
+            if (part := (slice(box[1], box[3]), slice(box[0], box[2])))
+        ]
+
+    def _moment(self, image: NDArray[np.uint8]) -> tuple[GreyImage, float]:
+        """The static scene in the light of an image, and by what factor its noise is larger than that of most."""
+        gain, offset, right, down, factor = self._light(image)
+        behind = cv2.addWeighted(self._right, right, self._down, down, offset)
+        return np.asarray(cv2.scaleAdd(self._grey, gain, behind), np.float32), factor
+
+    def _light(self, image: NDArray[np.uint8]) -> tuple[float, float, float, float, float]:
+        sample = image[self._grid].ravel().astype(float)
+        rows: Floats = self._design * self._weight[:, None]
+        values = sample * self._weight
+        keep = np.ones(len(values), bool)
+        unknown, factor = np.array([1.0, 0.0, 0.0, 0.0]), 1.0
+        for _ in range(_ROUNDS):
+            normal = rows[keep].T @ rows[keep]
+            normal += np.diag(1e-9 * np.diag(normal) + 1e-12)
+            unknown = np.linalg.solve(normal, rows[keep].T @ values[keep])
+            v = np.abs(values - rows @ unknown)
+            factor = max(1e-3, 1.4826 * float(np.median(v)))
+            keep = v < _CLIP * factor
+        gain, offset, right, down = unknown.tolist()
+        return gain, offset, right, down, max(1.0, factor)
+
+
+def _boxes(front: NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
+    """Boxes around what moves: columns and rows of the first and behind the last pixel, the largest first."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(front, connectivity=8)
+    large = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _SMALLEST
+    large &= np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _THINNEST
+    large[0] = False
+    if count < 2 or not large.any():
+        return []
+    boxes = [(x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area) for x, y, w, h, area in stats[large].tolist()]
+    rows, columns = labels.shape
+    grown = sorted(_joined(boxes), key=lambda box: -box[4])[:_MOST]
+    spare = _MARGIN - _JOIN
+    return [
+        (max(0, x - spare), max(0, y - spare), min(columns, right + spare), min(rows, bottom + spare))
+        for x, y, right, bottom, _ in grown
+    ]
+
+
+def _joined(boxes: list[tuple[int, int, int, int, int]]) -> list[tuple[int, int, int, int, int]]:
+    """Boxes that overlap as one; the last number is the area in front."""
+    done: list[tuple[int, int, int, int, int]] = []
+    waiting = list(boxes)
+    while waiting:
+        box = waiting.pop()
+        touching = [o for o in (*waiting, *done) if o[0] < box[2] and box[0] < o[2] and o[1] < box[3] and box[1] < o[3]]
+        if not touching:
+            done.append(box)
+            continue
+        waiting = [o for o in waiting if o not in touching]
+        done = [o for o in done if o not in touching]
+        group = [box, *touching]
+        low, high = np.min(group, axis=0), np.max(group, axis=0)
+        waiting.append((int(low[0]), int(low[1]), int(high[2]), int(high[3]), sum(o[4] for o in group)))
+    return done

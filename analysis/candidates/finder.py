@@ -1,0 +1,136 @@
+"""Finds the candidates of all images of a recording, and looks again where an identification expects something.
+
+What is in front of the static scene is cut out of each image and kept in memory for the second look, which is given a
+predicted place with its covariance, and takes weaker evidence there. Pixels that are a signature of the camera
+(`stamped` in the tag) are no picture and are never looked at.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from msgspec import UNSET
+from numpy.typing import NDArray
+
+from analysis.candidates.background import Background, Region
+from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
+from analysis.candidates.spots import find_spots, look_for_spots
+from analysis.candidates.traces import find_traces
+from analysis.scene.static_image import StaticImage
+from recorder.reading.log_reader import LogReader
+from recorder.reading.triplets import stored_triplets, triplets
+from rig.arrays import Floats
+from rig.errors import BadInputError
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+from rig.tag import CameraTag, TripletTag
+
+_MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
+
+
+class Finder:
+    """Finds candidates in the images of one recording.
+
+    Args:
+        static: static image of each camera; cameras without one are left out.
+        memory: bytes that are kept for second looks.
+    """
+
+    def __init__(self, static: Mapping[str, StaticImage], memory: int = _MEMORY) -> None:
+        self._backgrounds = {name: Background(image) for name, image in static.items()}
+        self._regions: OrderedDict[tuple[PulseNumber, str], list[Region]] = OrderedDict()
+        self._kept, self._memory = 0, memory
+
+    def find(self, tag: TripletTag, image: NDArray[np.uint8]) -> PulseCandidates:
+        """The candidates of a pulse; keeps what a second look needs.
+
+        Args:
+            tag: of the pulse.
+            image: (rows, columns) all cameras side by side.
+
+        Raises:
+            BadInputError: an image is not as large as the static image of its camera.
+        """
+        found: dict[str, ImageCandidates] = {}
+        for camera in tag.cameras:
+            background = self._backgrounds.get(camera.name)
+            if camera.status is not FrameStatus.OK or background is None:
+                continue
+            block = image[:, slice(*camera.columns)]
+            if block.shape != background.shape:
+                raise BadInputError(
+                    f"{camera.name}: image of {block.shape[1]} x {block.shape[0]} px, but the static image has "
+                    f"{background.shape[1]} x {background.shape[0]} px; compute both from the same recording"
+                )
+            regions = background.regions(block, _stamped(camera))
+            self._keep(tag.pulse, camera.name, regions)
+            found[camera.name] = _candidates(regions)
+        return PulseCandidates(tag.pulse, tag.time, found)
+
+    def look_for_spots(
+        self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats, radius: float | None = None
+    ) -> Spots:
+        """Spots near a predicted place, on weaker evidence than at first sight; the nearest by chi-squared first.
+
+        Args:
+            pulse: one that was searched before, not longer ago than the memory reaches.
+            camera: its name.
+            xy: (2,) predicted place, px.
+            covariance: (2, 2) of the prediction, px^2.
+            radius: expected, px, where it is known.
+
+        Returns:
+            None at all, also where nothing was in front of the static scene.
+        """
+        for region in self._regions.get((pulse, camera), ()):
+            if region.holds(xy):
+                return look_for_spots(region, xy, covariance, radius)
+        return Spots.none()
+
+    def _keep(self, pulse: PulseNumber, camera: str, regions: list[Region]) -> None:
+        self._kept -= sum(region.nbytes for region in self._regions.pop((pulse, camera), ()))
+        self._regions[pulse, camera] = regions
+        self._kept += sum(region.nbytes for region in regions)
+        while self._kept > self._memory and len(self._regions) > 1:
+            _, oldest = self._regions.popitem(last=False)
+            self._kept -= sum(region.nbytes for region in oldest)
+
+
+def find_candidates(
+    log: Path, finder: Finder, progress: Callable[[float], None] | None = None
+) -> list[PulseCandidates]:
+    """The candidates of every pulse of a log.
+
+    Args:
+        log: the log; of a damaged one, the part that can be read.
+        finder: with the static images of this log.
+        progress: is called with the share that is done.
+
+    Raises:
+        BadInputError: no such log, or its images are not as large as the static ones.
+    """
+    total = 0
+    if progress is not None:
+        with LogReader(log) as reader:
+            total = len(stored_triplets(reader))
+    found = []
+    for tag, image in triplets(log):
+        found.append(finder.find(tag, image))
+        if progress is not None:
+            progress(min(1.0, len(found) / max(1, total)))
+    return found
+
+
+def _candidates(regions: list[Region]) -> ImageCandidates:
+    spots = Spots.joined([find_spots(region) for region in regions])
+    traces = tuple(trace for region in regions for trace in find_traces(region))
+    return ImageCandidates(spots, traces)
+
+
+def _stamped(camera: CameraTag) -> tuple[int, int, int] | None:
+    """Row, first column in the camera's block, and count of pixels that are no picture."""
+    if camera.stamped is UNSET:
+        return None
+    row, column, count = camera.stamped
+    return row, column - camera.columns[0], count

@@ -1,0 +1,67 @@
+"""Candidates in the images of a simulated hill, judged by its truth."""
+
+import numpy as np
+import pytest
+
+from rig.errors import BadInputError
+from rig.pulse import PulseNumber
+from tests.analysis.candidates.judge import Hill, judged, scenario
+
+PULSES = (29, 36, 43, 50)  # table, edge, early flight, V
+
+
+@pytest.fixture(scope="module")
+def hill() -> Hill:
+    return Hill(scenario())
+
+
+def test_all_markers_are_found_with_sigmas_that_hold(hill: Hill) -> None:
+    verdict = judged(hill, PULSES)
+    assert verdict.found == verdict.clear >= 44
+    # 90 coordinates: the mean of their squares scatters by 0.15; the noise model is rounded up a little
+    assert 0.4 < verdict.squares.mean() < 1.5
+    sigma = np.sqrt(np.trace(np.array(verdict.covariances), axis1=1, axis2=2) / 2)
+    assert np.median(sigma) < 0.05, "a marker of contrast 200 and noise 2.5"
+    assert verdict.false < 5 * verdict.images
+
+
+def test_dark_markers_on_a_light_suit_are_found_as_well() -> None:
+    dark = Hill(scenario(jumper={"marker": 10.0, "patch": 180.0, "suit": 150.0}))
+    verdict = judged(dark, PULSES[::2])
+    assert verdict.found == verdict.clear >= 20
+    assert 0.3 < verdict.squares.mean() < 1.8
+
+
+def test_most_skis_have_a_trace(hill: Hill) -> None:
+    verdict = judged(hill, PULSES)
+    assert verdict.traced >= 0.75 * verdict.skis > 10
+
+
+def test_nothing_moves_nothing_found(hill: Hill) -> None:
+    for image in hill.find(85).images.values():  # between two jumps, with flakes of snow in the air
+        assert len(image.spots) == 0
+        assert image.traces == ()
+
+
+def test_a_predicted_place_finds_the_marker_again(hill: Hill) -> None:
+    pulse = 43
+    hill.find(pulse)
+    state = hill.truth([pulse])[0]
+    for camera, places in state["images"].items():
+        for place in places.values():
+            predicted = np.array(place) + np.array((0.8, -0.6))
+            spots = hill.finder.look_for_spots(PulseNumber(pulse), camera, predicted, np.eye(2))
+            assert np.hypot(*(spots.xy - place).T).min() < 0.15
+    nowhere = hill.finder.look_for_spots(PulseNumber(pulse), "K1", np.array((600.0, 20.0)), np.eye(2))
+    assert len(nowhere) == 0
+
+
+def test_a_camera_without_a_frame_has_no_candidates(hill: Hill) -> None:
+    found = hill.finder.find(hill.tag(43, lost=["K2"]), hill.triplet(43))
+    assert set(found.images) == {"K1", "K3"}
+
+
+def test_images_of_another_size_are_refused(hill: Hill) -> None:
+    small = Hill(scenario(), (320, 240))
+    with pytest.raises(BadInputError, match="640 x 480"):
+        hill.finder.find(small.tag(43), small.triplet(43))

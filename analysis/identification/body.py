@@ -1,0 +1,73 @@
+"""What a jumper looks like in space, loosely: enough to tell which is which, too little to measure anything by it.
+
+The frame is that of the flight: x horizontal along it, y to the left, z up. All numbers are sizes of people and skis.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from analysis.measurements.model import POINTS
+from rig.arrays import Floats
+
+#: Means and standard deviations of differences of points, m, from the crouch on the table to the flight.
+_DIFFERENCES: Final = {
+    ("P2", "P1"): ((0.60, 0.00, 0.25), (0.20, 0.12, 0.25)),
+    ("P3", "P4"): ((0.00, 0.45, 0.00), (0.12, 0.12, 0.10)),
+    ("P3", "P2"): ((0.25, 0.22, 0.60), (0.30, 0.18, 0.17)),
+    ("P4", "P2"): ((0.25, -0.22, 0.60), (0.30, 0.18, 0.17)),
+    ("P3", "P1"): ((0.90, 0.22, 0.80), (0.35, 0.20, 0.28)),
+    ("P4", "P1"): ((0.90, -0.22, 0.80), (0.35, 0.20, 0.28)),
+}
+#: Means and standard deviations of distances, m.
+_DISTANCES: Final = {
+    ("P2", "P1"): (0.70, 0.10),
+    ("P3", "P4"): (0.48, 0.13),
+    ("P3", "P2"): (0.75, 0.16),
+    ("P4", "P2"): (0.75, 0.16),
+    ("P3", "P1"): (1.30, 0.27),
+    ("P4", "P1"): (1.30, 0.27),
+}
+#: A jumper with skis is not longer than this, m.
+REACH_M = 2.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlightFrame:
+    """The frame of a flight.
+
+    Attributes:
+        axes: (3, 3) forward, left and up as rows, in the object system.
+        velocity: (3,) mean velocity in the object system, m/s.
+    """
+
+    axes: Floats
+    velocity: Floats
+
+    @classmethod
+    def along(cls, velocity: Floats) -> "FlightFrame":
+        """The frame of a flight with a mean velocity (3,)."""
+        forward = np.array((velocity[0], velocity[1], 0.0)) / np.hypot(velocity[0], velocity[1])
+        up = np.array((0.0, 0.0, 1.0))
+        return cls(np.stack((forward, np.cross(up, forward), up)), velocity)
+
+
+def implausibility(one: int, other: int, difference: Floats) -> Floats:
+    """How badly differences other - one fit two points of the body: about chi-square with three degrees of freedom.
+
+    Args:
+        one: index into `POINTS`.
+        other: likewise.
+        difference: (n, 3) m, in the frame of the flight.
+
+    Returns:
+        (n,) squared deviations from the means.
+    """
+    names = POINTS[one], POINTS[other]
+    if names not in _DIFFERENCES:
+        return implausibility(other, one, -difference)
+    mean, sigma = (np.array(values) for values in _DIFFERENCES[names])
+    length, spread = _DISTANCES[names]
+    apart = (np.linalg.norm(difference, axis=1) - length) / spread
+    return np.asarray((((difference - mean) / sigma) ** 2).sum(axis=1) + apart**2)

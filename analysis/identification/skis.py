@@ -1,0 +1,263 @@
+"""The skis of one jump: which traces show the right ski, which the left one, in every image.
+
+In each pulse the traces of all images are assigned jointly: the lines in space must pass their bindings, and fit in
+every view. Traces that could as well be the other ski, or both in one, stay without a name. Time makes it sharper: the
+skis turn smoothly, and a binding marker keeps its place on its ski, so that pulses in which the skis lie apart tell
+about those in which they are not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.identification.assignment import (
+    DECISIVE,
+    DETECTED,
+    MOST_OPTIONS,
+    MOST_VAGUE_M,
+    Option,
+    jointly_best,
+    nothing,
+)
+from analysis.identification.body import FlightFrame
+from analysis.identification.prediction import SKI, Prediction, predict
+from analysis.identification.ski_traces import SeenSkis, StraightTrace
+from analysis.identification.views import Views, gate
+from analysis.measurements.model import SIDES
+from rig.arrays import Flags, Floats, Integers
+
+#: Slope and heading of skis against the horizontal direction of the flight, rad: standard deviations.
+_SLOPE, _HEADING = np.radians(25.0), np.radians(15.0)
+_BINDING_M = 0.06  #: standard deviation, across the ski, of a binding's marker from the ski's axis
+_ALONG_M = 0.3  #: likewise along it
+_STEADY_M = 0.01  #: standard deviation of that distance from pulse to pulse
+_MOST_TURNS = 4
+_BEAM = 12
+_LENGTH_PX = 40.0  #: of a trace, for the density of traces that are there by chance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skis:
+    """The skis of a jump.
+
+    Attributes:
+        traces: (t, 2, m) index of the straight trace of each side in each image; -1: none, or not to be told.
+    """
+
+    traces: Integers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Where the bindings are.
+
+    Attributes:
+        xyz: (t, 2, 3) of P3 and P4.
+        covariance: (t, 2, 3, 3).
+    """
+
+    xyz: Floats
+    covariance: Floats
+
+
+def follow_skis(
+    views: Views,
+    time_s: Floats,
+    traces: Sequence[Sequence[Sequence[StraightTrace]]],
+    delivered: Flags,
+    frame: FlightFrame,
+    bindings: Places,
+) -> Skis:
+    """Find the traces of both skis.
+
+    Args:
+        views: the cameras.
+        time_s: (t,) of the pulses.
+        traces: of each pulse by camera.
+        delivered: (t, m) whether a camera has an image of a pulse.
+        frame: of the flight.
+        bindings: their places.
+    """
+    search = _Search(views, traces, delivered, frame, bindings)
+    steps = len(time_s)
+    angles = Prediction(
+        np.zeros((steps, 2, 2)),
+        np.broadcast_to(np.diag((_SLOPE**2, _HEADING**2)), (steps, 2, 2, 2)),
+        np.zeros((steps, 2, 2)),
+    )
+    offsets = np.zeros((2, 2)), np.tile(_BINDING_M**2 * np.eye(2), (2, 1, 1))
+    broad = search.belief(angles, offsets)
+    found, believed = np.full((steps, 2, len(views)), -2), broad
+    for _ in range(_MOST_TURNS):
+        before, found = found, search.assigned(believed)
+        if (found == before).all():
+            break
+        lines = search.measured(broad, found)
+        offsets = search.offsets(lines)
+        angles = predict(time_s, *search.angles(lines), np.zeros(2), SKI)
+        believed = search.belief(angles, offsets)
+    return Skis(found)
+
+
+class _Search:
+    """The assignment of traces in all pulses for given beliefs."""
+
+    def __init__(
+        self,
+        views: Views,
+        traces: Sequence[Sequence[Sequence[StraightTrace]]],
+        delivered: Flags,
+        frame: FlightFrame,
+        bindings: Places,
+    ) -> None:
+        self._views, self._traces, self._delivered, self._frame, self._bindings = (
+            views,
+            traces,
+            delivered,
+            frame,
+            bindings,
+        )
+        sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(bindings.covariance, nan=1e6))[..., -1])
+        self._known = sigma < MOST_VAGUE_M
+        height = np.array([placed.size.min() for placed in views.placed])
+        self._space = height * np.pi / 2 * _LENGTH_PX  # px^2 over which the ends of a trace may lie by chance
+
+    def belief(self, angles: Prediction, offsets: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        """Values (t, 2, 6) and covariances (t, 2, 6, 6) of skis with angles (slope, heading) and offsets of markers.
+
+        Args:
+            angles: (t, 2, 2) slope and heading in the frame of the flight, rad.
+            offsets: (2, 2) of the ski from its marker, to the left and up, with covariance (2, 2, 2), m.
+        """
+        slope, heading = np.clip(angles.xyz[..., 0], -1, 1), np.clip(angles.xyz[..., 1], -1, 1)
+        direction, left, up = self._axes(slope, heading)
+        values = np.concatenate(
+            (
+                self._bindings.xyz + offsets[0][None, :, :1] * left + offsets[0][None, :, 1:] * up,
+                direction,
+            ),
+            axis=-1,
+        )
+        broad = np.diag((_SLOPE**2, _HEADING**2))
+        inverse = np.linalg.inv(angles.covariance) + np.linalg.inv(broad) * 1e-3
+        turning = np.linalg.inv(inverse)
+        across = np.stack((up, np.cos(slope)[..., None] * left), axis=-1)
+        aside = np.stack((left, up), axis=-1)
+        covariance = np.zeros((*values.shape, 6))
+        covariance[..., :3, :3] = self._bindings.covariance + aside @ offsets[1] @ aside.swapaxes(-1, -2)
+        covariance[..., :3, :3] += _ALONG_M**2 * direction[..., :, None] * direction[..., None, :]
+        covariance[..., 3:, 3:] = across @ turning @ across.swapaxes(-1, -2)
+        return values, covariance
+
+    def _axes(self, slope: Floats, heading: Floats) -> tuple[Floats, Floats, Floats]:
+        """Direction, left and up (..., 3) of skis in the object system."""
+        zero = np.zeros_like(slope)
+        local = (
+            (np.cos(slope) * np.cos(heading), np.cos(slope) * np.sin(heading), np.sin(slope)),
+            (-np.sin(heading), np.cos(heading), zero),
+            (-np.sin(slope) * np.cos(heading), -np.sin(slope) * np.sin(heading), np.cos(slope)),
+        )
+        direction, left, up = (np.stack(part, axis=-1) @ self._frame.axes for part in local)
+        return direction, left, up
+
+    def assigned(self, belief: tuple[Floats, Floats]) -> Integers:
+        """Traces (t, 2, m) of the skis."""
+        steps, m = self._delivered.shape
+        seen = [SeenSkis(self._views, k, belief[0].reshape(-1, 6)) for k in range(m)]
+        found = np.full((steps, 2, m), -1)
+        for t in np.flatnonzero(self._known.any(axis=1)).tolist():
+            options = [[nothing(m)] for _ in SIDES]
+            for side in np.flatnonzero(self._known[t]).tolist():
+                options[side] += self._options(seen, t, side, belief[1][t, side])
+            for side, (option, doubtful) in enumerate(jointly_best(options)):
+                found[t, side] = np.where(doubtful, -1, option.rays)
+        return found
+
+    def _options(self, seen: Sequence[SeenSkis], t: int, side: int, covariance: Floats) -> list[Option]:
+        """Options of one ski, the best first."""
+        m = len(self._views)
+        beam = [(0.0, np.full(m, -1), np.zeros(6), covariance)]
+        for k in range(m):
+            if not self._delivered[t, k] or not seen[k].inside[2 * t + side]:
+                continue
+            chance = (len(self._traces[t][k]) + 1) / self._space[k]
+            rate = 2 * np.log(2 * np.pi * chance / DETECTED) + 2 * np.log(1 - DETECTED)
+            equations = [seen[k].equations(2 * t + side, line) for line in self._traces[t][k]]
+            near = [i for i, e in enumerate(equations) if _misfit(e, np.zeros(6), covariance)[0] < gate(2)]
+            longer = list(beam)
+            for cost, rays, state, spread in beam:
+                for i in near:
+                    misfit, area = _misfit(equations[i], state, spread)
+                    if misfit < gate(2):
+                        more = rays.copy()
+                        more[k] = i
+                        longer.append((cost + misfit + area + rate, more, *_updated(equations[i], state, spread)))
+            beam = sorted(longer, key=lambda hypothesis: hypothesis[0])[:_BEAM]
+        options = [Option(cost, rays, 0) for cost, rays, _, _ in beam if cost < -DECISIVE]
+        return options[: 2 * MOST_OPTIONS]
+
+    def measured(self, belief: tuple[Floats, Floats], found: Integers) -> tuple[Floats, Floats, Flags]:
+        """Skis (t, 2, 6) with covariance, by their traces with little prior; (t, 2) which have two views or more."""
+        values, covariance = belief[0].copy(), belief[1].copy()
+        m = found.shape[2]
+        seen = [SeenSkis(self._views, k, values.reshape(-1, 6)) for k in range(m)]
+        for t, side in np.argwhere((found >= 0).sum(axis=2) >= 2).tolist():
+            state, spread = np.zeros(6), covariance[t, side]
+            for k in np.flatnonzero(found[t, side] >= 0).tolist():
+                equations = seen[k].equations(2 * t + side, self._traces[t][k][found[t, side, k]])
+                state, spread = _updated(equations, state, spread)
+            values[t, side] += state
+            covariance[t, side] = spread
+        return values, covariance, np.asarray((found >= 0).sum(axis=2) >= 2)
+
+    def angles(self, lines: tuple[Floats, Floats, Flags]) -> tuple[Floats, Floats]:
+        """Slope and heading (t, 2, 2) of measured skis with covariance; NaN where not measured."""
+        values, covariance, known = lines
+        local = values[..., 3:] @ self._frame.axes.T
+        x, y, z = np.moveaxis(local, -1, 0)
+        level = np.hypot(x, y)
+        angles = np.stack((np.arctan2(z, level), np.arctan2(y, x)), axis=-1)
+        square = level**2 + z**2
+        by_slope = np.stack((-z * x / level, -z * y / level, level), axis=-1) / square[..., None]
+        by_heading = np.stack((-y, x, np.zeros_like(x)), axis=-1) / (level**2)[..., None]
+        jacobian = np.stack((by_slope, by_heading), axis=-2) @ self._frame.axes
+        spread = jacobian @ covariance[..., 3:, 3:] @ jacobian.swapaxes(-1, -2)
+        angles[~known], spread[~known] = np.nan, np.nan
+        return angles, spread
+
+    def offsets(self, lines: tuple[Floats, Floats, Flags]) -> tuple[Floats, Floats]:
+        """Offsets (2, 2) of the skis from their markers, to the left and up, with covariance (2, 2, 2), m."""
+        values, covariance, known = lines
+        angles, _ = self.angles(lines)
+        _, left, up = self._axes(np.nan_to_num(angles[..., 0]), np.nan_to_num(angles[..., 1]))
+        aside = np.stack((left, up), axis=-2)
+        off = (aside @ (values[..., :3] - self._bindings.xyz)[..., None])[..., 0]
+        prior = np.linalg.inv(_BINDING_M**2 * np.eye(2))
+        mean, spread = np.zeros((2, 2)), np.tile(_BINDING_M**2 * np.eye(2), (2, 1, 1))
+        for side in range(2):
+            own = known[:, side]
+            # The offsets were pulled by their prior; without it they weigh by what the traces alone say.
+            total = aside[own, side] @ covariance[own, side, :3, :3] @ aside[own, side].swapaxes(-1, -2)
+            total = total + _STEADY_M**2 * np.eye(2)
+            weight = np.linalg.inv(total)
+            spread[side] = np.linalg.inv(prior + weight.sum(axis=0))
+            mean[side] = spread[side] @ (weight @ off[own, side][..., None]).sum(axis=0)[:, 0]
+        return mean, spread + _STEADY_M**2 * np.eye(2)
+
+
+def _misfit(equations: tuple[Floats, Floats, Floats], state: Floats, spread: Floats) -> tuple[float, float]:
+    """Chi-square of a trace for a ski that differs by `state`, and the logarithm of its covariance's determinant."""
+    off, by_ski, covariance = equations
+    total = by_ski @ spread @ by_ski.T + covariance
+    (a, b), (_, d) = total
+    x, y = off - by_ski @ state
+    determinant = a * d - b * b
+    return float((d * x * x - 2 * b * x * y + a * y * y) / determinant), float(np.log(determinant))
+
+
+def _updated(equations: tuple[Floats, Floats, Floats], state: Floats, spread: Floats) -> tuple[Floats, Floats]:
+    """The ski with what a trace says."""
+    off, by_ski, covariance = equations
+    gain = spread @ by_ski.T @ np.linalg.inv(by_ski @ spread @ by_ski.T + covariance)
+    return state + gain @ (off - by_ski @ state), spread - gain @ by_ski @ spread

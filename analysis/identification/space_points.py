@@ -1,0 +1,175 @@
+"""Points in space that spots of two or more images may show: pairs by the epipolar gate, verified in all other views.
+
+Nothing is decided here. A spot may belong to several points; which of them are markers, time and body decide.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from analysis.candidates.model import PulseCandidates, Spots
+from analysis.identification.views import Views, gate
+from photogrammetry.intersection.point_intersection import intersect_points
+from rig.arrays import Floats, Integers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpacePoints:
+    """n points of one pulse.
+
+    Attributes:
+        xyz: (n, 3) m.
+        covariance: (n, 3, 3) m^2, of spots, poses and marker size.
+        rays: (n, m) index of the spot in each camera's image, -1: none.
+        misfit: (n,) chi-square of the rays, with twice their number less three degrees of freedom.
+    """
+
+    xyz: Floats
+    covariance: Floats
+    rays: Integers
+    misfit: Floats
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @property
+    def count(self) -> Integers:
+        """(n,) number of rays."""
+        return np.asarray((self.rays >= 0).sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rays:
+    """The spots of one image as rays.
+
+    Attributes:
+        xy: (n, 2) px.
+        covariance: (n, 2, 2) px^2, of the spots alone.
+        reduced: (n, 2) without distortion, metric frame.
+        variance: (n,) px^2, of a coordinate, with pose and marker size at the scene's centre.
+    """
+
+    xy: Floats
+    covariance: Floats
+    reduced: Floats
+    variance: Floats
+
+
+def rays_of(views: Views, candidates: PulseCandidates) -> list[Rays]:
+    """The spots of a pulse by camera; none where a camera has no image."""
+    rays = []
+    for k, name in enumerate(views.names):
+        image = candidates.images.get(name)
+        spots = Spots.none() if image is None else image.spots
+        reduced = views.placed[k].reduced(spots.xy)
+        usable = np.asarray(np.isfinite(reduced).all(axis=1))
+        variance = np.trace(spots.covariance, axis1=1, axis2=2) / 2 + views.noise[k]
+        rays.append(
+            Rays(
+                spots.xy, spots.covariance, np.where(usable[:, None], reduced, 0.0), np.where(usable, variance, np.inf)
+            )
+        )
+    return rays
+
+
+def find_space_points(views: Views, pulses: Sequence[Sequence[Rays]]) -> list[SpacePoints]:
+    """All points that rays of two or more cameras may show, pulse by pulse.
+
+    Args:
+        views: the cameras.
+        pulses: rays of each pulse by camera.
+    """
+    m = len(views)
+    of_pulse, pairs = _epipolar_pairs(views, pulses)
+    if not len(pairs):
+        return [SpacePoints(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, m), int), np.empty(0)) for _ in pulses]
+    solved = _solve(views, pulses, of_pulse, pairs)
+    good = np.isfinite(solved.misfit)
+    of_pulse, pairs = of_pulse[good], pairs[good]
+    full = _extended(views, pulses, of_pulse, pairs, solved.xyz[good], solved.covariance[good])
+    fits = _solve(views, pulses, of_pulse, full).misfit
+    allowed = np.array([np.inf, np.inf, *(gate(2 * count - 3) for count in range(2, m + 1))])
+    rays = np.where((fits <= allowed[(full >= 0).sum(axis=1)])[:, None], full, pairs)
+    both = np.unique(np.column_stack((of_pulse, rays)), axis=0)
+    of_pulse, rays = both[:, 0], both[:, 1:]
+    solved = _solve(views, pulses, of_pulse, rays)
+    points = []
+    for pulse in range(len(pulses)):
+        own = np.flatnonzero((of_pulse == pulse) & np.isfinite(solved.misfit))
+        points.append(SpacePoints(solved.xyz[own], solved.covariance[own], rays[own], solved.misfit[own]))
+    return points
+
+
+def _epipolar_pairs(views: Views, pulses: Sequence[Sequence[Rays]]) -> tuple[Integers, Integers]:
+    """Pulse (n,) and rays (n, m) of all pairs of spots whose rays meet within their accuracy."""
+    m = len(views)
+    of_pulse, found = [np.empty(0, int)], [np.empty((0, m), int)]
+    for p, rays in enumerate(pulses):
+        vectors = [
+            np.column_stack((r.reduced, np.full(len(r.reduced), -camera.c))) @ camera.R.T
+            for r, camera in zip(rays, views.ideal, strict=True)
+        ]
+        for i, j in combinations(range(m), 2):
+            if not len(vectors[i]) or not len(vectors[j]):
+                continue
+            base = views.ideal[j].X0 - views.ideal[i].X0
+            across_j, across_i = np.cross(vectors[j], base), np.cross(base, vectors[i])
+            closure = vectors[i] @ across_j.T
+            by_i = ((across_j @ views.ideal[i].R[:, :2]) ** 2).sum(axis=1)
+            by_j = ((across_i @ views.ideal[j].R[:, :2]) ** 2).sum(axis=1)
+            variance = rays[i].variance[:, None] * by_i + rays[j].variance[:, None].T * by_j[:, None]
+            a, b = np.nonzero(closure**2 < gate(1) * variance)
+            pair = np.full((len(a), m), -1)
+            pair[:, i], pair[:, j] = a, b
+            found.append(pair)
+            of_pulse.append(np.full(len(a), p))
+    return np.concatenate(of_pulse), np.concatenate(found)
+
+
+def _solve(views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, rays: Integers) -> SpacePoints:
+    """Intersect rays (n, m) of their pulses (n,); misfit is NaN where they do not meet before the cameras."""
+    n, m = rays.shape
+    xy, sigma = np.zeros((n, m, 2)), np.ones((n, m))
+    for k in range(m):
+        of_camera = [pulse[k] for pulse in pulses]
+        first = np.cumsum([0, *(len(r.reduced) for r in of_camera)])
+        seen = rays[:, k] >= 0
+        at = first[of_pulse[seen]] + rays[seen, k]
+        xy[seen, k] = np.concatenate([r.reduced for r in of_camera])[at]
+        sigma[seen, k] = np.sqrt(np.concatenate([r.variance for r in of_camera])[at])
+    usable = np.isfinite(sigma).all(axis=1)
+    sigma[~np.isfinite(sigma)] = 1.0
+    meet = intersect_points(views.ideal, xy, seen=rays >= 0, sigma=sigma)
+    misfit = np.nansum((meet.residuals / sigma[..., None]) ** 2, axis=(1, 2))
+    return SpacePoints(meet.X, meet.covariance, rays, np.where(meet.ok & usable, misfit, np.nan))
+
+
+def _extended(
+    views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, pairs: Integers, xyz: Floats, covariance: Floats
+) -> Integers:
+    """Rays (n, m) of points seen by pairs, with the nearest spot in the gate of every other camera."""
+    full = pairs.copy()
+    for k in range(len(views)):
+        sight = views.see(k, xyz)
+        spread = sight.by_point @ covariance @ sight.by_point.transpose(0, 2, 1) + sight.noise
+        other = np.asarray((pairs[:, k] < 0) & sight.inside)
+        for p in np.unique(of_pulse[other]):
+            rays = pulses[p][k]
+            if not len(rays.xy):
+                continue
+            own = np.flatnonzero(other & (of_pulse == p))
+            distance = squared_distances(sight.xy[own], spread[own], rays)
+            best = distance.argmin(axis=1)
+            full[own, k] = np.where(distance[np.arange(len(own)), best] < gate(2), best, -1)
+    return full
+
+
+def squared_distances(xy: Floats, covariance: Floats, rays: Rays) -> Floats:
+    """Squared distances (n, spots) in sigmas of predicted image points (n, 2) with covariance (n, 2, 2) from spots."""
+    total = covariance[:, None] + rays.covariance
+    off = xy[:, None] - rays.xy
+    a, b, d = total[..., 0, 0], total[..., 0, 1], total[..., 1, 1]
+    x, y = off[..., 0], off[..., 1]
+    return np.asarray((d * x * x - 2 * b * x * y + a * y * y) / (a * d - b * b))

@@ -1,0 +1,107 @@
+"""The cameras as identification needs them: projection with derivatives, and what makes rays of one marker miss.
+
+Rays of one marker miss each other by the errors of its spots, by those of the poses, and because a marker is no point:
+cameras from different directions see different parts of it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.stats import chi2
+
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from photogrammetry.geometry.ideal_camera import IdealCamera
+from rig.arrays import Flags, Floats
+
+#: Standard deviation of the point of a marker that a camera sees as its centre, m: a fraction of a marker's radius.
+MARKER_SIGMA_M = 0.01
+#: Share of true correspondences that a gate lets pass.
+GATE = 0.999
+_AXES_PULL = 1e-6  #: keeps the scene's centre finite where all cameras look in one direction
+
+
+@cache
+def gate(degrees_of_freedom: int) -> float:
+    """Chi-square below which `GATE` of the true correspondences lie."""
+    return float(chi2.ppf(GATE, degrees_of_freedom))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """How a camera sees n object points.
+
+    Attributes:
+        xy: (n, 2) px; NaN behind the camera.
+        by_point: (n, 2, 3) derivatives by the object point.
+        pose: (n, 2, 2) px^2, covariance by the errors of the camera's pose and interior orientation.
+        inside: (n,) whether the point lies in the image.
+    """
+
+    xy: Floats
+    by_point: Floats
+    pose: Floats
+    inside: Flags
+
+    @property
+    def noise(self) -> Floats:
+        """(n, 2, 2) px^2, by the camera and by the size of a marker; without spot and object point."""
+        return np.asarray(self.pose + MARKER_SIGMA_M**2 * self.by_point @ self.by_point.transpose(0, 2, 1))
+
+
+class Views:
+    """The cameras of a recording, in their order.
+
+    Attributes:
+        names: of the cameras.
+        placed: the cameras.
+        ideal: the cameras without distortion, for `PlacedCamera.reduced` coordinates.
+        late_s: (m,) how much later than the mean of all cameras each one shows the scene.
+        centre: (3,) the point that all cameras look at.
+        noise: (m,) px^2, variance of an image coordinate there, as in `Sight.noise`.
+        scale: (m,) px per m there.
+    """
+
+    def __init__(self, system: CameraSystem, exposures_s: Mapping[str, float] | None = None) -> None:
+        self.system = system
+        self.names = system.names
+        self.placed: Sequence[PlacedCamera] = [system[name] for name in self.names]
+        self.ideal: Sequence[IdealCamera] = [placed.ideal() for placed in self.placed]
+        middles = np.array([(exposures_s or {}).get(name, 0.0) / 2 for name in self.names])
+        self.late_s = middles - middles.mean()
+        self.centre = _looked_at(self.ideal)
+        sights = [self.see(k, self.centre[None]) for k in range(len(self.names))]
+        self.noise = np.array([np.trace(sight.noise[0]) / 2 for sight in sights])
+        self.scale = np.array([np.linalg.norm(sight.by_point[0], ord=2) for sight in sights])
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def see(self, k: int, xyz: Floats) -> Sight:
+        """Project object points (n, 3) into camera k."""
+        placed = self.placed[k]
+        xy = placed.project(xyz)
+        there = np.asarray(np.isfinite(xy).all(axis=1))
+        by_point, noise = np.full((len(xyz), 2, 3), np.nan), np.full((len(xyz), 2, 2), np.nan)
+        if there.any():
+            _, by_there, by_parameters = placed.linearised(xyz[there], xy[there])
+            pose = self.system.covariance[np.ix_(placed.columns, placed.columns)]
+            by_point[there] = by_there
+            noise[there] = by_parameters @ pose @ by_parameters.transpose(0, 2, 1)
+        with np.errstate(invalid="ignore"):
+            inside = ((xy > -0.5) & (xy < placed.size - 0.5)).all(axis=1)
+        return Sight(xy, by_point, noise, np.asarray(inside))
+
+
+def _looked_at(cameras: Sequence[IdealCamera]) -> Floats:
+    """The point nearest to the axes of all cameras."""
+    normal, right = np.zeros((3, 3)), np.zeros(3)
+    apart = max(float(np.linalg.norm(a.X0 - b.X0)) for a in cameras for b in cameras) or 1.0
+    for camera in cameras:
+        axis = camera.R[:, 2]
+        across = np.eye(3) - np.outer(axis, axis)
+        pull = _AXES_PULL * np.eye(3)
+        normal += across + pull
+        right += across @ camera.X0 + pull @ (camera.X0 - apart * axis)
+    return np.asarray(np.linalg.solve(normal, right))

@@ -1,0 +1,85 @@
+"""Identification on candidates with much that is neither marker nor ski."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from analysis.identification.identify import identify
+from analysis.measurements.model import SIDES, JumpMeasurements
+from rig.arrays import Floats
+from tests.analysis.identification.cluttered import Disturbed, Scene, scene
+from tests.analysis.simulated import RATE_HZ, SIGMA_PX, SKI_SIGMA_PX, true_cameras, true_jump
+
+PULSES = range(15, 70)
+#: A spot is the named marker if it lies within 6 sigma of it; spots of others or of nothing do so once in a million.
+NEAR_PX = 6 * SIGMA_PX
+
+
+def _wrong_points(jumps: Sequence[JumpMeasurements], made: Scene) -> list[tuple[int, str, str]]:
+    return [
+        (pulse.pulse, camera, label)
+        for jump in jumps
+        for pulse in jump.pulses
+        for camera, image in pulse.images.items()
+        for label, point in image.points.items()
+        if np.linalg.norm(point.xy - made.spots.get((pulse.pulse, camera, label), np.full(2, np.inf))) > NEAR_PX
+    ]
+
+
+def _off(xy: Floats, line: Floats) -> float:
+    along = line[1] - line[0]
+    normal = np.array((-along[1], along[0])) / np.linalg.norm(along)
+    return float(np.abs((xy - line[0]) @ normal).mean())
+
+
+def _wrong_skis(jumps: Sequence[JumpMeasurements], made: Scene) -> list[tuple[int, str, str]]:
+    """Skis that are not where they should be: the mean of 24 points is within 1 sigma of one."""
+    return [
+        (pulse.pulse, camera, side)
+        for jump in jumps
+        for pulse in jump.pulses
+        for camera, image in pulse.images.items()
+        for side, ski in image.skis.items()
+        if (line := made.skis.get((pulse.pulse, camera, side))) is None or _off(ski.xy, line) > 2 * SKI_SIGMA_PX
+    ]
+
+
+def _share(jumps: Sequence[JumpMeasurements], made: Scene) -> float:
+    named = sum(len(image.points) for jump in jumps for pulse in jump.pulses for image in pulse.images.values())
+    return named / len(made.spots)
+
+
+@pytest.mark.parametrize(
+    "disturbed",
+    [
+        Disturbed(),
+        Disturbed(false_spots=20, false_traces=3),
+        Disturbed(false_spots=20, false_traces=3, body_spots=1, lost=0.1, broken=0.3),
+    ],
+    ids=["clean", "clutter", "clutter and losses"],
+)
+def test_nothing_is_named_wrongly_and_little_is_missed(disturbed: Disturbed) -> None:
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), PULSES, disturbed)
+    jumps = identify(made.candidates, true_cameras(), RATE_HZ)
+    assert len(jumps) == 1
+    assert not _wrong_points(jumps, made)
+    assert not _wrong_skis(jumps, made)
+    assert _share(jumps, made) > 0.97
+    skis = {side: sum(side in i.skis for p in jumps[0].pulses for i in p.images.values()) for side in SIDES}
+    assert min(skis.values()) > 0.7 * len(made.skis) / 2
+
+
+def test_without_a_jumper_there_is_no_jump() -> None:
+    disturbed = Disturbed(false_spots=25, false_traces=3)
+    made = scene([], true_cameras(), np.random.default_rng(3), range(60), disturbed)
+    assert identify(made.candidates, true_cameras(), RATE_HZ) == []
+
+
+def test_markers_hidden_in_two_views_are_not_invented() -> None:
+    hidden = tuple((label, camera, 42, 46) for label in ("P2", "P3") for camera in ("K1", "K2"))
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(4), PULSES, Disturbed(20, 3, hidden=hidden))
+    jumps = identify(made.candidates, true_cameras(), RATE_HZ)
+    assert not _wrong_points(jumps, made)
+    named = [p for p in jumps[0].pulses if 42 <= p.pulse <= 46 for c in ("K1", "K2") if "P2" in p.images[c].points]
+    assert not named

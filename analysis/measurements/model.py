@@ -127,3 +127,14 @@ class Measurements:
     rate_hz: float
     cameras: Mapping[str, MeasuredCamera]
     jumps: tuple[JumpMeasurements, ...]
+
+    @property
+    def middle_s(self) -> float:
+        """How long after its pulse a result is true, s: at the middle of the exposures, their mean if they differ."""
+        halves = [camera.exposure_s / 2 for camera in self.cameras.values()]
+        return sum(halves) / len(halves) if halves else 0.0
+
+    def late_s(self, camera: str) -> float:
+        """How much later than `middle_s` the middle of a camera's exposure is, s."""
+        there = self.cameras.get(camera)
+        return 0.0 if there is None else there.exposure_s / 2 - self.middle_s

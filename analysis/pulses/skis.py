@@ -1,0 +1,205 @@
+"""Skis as lines in space: image lines of all pulses, their start values and their equations.
+
+A line has a point and a unit direction, and four local parameters: shifts of the point along two axes across the line,
+and turns of the direction towards them. So it may run anywhere, unlike (C8), which expects it near the X axis. The
+points measured on one image of a ski give two observations: the mean distance from the projected line, and the turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.measurements.model import SIDES, PulseMeasurements, Source
+from analysis.pulses.least_squares import Equations
+from analysis.pulses.points import nearest, rays
+from analysis.scene.camera_system import PlacedCamera
+from rig.arrays import Flags, Floats, Integers
+
+_LARGEST_IMAGE_TURN = 0.1  # rad, sigma of the direction of an image line: with a larger one it is a point
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SkiLines:
+    """n skis in m images of k points: state (n, 6) a point on the line and its unit direction.
+
+    Attributes:
+        cameras: the m cameras.
+        xy: (n, m, k, 2) px.
+        weight: (n, m, k) 1 / sigma^2 across the ski, px^-2; 0 where there is no point.
+        common: (n, m) standard deviation across the ski that the points of an image share, px.
+        seen: (n, m).
+        by_hand: (n, m).
+        shift: (n, m, 3) how much farther the jumper was when the camera saw it than at the instant of the result, m.
+    """
+
+    cameras: Sequence[PlacedCamera]
+    xy: Floats
+    weight: Floats
+    common: Floats
+    seen: Flags
+    by_hand: Flags
+    shift: Floats
+
+    def start(self, seen: Flags) -> Floats:
+        """Lines that meet the planes through projection centres and image lines best (C.3)."""
+        n = len(seen)
+        centroid = np.mean([camera.position for camera in self.cameras], axis=0)
+        scatter, target = np.zeros((n, 3, 3)), np.zeros((n, 3))
+        sight, start = np.zeros((n, 3)), np.zeros((n, 3))
+        for image, camera in reversed(list(enumerate(self.cameras))):
+            here = seen[:, image]
+            ray = np.where(self.weight[:, image, :, None] > 0, rays(camera, self.xy[:, image]), 0.0)
+            normal = np.linalg.eigh(np.swapaxes(ray, 1, 2) @ ray)[1][:, :, 0]
+            normal = np.where(here[:, None], normal, 0.0)
+            centre = camera.position - centroid - self.shift[:, image]
+            scatter += normal[:, :, None] * normal[:, None, :]
+            target += normal * (normal * centre).sum(axis=1, keepdims=True)
+            sight = np.where(here[:, None], ray.sum(axis=1), sight)
+            start = np.where(here[:, None], centre, start)
+        values, vectors = np.linalg.eigh(scatter)
+        direction, planes = vectors[:, :, 0], vectors[:, :, 1:]
+        within = np.where(values[:, 1:] > 0, 1 / values[:, 1:], 0.0)
+        foot = np.einsum("nij,nj,nkj,nk->ni", planes, within, planes, target)
+        return np.concatenate((_nearest_on_line(foot, direction, start, _unit(sight)) + centroid, direction), axis=1)
+
+    def equations(self, state: Floats) -> Equations:
+        """Distances of the measured points from the projected line, reduced to mean and turn for each image."""
+        n, m = self.seen.shape
+        columns = sum(len(camera.columns) for camera in self.cameras)
+        v, covariance = np.zeros((n, m, 2)), np.zeros((n, m, 2, 2))
+        by_object, by_calibration = np.zeros((n, m, 2, 4)), np.zeros((n, m, 2, columns))
+        in_front = np.zeros((n, m), bool)
+        for image, camera in enumerate(self.cameras):
+            part = self._image(image, camera, state)
+            v[:, image], by_object[:, image], covariance[:, image], in_front[:, image] = part[:4]
+            by_calibration[:, image, :, camera.columns] = np.moveaxis(part[4], -1, 0)
+        return Equations(v, by_object, by_calibration, covariance, in_front)
+
+    def _image(self, image: int, camera: PlacedCamera, state: Floats) -> tuple[Floats, Floats, Floats, Flags, Floats]:
+        """Equations of one image: v, by_object, covariance, in_front, by_calibration."""
+        xy, weight = self.xy[:, image], self.weight[:, image]
+        n, k, _ = xy.shape
+        origin, direction = state[:, None, :3] + self.shift[:, image, None], state[:, None, 3:]
+        there = _nearest_on_line(origin, direction, camera.position, rays(camera, xy))
+        parts = camera.linearised(there.reshape(-1, 3), xy.reshape(-1, 2))
+        v, by_point, by_camera = (part.reshape(n, k, *part.shape[1:]) for part in parts)
+        tangent = _unit(np.einsum("nkab,nb->nka", by_point, state[:, 3:]))
+        normal = np.stack((-tangent[..., 1], tangent[..., 0]), axis=-1)
+        across = np.einsum("nka,nkab->nkb", normal, by_point)
+        one, other = across_axes(state[:, 3:])
+        lever = ((there - origin) * direction).sum(axis=-1)
+        on_one, on_other = np.einsum("nkb,nb->nk", across, one), np.einsum("nkb,nb->nk", across, other)
+        design = np.stack((on_one, on_other, lever * on_one, lever * on_other), axis=-1)
+        gain, own = self._reduction(image, tangent)
+        return (
+            np.einsum("nrk,nk->nr", gain, (normal * v).sum(axis=-1)),
+            gain @ design,
+            own,
+            np.asarray((camera.in_front(there) | (weight == 0)).all(axis=1)),
+            gain @ np.einsum("nka,nkaq->nkq", normal, by_camera),
+        )
+
+    def _reduction(self, image: int, tangent: Floats) -> tuple[Floats, Floats]:
+        """From distances across the line to their weighted mean and turn: gains (n, 2, k), and covariance (n, 2, 2).
+
+        The turn is given as the distance that it makes at the points' root mean square distance from their centre.
+        """
+        xy, weight = self.xy[:, image], self.weight[:, image]
+        total = weight.sum(axis=1, keepdims=True)
+        total = np.where(total > 0, total, 1.0)
+        centre = (weight[..., None] * xy).sum(axis=1, keepdims=True) / total[..., None]
+        axis = _unit((weight[..., None] * tangent).sum(axis=1, keepdims=True))
+        along = ((xy - centre) * axis).sum(axis=-1)
+        along = along / np.sqrt((weight * along**2).sum(axis=1, keepdims=True) / total)
+        gain = np.stack((weight / total, weight * along / total), axis=1)
+        own = np.zeros((len(xy), 2, 2))
+        own[:, 0, 0] = 1 / total[:, 0] + self.common[:, image] ** 2
+        own[:, 1, 1] = 1 / total[:, 0]
+        return gain, own
+
+    def moved(self, state: Floats, step: Floats) -> Floats:
+        """Lines (n, 6) changed by steps (n, 4) of their local parameters."""
+        one, other = across_axes(state[:, 3:])
+        origin = state[:, :3] + step[:, :1] * one + step[:, 1:2] * other
+        return np.concatenate((origin, _unit(state[:, 3:] + step[:, 2:3] * one + step[:, 3:] * other)), axis=1)
+
+    def reach(self, state: Floats) -> Floats:
+        """The distance from the nearest camera, and one radian."""
+        distance = nearest(self.cameras, state[:, :3], self.seen)
+        return np.stack((distance, distance, np.ones(len(state)), np.ones(len(state))), axis=1)
+
+    def subset(self, rows: Integers) -> "SkiLines":
+        """The skis `rows`, which may repeat."""
+        return replace(
+            self,
+            xy=self.xy[rows],
+            weight=self.weight[rows],
+            common=self.common[rows],
+            seen=self.seen[rows],
+            by_hand=self.by_hand[rows],
+            shift=self.shift[rows],
+        )
+
+    def interchanged(self, image: int) -> "SkiLines":
+        """The skis with right and left interchanged in one image; they stand in turn, as `skis_of` puts them."""
+        other = np.arange(len(self.seen)) ^ 1
+        result = self.subset(np.arange(len(self.seen)))
+        for array in (result.xy, result.weight, result.common, result.seen, result.by_hand):
+            array[:, image] = array[other, image]
+        return result
+
+
+def skis_of(cameras: Sequence[PlacedCamera], pulses: Sequence[PulseMeasurements], shift: Floats) -> SkiLines:
+    """All skis of a jump: right and left one of the first pulse, then of the next.
+
+    Args:
+        cameras: m oriented cameras; measurements of others are left out.
+        pulses: of the jump.
+        shift: (pulses, m, 3), see `SkiLines.shift`.
+    """
+    found = [
+        (p * len(SIDES) + SIDES.index(side), j, ski)
+        for p, pulse in enumerate(pulses)
+        for j, camera in enumerate(cameras)
+        if camera.name in pulse.images
+        for side, ski in pulse.images[camera.name].skis.items()
+    ]
+    n, m = len(pulses) * len(SIDES), len(cameras)
+    k = max((len(ski.xy) for _, _, ski in found), default=2)
+    xy, weight, common = np.zeros((n, m, k, 2)), np.zeros((n, m, k)), np.zeros((n, m))
+    by_hand = np.zeros((n, m), bool)
+    for i, j, ski in found:
+        points = len(ski.xy)
+        xy[i, j, :points], weight[i, j, :points], common[i, j] = ski.xy, ski.sigma**-2.0, ski.common
+        xy[i, j, points:] = ski.xy[0]  # with weight 0, but where rays and lines meet
+        by_hand[i, j] = ski.source is Source.BY_HAND
+    return SkiLines(cameras, xy, weight, common, _long(xy, weight), by_hand, np.repeat(shift, len(SIDES), axis=0))
+
+
+def across_axes(direction: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (n, 3) at right angles to unit directions (n, 3) and to each other."""
+    least = np.eye(3)[np.abs(direction).argmin(axis=1)]
+    one = _unit(np.cross(direction, least))
+    return one, np.cross(direction, one)
+
+
+def _long(xy: Floats, weight: Floats) -> Flags:
+    """Whether image lines (n, m, k) have a direction."""
+    total = np.maximum(weight.sum(axis=-1), np.finfo(float).tiny)
+    centre = (weight[..., None] * xy).sum(axis=-2) / total[..., None]
+    away = (xy - centre[..., None, :]) * np.sqrt(weight)[..., None]
+    along = np.linalg.eigvalsh(np.swapaxes(away, -1, -2) @ away)[..., -1]  # its inverse is the turn's variance
+    return np.asarray(along * _LARGEST_IMAGE_TURN**2 > 1)
+
+
+def _nearest_on_line(origin: Floats, direction: Floats, centre: Floats, ray: Floats) -> Floats:
+    """Points (..., 3) of lines that are nearest to rays from centres."""
+    offset = origin - centre
+    cosine = (direction * ray).sum(axis=-1, keepdims=True)
+    on_line, on_ray = (direction * offset).sum(axis=-1, keepdims=True), (ray * offset).sum(axis=-1, keepdims=True)
+    return np.asarray(origin + direction * (cosine * on_ray - on_line) / (1 - cosine**2))
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector, axis=-1, keepdims=True))

@@ -1,0 +1,104 @@
+"""Solves the pulses of a jump one by one: the raw solution, for which nothing is assumed about the motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, PulseMeasurements
+from analysis.pulses.gross_errors import Checked, check_points, check_skis
+from analysis.pulses.least_squares import adjust
+from analysis.pulses.points import points_of
+from analysis.pulses.skis import skis_of
+from analysis.pulses.states import Solved, jumper_states
+from analysis.pulses.travel import velocities
+from analysis.result.model import JumperState, RayTest
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from rig.arrays import Floats
+from rig.errors import BadInputError
+
+_NS = 1e-9
+_TOGETHER_S = 1e-7  # within which exposures are simultaneous: 3 um of way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawJump:
+    """A jump, solved pulse by pulse.
+
+    Attributes:
+        states: one for each pulse of the measurements, in order, at the middle of the exposures.
+        tests: of all rays and image lines, the worst first. Where an error was found, but not the wrong ray, all rays
+            of that point are removed.
+    """
+
+    states: tuple[JumperState, ...]
+    tests: tuple[RayTest, ...]
+
+
+def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> RawJump:
+    """Intersect points and skis of each pulse, compute angles, height and speed, and test all rays.
+
+    Args:
+        jump: what was measured; images of cameras that are not oriented are left out.
+        measurements: the recording that the jump belongs to, with the cameras' exposure times.
+        system: the oriented cameras.
+
+    Raises:
+        BadInputError: images have another size than the camera was calibrated for.
+    """
+    cameras = [system[name] for name in system.names]
+    _check_sizes(cameras, measurements)
+    pulses = jump.pulses
+    if not pulses:
+        return RawJump((), ())
+    times = np.array([(pulse.time - pulses[0].time) * _NS for pulse in pulses])
+    late = np.array([measurements.late_s(camera.name) for camera in cameras])
+    shift = np.zeros((len(pulses), len(cameras), 3))
+    if np.abs(late).max() > _TOGETHER_S:
+        points = adjust(points_of(cameras, pulses, shift), system.covariance).state  # good enough for the velocity
+        shift = late[:, None] * velocities(points.reshape(-1, len(POINTS), 3), times)[:, None]
+    solved = _solve(cameras, pulses, shift, system)
+    numbers = np.array([pulse.pulse for pulse in pulses])
+    tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))
+    return RawJump(jumper_states(solved, numbers, times, system), tuple(tests))
+
+
+def _solve(
+    cameras: list[PlacedCamera], pulses: tuple[PulseMeasurements, ...], shift: Floats, system: CameraSystem
+) -> Solved:
+    points, skis = points_of(cameras, pulses, shift), skis_of(cameras, pulses, shift)
+    return Solved(
+        check_points(points, system.covariance), points.by_hand, check_skis(skis, system.covariance), skis.by_hand
+    )
+
+
+def _check_sizes(cameras: list[PlacedCamera], measurements: Measurements) -> None:
+    for camera in cameras:
+        there = measurements.cameras.get(camera.name)
+        size = (int(camera.size[0]), int(camera.size[1]))
+        if there is not None and there.size != size:
+            measured, calibrated = (f"{width} x {height}" for width, height in (there.size, size))
+            raise BadInputError(
+                f"camera {camera.name}: measured in images of {measured} px, but oriented for {calibrated} px; "
+                "give the calibration that belongs to these images"
+            )
+
+
+def _tests(solved: Solved, pulses: tuple[PulseMeasurements, ...], names: tuple[str, ...]) -> list[RayTest]:
+    return [*_of(solved.points, POINTS, pulses, names), *_of(solved.skis, SIDES, pulses, names)]
+
+
+def _of(
+    checked: Checked, what: tuple[str, ...], pulses: tuple[PulseMeasurements, ...], names: tuple[str, ...]
+) -> list[RayTest]:
+    rows, images = np.nonzero(np.isfinite(checked.residual))
+    return [
+        RayTest(
+            pulses[row // len(what)].pulse,
+            names[image],
+            what[row % len(what)],
+            float(checked.residual[row, image]),
+            float(checked.w[row, image]),
+            bool(checked.removed[row, image]),
+        )
+        for row, image in zip(rows, images, strict=True)
+    ]

@@ -41,6 +41,11 @@ class Svg:
         text = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
         self._parts.append(f'<polyline class="{colour}" points="{text}" fill="none" stroke-width="{width:g}"/>')
 
+    def area(self, places: Iterable[tuple[float, float]], colour: Colour) -> None:
+        """A pale area with these corners."""
+        text = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+        self._parts.append(f'<polygon class="{colour}" points="{text}" fill-opacity="0.25"/>')
+
     def dot(self, x: float, y: float, colour: Colour, radius: float = 2.0) -> None:
         """A filled circle; labels keep away from it."""
         self._taken.append((x - radius, y - radius, x + radius, y + radius))

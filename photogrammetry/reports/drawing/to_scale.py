@@ -117,6 +117,12 @@ class Chart:
         """A line through (n,) values."""
         self.svg.path(((self.x(a), self.y(b)) for a, b in zip(x, y, strict=True)), colour)
 
+    def band(self, x: Floats, low: Floats, high: Floats, colour: Colour) -> None:
+        """A pale area between (n,) values."""
+        there = [(self.x(a), self.y(b)) for a, b in zip(x, low, strict=True)]
+        back = [(self.x(a), self.y(b)) for a, b in zip(x, high, strict=True)]
+        self.svg.area([*there, *reversed(back)], colour)
+
     def dots(self, x: Floats, y: Floats, colour: Colour, radius: float = 1.4) -> None:
         """A dot at each of (n,) values."""
         for a, b in zip(x, y, strict=True):
@@ -140,6 +146,10 @@ class Chart:
     def rule(self, y: float, colour: Colour) -> None:
         """A horizontal line across the chart."""
         self.svg.line((_LEFT, self.y(y), WIDTH - _RIGHT, self.y(y)), colour)
+
+    def upright(self, x: float, colour: Colour) -> None:
+        """A vertical line through the chart."""
+        self.svg.line((self.x(x), self.y(self._y[0]), self.x(x), self.y(self._y[1])), colour)
 
     def legend(self, colour: Colour, words: str) -> None:
         """One more entry above the chart."""

@@ -1,0 +1,147 @@
+"""`report.html`: one page for the coach, which needs nothing from elsewhere."""
+
+import base64
+import hashlib
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from analysis.measurements.model import Measurements
+from analysis.report.course import course_of
+from analysis.report.crops import crops_of, windows_of
+from analysis.report.figures import five_figures
+from analysis.report.jump_section import JumpShown, jump_section
+from analysis.report.scrubbing import overlays_of, shown_pulses
+from analysis.result.model import MeasuredRecording, Quantity
+from analysis.scene.camera_system import CameraSystem
+from rig.clocks import NS_PER_S
+from rig.errors import BadInputError
+
+#: Bytes that all pictures of a page may need; the whole page stays below 8 MB.
+PICTURE_BUDGET: Final = 6_000_000
+#: Pulses that can be scrubbed, in all jumps of a page together.
+_MOST_FRAMES: Final = 120
+_FEWEST_FRAMES: Final = 12
+_NOTES: Final = (
+    (
+        "± is one standard deviation: two of three such numbers are closer than that to the truth, 95 of 100 closer "
+        "than twice that. It carries the errors of the measurement in the images, of the orientation of the cameras "
+        "and of the survey."
+    ),
+    (
+        "Angle of attack: slope of the skis minus the slope of the path. No wind is assumed: head wind and up-draught "
+        "make the true angle to the air larger."
+    ),
+    (
+        "The posture in early flight correlates with the length of the jump most at 1.1 s after take-off (Virmavirta "
+        "and others, 2005), some 28 m from the edge: that is beyond the 20 m filmed here."
+    ),
+    "Speed, height and distance are those of O, the middle between the two bindings, not of the centre of mass.",
+)
+_MORE: Final = "How the cameras were oriented, and the test of every ray: protocol.html."
+
+
+def write_report(
+    result: MeasuredRecording,
+    measurements: Measurements,
+    system: CameraSystem,
+    log: Path,
+    out: Path,
+    *,
+    perpendicular: Mapping[int, Quantity] | None = None,
+) -> None:
+    """Write the coach's page.
+
+    Args:
+        result: what was measured.
+        measurements: what was measured in the images of its jumps.
+        system: the oriented cameras.
+        log: where the images are.
+        out: the page, overwritten if it exists.
+        perpendicular: by number of the jump its velocity perpendicular to the table, m/s, up is positive.
+
+    Raises:
+        BadInputError: the log cannot be read, or `out` cannot be written.
+    """
+    page = report_page(result, measurements, system, log, perpendicular or {})
+    try:
+        out.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another place") from None
+
+
+def report_page(
+    result: MeasuredRecording,
+    measurements: Measurements,
+    system: CameraSystem,
+    log: Path,
+    perpendicular: Mapping[int, Quantity],
+) -> str:
+    """The page; see `write_report`."""
+    measured = {jump.number: jump for jump in measurements.jumps}
+    share = max(1, len(result.jumps))
+    most = max(_FEWEST_FRAMES, _MOST_FRAMES // share)
+    parts = []
+    for jump in result.jumps:
+        course = course_of(jump, result.rate_hz)
+        pulses = shown_pulses(course, most)
+        overlays = overlays_of(course, pulses, measured.get(jump.number), system)
+        crops = crops_of(log, windows_of(overlays, system), PICTURE_BUDGET // share)
+        figures = five_figures(course, perpendicular.get(jump.number))
+        shown = JumpShown(jump, course, pulses, overlays, crops, system.names, figures)
+        parts.append(jump_section(shown, several=len(result.jumps) > 1))
+    body = [_head(result), *parts] if parts else [_head(result), "<p>There is no jump in this recording.</p>"]
+    return _page(_title(result), "\n".join([*body, _notes(result)]))
+
+
+def _page(title: str, body: str) -> str:
+    style, script = _resource("report.css"), _resource("report.js")
+    policy = (
+        f"default-src 'none'; img-src data:; style-src '{_hash(style)}'; script-src '{_hash(script)}'; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    head = (
+        f'<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{style}</style>"
+    )
+    whole = f"{body}\n<script>{script}</script>"
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n{whole}</body></html>\n'
+
+
+def _resource(name: str) -> str:
+    return files("analysis.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+
+def _title(result: MeasuredRecording) -> str:
+    return result.session.get("athlete", "").strip() or f"Recording {result.recording}"
+
+
+def _head(result: MeasuredRecording) -> str:
+    facts = [f"{key} {value}" for key, value in result.session.items() if key != "athlete" and value.strip()]
+    times = [pulse.time for jump in result.jumps for pulse in jump.pulses[:1]]
+    if times:
+        facts.append(datetime.fromtimestamp(min(times) // NS_PER_S, UTC).strftime("%-d %B %Y, %H:%M:%S UTC"))
+    facts.append(f"recording {result.recording}")
+    items = "".join(f"<li>{escape(fact)}</li>" for fact in facts)
+    return f'<header><h1>{escape(_title(result))}</h1><ul class="facts">{items}</ul></header>{_alarms(result)}'
+
+
+def _alarms(result: MeasuredRecording) -> str:
+    """What is wrong with the whole recording."""
+    lines = [move.message for move in result.orientation.moved]
+    lines += [offset.message for offset in result.synchrony.values() if offset.message]
+    return "".join(f'<p class="alarm"><strong>Attention:</strong> {escape(line)}</p>' for line in lines)
+
+
+def _notes(result: MeasuredRecording) -> str:
+    pulses = f"Measured at {result.rate_hz:g} pulses per second."
+    items = "".join(f"<li>{escape(line)}</li>" for line in (*_NOTES, f"{pulses} {_MORE}"))
+    return f"<footer><h3>What the numbers mean</h3><ul>{items}</ul></footer>"

@@ -1,0 +1,42 @@
+"""Reads the images of chosen pulses of a log, one at a time."""
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recorder.reading.log_reader import LogReader
+from recorder.reading.triplets import stored_triplets
+from rig.frame import FrameStatus
+from rig.tag import TripletTag
+
+Grey = NDArray[np.uint8]
+
+
+def frames_of(log: Path, pulses: Collection[int]) -> Iterator[tuple[TripletTag, Grey]]:
+    """Tag and image (rows, columns) of each of these pulses that the log has an image of, in the order of the log.
+
+    The image is valid until the next one is taken. Pulses whose image is damaged are left out.
+
+    Raises:
+        BadInputError: no such file, no MCAP log, or not one of ours.
+    """
+    wanted = frozenset(pulses)
+    with LogReader(log, skim=True) as reader:
+        for stored in stored_triplets(reader):
+            if stored.tag.pulse in wanted:
+                try:
+                    image = stored.image(reader)
+                except ValueError:
+                    continue  # the account of the log (`svev verify`) names damaged chunks
+                yield stored.tag, image
+
+
+def camera_images(tag: TripletTag, image: Grey) -> dict[str, Grey]:
+    """The images of the cameras that delivered, by name; no copies."""
+    return {
+        camera.name: image[:, camera.columns[0] : camera.columns[1]]
+        for camera in tag.cameras
+        if camera.status is FrameStatus.OK
+    }

@@ -1,0 +1,109 @@
+"""What is drawn over an image: measured points, the projected stick model, and how sure its points are."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from analysis.measurements.model import ImageMeasurements
+from analysis.report.course import origin_of
+from analysis.result.model import JumperState
+from analysis.scene.camera_system import PlacedCamera
+from rig.arrays import Floats
+
+#: Length of a ski, m (section 3 of the paper); the binding is at its middle.
+SKI_LENGTH_M = 2.63
+#: Drawn sizes of standard deviations: the true ones are smaller than a pixel.
+ELLIPSE_SIGMAS = 10.0
+_ALONG = np.linspace(0.0, 1.0, 9)[:, None]  # a straight line may be bent by the lens
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overlay:
+    """What is drawn over one image, px.
+
+    Attributes:
+        lines: (m, 2) by part: body, feet, right, left.
+        ellipses: by point its projected place (2,) and its covariance (2, 2).
+        points: measured points (2,) by name.
+        skis: measured points (k, 2) of the skis by side.
+    """
+
+    lines: Mapping[str, Floats]
+    ellipses: Mapping[str, tuple[Floats, Floats]]
+    points: Mapping[str, Floats]
+    skis: Mapping[str, Floats]
+
+    def places(self) -> Floats:
+        """All places (n, 2), n >= 0."""
+        measured = [xy[None] for xy in self.points.values()]
+        found = [*self.lines.values(), *measured, *self.skis.values(), np.zeros((0, 2))]
+        return np.concatenate(found)
+
+
+def stick_lines(state: JumperState) -> dict[str, Floats]:
+    """The lines (m, 3) of the stick model of Fig. 6, as far as its points are known.
+
+    body: P1, P2, O; feet: P3, P4; right and left: the skis, tail to tip.
+    """
+    known = {name: point.xyz for name, point in state.points.items() if point is not None}
+    origin = origin_of(state)
+    lines = {}
+    body = [known[name] for name in ("P1", "P2") if name in known] + ([] if origin is None else [origin])
+    if "P2" in known and len(body) > 1:
+        lines["body"] = np.stack(body)
+    if origin is not None:
+        lines["feet"] = np.stack((known["P3"], known["P4"]))
+    for side, binding in (("right", "P3"), ("left", "P4")):
+        ski = state.skis.get(side)
+        if ski is not None and binding in known:
+            half = SKI_LENGTH_M / 2 * ski.direction
+            lines[side] = np.stack((known[binding] - half, known[binding] + half))
+    return lines
+
+
+def overlay_of(state: JumperState, measured: ImageMeasurements | None, camera: PlacedCamera) -> Overlay:
+    """What is drawn over an image.
+
+    Args:
+        state: the jumper at this pulse.
+        measured: what was measured in this image.
+        camera: that took it.
+    """
+    projected = {part: camera.project(_dense(line)) for part, line in stick_lines(state).items()}
+    points = {} if measured is None else {name: point.xy for name, point in measured.points.items()}
+    skis = {} if measured is None else {side: ski.xy for side, ski in measured.skis.items()}
+    return Overlay(
+        {part: line for part, line in projected.items() if np.isfinite(line).all()},
+        _ellipses(state, camera),
+        points,
+        skis,
+    )
+
+
+def half_axes(covariance: Floats, sigmas: float = ELLIPSE_SIGMAS) -> tuple[float, float, float]:
+    """Long and short half axis of the ellipse of a (2, 2) covariance, and the turn of the long one, degrees.
+
+    The turn counts from x towards y.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    short, long = sigmas * np.sqrt(np.maximum(values, 0.0))
+    return float(long), float(short), float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
+
+
+def _dense(line: Floats) -> Floats:
+    """More points on a line (m, 3)."""
+    return np.concatenate([a + _ALONG * (b - a) for a, b in pairwise(line)])
+
+
+def _ellipses(state: JumperState, camera: PlacedCamera) -> dict[str, tuple[Floats, Floats]]:
+    known = {name: point for name, point in state.points.items() if point is not None and camera.in_front(point.xyz)}
+    if not known:
+        return {}
+    xyz = np.stack([point.xyz for point in known.values()])
+    xy = camera.project(xyz)
+    _, by_point, _ = camera.linearised(xyz, xy)
+    covariances = np.stack([point.covariance for point in known.values()])
+    spread = by_point @ covariances @ by_point.transpose(0, 2, 1)
+    return {name: (xy[i], spread[i]) for i, name in enumerate(known)}

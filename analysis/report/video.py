@@ -1,0 +1,232 @@
+"""A video of the jumps with the overlay drawn into every triplet: VP9 for browsers, or FFV1 without loss.
+
+Each frame stands at the time of its pulse, to a microsecond where the container allows it (MP4), to a millisecond in
+WebM and Matroska. The pulse number is written into the picture.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Final
+
+import av
+import cv2
+import numpy as np
+from av.error import FFmpegError
+from av.video.stream import VideoStream
+from numpy.typing import NDArray
+
+from analysis.measurements.model import ImageMeasurements, Measurements
+from analysis.report.course import Course, best_state, course_of
+from analysis.report.figures import fixed
+from analysis.report.frames import Grey, camera_images, frames_of
+from analysis.report.overlay import Overlay, half_axes, overlay_of
+from analysis.result.model import MeasuredRecording, PulseState
+from analysis.scene.camera_system import CameraSystem
+from rig.clocks import NS_PER_S
+from rig.errors import BadInputError
+from rig.tag import TripletTag
+
+_Picture = NDArray[np.uint8]
+_Colour = tuple[int, int, int]
+Progress = Callable[[int, int], None]
+
+#: Shown before and after each jump, s; between two jumps the video waits as long.
+_AROUND_S: Final = 0.5
+#: Wider pictures are made smaller: decoders in phones stop there.
+_WIDEST_PX: Final = 3840
+_TIME_BASE: Final = Fraction(1, 1_000_000)
+_VP9: Final = {"crf": "28", "b": "0", "deadline": "realtime", "cpu-used": "6", "g": "30"}
+_SHIFT: Final = 4  # bits of sub-pixels when lines are drawn
+_FONT: Final = cv2.FONT_HERSHEY_DUPLEX
+#: Blue, green, red.
+_COLOURS: Final[Mapping[str, _Colour]] = {
+    "body": (92, 243, 255),
+    "feet": (92, 243, 255),
+    "right": (46, 157, 255),
+    "left": (255, 194, 89),
+}
+_POINT: Final[_Colour] = (168, 92, 255)
+_INK: Final[_Colour] = (255, 255, 255)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """What is drawn at a pulse; `state` is None before and after the jump."""
+
+    words: str
+    state: PulseState | None
+    images: Mapping[str, ImageMeasurements]
+
+
+def write_video(
+    result: MeasuredRecording,
+    measurements: Measurements,
+    system: CameraSystem,
+    log: Path,
+    out: Path,
+    *,
+    lossless: bool = False,
+    progress: Progress | None = None,
+) -> int:
+    """Write the video; holds one frame at a time.
+
+    Args:
+        result: what was measured.
+        measurements: what was measured in the images of its jumps.
+        system: the oriented cameras.
+        log: where the images are.
+        out: the file; its ending chooses the container: .mp4 or .webm for browsers, .mkv.
+        lossless: FFV1 instead of VP9; needs .mkv.
+        progress: called with the number of frames done and to do.
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        BadInputError: the log cannot be read or has no image of a jump, or `out` cannot be written.
+    """
+    if lossless and out.suffix != ".mkv":
+        raise BadInputError(f"{out}: a video without loss needs the ending .mkv; choose another name")
+    shown = _shown(result, measurements)
+    done = 0
+    writer: _Writer | None = None
+    try:
+        for tag, image in frames_of(log, shown.keys()):
+            picture = _picture(tag, image, shown[int(tag.pulse)], system)
+            if writer is None:
+                writer = _Writer(out, (picture.shape[1], picture.shape[0]), result.rate_hz, lossless=lossless)
+            writer.add(picture, tag)
+            done += 1
+            if progress is not None:
+                progress(done, len(shown))
+        if writer is not None:
+            writer.finish()
+    except (FFmpegError, OSError) as error:
+        raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another place") from None
+    finally:
+        if writer is not None:
+            writer.close()
+    if not done:
+        raise BadInputError(f"{log}: has no image of a jump, so that there is no video; look at it with `svev info`")
+    return done
+
+
+class _Writer:
+    """One video file.
+
+    Args:
+        out: the file.
+        size: of the pictures, px.
+        rate_hz: pulses per second.
+        lossless: FFV1.
+    """
+
+    def __init__(self, out: Path, size: tuple[int, int], rate_hz: float, *, lossless: bool) -> None:
+        scale = 1.0 if lossless else min(1.0, _WIDEST_PX / size[0])
+        self._size = tuple(max(2, round(side * scale) // 2 * 2) for side in size)
+        self._gap_us = round(_AROUND_S * 1e6)
+        options = {"video_track_timescale": str(_TIME_BASE.denominator)} if out.suffix == ".mp4" else {}
+        self._file = av.open(str(out), "w", options=options)
+        codec, pixels, settings = ("ffv1", "bgr0", {}) if lossless else ("libvpx-vp9", "yuv420p", _VP9)
+        rate = Fraction(rate_hz).limit_denominator(1000)
+        stream = self._file.add_stream(codec, rate=rate, options=settings)
+        if not isinstance(stream, VideoStream):
+            raise TypeError(f"{codec} makes no video")
+        stream.width, stream.height = self._size
+        stream.pix_fmt = pixels
+        stream.time_base = stream.codec_context.time_base = _TIME_BASE
+        self._stream = stream
+        self._at_us = 0
+        self._last: TripletTag | None = None
+
+    def add(self, picture: _Picture, tag: TripletTag) -> None:
+        """Append a picture at the time of its pulse."""
+        if self._last is not None:
+            step = round((tag.time - self._last.time) * 1e6 / NS_PER_S)
+            self._at_us += min(max(step, 1), self._gap_us)
+        self._last = tag
+        if picture.shape[1::-1] != self._size:
+            picture = np.asarray(cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+        frame.pts, frame.time_base = self._at_us, _TIME_BASE
+        self._file.mux(self._stream.encode(frame))
+
+    def finish(self) -> None:
+        """Write what the encoder still holds."""
+        self._file.mux(self._stream.encode(None))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _shown(result: MeasuredRecording, measurements: Measurements) -> dict[int, _Shown]:
+    """By pulse: those of the jumps and some before and after, in order."""
+    measured = {jump.number: jump for jump in measurements.jumps}
+    around = round(_AROUND_S * result.rate_hz)
+    found: dict[int, _Shown] = {}
+    for jump in result.jumps:
+        if not jump.pulses:
+            continue
+        first, last = int(jump.pulses[0].pulse), int(jump.pulses[-1].pulse)
+        for pulse in (*range(max(0, first - around), first), *range(last + 1, last + around + 1)):
+            found.setdefault(pulse, _Shown(f"pulse {pulse}", None, {}))
+        own = measured.get(jump.number)
+        images = {} if own is None else {int(pulse.pulse): pulse.images for pulse in own.pulses}
+        course = course_of(jump, result.rate_hz)
+        for i, state in enumerate(jump.pulses):
+            number = int(state.pulse)
+            found[number] = _Shown(_words(course, i), state, images.get(number, {}))
+    return found
+
+
+def _words(course: Course, i: int) -> str:
+    """Pulse, time, speed; the font has no signs beyond ASCII."""
+    words = f"pulse {course.pulses[i].pulse}  {fixed(float(course.since[i]), 3)} s"
+    speed = float(course.smoothed["speed"].value[i])
+    return (words + (f"  {speed:.1f} m/s" if np.isfinite(speed) else "")).replace("\N{MINUS SIGN}", "-")
+
+
+def _picture(tag: TripletTag, image: Grey, shown: _Shown, system: CameraSystem) -> _Picture:
+    """The triplet in colour with its overlay."""
+    picture = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
+    there = camera_images(tag, image)
+    for camera in tag.cameras:
+        block = picture[:, camera.columns[0] : camera.columns[1]]
+        if camera.name in there and camera.name in system.cameras and shown.state is not None:
+            overlay = overlay_of(best_state(shown.state), shown.images.get(camera.name), system[camera.name])
+            _draw(block, overlay)
+        _write(block, camera.name, (10, 24))
+    _write(picture, shown.words, (10, picture.shape[0] - 12))
+    return picture
+
+
+def _draw(block: _Picture, overlay: Overlay) -> None:
+    """Draw an overlay into the image of its camera, in place."""
+    for part, line in overlay.lines.items():
+        cv2.polylines(block, [_fine(line)], False, _COLOURS[part], 1, cv2.LINE_AA, _SHIFT)
+    for place, covariance in overlay.ellipses.values():
+        long, short, turn = half_axes(covariance)
+        if np.isfinite(place).all() and long < block.shape[1]:
+            size = (_fine(np.array(long)).item(), _fine(np.array(short)).item())
+            centre = tuple(_fine(place).tolist())
+            cv2.ellipse(block, centre, size, turn, 0, 360, _INK, 1, cv2.LINE_AA, _SHIFT)
+    for x, y in overlay.points.values():
+        for dx, dy in ((3.0, 0.0), (0.0, 3.0)):
+            ends = _fine(np.array([(x - dx, y - dy), (x + dx, y + dy)]))
+            cv2.polylines(block, [ends], False, _POINT, 1, cv2.LINE_AA, _SHIFT)
+    for side, points in overlay.skis.items():
+        for x, y in _fine(points):
+            cv2.circle(block, (int(x), int(y)), 1 << _SHIFT, _COLOURS[side], -1, cv2.LINE_AA, _SHIFT)
+
+
+def _fine(places: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Image coordinates as OpenCV takes sub-pixels."""
+    return np.asarray(np.rint(np.clip(places, -1e5, 1e5) * (1 << _SHIFT)), np.int32)
+
+
+def _write(picture: _Picture, words: str, at: tuple[int, int]) -> None:
+    cv2.putText(picture, words, at, _FONT, 0.6, (0, 0, 0), 4, cv2.LINE_AA)
+    cv2.putText(picture, words, at, _FONT, 0.6, _INK, 1, cv2.LINE_AA)

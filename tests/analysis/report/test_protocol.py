@@ -1,0 +1,87 @@
+"""The protocol for the geodesist: everything that was found, and what was refused."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.report.protocol import WORST_RAYS, protocol, write_protocol
+from analysis.result.model import CameraMove, CameraOffset, MeasuredRecording, RayTest
+from photogrammetry.reports.document import as_text
+from rig.pulse import PulseNumber
+from tests.analysis.report.jumps import measured_recording, measurements
+
+
+def _text(result: MeasuredRecording) -> str:
+    return as_text(protocol(result, measurements())).replace("\N{MINUS SIGN}", "-")
+
+
+def _section(text: str, title: str) -> str:
+    return text.split(f"\n{title}\n", 1)[1].split("\n\n", 1)[0]
+
+
+def test_cameras_balls_and_synchrony_are_listed() -> None:
+    text = _text(measured_recording())
+    poses = _section(text, "Orientation of the cameras")
+    assert [line.split()[0] for line in poses.splitlines() if line.startswith("  K")] == ["K1", "K2", "K3"]
+    assert "no camera moved" in poses
+    assert "12 of 14 balls found" in poses
+    assert "B7    control   7.608   8.464  -3.557  12.0  12.0  12.0  K1 K2 K3" in _section(text, "Balls")
+    assert "K3             0.20        0.20             1.0  synchronous" in _section(text, "Synchrony")
+
+
+def test_faults_are_listed_with_their_words() -> None:
+    result = measured_recording()
+    move = CameraMove("K2", "camera K2 turned by 0.05°", np.zeros(3), np.zeros(3), 1e-9)
+    late = CameraOffset(33.3, 0.2, "camera K3 is one frame late")
+    text = _text(
+        replace(
+            result,
+            orientation=replace(result.orientation, moved=(move,)),
+            synchrony=dict(result.synchrony) | {"K3": late},
+        )
+    )
+    assert "moved: camera K2 turned by 0.05° (p = 1.0e-09)" in text
+    assert "166.5  camera K3 is one frame late" in text
+
+
+def test_rays_are_listed_worst_first_and_removed_ones_whole() -> None:
+    result = measured_recording()
+    w = np.random.default_rng(1).standard_normal(200)
+    tests = [RayTest(PulseNumber(20 + i // 9), "K1", "P1", 0.3, float(w[i]), False) for i in range(200)]
+    removed = [RayTest(PulseNumber(30 + i), "K2", "P2", 5.0, 0.001 * i, True) for i in range(3)]
+    jump = replace(result.jumps[0], tests=(*tests, *removed, *result.jumps[0].tests[-1:]))
+    text = _text(replace(result, jumps=(jump,)))
+    rows = [line.split() for line in _section(text, "Jump 1: tests of rays, the worst first").splitlines()[3:]]
+    values = [abs(float(row[4])) for row in rows]
+    assert len(values) == WORST_RAYS
+    assert values == sorted(values, reverse=True)
+    assert f"{np.count_nonzero(np.abs(w) > 2)} of them with |w| > 2" in text
+    assert "1 are controlled by nothing" in text
+    refused = _section(text, "Jump 1: refused, and why")
+    assert "3 rays or image lines were left out as gross errors" in refused
+    assert refused.count("removed") == 3
+
+
+def test_what_has_no_solution_is_named_with_its_pulses() -> None:
+    first = measured_recording().jumps[0].pulses[0].pulse
+    refused = _section(_text(measured_recording()), "Jump 1: refused, and why")
+    gap = f"pulses {first + 14}-{first + 18}"
+    assert f"P1: measured in two images or more, but refused as contradictory at {gap}" in refused
+    assert f"P4: two rays, not controllable, at pulses {first + 8}-{first + 11}" in refused
+
+
+def test_phases_have_their_figures() -> None:
+    text = _text(measured_recording())
+    verdict = _section(text, "Jump 1: verdict")
+    assert "reliable: measured in all phases" in verdict
+    assert "chi2_by_dof" in verdict
+    assert "  flight      25         1.02" in verdict
+    assert re.search(r"^  flight +P1 +20 +0 +0 +0 +5$", text, re.MULTILINE)
+
+
+def test_text_and_page_are_written(tmp_path: Path) -> None:
+    text, page = write_protocol(measured_recording(), measurements(), tmp_path / "new")
+    assert text.read_text().startswith("Protocol of recording simulated")
+    assert "<h2>Synchrony</h2>" in page.read_text()

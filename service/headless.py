@@ -184,6 +184,7 @@ class HeadlessRig:
                     on_progress(recording.counts)
                 continue
             if isinstance(outcome, RecordingFinished):
+                self._supervisor.truths.wait()
                 return outcome
             if isinstance(outcome, ProcessDiedError):
                 kept = f"the log until then is readable: svev verify {self._path}"

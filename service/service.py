@@ -82,6 +82,7 @@ class Service(Archive):
 
         with suppress(UnknownRecordingError):  # not in progress: it is over, or the catalogue does not know it either
             supervisor.commands.ask(stop, _CLOSE_S)
+            supervisor.truths.wait(_SOON_S)
         return as_recording(self._catalogue.entry(recording_id))
 
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:

@@ -1,6 +1,5 @@
-"""Runs the demonstration on the simulated hill: records, publishes, checks the log, writes pictures and truth."""
+"""Runs the demonstration on the simulated hill: records, publishes, checks the log, writes pictures."""
 
-import json
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -8,17 +7,13 @@ from typing import Any, Final, Literal
 
 from analysis.images.contact_sheet import write_contact_sheet
 from recorder.checking.verify import verify
+from recorder.log.truth_path import truth_path
 from recorder.publishing.subscriber import free_address, subscriber
-from recorder.reading.triplets import triplets
 from rig.errors import BadInputError
-from rig.pulse import HillPulse, PulseNumber
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from service.headless import HeadlessRig, record
 from service.recordings.storage import new_log_path
-from simrig.images import stamp
-from simrig.world.scenario import load_scenario
-from simrig.world.truth import truth
 from svev import console
 
 Bus = Literal["gige", "firewire", "sim"]
@@ -71,40 +66,8 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
         "subscriber": {name: getattr(counted, name) for name in ("received", "missing", "bytes", "latency_ms")},
         "verdict": report.verdict,
         "contact_sheet": str(sheet),
-        "truth": str(_write_truth(path, rig)),
+        "truth": str(truth_path(path)),
     }
-
-
-def hill_pulses(log: Path, rig: RigSettings) -> dict[PulseNumber, set[HillPulse]]:
-    """For each pulse of a recording, the hill's pulses that its frames were stamped with; more than one is a mix-up."""
-    columns = rig.columns()
-    found: dict[PulseNumber, set[HillPulse]] = {}
-    for tag, image in triplets(log):
-        stamps = [
-            stamp.read(image[:, first:end])
-            for (first, end), camera in zip(columns, tag.cameras, strict=True)
-            if camera.status == "ok"
-        ]
-        found[tag.pulse] = {seen.pulse for seen in stamps if seen is not None}
-    return found
-
-
-def _write_truth(log: Path, rig: RigSettings) -> Path:
-    """Write `LOG.truth.json`: what the cameras really saw, by pulse number of the log.
-
-    Returns:
-        The path of the file.
-    """
-    if rig.simulation is None:
-        raise ValueError("only the simulated hill knows the truth")
-    scenario = load_scenario(rig.simulation.scenario)
-    of_recording = {pulse: min(hill) for pulse, hill in hill_pulses(log, rig).items() if hill}
-    region = rig.cameras[0].region
-    content = truth(scenario, of_recording.values(), rig.trigger.rate_hz, (region.width, region.height))
-    content["hill_pulse_of_recording"] = {str(pulse): hill for pulse, hill in of_recording.items()}
-    path = log.with_suffix(".truth.json")
-    path.write_text(json.dumps(content), encoding="utf-8")
-    return path
 
 
 def _on_free_addresses(rig: RigSettings) -> RigSettings:

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from recorder.catalogue.entry import Entry, with_changes
 from recorder.catalogue.log_cache import LogCache
 from recorder.log.session_changes import session_changes, session_path, write_session_changes
+from recorder.log.truth_path import truth_path
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
-from recorder.reading.triplets import stored_image, tag_of
+from recorder.reading.triplets import stored_image, tags
 from rig.errors import LogDamagedError, StorageError, UnknownRecordingError
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
-from rig.topics import TAG
 
 _SUFFIX: Final = ".mcap"
 _TRASH: Final = ".trash"
@@ -99,13 +99,7 @@ class Catalogue:
             UnknownRecordingError: no recording has this id.
             BadInputError: the log cannot be read.
         """
-        with LogReader(self._path(recording), skim=True) as reader:
-            return tuple(
-                tag
-                for chunk in reader.sound_chunks(only=(TAG.name,))
-                for message in chunk.messages
-                if (tag := tag_of(message)) is not None
-            )
+        return tuple(tags(self._path(recording)))
 
     def image(self, recording: str, pulse: int) -> NDArray[np.uint8]:
         """The image of one pulse, (rows, columns), uint8, a copy. Reads no other image.
@@ -152,8 +146,8 @@ class Catalogue:
             if path.parent != self._trash:
                 self._trash.mkdir(exist_ok=True)
                 log, path = path, self._free_path(path, self._trash)
-                log.rename(path)  # after a crash here the session changes are where `restore` leaves them
-                _move_session_changes(log, path)
+                log.rename(path)  # after a crash here the files beside it are where `restore` leaves them
+                _move_beside(log, path)
         return self.entry(path.stem)
 
     def restore(self, recording: str) -> Entry:
@@ -167,7 +161,7 @@ class Catalogue:
             path = self._path(recording, prefer_deleted=True)
             if path.parent == self._trash:
                 log, path = path, self._free_path(path, self.directory)
-                _move_session_changes(log, path)
+                _move_beside(log, path)
                 log.rename(path)
         return self.entry(path.stem)
 
@@ -187,7 +181,8 @@ class Catalogue:
                 stat = log.lstat()
                 if not S_ISDIR(stat.st_mode) and stat.st_ctime <= time.time() - older_than_s:
                     log.unlink()
-                    session_path(log).unlink(missing_ok=True)
+                    for beside in _beside(log):
+                        beside.unlink(missing_ok=True)
                     gone.append(log.stem)
         return gone
 
@@ -232,9 +227,15 @@ class Catalogue:
         return target / name
 
 
-def _move_session_changes(log: Path, target: Path) -> None:
-    if session_path(log).exists():
-        session_path(log).rename(session_path(target))
+def _beside(log: Path) -> tuple[Path, ...]:
+    """The files that belong to a log, whether they are there or not."""
+    return session_path(log), truth_path(log)
+
+
+def _move_beside(log: Path, target: Path) -> None:
+    for before, after in zip(_beside(log), _beside(target), strict=True):
+        if before.exists():
+            before.rename(after)
 
 
 def _unknown(recording: str) -> UnknownRecordingError:

@@ -46,6 +46,19 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
                     yield tag, np.zeros(tag.shape, np.uint8) if data is None else pixels(view_image(data))
 
 
+def tags(path: Path) -> Iterator[TripletTag]:
+    """The tags of a log, in its order, without those in damaged parts; reads no pixels.
+
+    Raises:
+        BadInputError: the log cannot be read.
+    """
+    with LogReader(path, skim=True) as reader:
+        for chunk in reader.sound_chunks(only=(TAG.name,)):
+            for message in chunk.messages:
+                if (tag := tag_of(message)) is not None:
+                    yield tag
+
+
 @dataclass(frozen=True, slots=True)
 class StoredTriplet:
     """Where the chunk of a pulse stands in the file: `length` bytes from `offset` on."""

@@ -1,16 +1,22 @@
 """Starts the simulated cameras of a rig file with a `[simulation]` table; no other module here imports `simrig`."""
 
 import ipaddress
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
 
 from capture.sim.camera import Scene
 from rig.clocks import HostNs
 from rig.errors import BadInputError
+from rig.pulse import PulseNumber
 from rig.settings.model import CameraSettings, Region, RigSettings
+from simrig.programs.recording_truth import RecordingTruth
 from simrig.programs.scene import SimScene
 from simrig.programs.simulated_hill import SimulatedHill
 from simrig.world.scenario import load_scenario
+
+#: Writes the truth of a recording into a file; called with its path, and number and host time of each pulse.
+WriteTruth = Callable[[Path, Iterable[tuple[PulseNumber, HostNs]]], None]
 
 
 def simulated_hill(
@@ -69,6 +75,21 @@ def hill_environment(rig: RigSettings, epoch: HostNs) -> Iterator[Mapping[str, s
 def sim_scene(rig: RigSettings, index: int, epoch: HostNs) -> Scene:
     """The simulated hill as one camera inside its grabber process sees it (back end "sim")."""
     return SimScene(rig, index, epoch)
+
+
+def simulated_truth(rig: RigSettings, epoch: HostNs) -> WriteTruth | None:
+    """What writes the truth of recordings of a simulated rig; None if not all of its cameras are simulated.
+
+    Args:
+        rig: the rig.
+        epoch: host time of hill pulse 0.
+
+    Raises:
+        BadInputError: the scenario is wrong.
+    """
+    if rig.simulation is None or any(camera.backend == "replay" for camera in rig.cameras):
+        return None
+    return RecordingTruth(rig, rig.simulation.scenario, epoch).write
 
 
 def _check_loopback(camera: CameraSettings) -> None:

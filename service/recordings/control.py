@@ -37,6 +37,7 @@ from rig.transport.messages import (
 )
 from service.processes.rig_processes import RigProcesses
 from service.recordings.storage import check_room_for, new_log_path
+from service.recordings.truth import TruthWriter
 from service.status.statements import FORBIDDEN, recording_continued, recording_ended
 from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
@@ -158,6 +159,7 @@ class RecordingControl:
         session: the rig, its processes, and whom to tell events.
         rig_toml: the rig file's text, attached to every log.
         calibration: calibration of the cameras, written into every log; None: not known.
+        truths: writes the truth beside the logs of simulated cameras.
 
     Attributes:
         current: the recording in progress, or one whose log is being opened.
@@ -167,9 +169,14 @@ class RecordingControl:
     """
 
     def __init__(
-        self, machine: StateMachine, session: RigSession, rig_toml: str, calibration: Calibration | None
+        self,
+        machine: StateMachine,
+        session: RigSession,
+        rig_toml: str,
+        calibration: Calibration | None,
+        truths: TruthWriter,
     ) -> None:
-        self._machine, self._session = machine, session
+        self._machine, self._session, self._truths = machine, session, truths
         self._rig, self._data = session.rig, session.recorder.directory
         self._rig_toml, self._calibration = rig_toml, calibration
         self.current: RecordingInProgress | None = None
@@ -287,6 +294,7 @@ class RecordingControl:
         match report:
             case RecordingStarted():
                 self._answers.append(current.open(report))
+                self._truths.opened(current.path, self._session.truth)
                 self._machine.move(State.RECORDING)
                 self._say(Level.INFO, f"recording {current.id} started")
             case RecorderHealth() if not current.opening:
@@ -294,6 +302,7 @@ class RecordingControl:
                     current.grown(current.path.stat().st_size)
             case RecordingContinued():
                 current.continue_in(report.path)
+                self._truths.opened(report.path, self._session.truth)
                 self.notice = recording_continued(report.before.path.stem, report.path, report.before.failure)
             case RecordingFinished():
                 self._finished(current, report)
@@ -335,6 +344,8 @@ class RecordingControl:
 
     def _over(self, outcome: Outcome, then: State) -> None:
         current, self.current = self.current, None
+        parts = outcome.earlier if isinstance(outcome, RecordingFinished) else ()
+        self._truths.closed([part.path for part in parts if not part.closed])
         if current is not None:
             self.last = current.id
             self._machine.move(then)

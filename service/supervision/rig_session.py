@@ -14,7 +14,7 @@ from rig.events import Event
 from rig.settings.model import RigSettings
 from rig.transport.messages import RecorderOptions, TellEvent
 from service.processes.rig_processes import RigProcesses
-from service.processes.simulation import hill_environment
+from service.processes.simulation import WriteTruth, hill_environment, simulated_truth
 
 #: Starts simulated cameras with pulse 0 at a host time; yields the environment variables that grabbers need for them.
 StartHill = Callable[[HostNs], AbstractContextManager[Mapping[str, str]]]
@@ -33,6 +33,7 @@ class RigSession:
     Attributes:
         rig, recorder: as given.
         processes: the running processes; None while there are none, or while they are started or stopped.
+        truth: writes what the simulated cameras saw; None: the cameras are real, or those that the caller started.
     """
 
     def __init__(
@@ -46,7 +47,9 @@ class RigSession:
     ) -> None:
         self.rig, self.recorder = rig, recorder
         self._on_event, self._on_done = on_event, on_done
+        self._own_hill = hill is None
         self._start_hill = partial(hill_environment, rig) if hill is None else hill
+        self.truth: WriteTruth | None = None
         self._hill: ExitStack | None = None
         self._epoch: HostNs | None = None
         self._environment: Mapping[str, str] = {}
@@ -125,6 +128,7 @@ class RigSession:
                 epoch = host_now()
                 self._environment = stack.enter_context(self._start_hill(epoch))
                 self._epoch = epoch
+                self.truth = simulated_truth(self.rig, epoch) if self._own_hill else None
             processes = RigProcesses(
                 self.rig, self._on_event, epoch=self._epoch, recorder=self.recorder,
                 environment=self._environment,

@@ -21,6 +21,7 @@ from rig.transport.messages import RecorderFailed, RecorderOptions, RecorderRepo
 from service.processes.rig_processes import RECORDER, CameraPresence
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
+from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.picture import Facts, picture
 from service.status.statements import FORBIDDEN
@@ -74,6 +75,7 @@ class Supervisor:
         failure: the error that ended the thread, None if there was none.
         commands: through which other threads give commands.
         recordings: starts and ends recordings; only for commands in the supervisor's thread.
+        truths: writes the truth beside the logs of simulated cameras; any thread may wait for it.
     """
 
     def __init__(
@@ -95,7 +97,8 @@ class Supervisor:
         self.commands = Commands()
         self._machine = StateMachine(self._moved)
         self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder, hill=hill)
-        self.recordings = RecordingControl(self._machine, self._session, rig_toml, calibration)
+        self.truths = TruthWriter(hub.tell)
+        self.recordings = RecordingControl(self._machine, self._session, rig_toml, calibration, self.truths)
         self._fault = Fault()
         self._wanted = False
         self._settling, self._watch = Settling(), RecorderWatch()
@@ -178,6 +181,7 @@ class Supervisor:
         finally:
             self._session.close()
             self.recordings.abandon()
+            self.truths.end(_FINISH_S)
             self._refresh()
             self.commands.end()
             self.on_end()

@@ -6,6 +6,7 @@ import socket
 import sys
 import threading
 import time
+from dataclasses import asdict
 from typing import Final
 
 from rig.clocks import HostNs
@@ -35,7 +36,9 @@ from simrig.programs.messages import (
     Unplug,
 )
 from simrig.programs.simulator import run
+from simrig.world.conditions.effects import LensErrors
 from simrig.world.faults import OF_THE_CAMERA, FaultPlan
+from simrig.world.projection import Lens
 from simrig.world.pulses import DeviceClock, PulseTrain
 from simrig.world.scenario import Scenario, load_scenario
 
@@ -142,9 +145,18 @@ def _listen(name: str) -> socket.socket:
 
 def _painter(config: BusConfig, scenario: Scenario, name: str) -> Painter:
     """Images of the whole sensor; its middle 640 columns, which Format_0 reads, show what the scenario says."""
-    wider = tuple(camera.model_copy(update={"c": camera.c * VGA[0] / SENSOR[0]}) for camera in scenario.cameras)
-    whole = scenario.model_copy(update={"cameras": wider})
+    whole = of_whole_sensor(scenario)
     return Painter(whole, scenario.camera_index(name), SENSOR, config.rate_hz, test_pattern=config.test_pattern)
+
+
+def of_whole_sensor(scenario: Scenario) -> Scenario:
+    """The scenario for images as large as the sensor: c and lens of its cameras hold in the middle 640 columns."""
+    by = VGA[0] / SENSOR[0]
+    cameras = []
+    for camera in scenario.cameras:
+        lens = LensErrors.model_construct(**asdict(Lens(**camera.lens.model_dump()).scaled(by)))
+        cameras.append(camera.model_copy(update={"c": camera.c * by, "lens": lens}))
+    return scenario.model_copy(update={"cameras": tuple(cameras)})
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ shares no code with `photogrammetry`, so that it can judge what that computes.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,6 +66,25 @@ class Lens:
 
 
 @dataclass(frozen=True, slots=True)
+class Window:
+    """The part of a camera's images that is recorded.
+
+    Attributes:
+        full: width and height of the image that the camera draws, px.
+        left: its first column that is recorded; may be negative, if the camera draws more than that.
+        top: likewise, row.
+        width: columns that are recorded.
+        height: rows that are recorded.
+    """
+
+    full: tuple[int, int]
+    left: int
+    top: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
 class Projection:
     """A camera with its place and orientation.
 
@@ -76,6 +95,7 @@ class Projection:
         width: columns of the image.
         height: rows of the image.
         lens: principal point and distortion; None: image centre, none.
+        reach: radius beyond which the distortion grows no more, px; None: three quarters of the image's diagonal.
     """
 
     X0: Floats
@@ -84,6 +104,21 @@ class Projection:
     width: int
     height: int
     lens: Lens | None = None
+    reach: float | None = None
+
+    @property
+    def _reach(self) -> float:
+        return 0.75 * math.hypot(self.width, self.height) if self.reach is None else self.reach
+
+    def windowed(self, window: Window) -> "Projection":
+        """The camera with that part of its image alone: the principal point moves against the image's centre."""
+        right = (self.width - 1) / 2 - window.left - (window.width - 1) / 2
+        down = (self.height - 1) / 2 - window.top - (window.height - 1) / 2
+        lens = self.lens
+        if right or down:
+            lens = lens or Lens(*[0.0] * 10)
+            lens = replace(lens, x0=lens.x0 + right, y0=lens.y0 - down)
+        return replace(self, width=window.width, height=window.height, lens=lens, reach=self._reach)
 
     def pixels(self, points: ArrayLike) -> Floats:
         """Pixel coordinates (x, y) of object points by Eq. (A1); shape (..., 3) to (..., 2).
@@ -93,7 +128,7 @@ class Projection:
         along = (np.asarray(points, float) - self.X0) @ self.R
         metric = -self.c * along[..., :2] / along[..., 2:]
         if self.lens is not None:
-            metric = self.lens.bend(metric, reach=0.75 * math.hypot(self.width, self.height))
+            metric = self.lens.bend(metric, reach=self._reach)
         return np.stack(((self.width - 1) / 2 + metric[..., 0], (self.height - 1) / 2 - metric[..., 1]), axis=-1)
 
     def distance(self, points: ArrayLike) -> Floats:

@@ -264,22 +264,31 @@ class Scenario(FiniteModel):
 def load_scenario(path: Path) -> Scenario:
     """Read and check a scenario file.
 
-    The key `base` names another scenario file, relative to this one, for everything that this file leaves out. Tables
-    are merged key by key; a list of this file replaces that of the base.
+    The key `base` names another scenario file, relative to this one, for everything that this file leaves out; that
+    one may have a base too. Tables are merged key by key; a list of this file replaces that of the base.
 
     Raises:
         BadInputError: the file is missing or no valid scenario; the message names file, key and remedy.
     """
+    return validate(Scenario, _content(path, ()), path)
+
+
+def _content(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    """The keys of a scenario file and of its bases; `above` are the files that lead to it."""
     own = read_toml(path)
     base = own.pop("base", None)
     if base is None:
-        return validate(Scenario, own, path)
+        return own
     if not isinstance(base, str):
         raise BadInputError(f'{path}: key "base" = {base!r}: give the name of a scenario file')
-    below = read_toml(path.parent / base)
-    if "base" in below:
-        raise BadInputError(f'{path}: base "{base}" has a base itself; name a scenario file that stands alone')
-    return validate(Scenario, _merged(below, own), path)
+    leading = (*above, path.resolve())
+    below = path.parent / base
+    if below.resolve() in leading:
+        names = " -> ".join(file.name for file in (*leading, below))
+        raise BadInputError(
+            f'{path}: its base leads back to "{base}" ({names}): remove the key "base" from one of them'
+        )
+    return _merged(_content(below, leading), own)
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

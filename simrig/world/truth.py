@@ -1,4 +1,4 @@
-"""The truth of a scenario as plain data: `svev demo` writes it beside a log, and tests judge measurements by it.
+"""The truth of a scenario as plain data: it stands beside every log of a simulated rig; tests judge measurements by it.
 
 Units: m, s, degrees, m/s, px. Frame: origin at the take-off edge, X horizontal along the flight, Z up, Y to the left
 (right-handed). Cameras and pixel coordinates follow the network file (pixel frame, Eq. A1). `height` (Z0 of the paper)
@@ -22,7 +22,7 @@ which O passes the edge, `takeoff_pulse` the same in pulses.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -37,7 +37,7 @@ from simrig.world.figure import body
 from simrig.world.figure.mass import centre_of_mass, landmarks
 from simrig.world.figure.sight import IN_SIGHT, inside, visible_shares
 from simrig.world.jumper import FLIGHT_X_M, Jump, JumpSeries, Pose
-from simrig.world.projection import Lens, Projection
+from simrig.world.projection import Lens, Projection, Window
 from simrig.world.scenario import Ball, Scenario, SceneCamera
 
 FORMAT = "svev-truth/1"
@@ -76,9 +76,39 @@ def truth(
         rate_hz: pulses per second.
         size: width and height of the images, px.
     """
-    seers = {camera.name: _Seer(scenario, index, size) for index, camera in enumerate(scenario.cameras)}
-    jumps = JumpSeries(scenario)
-    states = [_pulse(scenario, jumps, seers, pulse, rate_hz) for pulse in pulses]
+    whole = Window(size, 0, 0, *size)
+    known = Truth(scenario, rate_hz, {camera.name: whole for camera in scenario.cameras})
+    return {**known.setting(), "pulses": [known.state(pulse) for pulse in pulses]}
+
+
+class Truth:
+    """The truth of a scenario, piece by piece.
+
+    Args:
+        scenario: the scenario.
+        rate_hz: pulses per second.
+        windows: what is recorded of each camera's images, by name; cameras that are not named do not appear.
+    """
+
+    def __init__(self, scenario: Scenario, rate_hz: float, windows: Mapping[str, Window]) -> None:
+        self._scenario, self._rate_hz = scenario, rate_hz
+        self._seers = {
+            camera.name: _Seer(scenario, index, windows[camera.name])
+            for index, camera in enumerate(scenario.cameras)
+            if camera.name in windows
+        }
+        self._jumps = JumpSeries(scenario)
+
+    def setting(self) -> dict[str, Any]:
+        """All members but `pulses`."""
+        return _setting(self._scenario, self._seers, self._rate_hz)
+
+    def state(self, pulse: HillPulse) -> dict[str, Any]:
+        """The member of `pulses` for one hill pulse, counted from 0."""
+        return _pulse(self._scenario, self._jumps, self._seers, pulse, self._rate_hz)
+
+
+def _setting(scenario: Scenario, seers: "Mapping[str, _Seer]", rate_hz: float) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "scenario": scenario.name,
@@ -100,16 +130,15 @@ def truth(
             name: {ball.name: _ball_share(scenario, ball, seer.projection) for ball in scenario.balls}
             for name, seer in seers.items()
         },
-        "pulses": states,
     }
 
 
 class _Seer:
     """One camera of the scenario, at any time."""
 
-    def __init__(self, scenario: Scenario, index: int, size: tuple[int, int]) -> None:
+    def __init__(self, scenario: Scenario, index: int, window: Window) -> None:
         self.settings = scenario.cameras[index]
-        self.projection = self.settings.projection(*size)
+        self.projection = self.settings.projection(*window.full).windowed(window)
         self._scenario = scenario
         self._people = surroundings.walkers(scenario)
         self._motion = CameraMotion(scenario, index)
@@ -171,10 +200,10 @@ def _camera(settings: SceneCamera, projection: Projection) -> dict[str, Any]:
 
 
 def _pulse(
-    scenario: Scenario, jumps: JumpSeries, seers: dict[str, _Seer], pulse: HillPulse, rate_hz: float
+    scenario: Scenario, jumps: JumpSeries, seers: Mapping[str, _Seer], pulse: HillPulse, rate_hz: float
 ) -> dict[str, Any]:
     time_s = pulse / rate_hz
-    state_s = time_s + float(np.mean([camera.exposure_us for camera in scenario.cameras])) / 2e6
+    state_s = time_s + float(np.mean([seer.settings.exposure_us for seer in seers.values()])) / 2e6
     moments = {name: seer.moment(pulse, rate_hz) for name, seer in seers.items()}
     there = jumps.at(state_s)
     state = {

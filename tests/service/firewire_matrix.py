@@ -31,7 +31,7 @@ from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill
 from simrig.world.faults import Fault
-from svev.demo import hill_pulses
+from tests.support.stamps import hill_pulses
 
 PAGE: Final = Path(__file__).resolve().parents[2] / "docs" / "firewire.md"
 BEGIN: Final = "<!-- fault matrix: written by tests.service.firewire_matrix, do not edit -->"

@@ -301,6 +301,8 @@ def test_on_a_second_disk_the_recording_goes_on_without_a_gap(
     assert reports[1].verdict == "clean"
     assert code == 0, err
     assert f"the recording goes on in {second}" in err
+    assert len(json.loads(second.with_suffix(".truth.json").read_text())["hill_pulse_of_recording"]) > 100
+    assert f"not written beside {first.name}" in err
     (said,) = (line for line in err.splitlines() if "goes on in" in line)
     name = "fails (EIO)" if fault == "fails" else "hangs for ever"
     fault_table.tell(DISK, f"the disk {name}; there is a second one", lost=0, said=said, code=code)

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,10 @@ from rig.events import Event
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.settings.file import load_rig
-from svev.demo import hill_pulses
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
+from tests.support.stamps import hill_pulses
 from tests.support.waiting import wait_until
 
 PROCESSES = "Processes"
@@ -73,6 +74,36 @@ def test_every_pulse_is_recorded_whole_and_unmixed(tmp_path: Path, loopback: Loo
     assert [len(seen) for seen in hill.values()] == [1] * 60
     first = min(hill[PulseNumber(1)])
     assert {pulse: min(seen) for pulse, seen in hill.items()} == {n: first + n - 1 for n in range(1, 61)}
+    assert _true_pulses(Path(result["log"])) == {n: first + n - 1 for n in range(1, 61)}
+
+
+def _true_pulses(log: Path) -> dict[int, int]:
+    """The hill pulse of each pulse of a log, by its truth."""
+    truth = json.loads(log.with_suffix(".truth.json").read_text())
+    assert [state["pulse"] for state in truth["pulses"]] == list(truth["hill_pulse_of_recording"].values())
+    return {int(pulse): hill for pulse, hill in truth["hill_pulse_of_recording"].items()}
+
+
+@pytest.mark.parametrize("backend", ["sim", "aravis", "iidc"])
+def test_the_truth_is_found_without_stamps_beside_pauses_and_missed_pulses(
+    tmp_path: Path, loopback: Loopback, backend: str
+) -> None:
+    """The pulses pause and K1 goes away again and again, so that the recording meets some whenever it begins."""
+    pauses = [[pulse, pulse + 9] for pulse in range(15, 1800, 45)]
+    faults = [{"kind": "missed_pulse", "camera": "K1", "at_pulse": pulse, "count": 7} for pulse in range(5, 1800, 45)]
+    scenario = f"stamp = false\npauses = {pauses}"
+    path = write_rig(tmp_path, backend, loopback, faults=faults, scenario=scenario)
+    _, result, err = _result(_record(path, tmp_path / "logs", 3))
+    log = Path(result["log"])
+    assert "not written" not in err
+    hill = _true_pulses(log)
+    assert list(hill) == list(range(1, result["pulses"] + 1))
+    assert not any(first <= pulse < end for pulse in hill.values() for first, end in pauses)
+    tags = [tag for tag, _ in triplets(log)]
+    for before, after in pairwise(tags):
+        periods = (after.time - before.time) * 30 / 1e9
+        assert hill[after.pulse] - hill[before.pulse] == round(periods)
+    assert max(hill[after.pulse] - hill[before.pulse] for before, after in pairwise(tags)) == 10
 
 
 CAUSES = {"missed_pulse": ("K1", "missed"), "lost_frame": ("K2", "lost"), "damaged_frame": ("K3", "damaged")}
@@ -108,6 +139,7 @@ def test_each_fault_is_recorded_with_its_cause(
     }
     assert found == expected
     assert set(expected.values()) == {"missed", "lost", "damaged"}
+    assert _true_pulses(log) == {pulse: min(seen) for pulse, seen in hill.items()}
     what = {"missed_pulse": "a camera does not see a pulse", "lost_frame": "a frame is lost in transfer"}
     what["damaged_frame"] = "a frame comes damaged"
     for kind, (camera, status) in CAUSES.items():

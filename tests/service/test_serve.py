@@ -1,5 +1,6 @@
 """`svev serve` as an operator uses it: real processes, real HTTP, the simulated hill."""
 
+import json
 import os
 import signal
 import subprocess
@@ -45,6 +46,8 @@ def test_arm_record_stop_disarm(tmp_path: Path, loopback: Loopback) -> None:
         service.post("/api/disarm")
         service.await_state("idle")
         log = service.data / f"{recording['id']}.mcap"
+        truth = log.with_suffix(".truth.json")
+        assert len(json.loads(truth.read_text())["hill_pulse_of_recording"]) == ended["counts"]["pulses"]
     assert verify(log).verdict == "clean"
     assert info(log).session["athlete"] == "Ola"
     with LogReader(log) as reader:

@@ -34,19 +34,28 @@ def visible_shares(
         jump: number of the jump.
         fronts: what stands between camera and jumper.
     """
+    distances, spots = projection.distance(pose.markers), projection.pixels(pose.markers)
+    worn = scenario.jumper.worn(jump)
+    seen = [worn[i] and distances[i] > 0 and bool(projection.sees(spots[i])) for i in range(len(spots))]
+    if not any(seen):
+        return [0.0] * len(seen)
     order = _order(scenario, pose, projection) if scenario.jumper.occlusion else []
-    distances = projection.distance(pose.markers)
+    places = {thing.marker: place for place, thing in enumerate(order)}
+    own = [(place, thing.part) for place, thing in enumerate(order) if thing.part is not None]
+    shapes = [part for _, part in own] + [front for front in fronts if isinstance(front, Part)]
+    ends, radii = body.outlines(shapes, projection)
+    outlined = [front for front in fronts if not isinstance(front, Part)]
     shares = []
-    for i, spot in enumerate(projection.pixels(pose.markers)):
-        if not scenario.jumper.worn(jump)[i] or distances[i] <= 0 or not projection.sees(spot):
+    for i, spot in enumerate(spots):
+        if not seen[i]:
             shares.append(0.0)
             continue
-        later = order[[thing.marker for thing in order].index(i) + 1 :] if order else []
-        covers = [thing.part for thing in later if thing.part is not None and i not in thing.part.carries]
+        before = [place > places[i] and i not in part.carries for place, part in own]
+        hiding = np.array(before + [True] * (len(shapes) - len(own)), bool)
         disc = _disc(spot, scenario.jumper.marker_radius_m * projection.c / float(distances[i]))
-        hidden = np.zeros(len(disc), bool)
-        for cover in (*covers, *fronts):
-            hidden |= _covered(disc, cover, projection) if isinstance(cover, Part) else inside(cover, disc)
+        hidden = _covered(disc, ends[hiding], radii[hiding])
+        for polygon in outlined:
+            hidden |= inside(polygon, disc)
         shares.append(1.0 - float(hidden.mean()))
     return shares
 
@@ -78,15 +87,21 @@ def _disc(centre: Floats, radius: float) -> Floats:
     return np.asarray(centre + np.stack((r * np.cos(_SUNFLOWER * k), r * np.sin(_SUNFLOWER * k)), axis=1))
 
 
-def _covered(points: Floats, part: Part, projection: Projection) -> Flags:
-    """Whether points, px, shape (n, 2), lie in the image of a capsule."""
-    ends, radii = body.outlines([part], projection)
-    a, along = ends[0, 0], ends[0, 1] - ends[0, 0]
-    square = float(along @ along)
-    share = np.clip((points - a) @ along / square, 0, 1) if square > 0 else np.zeros(len(points))
-    away = np.hypot(*(points - a - share[:, None] * along).T)
-    covered: Flags = away < radii[0, 0] + (radii[0, 1] - radii[0, 0]) * share
-    return covered
+def _covered(points: Floats, ends: Floats, radii: Floats) -> Flags:
+    """Whether points, px, shape (n, 2), lie in the image of any capsule.
+
+    Args:
+        points: the points.
+        ends: centres of the two balls of each capsule, px, shape (m, 2, 2).
+        radii: of the balls, px, shape (m, 2).
+    """
+    a, along = ends[:, None, 0], (ends[:, 1] - ends[:, 0])[:, None]
+    square = np.sum(along * along, axis=-1)
+    to = points - a
+    share = np.clip(np.sum(to * along, axis=-1) / np.where(square > 0, square, 1.0), 0, 1)
+    away = np.hypot(*np.moveaxis(to - share[..., None] * along, -1, 0))
+    covered: Flags = away < radii[:, :1] + (radii[:, 1:] - radii[:, :1]) * share
+    return np.asarray(covered.any(axis=0))
 
 
 def _hull(points: Floats) -> Floats:

@@ -260,6 +260,7 @@ def test_nothing_is_overwritten_when_names_collide(folder: Path) -> None:
     for pulses in (1, 2, 3):
         write_log(folder / "jump.mcap", (ALL_OK,) * pulses)
         catalogue.change_session("jump", {"bib": str(pulses)})
+        (folder / "jump.truth.json").write_text(str(pulses))
         catalogue.delete("jump")
     write_log(folder / "jump.mcap", (ALL_OK,) * 4)
     found = {entry.id: (entry.pulses, entry.session["bib"]) for entry in catalogue.entries(deleted=True)}
@@ -267,6 +268,7 @@ def test_nothing_is_overwritten_when_names_collide(folder: Path) -> None:
     assert catalogue.restore("jump").id == "jump-4"
     found = {entry.id: (entry.pulses, entry.session["bib"]) for entry in catalogue.entries()}
     assert found == {"jump": (4, "17"), "jump-4": (1, "1")}
+    assert {path.name: path.read_text() for path in folder.glob("*.truth.json")} == {"jump-4.truth.json": "1"}
 
 
 def test_the_trash_is_emptied_of_what_is_old(folder: Path) -> None:
@@ -274,6 +276,7 @@ def test_the_trash_is_emptied_of_what_is_old(folder: Path) -> None:
     write_log(folder / "jump.mcap", (ALL_OK,))
     os.utime(folder / "jump.mcap", ns=(0, 0))  # recorded long ago, deleted now
     catalogue.change_session("jump", {"bib": "3"})
+    (folder / "jump.truth.json").write_text("{}")
     catalogue.delete("jump")
     assert catalogue.purge(3600) == []
     assert catalogue.entry("jump").deleted

@@ -40,10 +40,10 @@ from rig.transport.messages import (
 from rig.transport.preview import PreviewSlot
 from service.processes.rig_processes import RECORDER, RigProcesses
 from service.processes.simulation import simulated_hill
-from svev.demo import hill_pulses
 from tests.capture.rigs import make_rig
 from tests.recorder.logs import jumper_state
 from tests.support.loopback import Loopback
+from tests.support.stamps import hill_pulses
 from tests.support.waiting import wait_until
 
 T = TypeVar("T")

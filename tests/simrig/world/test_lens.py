@@ -5,6 +5,8 @@ import pytest
 
 from photogrammetry.geometry.camera_model import INTERIOR, Lens, image_point
 from rig.pulse import HillPulse
+from simrig.firewire.camera.geometry import SENSOR, VGA
+from simrig.programs.firewire_bus import of_whole_sensor
 from simrig.world.scenario import Scenario
 from simrig.world.truth import truth
 from tests.simrig.images.measuring import centroid, ridge_offset
@@ -19,6 +21,14 @@ LENS = {
 @pytest.fixture(scope="module")
 def bent(calm: Scenario) -> Scenario:
     return with_keys(calm, cameras={"lens": LENS})
+
+
+def test_the_middle_of_a_larger_sensor_shows_the_same(bent: Scenario, calm: Scenario) -> None:
+    points = np.random.default_rng(3).uniform((0, -8, -6), (20, 8, 2), (50, 3))
+    for scenario in (bent, calm):
+        for small, large in zip(scenario.cameras, of_whole_sensor(scenario).cameras, strict=True):
+            spots = large.projection(*SENSOR).pixels(points) - (np.array(SENSOR) - VGA) / 2
+            assert spots == pytest.approx(small.projection(*VGA).pixels(points), abs=1e-9)
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1936, 1216)])

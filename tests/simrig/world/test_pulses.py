@@ -26,6 +26,17 @@ def test_pulses_stand_at_whole_multiples_of_the_period() -> None:
     assert [train.time(HillPulse(n)) for n in (0, 1, 2, 3)] == [1_000, 33_334_333, 66_667_667, 100_001_000]
 
 
+@settings(deadline=None)
+@given(EPOCHS, RATES, PAUSES, st.integers(0, 10**6).map(HillPulse), st.floats(-0.24, 0.24))
+def test_a_pulse_is_told_by_its_time(
+    epoch: HostNs, rate: float, pauses: tuple[tuple[int, int], ...], pulse: HillPulse, off: float
+) -> None:
+    train = PulseTrain(epoch, rate, pauses)
+    measured = HostNs(train.time(pulse) + round(off * 1e9 / rate))
+    assert train.fired_at(measured) == (pulse if fires(train, pulse) else None)
+    assert train.fired_at(HostNs(train.time(pulse) + round(0.4 * 1e9 / rate))) is None
+
+
 def test_the_error_does_not_grow() -> None:
     assert PulseTrain(HostNs(0), 30.0).time(HillPulse(30 * 86_400)) == 86_400 * 10**9
 

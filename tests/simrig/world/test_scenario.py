@@ -104,6 +104,10 @@ def test_a_scenario_says_only_what_differs_from_its_base(tmp_path: Path) -> None
     scenario = load_scenario(tmp_path / "above.toml")
     assert (scenario.name, scenario.seed) == ("small", 7)
     assert (scenario.image.noise_sigma, scenario.image.snow_flakes) == (1.0, 9)
+    (tmp_path / "top.toml").write_text('base = "above.toml"\nimage = { noise_sigma = 2.0 }\n')
+    scenario = load_scenario(tmp_path / "top.toml")
+    assert (scenario.name, scenario.seed) == ("small", 7)
+    assert (scenario.image.noise_sigma, scenario.image.snow_flakes) == (2.0, 9)
 
 
 @pytest.mark.parametrize(
@@ -112,12 +116,15 @@ def test_a_scenario_says_only_what_differs_from_its_base(tmp_path: Path) -> None
         ('base = "none.toml"', "no such file"),
         ("base = 3", "name of a scenario file"),
         ('base = "scene.toml"\nsede = 3', "sede"),
-        ('base = "second.toml"', "stands alone"),
+        ('base = "above.toml"', "above.toml -> above.toml.: remove"),
+        ('base = "second.toml"\nname = 3', "name"),
+        ('base = "third.toml"', "above.toml -> third.toml -> above.toml.: remove"),
     ],
 )
 def test_a_wrong_base_is_refused(tmp_path: Path, text: str, words: str) -> None:
     written(tmp_path, SMALL)
     (tmp_path / "second.toml").write_text('base = "scene.toml"')
+    (tmp_path / "third.toml").write_text('base = "above.toml"')
     (tmp_path / "above.toml").write_text(text)
     with pytest.raises(BadInputError, match=words):
         load_scenario(tmp_path / "above.toml")

@@ -1,0 +1,96 @@
+"""Writes the truth of a recording of simulated cameras into a file, by the pulse numbers of the recording."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import BinaryIO, Final
+
+import msgspec
+
+from rig.clocks import HostNs
+from rig.pulse import HillPulse, PulseNumber
+from rig.settings.model import CameraSettings, Region, RigSettings
+from simrig.firewire.camera.geometry import SENSOR, VGA
+from simrig.world.projection import Window
+from simrig.world.pulses import PulseTrain
+from simrig.world.scenario import load_scenario
+from simrig.world.truth import Truth
+
+_VGA_REGION: Final = Region(width=VGA[0], height=VGA[1])
+
+
+class RecordingTruth:
+    """What the simulated cameras of a rig really saw.
+
+    Which hill pulse a pulse of a recording is follows from its time alone: all cameras see the pulses of one train on
+    the host's clock, and the recorder knows their times far better than to half a period. Nothing is read from images.
+
+    Args:
+        rig: a rig with a `[simulation]` table.
+        scenario: its scenario file.
+        epoch: host time of hill pulse 0.
+
+    Raises:
+        BadInputError: the scenario is wrong.
+    """
+
+    def __init__(self, rig: RigSettings, scenario: Path, epoch: HostNs) -> None:
+        loaded = load_scenario(scenario)
+        self._train = PulseTrain(epoch, rig.trigger.rate_hz, loaded.pauses)
+        self._truth = Truth(loaded, rig.trigger.rate_hz, windows(rig))
+
+    def write(self, path: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
+        """Write the file in one go: it is there as a whole or not at all.
+
+        A pulse at whose time the hill fired none is left out. Pulses are written as they come: the truth of an hour
+        would not fit into memory as objects.
+
+        Args:
+            path: the file.
+            pulses: number and host time of each pulse of the recording; what it raises ends the writing.
+
+        Raises:
+            OSError: the disk refuses.
+        """
+        unfinished = path.with_name(f".{path.name}.unfinished")
+        try:
+            with unfinished.open("wb") as file:
+                self._write(file, pulses)
+            unfinished.replace(path)
+        finally:
+            unfinished.unlink(missing_ok=True)
+
+    def _write(self, file: BinaryIO, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
+        encode = msgspec.json.Encoder().encode
+        hill_pulses: dict[str, HillPulse] = {}
+        written: set[HillPulse] = set()
+        file.write(encode(self._truth.setting())[:-1] + b',"pulses":[')
+        for number, time in pulses:
+            fired = self._train.fired_at(time)
+            if fired is None:
+                continue
+            hill_pulses[str(number)] = fired
+            if fired not in written:
+                file.write((b",\n" if written else b"\n") + encode(self._truth.state(fired)))
+                written.add(fired)
+        file.write(b'],\n"hill_pulse_of_recording":' + encode(hill_pulses) + b"}\n")
+
+
+def windows(rig: RigSettings) -> dict[str, Window]:
+    """Which part of the image that a simulated camera draws is in the log, by camera."""
+    gige = [camera.region for camera in rig.cameras if camera.backend == "aravis"]
+    return {camera.name: _window(camera, gige) for camera in rig.cameras}
+
+
+def _window(camera: CameraSettings, gige: list[Region]) -> Window:
+    region = camera.region
+    left, top = region.x, region.y
+    match camera.backend:
+        case "aravis":  # the sensor of all is as large as the first one's region
+            full = (gige[0].width, gige[0].height)
+        case "iidc":  # the middle of the sensor shows what the scenario says, in VGA; Format_0 reads that out
+            full = VGA
+            if region != _VGA_REGION:
+                left, top = left - (SENSOR[0] - VGA[0]) // 2, top - (SENSOR[1] - VGA[1]) // 2
+        case _:
+            left, top, full = 0, 0, (region.width, region.height)
+    return Window(full, left, top, region.width, region.height)

@@ -56,15 +56,19 @@ def read_network(path: Path) -> Network:
     return network_from_json(read_json(path), str(path))
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path, kind: str = "network file") -> dict[str, Any]:
     """Read one JSON object, strictly: no key twice, no NaN or Infinity.
+
+    Args:
+        path: of the file.
+        kind: what the file should be, for messages.
 
     Raises:
         BadInputError: missing, unreadable, not UTF-8, not JSON, not an object.
     """
     try:
         data = json.loads(
-            read_text(path, "JSON", "an existing network file"),
+            read_text(path, "JSON", f"an existing {kind}"),
             object_pairs_hook=_no_key_twice,
             parse_constant=_no_constant,
             parse_int=_whole_number,
@@ -77,7 +81,7 @@ def read_json(path: Path) -> dict[str, Any]:
     except _RefusedError as error:
         raise BadInputError(f"{path}: {error}") from None
     if not isinstance(data, dict):
-        raise BadInputError(f"{path}: is no JSON object; a network file starts with {{")
+        raise BadInputError(f"{path}: is no JSON object; a {kind} starts with {{")
     return data
 
 

@@ -149,12 +149,18 @@ def _shown(value: object) -> str:
         return "a number of many digits"
 
 
+def _value_of(node: dict[str, Any], key: str) -> Any:
+    """Schema of the value of a key in a table with fixed or with free keys."""
+    return node.get("properties", {}).get(key, node.get("additionalProperties"))
+
+
 def _keys_beside(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """Known keys of the table in which the last key of `location` stands."""
     schema = model.model_json_schema()
     node: dict[str, Any] = schema
     for part in location[:-1]:
-        node = node.get("items", {}) if isinstance(part, int) else node.get("properties", {}).get(part, {})
+        inside = node.get("items") if isinstance(part, int) else _value_of(node, part)
+        node = inside if isinstance(inside, dict) else {}
         for choice in node.get("anyOf", []):
             if "$ref" in choice:
                 node = choice

@@ -1,0 +1,286 @@
+"""The bundle over time: one least-squares adjustment of all measurements of a jump.
+
+Unknowns are the state of sixteen channels at each pulse, and, shared by all pulses, the uncertain parameters of the
+cameras and how much later each camera shows the scene than it says. The cameras' parameters enter as c0 + L u with
+c0 and L L' the given ones and u of weight 1; so a rank defect of their covariance does no harm. Gauss-Newton on normal
+equations that are block-tridiagonal with a border (`blocks`).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2
+
+from analysis.motion.blocks import Normals, Solution, solve
+from analysis.motion.channels import CHANNELS, MotionFrame
+from analysis.motion.observations import Equations, Observations, linearised
+from analysis.motion.prior import STATE, Prior, transitions
+from analysis.scene.camera_system import CameraSystem
+from rig.arrays import Flags, Floats
+
+#: Probability that a jump without gross errors loses any measurement.
+FALSE_REMOVAL_P: Final = 0.05
+_RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
+_COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is zero by definition
+_SETTLED: Final = 0.01  # of a sigma: greatest step of O that ends the iteration
+_FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """What is given to the adjustment.
+
+    Attributes:
+        observed: the measurements.
+        system: the cameras as they were oriented.
+        root: (p, r) L, a root of the covariance of their parameters.
+        frame: of the motion.
+        prior: of the motion.
+        late: (m,) expected lateness of the cameras, in pulse intervals.
+        late_sigma: (m,) its standard deviation.
+        clock_is_mean: whether the mean lateness of all cameras is zero by definition, because no camera's is known.
+    """
+
+    observed: Observations
+    system: CameraSystem
+    root: Floats
+    frame: MotionFrame
+    prior: Prior
+    late: Floats
+    late_sigma: Floats
+    clock_is_mean: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Adjusted:
+    """The state of an adjustment.
+
+    Attributes:
+        model: what was given.
+        used: (n, m, 6) groups that take part.
+        states: (n, 48), see `prior`.
+        shared: (r + m,) u, then the lateness of each camera in pulse intervals.
+        equations: at the point of the last linearisation.
+        solution: of the last step, with the covariances; None before the first.
+        step: length of the last step of O in its sigmas.
+    """
+
+    model: Model
+    used: Flags
+    states: Floats
+    shared: Floats
+    equations: Equations
+    solution: Solution
+    step: float = np.inf
+
+    @property
+    def cameras(self) -> CameraSystem:
+        """The cameras with adjusted parameters."""
+        return _cameras(self.model, self.shared)
+
+    @property
+    def late(self) -> Floats:
+        """(m,) in pulse intervals."""
+        return self.shared[self.model.root.shape[1] :]
+
+    @property
+    def instants(self) -> Floats:
+        """(m, 3): what value, speed and acceleration of a state contribute at each camera's own time."""
+        return _instants(self.model, self.shared)
+
+
+def root_of(covariance: Floats) -> Floats:
+    """L (p, r) with L L' the covariance, r its rank."""
+    scale = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    use = values > _RANK * max(float(values.max(initial=0.0)), 1.0)
+    return np.asarray(scale[:, None] * vectors[:, use] * np.sqrt(values[use]))
+
+
+def begun(model: Model, states: Floats, used: Flags, shared: Floats | None = None) -> Adjusted:
+    """The first step of an adjustment from approximate states (n, 48)."""
+    if shared is None:
+        shared = np.concatenate((np.zeros(model.root.shape[1]), model.late))
+    return _stepped(model, used, states, shared)
+
+
+def settled(adjusted: Adjusted, most: int) -> Adjusted:
+    """Gauss-Newton steps until they are small, at most so many."""
+    for _ in range(most):
+        adjusted = _stepped(adjusted.model, adjusted.used, adjusted.states, adjusted.shared)
+        if adjusted.step < _SETTLED:
+            break
+    return adjusted
+
+
+def with_prior(adjusted: Adjusted, prior: Prior) -> Adjusted:
+    """One step with another prior of the motion."""
+    return _stepped(replace(adjusted.model, prior=prior), adjusted.used, adjusted.states, adjusted.shared)
+
+
+def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
+    """Leave out measurements that contradict all others, the worst around first; take back those that no longer do."""
+    seen = adjusted.model.observed.seen
+    limit = float(chi2.isf(FALSE_REMOVAL_P / max(int(seen.sum()), 1), 2))
+    for _ in range(most):
+        tests = statistics(adjusted).test
+        worst = np.where(adjusted.used, tests, 0.0).max(axis=(1, 2))
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(worst, 1), 3).max(axis=1)
+        leave = adjusted.used & (tests > limit) & (tests >= around[:, None, None])
+        back = seen & ~adjusted.used & (tests < limit)
+        if not (leave | back).any():
+            return adjusted
+        used = (adjusted.used & ~leave) | back
+        adjusted = settled(replace(adjusted, used=used), 2)
+    return adjusted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Statistics:
+    """Of each group (n, m, 6).
+
+    Attributes:
+        square: weighted square sum of its residuals.
+        redundancy: its share in the degrees of freedom, 0..2; 0 where it was not used.
+        test: chi-squared of two degrees of freedom: how far the measurement is from what all others say of it.
+    """
+
+    square: Floats
+    redundancy: Floats
+    test: Floats
+
+
+def statistics(adjusted: Adjusted) -> Statistics:
+    """Residuals, redundancies and tests of all groups."""
+    solution, instants = adjusted.solution, adjusted.instants
+    rows, border = adjusted.equations.by_channels, _border_rows(adjusted)
+    n, m = adjusted.used.shape[:2]
+    spread = np.empty((n, m, 6, 2, 2))
+    for i in range(m):
+        own = np.einsum(
+            "d,ndcef,e->ncf", instants[i], solution.covariance.reshape(n, 3, CHANNELS, 3, CHANNELS), instants[i]
+        )
+        cross = np.einsum("d,ndcb->ncb", instants[i], solution.cross.reshape(n, 3, CHANNELS, -1))
+        flat, shared = rows[:, i].reshape(n, 12, CHANNELS), border[:, i].reshape(n, 12, -1)
+        half = (flat @ cross @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
+        whole = (flat @ own @ flat.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
+        whole += half + half.transpose(0, 3, 4, 1, 2)
+        whole += (shared @ solution.shared_covariance @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
+        spread[:, i] = np.einsum("ngagb->ngab", whole)
+    v, unit = adjusted.equations.v, np.eye(2)
+    used = adjusted.used[..., None, None]
+    free = np.where(used, unit * (1 + _FLOOR) - spread, unit + spread)
+    test = np.einsum("...a,...ab,...b->...", v, np.linalg.inv(free), v)
+    redundancy = np.where(adjusted.used, 2.0 - np.trace(spread, axis1=-2, axis2=-1), 0.0)
+    return Statistics((v**2).sum(axis=-1), redundancy, test)
+
+
+def _cameras(model: Model, shared: Floats) -> CameraSystem:
+    return model.system.moved(model.root @ shared[: model.root.shape[1]])
+
+
+def _instants(model: Model, shared: Floats) -> Floats:
+    late = shared[model.root.shape[1] :] + model.observed.delay / model.prior.unit
+    return np.asarray(transitions(late)[:, 0])
+
+
+def _border_rows(adjusted: Adjusted) -> Floats:
+    """(n, m, 6, 2, r + m) derivatives of the observations by the shared unknowns."""
+    return _rows_by_shared(adjusted.model, adjusted.equations, adjusted.states, adjusted.instants)
+
+
+def _rows_by_shared(model: Model, equations: Equations, states: Floats, instants: Floats) -> Floats:
+    n, m = model.observed.shape
+    x = states.reshape(n, 3, CHANNELS)
+    rank = model.root.shape[1]
+    out = np.zeros((n, m, 6, 2, rank + m))
+    out[..., :rank] = equations.by_camera @ model.root
+    for i in range(m):
+        speed = x[:, 1] + 2 * instants[i, 1] * x[:, 2]
+        out[:, i, :, :, rank + i] = np.einsum("ngac,nc->nga", equations.by_channels[:, i], speed)
+    return out
+
+
+def _stepped(model: Model, used: Flags, states: Floats, shared: Floats) -> Adjusted:
+    """Linearise and solve once."""
+    n, _ = model.observed.shape
+    instants = _instants(model, shared)
+    channels = np.einsum("id,ndc->nic", instants, states.reshape(n, 3, CHANNELS))
+    equations = linearised(model.observed, _cameras(model, shared), model.frame, channels)
+    normals = _normals(model, used, states, shared, equations, instants)
+    solution = solve(normals)
+    sigma = np.sqrt(np.diagonal(solution.covariance[:, :3, :3], axis1=1, axis2=2))
+    step = float(np.abs(solution.states[:, :3] / sigma).max())
+    states, shared = states + solution.states, shared + solution.shared
+    equations = replace(equations, v=_predicted(model, equations, solution, instants, states))
+    return Adjusted(model, used, states, shared, equations, solution, step)
+
+
+def _predicted(model: Model, equations: Equations, solution: Solution, instants: Floats, states: Floats) -> Floats:
+    """Residuals after the step, by the linearised equations."""
+    n = len(states)
+    change = np.einsum("id,ndc->nic", instants, solution.states.reshape(n, 3, CHANNELS))
+    rows = _rows_by_shared(model, equations, states, instants)
+    moved = np.einsum("nigac,nic->niga", equations.by_channels, change) + rows @ solution.shared
+    return np.asarray(equations.v + moved)
+
+
+def _normals(
+    model: Model, used: Flags, states: Floats, shared: Floats, equations: Equations, instants: Floats
+) -> Normals:
+    n, m = model.observed.shape
+    take = used[..., None, None]
+    rows = np.where(take, equations.by_channels, 0.0).reshape(n, m, 12, CHANNELS)
+    by_shared = np.where(take, _rows_by_shared(model, equations, states, instants), 0.0).reshape(n, m, 12, -1)
+    v = np.where(used[..., None], equations.v, 0.0).reshape(n, m, 12)
+    back = rows.transpose(0, 1, 3, 2)
+    diagonal = np.einsum("id,ie,nicf->ndcef", instants, instants, back @ rows, optimize=True).reshape(n, STATE, STATE)
+    border = np.einsum("id,nicb->ndcb", instants, back @ by_shared).reshape(n, STATE, -1)
+    right = -np.einsum("id,nicr,nir->ndc", instants, back, v, optimize=True).reshape(n, STATE)
+    flat = by_shared.reshape(n * m * 12, -1)
+    corner, right_corner = flat.T @ flat, -flat.T @ v.ravel()
+    lower = _add_motion(model.prior, states, diagonal, right)
+    _add_shared(model, shared, corner, right_corner)
+    return Normals(diagonal, lower, border, corner, right, right_corner)
+
+
+def _add_motion(prior: Prior, states: Floats, diagonal: Floats, right: Floats) -> Floats:
+    """Add the prior of the motion to diagonal and right-hand side; returns the blocks below the diagonal."""
+    n = len(states)
+    x = states.reshape(n, 3, CHANNELS).transpose(0, 2, 1)
+    move = prior.transition[:, None]
+    weight = np.asarray(np.linalg.inv(prior.noise()), float)
+    pull = np.einsum(
+        "kcij,kcj->kci", weight, x[1:] - np.einsum("kcij,kcj->kci", np.broadcast_to(move, weight.shape), x[:-1])
+    )
+    diagonal[1:] += _embedded(weight)
+    diagonal[:-1] += _embedded(move.swapaxes(-1, -2) @ weight @ move)
+    right[1:] -= pull.transpose(0, 2, 1).reshape(n - 1, STATE)
+    right[:-1] += np.einsum("kji,kcj->kic", prior.transition, pull).reshape(n - 1, STATE)
+    mean, start_weight = prior.start()
+    diagonal[0] += np.diag(start_weight)
+    right[0] -= start_weight * (states[0] - mean)
+    return _embedded(-weight @ move)
+
+
+def _embedded(blocks: Floats) -> Floats:
+    """(n, 48, 48) from blocks (n, 16, 3, 3) of single channels."""
+    n = len(blocks)
+    out = np.zeros((n, 3, CHANNELS, 3, CHANNELS))
+    channel = np.arange(CHANNELS)
+    out[:, :, channel, :, channel] = blocks.transpose(1, 0, 2, 3)
+    return out.reshape(n, STATE, STATE)
+
+
+def _add_shared(model: Model, shared: Floats, corner: Floats, right: Floats) -> None:
+    """Add what is known of the shared unknowns: u, the lateness of each camera, and whose mean the clock is."""
+    rank = model.root.shape[1]
+    off = shared[rank:] - model.late
+    weight = np.diag(model.late_sigma**-2.0)
+    if model.clock_is_mean:
+        weight = weight + _COMMON_SIGMA**-2.0 / len(off) ** 2
+    corner[:rank, :rank] += np.eye(rank)
+    corner[rank:, rank:] += weight
+    right[:rank] -= shared[:rank]
+    right[rank:] -= weight @ off

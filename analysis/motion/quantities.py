@@ -1,0 +1,153 @@
+"""From a state of the motion with its covariance to points, skis, angles, height and speed with theirs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from analysis.measurements.model import POINTS, SIDES
+from analysis.motion.channels import CHANNELS, MotionFrame, slopes_and_headings
+from analysis.motion.observations import GROUPS
+from analysis.result.model import QUANTITIES, PointState, Quantity, SkiState, SmoothedState, Status, Vector
+from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope
+from rig.arrays import Flags, Floats
+
+_INPUTS = CHANNELS + 3  # the channels and the velocity of O
+_STEP = 1e-6  # m, rad, m/s: for derivatives by central differences
+_CONTROLLED = 3  # rays
+_POINT_ROWS, _SKI_ROWS, _ORIGIN_ROWS = slice(0, 12), slice(12, 16), slice(16, 19)
+_QUANTITY_ROWS = slice(19, 30)
+_DEGREES = np.ones(30)
+_DEGREES[[12, 13, 14, 15, *range(19, 25)]] = np.degrees(1.0)
+#: What each quantity needs, of GROUPS.
+_NEEDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "alpha": ("P2", "P3", "P4", "right", "left"),
+    "beta": ("P1", "P2", "P3", "P4"),
+    "gamma": ("right", "left"),
+    "dphi": ("right", "left"),
+    "phi": ("right", "left"),
+    "angle_of_attack": ("right", "left"),
+}
+
+
+def smoothed_states(
+    frame: MotionFrame,
+    unit: float,
+    states: Floats,
+    covariance: Floats,
+    by_calibration: Floats,
+    cameras: Sequence[Mapping[str, tuple[str, ...]]],
+    by_hand: Sequence[Mapping[str, bool]],
+    known: Flags,
+) -> list[SmoothedState]:
+    """What follows from n states.
+
+    Args:
+        frame: of the motion.
+        unit: of time of the states, s.
+        states: (n, 48).
+        covariance: (n, 48, 48).
+        by_calibration: (n, 48, p) derivatives of the states by the cameras' given parameters.
+        cameras: of each pulse, by group those whose measurement was used.
+        by_hand: of each pulse, by group whether a person measured any of them.
+        known: (6,) which groups were ever intersected; of the others nothing is stated.
+    """
+    pick = np.r_[0:CHANNELS, CHANNELS : CHANNELS + 3]
+    scale = np.concatenate((np.ones(CHANNELS), np.full(3, 1 / unit)))
+    inputs = states[:, pick] * scale
+    spread = covariance[:, pick][:, :, pick] * np.outer(scale, scale)
+    given = by_calibration[:, pick] * scale[:, None]
+    values = _evaluated(frame, inputs)
+    by = _derivatives(frame, inputs) * _DEGREES[:, None]
+    values = values * _DEGREES
+    out = by @ spread @ by.transpose(0, 2, 1)
+    gradient = (by @ given)[:, _QUANTITY_ROWS]
+    return [
+        _state(values[k], out[k], gradient[k], cameras[k], by_hand[k], dict(zip(GROUPS, known, strict=True)))
+        for k in range(len(states))
+    ]
+
+
+def _evaluated(frame: MotionFrame, inputs: Floats) -> Floats:
+    """All results (..., 30) of inputs (..., 19), SI units."""
+    channels, velocity = inputs[..., :CHANNELS], inputs[..., CHANNELS:] @ frame.rotation.T
+    points, skis = frame.points(channels), frame.skis(channels)
+    turned = slopes_and_headings(channels) + np.array((0.0, frame.heading))
+    turned[..., 1] = (turned[..., 1] + np.pi) % (2 * np.pi) - np.pi
+    origin = (points[..., 2, :] + points[..., 3, :]) / 2
+    angles = body_angles(points[..., 0, :], points[..., 1, :], origin, skis[..., 0, :], skis[..., 1, :])
+    flat = inputs.shape[:-1]
+    last = np.concatenate(
+        (
+            (angles[..., 4] - slope(velocity))[..., None],
+            origin[..., 2:],
+            np.linalg.norm(velocity, axis=-1, keepdims=True),
+            velocity,
+        ),
+        axis=-1,
+    )
+    return np.concatenate((points.reshape(*flat, 12), turned.reshape(*flat, 4), origin, angles, last), axis=-1)
+
+
+def _derivatives(frame: MotionFrame, inputs: Floats) -> Floats:
+    """(n, 30, 19)."""
+    steps = _STEP * np.eye(_INPUTS)
+    difference = _evaluated(frame, inputs[:, None] + steps) - _evaluated(frame, inputs[:, None] - steps)
+    return difference.transpose(0, 2, 1) / (2 * _STEP)
+
+
+def _state(
+    values: Floats,
+    covariance: Floats,
+    gradient: Floats,
+    cameras: Mapping[str, tuple[str, ...]],
+    by_hand: Mapping[str, bool],
+    known: Mapping[str, bool],
+) -> SmoothedState:
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+
+    def quantity(row: int) -> Quantity:
+        return Quantity(float(values[row]), float(sigma[row]))
+
+    def status(group: str) -> Status:
+        rays = len(cameras[group])
+        if rays < 2:
+            return Status.PREDICTED
+        if by_hand[group]:
+            return Status.BY_HAND
+        return Status.CONTROLLED if rays >= _CONTROLLED else Status.TWO_RAYS
+
+    points: dict[str, PointState | None] = {}
+    for i, label in enumerate(POINTS):
+        at = slice(3 * i, 3 * i + 3)
+        points[label] = (
+            PointState(values[at], covariance[at, at], cameras[label], status(label)) if known[label] else None
+        )
+    skis: dict[str, SkiState | None] = {}
+    for i, side in enumerate(SIDES):
+        up, aside = 12 + 2 * i, 13 + 2 * i
+        direction = _direction(values[up], values[aside])
+        correlation = float(covariance[up, aside] / (sigma[up] * sigma[aside]))
+        ski = SkiState(direction, quantity(up), quantity(aside), correlation, cameras[side], status(side))
+        skis[side] = ski if known[side] else None
+    first = _QUANTITY_ROWS.start
+    missing = [not all(known[group] for group in _NEEDS.get(name, ())) for name in QUANTITIES]
+    gradient = np.where(np.array(missing)[:, None], np.nan, gradient)
+    found = {name: None if missing[i] else quantity(first + i) for i, name in enumerate(QUANTITIES)}
+    velocity = slice(first + QUANTITIES.index("velocity_x"), _QUANTITY_ROWS.stop)
+    return SmoothedState(
+        points=points,
+        skis=skis,
+        angles={name: found[name] for name in ANGLES},
+        height=found["height"],
+        speed=found["speed"],
+        origin=Vector(values[_ORIGIN_ROWS], covariance[_ORIGIN_ROWS, _ORIGIN_ROWS]),
+        velocity=Vector(values[velocity], covariance[velocity, velocity]),
+        angle_of_attack=found["angle_of_attack"],
+        by_calibration=gradient,
+    )
+
+
+def _direction(slope_deg: float, heading_deg: float) -> Floats:
+    up, aside = np.radians((slope_deg, heading_deg))
+    return np.array((np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)))

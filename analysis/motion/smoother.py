@@ -1,0 +1,247 @@
+"""Smooths a jump: the whole procedure from its measurements to the motion with everything that is known about it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from analysis.measurements.model import JumpMeasurements, Measurements
+from analysis.motion.bundle import (
+    Adjusted,
+    Model,
+    begun,
+    root_of,
+    settled,
+    statistics,
+    with_prior,
+    without_gross_errors,
+)
+from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
+from analysis.motion.prior import prior, re_estimated, start_densities
+from analysis.motion.quantities import smoothed_states
+from analysis.motion.start_values import Start, start_values
+from analysis.motion.synchrony import Synchrony, judged
+from analysis.motion.table import TableMotion, table_motion
+from analysis.motion.takeoff import Break, find_break
+from analysis.result.model import CameraOffset, Phase, RayTest, SmoothedState, TakeOff, phase_at
+from analysis.scene.camera_system import CameraSystem
+from rig.arrays import Flags, Floats
+from rig.clocks import NS_PER_S, UtcNs
+
+_FREE_FRAMES: Final = 2.0  #: standard deviation of a camera's lateness before it is known, pulse intervals
+_TRIGGER_S: Final = 20e-6  #: of cameras that obey one trigger
+#: Three nodes of Gauss and Hermite stand for a normal distribution: the middle, and so many sigmas either side.
+_NODE: Final = float(np.sqrt(3.0))
+_SIDE_WEIGHT: Final = 1 / 6
+_STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS = 12, 2, 4, 12
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How well the measurements of a phase fit the motion.
+
+    Attributes:
+        observations: number of image coordinates that were used.
+        redundancy: their degrees of freedom.
+        chi_square: weighted square sum of their residuals; about the redundancy where all sigmas hold.
+    """
+
+    observations: int
+    redundancy: float
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A jump as one motion.
+
+    Attributes:
+        states: one per pulse of the jump; None before the first and after the last measured pulse.
+        takeoff: None where it was not in sight.
+        offsets: of the cameras that measured.
+        fit: by phase, of phases with measurements.
+        removed: measurements that contradict all others and were left out, the worst first.
+        table: direction of the table and the velocity across it; None without take-off, or where the table was hardly
+            in sight.
+    """
+
+    states: Sequence[SmoothedState | None]
+    takeoff: TakeOff | None
+    offsets: Mapping[str, CameraOffset]
+    fit: Mapping[Phase, Fit]
+    removed: Sequence[RayTest]
+    table: TableMotion | None
+
+
+def smooth(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Motion:
+    """The bundle over time of one jump.
+
+    Args:
+        jump: one of `measurements.jumps`.
+        measurements: of the recording.
+        system: the oriented cameras.
+
+    Returns:
+        The motion. Without states where fewer than `start_values.FEWEST` pulses have a point in two cameras.
+    """
+    everything = observations(jump, measurements, system)
+    measured = np.flatnonzero(everything.seen.any(axis=(1, 2)))
+    sight = slice(int(measured[0]), int(measured[-1]) + 1) if len(measured) else slice(0, 0)
+    observed = everything.part(sight)
+    start = start_values(observed, system) if len(measured) else None
+    if start is None:
+        return Motion([None] * len(jump.pulses), None, {}, {}, [], None)
+    unit = 1.0 / measurements.rate_hz
+    free = _with_free_cameras(observed, system, start, unit)
+    rank = free.model.root.shape[1]
+    synchrony = judged(observed.names, free.late * unit, free.solution.shared_covariance[rank:, rank:] * unit**2, unit)
+    adjusted, edge = _with_takeoff(_synchronised(free, synchrony))
+    states: list[SmoothedState | None] = [None] * len(jump.pulses)
+    states[sight] = _smoothed(adjusted, edge)
+    return Motion(
+        states,
+        _takeoff(jump, measurements.rate_hz, everything.times, edge),
+        synchrony.offsets,
+        _fit(adjusted, edge),
+        _removed(adjusted, [int(pulse.pulse) for pulse in jump.pulses[sight]]),
+        None if edge is None else table_motion(adjusted, edge),
+    )
+
+
+def _with_free_cameras(observed: Observations, system: CameraSystem, start: Start, unit: float) -> Adjusted:
+    """The bundle in which each camera may be late; nothing is known yet of take-off and densities."""
+    m = len(observed.names)
+    loose = np.repeat(start_densities()[1:2], 3, axis=0)
+    model = Model(
+        observed,
+        system,
+        root_of(system.covariance),
+        start.frame,
+        prior(observed.times, unit, None, loose),
+        np.zeros(m),
+        np.full(m, _FREE_FRAMES),
+        clock_is_mean=True,
+    )
+    late = start.late / unit
+    shared = np.concatenate((np.zeros(model.root.shape[1]), late - late.mean()))
+    channels = start.channels
+    speed = np.gradient(channels, observed.times, axis=0) * unit
+    states = np.concatenate((channels, speed, np.zeros_like(channels)), axis=1)
+    return without_gross_errors(settled(begun(model, states, observed.seen, shared), _STEPS), _REMOVALS)
+
+
+def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:
+    """The bundle with cameras that obey the trigger; a camera that is late keeps its own lateness as an unknown."""
+    unit = free.model.prior.unit
+    sigma = np.where(synchrony.late, _FREE_FRAMES, _TRIGGER_S / unit)
+    expected = np.where(synchrony.late, synchrony.lateness / unit, 0.0)
+    model = replace(free.model, late=expected, late_sigma=sigma, clock_is_mean=False)
+    shared = free.shared.copy()
+    shared[model.root.shape[1] :] = expected
+    return settled(begun(model, free.states, free.used, shared), _STEPS)
+
+
+def _with_takeoff(adjusted: Adjusted) -> tuple[Adjusted, Break | None]:
+    """Take-off and densities of the motion, in turn; then gross errors once more."""
+    times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
+    densities = start_densities()
+    edge = None
+    for _ in range(_ROUNDS):
+        edge = find_break(adjusted, densities)
+        for _ in range(_COMPONENT_STEPS):
+            adjusted = with_prior(adjusted, prior(times, unit, edge.seconds if edge else None, densities))
+            densities = _components(adjusted)
+    adjusted = with_prior(adjusted, prior(times, unit, edge.seconds if edge else None, densities))
+    return without_gross_errors(settled(adjusted, 2), _REMOVALS), edge
+
+
+def _components(adjusted: Adjusted) -> Floats:
+    solution = adjusted.solution
+    return re_estimated(adjusted.model.prior, adjusted.states, solution.covariance, solution.next_covariance)
+
+
+def _over_takeoff(adjusted: Adjusted, edge: Break | None) -> tuple[Floats, Floats, Floats]:
+    """States, their covariance, and that with the shared unknowns, over all possible times of the take-off.
+
+    The bundle holds for one time of the take-off. Its solutions for several times, weighted, are the marginals.
+    """
+    solution = adjusted.solution
+    if edge is None:
+        return adjusted.states, solution.covariance, solution.cross
+    model = adjusted.model
+    others = [
+        with_prior(adjusted, prior(model.observed.times, model.prior.unit, edge.seconds + node, model.prior.density))
+        for node in (-_NODE * edge.sigma, _NODE * edge.sigma)
+    ]
+    weighted = list(zip((1 - 2 * _SIDE_WEIGHT, _SIDE_WEIGHT, _SIDE_WEIGHT), (adjusted, *others), strict=True))
+    states = sum(w * a.states for w, a in weighted)
+    shared = sum(w * a.shared for w, a in weighted)
+    covariance, cross = np.zeros_like(solution.covariance), np.zeros_like(solution.cross)
+    for w, a in weighted:
+        off, off_shared = a.states - states, a.shared - shared
+        covariance += w * (a.solution.covariance + off[:, :, None] * off[:, None, :])
+        cross += w * (a.solution.cross + off[:, :, None] * off_shared)
+    return np.asarray(states), covariance, cross
+
+
+def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
+    model, used = adjusted.model, adjusted.used
+    rank = model.root.shape[1]
+    states, covariance, cross = _over_takeoff(adjusted, edge)
+    by_hand = [dict(zip(GROUPS, row, strict=True)) for row in np.asarray((model.observed.by_hand & used).any(axis=1))]
+    return smoothed_states(
+        model.frame,
+        model.prior.unit,
+        states,
+        covariance,
+        cross[:, :, :rank] @ np.linalg.pinv(model.root),
+        used_cameras(model.observed, used),
+        by_hand,
+        known_groups(used),
+    )
+
+
+def known_groups(used: Flags) -> Flags:
+    """(6,) which groups were in two cameras at once in any pulse."""
+    return np.asarray((used.sum(axis=1) >= 2).any(axis=0))
+
+
+def _takeoff(jump: JumpMeasurements, rate_hz: float, times: Floats, edge: Break | None) -> TakeOff | None:
+    if edge is None:
+        return None
+    numbers = np.array([pulse.pulse for pulse in jump.pulses], float)
+    return TakeOff(
+        float(np.interp(edge.seconds, times, numbers)),
+        edge.sigma * rate_hz,
+        UtcNs(jump.pulses[0].time + round(edge.seconds * NS_PER_S)),
+    )
+
+
+def _fit(adjusted: Adjusted, edge: Break | None) -> dict[Phase, Fit]:
+    """By phase; without a take-off all is flight."""
+    judged_groups = statistics(adjusted)
+    times = adjusted.model.observed.times
+    phases = [phase_at(t - edge.seconds) if edge else Phase.FLIGHT for t in times]
+    out = {}
+    for phase in Phase:
+        use = adjusted.used & np.array([p is phase for p in phases])[:, None, None]
+        if use.any():
+            square, redundancy = judged_groups.square[use].sum(), judged_groups.redundancy[use].sum()
+            out[phase] = Fit(2 * int(use.sum()), float(redundancy), float(square))
+    return out
+
+
+def _removed(adjusted: Adjusted, pulses: list[int]) -> list[RayTest]:
+    model = adjusted.model
+    tests = statistics(adjusted).test
+    gone = np.argwhere(model.observed.seen & ~adjusted.used)
+    out = []
+    for k, i, group in gone:
+        residual = np.linalg.solve(model.observed.whitener[k, i, group], adjusted.equations.v[k, i, group])
+        w = float(norm.isf(max(chi2.sf(tests[k, i, group], 2), 1e-300) / 2))
+        out.append(
+            RayTest(pulses[k], model.observed.names[i], GROUPS[group], float(np.linalg.norm(residual)), w, removed=True)
+        )
+    return sorted(out, key=lambda test: -test.w)

@@ -1,0 +1,95 @@
+"""The cameras' synchrony, proved by the moving jumper: whether one camera shows him later than the others.
+
+In the bundle every camera has its own lateness, as an unknown; only their mean is fixed. Cameras that agree within
+their sigmas are synchronous: the greatest consistent set is the reference, and each camera is compared with it.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from analysis.result.model import CameraOffset
+from rig.arrays import Flags, Floats
+
+#: Probability that cameras without fault give any alarm.
+FALSE_ALARM_P: Final = 0.002
+_MS = 1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Synchrony:
+    """The judgement.
+
+    Attributes:
+        offsets: by camera.
+        late: (m,) which cameras are not synchronous.
+        lateness: (m,) relative to the reference, s.
+    """
+
+    offsets: dict[str, CameraOffset]
+    late: Flags
+    lateness: Floats
+
+
+def judged(names: tuple[str, ...], lateness: Floats, covariance: Floats, interval: float) -> Synchrony:
+    """Judge the lateness (m,) of the cameras, s.
+
+    Args:
+        names: of the cameras.
+        lateness: from the bundle, up to a common constant.
+        covariance: (m, m) of them.
+        interval: between two pulses, s.
+    """
+    m = len(names)
+    reference = _reference(lateness, covariance)
+    limit = float(norm.isf(FALSE_ALARM_P / (2 * m)))
+    offsets: dict[str, CameraOffset] = {}
+    late, relative = np.zeros(m, bool), np.zeros(m)
+    for i, name in enumerate(names):
+        others = [k for k in reference if k != i] or [k for k in range(m) if k != i]
+        contrast = np.zeros(m)
+        contrast[i] = 1.0
+        contrast[others] = -_weights(covariance, others)
+        value, sigma = float(contrast @ lateness), float(np.sqrt(contrast @ covariance @ contrast))
+        relative[i] = value
+        late[i] = i not in reference and abs(value) > limit * sigma
+        message = _message(name, [names[k] for k in others], value, interval) if late[i] else None
+        offsets[name] = CameraOffset(value * _MS, sigma * _MS, message)
+    return Synchrony(offsets, late, relative)
+
+
+def _reference(lateness: Floats, covariance: Floats) -> list[int]:
+    """The cameras that agree: one after the other is left out, each time the one that contradicts most."""
+    chosen = list(range(len(lateness)))
+    while len(chosen) > 1 and _contradiction(lateness, covariance, chosen) > chi2.isf(FALSE_ALARM_P, len(chosen) - 1):
+        if len(chosen) == 2:
+            return chosen[:1]
+        rest = [[k for k in chosen if k != i] for i in chosen]
+        chosen = min(rest, key=lambda left: _contradiction(lateness, covariance, left))
+    return chosen
+
+
+def _contradiction(lateness: Floats, covariance: Floats, chosen: list[int]) -> float:
+    """Square sum of the chosen cameras' differences, by their covariance."""
+    differences = np.eye(len(chosen))[1:] - np.eye(len(chosen))[0]
+    value = differences @ lateness[chosen]
+    return float(value @ np.linalg.solve(differences @ covariance[np.ix_(chosen, chosen)] @ differences.T, value))
+
+
+def _weights(covariance: Floats, chosen: list[int]) -> Floats:
+    """Weights of the best mean of some cameras; their sum is 1. What is common to all cameras cancels."""
+    own = covariance[np.ix_(chosen, chosen)]
+    apart = own - own.mean(axis=0) - own.mean(axis=1)[:, None] + own.mean()
+    contrast = np.linalg.pinv(apart + np.full_like(own, np.diagonal(own).max()))
+    weights = contrast.sum(axis=0)
+    return np.asarray(weights / weights.sum())
+
+
+def _message(name: str, others: list[str], seconds: float, interval: float) -> str:
+    whom = "the others" if len(others) > 1 else f"camera {others[0]}"
+    which = "later" if seconds > 0 else "earlier"
+    advice = "check its trigger" if len(others) > 1 else "check the triggers of both"
+    size = f"{abs(seconds) * _MS:.1f} ms ({abs(seconds) / interval:.2f} frames)"
+    return f"camera {name} shows the jumper {size} {which} than {whom}: {advice}"

@@ -1,0 +1,74 @@
+"""The table as the motion before the take-off shows it, and the velocity across it."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from analysis.motion.bundle import Adjusted
+from analysis.motion.channels import CHANNELS
+from analysis.motion.takeoff import Break
+from analysis.result.model import EDGE_S, Quantity, Vector
+from rig.arrays import Floats
+
+GRAVITY: Final = 9.81  # m/s^2
+_FEWEST = 3  # pulses on the table
+_STEP = 1e-6  # m/s, for derivatives by central differences
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TableMotion:
+    """Table and take-off.
+
+    Attributes:
+        direction: (3,) unit vector along the table, in the direction of the motion.
+        slope: of the table above the horizontal, degrees (negative: downwards).
+        perpendicular: m/s, velocity of O perpendicular to the table, `EDGE_S` after the take-off, when the skis move
+            with the body, without what gravity has taken since: that of the take-off itself, if the air did nothing.
+    """
+
+    direction: Vector
+    slope: Quantity
+    perpendicular: Quantity
+
+
+def table_motion(adjusted: Adjusted, edge: Break) -> TableMotion | None:
+    """Table and take-off; None where fewer than three pulses lie on the table or none lies behind the edge."""
+    times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
+    on_table = np.flatnonzero(times < edge.seconds)
+    at = int(np.searchsorted(times, edge.seconds + EDGE_S, side="right")) - 1
+    if len(on_table) < _FEWEST or edge.seconds + EDGE_S > times[-1]:
+        return None
+    ahead = edge.seconds + EDGE_S - times[at]
+    by_states = np.zeros((*adjusted.states.shape, 9))
+    centred = times[on_table] - times[on_table].mean()
+    for axis in range(3):
+        by_states[on_table, axis, axis] = centred / (centred @ centred)
+        by_states[at, CHANNELS + axis, 3 + axis] = 1 / unit
+        by_states[at, 2 * CHANNELS + axis, [3 + axis, 6 + axis]] = (2 * ahead / unit**2, 2 / unit**2)
+    values = np.einsum("nsf,ns->f", by_states, adjusted.states)
+    covariance = adjusted.solution.covariance_of(by_states)
+    whole = np.kron(np.eye(3), adjusted.model.frame.rotation)
+    values, covariance = whole @ values, whole @ covariance @ whole.T
+    steps = _STEP * np.eye(9)
+    by = np.stack([(_results(values + s) - _results(values - s)) / (2 * _STEP) for s in steps], axis=1)
+    out, spread = _results(values), by @ covariance @ by.T
+    spread[4, 4] += (out[5] * edge.sigma) ** 2
+    return TableMotion(
+        Vector(out[:3], spread[:3, :3]),
+        Quantity(float(np.degrees(out[3])), float(np.degrees(np.sqrt(spread[3, 3])))),
+        Quantity(float(out[4]), float(np.sqrt(spread[4, 4]))),
+    )
+
+
+def _results(values: Floats) -> Floats:
+    """Direction, slope, perpendicular velocity and its growth with the take-off time.
+
+    From mean velocity on the table, velocity and acceleration behind the edge.
+    """
+    along = values[:3] / np.linalg.norm(values[:3])
+    normal = np.array((0.0, 0.0, 1.0)) - along[2] * along
+    normal /= np.linalg.norm(normal)
+    perpendicular = values[3:6] @ normal + GRAVITY * EDGE_S * normal[2]
+    growth = values[6:9] @ normal + GRAVITY * normal[2]
+    return np.concatenate((along, (np.arcsin(along[2]), perpendicular, growth)))

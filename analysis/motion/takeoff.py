@@ -1,0 +1,137 @@
+"""The take-off time as an unknown: when the motion of O stops to be that of the table.
+
+For each possible time the likelihood of the path of O follows from its prior with the break at that time (a Kalman
+filter gives it, for all times at once). What is stated is mean and standard deviation of the normalised likelihood.
+The states of the bundle serve as points of linearisation only: O and its covariance come from each pulse's own
+measurements, with the other channels as uncertain as the bundle says.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from analysis.motion.bundle import Adjusted
+from analysis.motion.channels import CHANNELS, ORIGIN, SLOPE, START_SIGMA
+from analysis.motion.prior import Prior, prior
+from rig.arrays import Floats
+
+_COARSE_S: Final = 1 / 60  # steps of the search
+_FINE: Final = 41  # times of the final grid
+_SUPPORT: Final = 8.0  # of log-likelihood below the greatest: less likely times do not count
+#: Acceleration of O in the first pulse, m/s^2 (Z up): of a table, and of a flight. Their spread covers any in-run.
+_ON_TABLE: Final = (np.array((0.0, 0.0, 0.0)), np.array((5.0, 3.0, 3.0)))
+_IN_FLIGHT: Final = (np.array((-2.0, 0.0, -6.0)), np.array((3.0, 3.0, 3.0)))
+_AT_END: Final = 2.0  # pulses: a break nearer to the ends of the sight is none
+_LOOSE: Final = 1e4  # m or rad: weak weight that keeps undetermined pulses solvable
+#: Channels that the table guides: O and the slope of the skis.
+_SELECTED: Final = (*range(ORIGIN.start, ORIGIN.stop), SLOPE)
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """The take-off in the time of `Observations.times`.
+
+    Attributes:
+        seconds: its mean.
+        sigma: its standard deviation, s.
+    """
+
+    seconds: float
+    sigma: float
+
+
+def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
+    """The take-off; None where the motion shows none.
+
+    Args:
+        adjusted: the bundle, with whatever take-off.
+        densities: (3, 8) of the prior of the motion.
+    """
+    times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
+    path = _path(adjusted)
+    first, last = times[0] + _AT_END * unit, times[-1] - _AT_END * unit
+    coarse = np.arange(first, last, max(_COARSE_S, unit / 2))
+    if not len(coarse):
+        return None
+    likelihood = _log_likelihood(path, times, [prior(times, unit, t, densities) for t in coarse], _ON_TABLE)
+    if likelihood.max() < _without(path, times, unit, densities):
+        return None
+    possible = coarse[likelihood > likelihood.max() - _SUPPORT]
+    step = coarse[1] - coarse[0] if len(coarse) > 1 else unit
+    fine = np.linspace(max(possible[0] - step, times[0]), min(possible[-1] + step, times[-1]), _FINE)
+    likelihood = _log_likelihood(path, times, [prior(times, unit, t, densities) for t in fine], _ON_TABLE)
+    weight = np.exp(likelihood - likelihood.max())
+    weight /= weight.sum()
+    mean = float(weight @ fine)
+    if not first <= mean <= last:
+        return None
+    return Break(mean, float(np.sqrt(weight @ (fine - mean) ** 2 + (fine[1] - fine[0]) ** 2 / 12)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Path:
+    """Selected channels (n, c) of each pulse alone, and their covariance (n, c, c)."""
+
+    value: Floats
+    covariance: Floats
+
+
+def _path(adjusted: Adjusted) -> _Path:
+    n = len(adjusted.states)
+    rows = np.where(adjusted.used[..., None, None], adjusted.equations.by_channels, 0.0).reshape(n, -1, CHANNELS)
+    v = np.where(adjusted.used[..., None], adjusted.equations.v, 0.0).reshape(n, -1)
+    variance = np.diagonal(adjusted.solution.covariance, axis1=1, axis2=2)[:, :CHANNELS]
+    weight = np.minimum(1.0 / variance, 1e12)
+    weight[:, list(_SELECTED)] = _LOOSE**-2.0
+    inverse = np.linalg.inv(rows.transpose(0, 2, 1) @ rows + weight[:, None] * np.eye(CHANNELS))
+    shift = np.einsum("ncd,nrd,nr->nc", inverse, rows, v)
+    pick = list(_SELECTED)
+    return _Path((adjusted.states[:, :CHANNELS] - shift)[:, pick], np.asarray(inverse[:, pick][:, :, pick], float))
+
+
+def _without(path: _Path, times: Floats, unit: float, densities: Floats) -> float:
+    """Logarithm of the likelihood of a path that is all table or all flight, whichever is likelier."""
+    best = -np.inf
+    for regime, start in ((0, _ON_TABLE), (2, _IN_FLIGHT)):
+        only = prior(times, unit, None, np.repeat(densities[regime : regime + 1], 3, axis=0))
+        best = max(best, float(_log_likelihood(path, times, [only], start)[0]))
+    return best
+
+
+def _log_likelihood(path: _Path, times: Floats, priors: list[Prior], start: tuple[Floats, Floats]) -> Floats:
+    """Logarithm of the likelihood of a path for each prior (g,), up to a constant.
+
+    `start` holds mean and standard deviation of the acceleration of O in the first pulse.
+    """
+    c = len(_SELECTED)
+    unit = priors[0].unit
+    scale = np.array((1.0, unit, unit**2 / 2))
+    noise = _spread(np.stack([p.noise()[:, list(_SELECTED)] for p in priors]))
+    move = np.einsum("kij,cd->kicjd", priors[0].transition, np.eye(c)).reshape(-1, 3 * c, 3 * c)
+    sigma = START_SIGMA[:, list(_SELECTED)].copy()
+    sigma[2, ORIGIN] = start[1]
+    mean = np.zeros((len(priors), 3 * c))
+    mean[:, :c] = path.value[0]
+    mean[:, 2 * c : 2 * c + 3] = start[0] * scale[2]
+    covariance = np.broadcast_to(np.diag((sigma * scale[:, None]).ravel() ** 2), (len(priors), 3 * c, 3 * c))
+    total = np.zeros(len(priors))
+    for k in range(len(times)):
+        if k:
+            mean = mean @ move[k - 1].T
+            covariance = move[k - 1] @ covariance @ move[k - 1].T + noise[:, k - 1]
+        innovation = path.value[k] - mean[:, :c]
+        spread = covariance[:, :c, :c] + path.covariance[k]
+        inverse = np.linalg.inv(spread)
+        gain = covariance[:, :, :c] @ inverse
+        total -= (np.einsum("gi,gij,gj->g", innovation, inverse, innovation) + np.linalg.slogdet(spread)[1]) / 2
+        mean = mean + np.einsum("gsi,gi->gs", gain, innovation)
+        covariance = covariance - gain @ covariance[:, :c]
+        covariance = (covariance + covariance.transpose(0, 2, 1)) / 2
+    return total
+
+
+def _spread(noise: Floats) -> Floats:
+    """(g, k, 3 c, 3 c) from blocks (g, k, c, 3, 3) of single channels."""
+    g, k, c = noise.shape[:3]
+    return np.asarray(np.einsum("gkcij,cd->gkicjd", noise, np.eye(c)).reshape(g, k, 3 * c, 3 * c))

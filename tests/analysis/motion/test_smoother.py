@@ -1,0 +1,171 @@
+"""The bundle over time: errors within their sigmas, gaps predicted, gross errors left out, cameras that are late named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.measurements.model import ImageMeasurements, JumpMeasurements, PointMeasurement
+from analysis.motion.smoother import Motion, smooth
+from analysis.result.model import QUANTITIES, Phase, SmoothedState, Status
+from rig.arrays import Floats
+from tests.analysis.simulated import TrueJump, drawn, simulated_measurements, true_cameras, true_jump
+
+SEED = 11
+LARGEST = 4.5  # sigmas, of some thousand correlated errors of one jump; 6e-6 of single ones are larger
+
+
+def _motion(seed: int, late_s: dict[str, float] | None = None) -> tuple[TrueJump, JumpMeasurements, Motion]:
+    rng, truth = np.random.default_rng(seed), true_jump(seed)
+    measured = simulated_measurements(truth, true_cameras(), rng, late_s=late_s)
+    return truth, measured.jumps[0], smooth(measured.jumps[0], measured, drawn(true_cameras(), rng))
+
+
+@pytest.fixture(scope="module")
+def clean() -> tuple[TrueJump, JumpMeasurements, Motion]:
+    return _motion(SEED)
+
+
+def _states(motion: Motion) -> list[tuple[int, SmoothedState]]:
+    return [(k, state) for k, state in enumerate(motion.states) if state is not None]
+
+
+def _distance(offset: Floats, covariance: Floats) -> float:
+    """Mahalanobis."""
+    return float(np.sqrt(offset @ np.linalg.solve(covariance, offset)))
+
+
+def test_points_and_velocity_err_as_their_covariance_says(clean: tuple[TrueJump, JumpMeasurements, Motion]) -> None:
+    truth, jump, motion = clean
+    for k, state in _states(motion):
+        pulse = jump.pulses[k].pulse
+        for i, point in enumerate(state.points.values()):
+            assert point is not None
+            assert _distance(point.xyz - truth.pose(pulse).markers[i], point.covariance) < LARGEST
+        assert _distance(state.velocity.value - truth.velocity(pulse), state.velocity.covariance) < LARGEST
+        assert state.height is not None
+        assert abs(state.height.value - truth.pose(pulse).origin[2]) < LARGEST * state.height.sigma
+
+
+def test_residuals_are_as_large_as_their_sigmas(clean: tuple[TrueJump, JumpMeasurements, Motion]) -> None:
+    for phase, fit in clean[2].fit.items():
+        scatter = np.sqrt(2 / fit.redundancy)
+        assert abs(fit.chi_square / fit.redundancy - 1) < LARGEST * scatter, phase
+    assert set(clean[2].fit) == set(Phase)
+
+
+def test_takeoff_is_found(clean: tuple[TrueJump, JumpMeasurements, Motion]) -> None:
+    truth, jump, motion = clean
+    assert motion.takeoff is not None
+    assert abs(motion.takeoff.pulse - truth.takeoff_pulse) < LARGEST * motion.takeoff.sigma_pulses
+    assert motion.takeoff.sigma_pulses < 0.5
+    since = (motion.takeoff.time - jump.pulses[0].time) * 1e-9 * truth.rate_hz
+    assert since == pytest.approx(motion.takeoff.pulse - jump.pulses[0].pulse, abs=1e-6)
+
+
+def test_table_is_that_of_the_hill(clean: tuple[TrueJump, JumpMeasurements, Motion]) -> None:
+    truth, _, motion = clean
+    assert motion.table is not None
+    along = truth.jump.table_velocity / np.linalg.norm(truth.jump.table_velocity)
+    slope = np.degrees(np.arcsin(along[2]))
+    assert abs(motion.table.slope.value - slope) < LARGEST * motion.table.slope.sigma
+    normal = np.array((-along[2], 0.0, along[0]))
+    later = truth.velocity(truth.takeoff_pulse + 0.1 * truth.rate_hz) @ normal + 9.81 * 0.1 * along[0]
+    assert abs(motion.table.perpendicular.value - later) < LARGEST * motion.table.perpendicular.sigma
+
+
+def test_derivatives_by_the_calibration_are_those_of_another_calibration() -> None:
+    truth, system = true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, np.random.default_rng(SEED))
+    step = np.zeros(len(system.covariance))
+    step[[2, 4, 13]] = 0.1 * np.sqrt(np.diagonal(system.covariance))[[2, 4, 13]]
+    one, other = (smooth(measured.jumps[0], measured, cameras) for cameras in (system, system.moved(step)))
+    for (_, a), (_, b) in list(zip(_states(one), _states(other), strict=True))[8::6]:
+        predicted = a.by_calibration @ step
+        for row, name in enumerate(QUANTITIES[:8]):
+            before, after = (_quantity(state, name) for state in (a, b))
+            # The take-off and the densities of the motion move a little with the calibration.
+            assert after[0] - before[0] == pytest.approx(predicted[row], abs=0.02 * before[1])
+
+
+def _quantity(state: SmoothedState, name: str) -> tuple[float, float]:
+    found = state.angles[name] if name in state.angles else getattr(state, name)
+    return found.value, found.sigma
+
+
+def test_points_that_were_not_measured_are_predicted_with_growing_sigma() -> None:
+    truth, system = true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, np.random.default_rng(SEED))
+    jump = measured.jumps[0]
+    gap = range(16, 21)
+    pulses = list(jump.pulses)
+    for k in gap:
+        images = {c: image if c == "K3" else ImageMeasurements({}, {}) for c, image in pulses[k].images.items()}
+        pulses[k] = replace(pulses[k], images=images)
+    motion = smooth(replace(jump, pulses=tuple(pulses)), measured, system)
+    sigmas = []
+    for k in range(gap.start - 1, gap.stop + 1):
+        state = motion.states[k]
+        assert state is not None
+        point = state.points["P2"]
+        assert point is not None
+        assert point.status is (Status.PREDICTED if k in gap else Status.CONTROLLED)
+        assert _distance(point.xyz - truth.pose(jump.pulses[k].pulse).markers[1], point.covariance) < LARGEST
+        sigmas.append(np.sqrt(np.trace(point.covariance)))
+    assert np.argmax(sigmas) in (2, 3, 4)
+    assert sigmas[3] > 1.1 * max(sigmas[0], sigmas[-1])
+
+
+def test_a_wrong_identification_is_left_out() -> None:
+    truth, system = true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, np.random.default_rng(SEED))
+    jump = measured.jumps[0]
+    image = jump.pulses[20].images["K2"]
+    swapped = {**image.points, "P1": image.points["P2"], "P2": image.points["P1"]}
+    off = PointMeasurement(image.points["P3"].xy + 3.0, image.points["P3"].covariance)
+    pulses = list(jump.pulses)
+    for k, points in ((20, swapped), (23, {**jump.pulses[23].images["K2"].points, "P3": off})):
+        changed = replace(pulses[k].images["K2"], points=points)
+        pulses[k] = replace(pulses[k], images={**pulses[k].images, "K2": changed})
+    motion = smooth(replace(jump, pulses=tuple(pulses)), measured, system)
+    number = jump.pulses[0].pulse
+    assert {(t.pulse - number, t.camera, t.what) for t in motion.removed} == {
+        (20, "K2", "P1"),
+        (20, "K2", "P2"),
+        (23, "K2", "P3"),
+    }
+    state = motion.states[20]
+    assert state is not None
+    point = state.points["P1"]
+    assert point is not None
+    assert point.cameras == ("K1", "K3")
+    assert point.status is Status.TWO_RAYS
+    assert _distance(point.xyz - truth.pose(jump.pulses[20].pulse).markers[0], point.covariance) < LARGEST
+
+
+@pytest.mark.parametrize(("camera", "seconds"), [("K2", 1 / 30), ("K1", 0.008), ("K3", -0.008)])
+def test_a_camera_that_is_late_is_named(camera: str, seconds: float) -> None:
+    truth, jump, motion = _motion(SEED + 1, {camera: seconds})
+    named = {name: offset for name, offset in motion.offsets.items() if offset.message}
+    assert set(named) == {camera}
+    offset = named[camera]
+    assert abs(offset.offset_ms - seconds * 1e3) < LARGEST * offset.sigma_ms
+    assert offset.message is not None
+    assert camera in offset.message
+    assert "later" in offset.message if seconds > 0 else "earlier" in offset.message
+    for k, state in _states(motion)[5:]:
+        expected = truth.pose(jump.pulses[k].pulse).origin
+        assert _distance(state.origin.value - expected, state.origin.covariance) < LARGEST
+
+
+def test_synchronous_cameras_raise_no_alarm(clean: tuple[TrueJump, JumpMeasurements, Motion]) -> None:
+    assert all(offset.message is None for offset in clean[2].offsets.values())
+    assert all(offset.sigma_ms < 1.0 for offset in clean[2].offsets.values())
+
+
+def test_a_jump_without_measurements_has_no_states() -> None:
+    measured = simulated_measurements(true_jump(SEED), true_cameras(), np.random.default_rng(SEED))
+    empty = replace(measured.jumps[0], pulses=tuple(replace(pulse, images={}) for pulse in measured.jumps[0].pulses))
+    motion = smooth(empty, measured, true_cameras())
+    assert motion.takeoff is None
+    assert set(motion.states) == {None}

@@ -1,4 +1,4 @@
-"""The bundle over time: errors within their sigmas, gaps predicted, gross errors left out, cameras that are late named."""
+"""The bundle over time: errors within their sigmas, gaps predicted, gross errors left out, late cameras named."""
 
 from dataclasses import replace
 
@@ -90,6 +90,7 @@ def test_derivatives_by_the_calibration_are_those_of_another_calibration() -> No
 
 def _quantity(state: SmoothedState, name: str) -> tuple[float, float]:
     found = state.angles[name] if name in state.angles else getattr(state, name)
+    assert found is not None
     return found.value, found.sigma
 
 

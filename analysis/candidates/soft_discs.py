@@ -24,7 +24,8 @@ MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a borde
 _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends on it
 _STRETCH_SPREAD, _SHAPE, _SHAPE_SPREAD = 0.25, 0.3, 0.5  # weak priors
 _SIZE_SPREAD = 0.4  # of log size
-_STEPS, _ENOUGH = 14, 2e-3  # iterations; px
+_STEPS, _ENOUGH = 10, 3e-3  # iterations; px
+_POOR_START = 0.4  # residuals over contrast, before the first step
 _LARGEST_STEP = 0.4  # of the logarithms
 
 
@@ -132,9 +133,13 @@ class _Batch:
         """Unknowns, their covariance a priori, misfit, rms, and whether the fit is good (Levenberg-Marquardt)."""
         n = len(self._start)
         theta = self._started()
-        damping, active = np.full(n, 1e-3), np.arange(n)
-        cost, normal, gradient = self._equations(theta, active)
+        damping, active = np.full(n, 1e-3), np.flatnonzero(self._promising(theta))
+        cost, normal, gradient = np.full(n, np.inf), np.tile(np.eye(UNKNOWNS), (n, 1, 1)), np.zeros((n, UNKNOWNS))
+        if len(active):
+            cost[active], normal[active], gradient[active] = self._equations(theta[active], active)
         for _ in range(_STEPS):
+            if not len(active):
+                break
             damped = normal[active] + damping[active, None, None] * _diagonal(normal[active])
             step = np.linalg.solve(damped, gradient[active][..., None])[..., 0]
             step[:, 2:6] = np.clip(step[:, 2:6], -_LARGEST_STEP, _LARGEST_STEP)
@@ -154,9 +159,15 @@ class _Batch:
             damping[active] *= np.where(better, 0.2, 10.0)
             settled = (np.abs(step[:, :2]).max(axis=1) < _ENOUGH) | (damping[active] > 1e6)
             active = active[~settled]
-            if not len(active):
-                break
-        return self._judged(theta, normal)
+        return self._judged(theta, normal, cost)
+
+    def _promising(self, theta: Floats) -> Flags:
+        """Whether the spot to start from explains enough; no fit would mend larger residuals."""
+        value, _ = self._model(theta, np.arange(len(theta)))
+        used = self._weight > 0
+        v = (self._grey - value) * used
+        rms = np.sqrt((v**2).sum(axis=1) / np.maximum(1, used.sum(axis=1)))
+        return np.asarray(rms < _POOR_START * np.abs(theta[:, 6]))
 
     def _started(self) -> Floats:
         theta = np.zeros((len(self._start), UNKNOWNS))
@@ -208,7 +219,7 @@ class _Batch:
         design[..., 8], design[..., 9] = dx, dy
         return contrast * value + b + bx * dx + by * dy, design
 
-    def _judged(self, theta: Floats, normal: Floats) -> _Fitted:
+    def _judged(self, theta: Floats, normal: Floats, cost: Floats) -> _Fitted:
         everything = np.arange(len(theta))
         value, _ = self._model(theta, everything)
         used = self._weight > 0
@@ -220,7 +231,12 @@ class _Batch:
         covariance = np.asarray(np.linalg.inv(normal + 1e-12 * _diagonal(normal)), float)
         away = np.hypot(*(theta[:, :2] - self._start).T)
         spread = np.einsum("nii->ni", covariance)[:, :2]
-        good: Flags = (count >= 2 * UNKNOWNS) & (away <= np.maximum(1.2, self._radius)) & (spread > 0).all(axis=1)
+        good: Flags = (
+            np.isfinite(cost)
+            & (count >= 2 * UNKNOWNS)
+            & (away <= np.maximum(1.2, self._radius))
+            & (spread > 0).all(axis=1)
+        )
         good &= np.isfinite(theta).all(axis=1)
         return theta, covariance, misfit, rms, good
 

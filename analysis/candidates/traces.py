@@ -3,7 +3,8 @@
 Lines are found among the middles of the bars (`analysis.candidates.bars`) by a Hough transform and refined by robust
 adjustment. Two skis that partly cover each other make one bar, which is wider: its upper edge belongs to one ski, its
 lower edge to the other, each half a ski's width from its axis. Such a bar stands for two middles. Gaps (body, boots,
-markers) may divide a line. A limb is not long enough for its width.
+markers) may divide a line. A limb is not long enough for its width. The lines, and two skis that nearly cover each
+other, are then fitted to all pixels around them (`analysis.candidates.ski_fit`).
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ import numpy as np
 from analysis.candidates.background import Region
 from analysis.candidates.bars import Bars, find_bars
 from analysis.candidates.model import Trace
+from analysis.candidates.ski_fit import Bar, FittedBar, fit_bars
 from rig.arrays import Flags, Floats, Integers
 
 _SLENDER = 5.0  # length over width of a visible part, at least
@@ -23,14 +25,32 @@ _STEEPEST = 1.05  # slope in the columns' direction; steeper lines are found in 
 _WIDE = 1.3  # times the width of one ski: such a bar may be two
 _TWO = 2.6  # times the width of one ski: two that just touch, and some blur
 _TOLERANCE = 0.8  # px from the line of the Hough transform
-_OUTLIER = 3.5  # sigmas
 _LEAST_SIGMA = 0.05  # px; of a middle
-_EDGE_SHIFT = 0.1  # px by which edges of a thin and of a wide bar appear at different places
 _FILLED = 0.45  # share of the columns between the ends that has a bar
 _GAP = 0.6  # share of the length that a body may hide in one piece
+_TOGETHER = 3  # lines that are fitted together, the longest ones
 _MOST = 4  # lines of each sign and direction
+_MISFIT = 4.0  # residuals over noise
+_WORST_SIGMA = 0.5  # px; of a point
+_FEWEST_POINTS = 3
+_PARALLEL = 0.9  # cosine; lines that cross at more than that hardly disturb each other
+_APART = 0.06  # share of their length by which two skis that cover each other may be apart at their ends
 _POINTS = 24  # of a trace
 _ENDS = 0.05  # share of the length at each end that is not measured: tips are bent, tails are round
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """A line that bars lie on: ends (2, 2) and width, px of the region; sign of the contrast."""
+
+    ends: Floats
+    width: float
+    sign: int
+
+    @property
+    def length(self) -> float:
+        """Length, px."""
+        return float(np.hypot(*(self.ends[1] - self.ends[0])))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,45 +79,90 @@ def find_traces(region: Region) -> tuple[Trace, ...]:
     """Traces of a region, in px of the image, the longest first."""
     noise = float(np.median(region.sigma))
     widest = max(region.grey.shape) / _LARGEST_WIDTH
-    found: list[Trace] = []
+    found: list[_Line] = []
     for steep in (False, True):
         grey, front = (region.grey.T, region.front.T) if steep else (region.grey, region.front)
         bars = find_bars(grey, noise, front, widest)
         bars = bars.only(bars.front)
         for sign in (1, -1):
-            traces = _lines(bars.only(np.sign(bars.contrast) == sign), grey.shape[0])
-            found += [_turned(trace) if steep else trace for trace in traces]
+            lines = _lines(bars.only(np.sign(bars.contrast) == sign), grey.shape[0])
+            found += [replace(line, ends=line.ends[:, ::-1].copy()) if steep else line for line in lines]
+    traces: list[Trace] = []
+    for group in _groups(_distinct(found)):
+        start = [Bar(line.ends, line.width) for line in group]
+        fitted = fit_bars(region, _explanations(start), group[0].sign > 0, _POINTS)
+        traces += [trace for bar in fitted if (trace := _trace_of(bar, region)) is not None]
+    return tuple(sorted(traces, key=lambda trace: -float(np.hypot(*(trace.ends[1] - trace.ends[0])))))
+
+
+def _explanations(bars: list[Bar]) -> list[list[Bar]]:
+    """What one line or several near each other may be: these, or two skis that nearly cover each other."""
+    longest = bars[0]
+    along = (longest.ends[1] - longest.ends[0]) / longest.length
+    aside = np.array((-along[1], along[0])) * longest.width / 4
+    shorter = along * _APART * longest.length
+    pairs = []
+    for side in (1, -1):
+        one = Bar(longest.ends + side * aside - np.array((np.zeros(2), shorter)), longest.width)
+        two = Bar(longest.ends - side * aside + np.array((shorter, np.zeros(2))), longest.width)
+        pairs.append([one, two])
+    return [bars, *pairs]
+
+
+def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
+    """A fitted bar as a trace of the image; None if it is no ski."""
+    bar = fitted.bar
+    if fitted.misfit > _MISFIT or bar.length < max(_SHORTEST, _SLENDER * bar.width):
+        return None
+    along = (bar.ends[1] - bar.ends[0]) / bar.length
+    t = (fitted.xy - bar.ends[0]) @ along
+    spare = max(bar.width / 2, _ENDS * bar.length)
+    inner = (t > spare) & (t < bar.length - spare) & (fitted.sigma < _WORST_SIGMA)
+    if np.count_nonzero(inner) < _FEWEST_POINTS:
+        return None
     offset = np.array((region.x, region.y), float)
-    found = _distinct(found)
-    return tuple(replace(trace, xy=trace.xy + offset, ends=trace.ends + offset) for trace in found)
+    xy = fitted.xy[inner] + offset
+    return Trace(xy, fitted.sigma[inner], fitted.common, bar.ends + offset, bar.width, fitted.contrast)
 
 
-def _turned(trace: Trace) -> Trace:
-    return replace(trace, xy=trace.xy[:, ::-1].copy(), ends=trace.ends[:, ::-1].copy())
+def _groups(lines: Sequence[_Line]) -> list[list[_Line]]:
+    """Lines that are near enough to each other to disturb each other, together."""
+    groups: list[list[_Line]] = []
+    for line in lines:
+        near = [group for group in groups if any(_near(line, other) for other in group)]
+        groups = [group for group in groups if group not in near]
+        groups.append([*(other for group in near for other in group), line])
+    return [sorted(group, key=lambda line: -line.length)[:_TOGETHER] for group in groups]
 
 
-def _distinct(traces: Sequence[Trace]) -> list[Trace]:
+def _near(line: _Line, other: _Line) -> bool:
+    one, two = line.ends[1] - line.ends[0], other.ends[1] - other.ends[0]
+    if line.sign != other.sign or abs(one @ two) < _PARALLEL * line.length * other.length:
+        return False
+    steps = np.linspace(0, 1, 15)[:, None]
+    distance = np.hypot(*((line.ends[0] + steps * one)[:, None] - (other.ends[0] + steps * two)).transpose(2, 0, 1))
+    step = max(line.length, other.length) / 28
+    return bool(distance.min() < line.width + other.width + step)
+
+
+def _distinct(lines: Sequence[_Line]) -> list[_Line]:
     """The longest first, without those that both directions found."""
-    kept: list[Trace] = []
-    for trace in sorted(traces, key=_length, reverse=True):
-        if not any(_same(trace, other) for other in kept):
-            kept.append(trace)
+    kept: list[_Line] = []
+    for line in sorted(lines, key=lambda line: -line.length):
+        if not any(_same(line, other) for other in kept):
+            kept.append(line)
     return kept
 
 
-def _length(trace: Trace) -> float:
-    return float(np.hypot(*(trace.ends[1] - trace.ends[0])))
+def _same(line: _Line, other: _Line) -> bool:
+    """Whether a line lies on a longer one of the same sign."""
+    along = (other.ends[1] - other.ends[0]) / other.length
+    across = np.abs((line.ends - other.ends[0]) @ np.array((-along[1], along[0])))
+    return line.sign == other.sign and bool(across.max() < _TOLERANCE)
 
 
-def _same(trace: Trace, other: Trace) -> bool:
-    """Whether a trace lies on a longer one of the same sign."""
-    along = (other.ends[1] - other.ends[0]) / _length(other)
-    across = np.abs((trace.xy - other.ends[0]) @ np.array((-along[1], along[0])))
-    return trace.contrast * other.contrast > 0 and bool(across.max() < _TOLERANCE)
-
-
-def _lines(bars: Bars, rows: int) -> list[Trace]:
-    """Traces of one sign and direction."""
+def _lines(bars: Bars, rows: int) -> list[_Line]:
+    """Lines of one sign and direction."""
     if len(bars.column) < _SHORTEST:
         return []
     plain = _Middles(
@@ -113,17 +178,17 @@ def _lines(bars: Bars, rows: int) -> list[Trace]:
         return []
     width = _single_width(plain.width[first[2]])
     left = _split(bars, width)
-    traces: list[Trace] = []
+    lines: list[_Line] = []
     for _ in range(_MOST):
         line = _best_line(left, rows)
         if line is None:
             break
         offset, slope, on = line
-        trace = _trace(left.only(on), offset, slope)
-        if trace is not None:
-            traces.append(trace)
+        found = _line(left.only(on), offset, slope)
+        if found is not None:
+            lines.append(found)
         left = left.only(~on)
-    return traces
+    return lines
 
 
 def _single_width(widths: Floats) -> float:
@@ -185,35 +250,20 @@ def _refined(middles: _Middles, offset: float, slope: float) -> tuple[float, flo
     return offset, slope, on
 
 
-def _trace(on: _Middles, offset: float, slope: float) -> Trace | None:
-    """The trace of the middles on a line; None if they are too few, too far apart, or the thing is too thick."""
-    order = np.argsort(on.column)
-    on = on.only(order)
+def _line(on: _Middles, offset: float, slope: float) -> _Line | None:
+    """The line of the middles on it; None if they are too few, too far apart, or the thing is too thick."""
+    on = on.only(np.argsort(on.column))
     on = on.only(_main_run(on.column))
-    across = 1 / np.hypot(1, slope)
-    if len(on.column) < _SHORTEST:
-        return None
-    off = on.row - offset - slope * on.column
-    scale = max(1.0, 1.4826 * float(np.median(np.abs(off) / on.sigma)))
-    good = np.abs(off) < _OUTLIER * scale * on.sigma
-    on, off = on.only(good), off[good]
     if len(on.column) < _SHORTEST:
         return None
     first, last = float(on.column[0]), float(on.column[-1])
-    width = float(np.median(on.width)) * across
-    length = (last - first + 1) / across
+    width = float(np.median(on.width)) / np.hypot(1, slope)
+    length = (last - first + 1) * np.hypot(1, slope)
     filled = len(np.unique(on.column)) / (last - first + 1)
     if length < _SLENDER * width or filled < _FILLED:
         return None
-    spare = max(width / 2, _ENDS * (last - first))
-    inner = (on.column >= first + spare) & (on.column <= last - spare)
-    if np.count_nonzero(inner) < 4:
-        return None
-    points = on.only(inner)
-    xy, sigma = _grouped(points, scale)
-    common = _EDGE_SHIFT * float(np.mean(points.split)) * across
     ends = np.array([(c, offset + slope * c) for c in (first, last)])
-    return Trace(xy, sigma * across, common, ends, width, float(np.median(on.contrast)))
+    return _Line(ends, width, int(np.sign(on.contrast[0])))
 
 
 def _main_run(column: Integers) -> Flags:
@@ -227,15 +277,3 @@ def _main_run(column: Integers) -> Flags:
         k = int(gaps.argmax())
         where = np.flatnonzero(keep)
         keep[where[k + 1 :] if k + 1 >= len(kept) - k - 1 else where[: k + 1]] = False
-
-
-def _grouped(points: _Middles, scale: float) -> tuple[Floats, Floats]:
-    """At most so many points, each the weighted mean of neighbours."""
-    groups = np.array_split(np.arange(len(points.column)), min(_POINTS, len(points.column)))
-    xy, sigma = [], []
-    for group in groups:
-        weight = 1 / (scale * points.sigma[group]) ** 2
-        total = float(weight.sum())
-        xy.append((float(weight @ points.column[group]) / total, float(weight @ points.row[group]) / total))
-        sigma.append(total**-0.5)
-    return np.array(xy), np.array(sigma)

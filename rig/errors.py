@@ -55,6 +55,12 @@ class LogDamagedError(SvevError):
     exit_code = 3
 
 
+class NoJumpError(SvevError):
+    """Nobody jumps in a log."""
+
+    exit_code = 3
+
+
 class LogTruncatedError(BadInputError):
     """A log ends in the middle of a record: an incomplete copy, since a recorder never leaves a log like that."""
 

@@ -32,11 +32,13 @@ _COMMANDS: Final = {
     "info": ("logs", "info_command", "Say what a log holds."),
     "recover": ("logs", "recover_command", "Repair a log that was not closed or is damaged."),
     "replay": ("replay", "replay_command", "Publish a log again, as it was published live."),
+    "worker": ("worker", "worker_command", "Measure the jumper from published triplets."),
     "schema": ("setup", "schema", "Print the JSON schema of rig files."),
     "verify": ("logs", "verify_command", "Check every byte of a log."),
     "adjust": ("adjust", "adjust", "Adjust a network of images (bundle adjustment)."),
     "calibrate": ("calibrate", "calibrate", "Calibrate cameras with images of a 3D frame."),
     "orient": ("orient", "orient", "Estimate the poses of the cameras on the hill."),
+    "analyze": ("analyze", "analyze_command", "Measure the jumps of a recording."),
     "plan": ("plan", "plan", "Predict the accuracy of planned cameras."),
     "bench": ("bench", "bench", "Measure how fast this computer records."),
 }

@@ -62,6 +62,28 @@ def complain(line: str) -> None:
 
 
 @contextmanager
+def steps() -> Iterator[Callable[[str, float], None]]:
+    """Show a progress bar for the step that is being done; show nothing if standard error is not a terminal.
+
+    Yields:
+        A function to call with the step in words, and the share of it that is done, 0 to 1.
+    """
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=_stderr, disable=not _stderr.is_terminal, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        last = ""
+
+        def show(step: str, share: float) -> None:
+            nonlocal last
+            if step != last:
+                bar.reset(task, total=1.0, description=visible(step))
+                last = step
+            bar.update(task, completed=share)
+
+        yield show
+
+
+@contextmanager
 def progress(label: str, total: int | None) -> Iterator[Callable[[int], None]]:
     """Show a progress bar on standard error; show nothing if that is not a terminal.
 

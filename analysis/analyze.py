@@ -1,0 +1,119 @@
+"""The whole analysis of a recording: from its log and the survey of the balls to the measured jumps."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.cameras.oriented_scene import OrientedScene, orientation_result
+from analysis.cameras.source import Source, orient_from
+from analysis.candidates.finder import Finder, find_candidates
+from analysis.identification.identify import identify
+from analysis.jump import ComputedJump, compute_jump
+from analysis.log_facts import LogFacts, log_facts
+from analysis.measurements.merging import merged
+from analysis.measurements.model import Measurements
+from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
+from analysis.scene.camera_system import CameraSystem
+from analysis.scene.static_image import static_images
+from photogrammetry.procedures.orientation import Orientation
+from rig.errors import NoJumpError
+
+#: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """A measured recording with everything that its files need.
+
+    Attributes:
+        result: the measured recording.
+        measurements: what was measured in the images of the jumper.
+        scene: cameras and balls.
+        orientation: the adjustment of the balls; None where the poses were known.
+        perpendicular: by jump, velocity perpendicular to the table at the take-off, m/s.
+    """
+
+    result: MeasuredRecording
+    measurements: Measurements
+    scene: OrientedScene
+    orientation: Orientation | None
+    perpendicular: Mapping[int, Quantity]
+
+    @property
+    def system(self) -> CameraSystem:
+        """The oriented cameras."""
+        return self.scene.system
+
+
+def analyze(
+    log: Path,
+    source: Source,
+    *,
+    by_hand: Measurements | None = None,
+    images: bool = True,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Measure the jumps of a recording.
+
+    Args:
+        log: the log.
+        source: survey of the balls, or poses of the cameras.
+        by_hand: measurements that are used beside automatic ones, or instead of them at the same place.
+        images: look for the jumper in the images; otherwise `by_hand` is all there is.
+        progress: told what is being done.
+
+    Raises:
+        BadInputError: the log is none, or survey or poses do not belong to it.
+        NoJumpError: nobody jumps in the log.
+        NotSolvableError, NotConvergedError: the balls do not determine the cameras.
+    """
+    tell = progress or (lambda _step, _share: None)
+    facts = log_facts(log)
+    tell("looking at the balls", 0.0)
+    static = static_images(log)
+    scene, orientation = orient_from(static, source)
+    measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, ())
+    if images:
+        measurements = _measured(facts, scene, tell)
+    if by_hand is not None:
+        measurements = merged(measurements, by_hand)
+    if not measurements.jumps:
+        raise NoJumpError(
+            f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording"
+        )
+    tell("computing", 0.0)
+    jumps = [compute_jump(jump, measurements, scene.system) for jump in measurements.jumps]
+    result = MeasuredRecording(
+        facts.recording,
+        facts.session,
+        facts.rate_hz,
+        orientation_result(scene, messages=facts.messages),
+        _synchrony(jumps),
+        tuple(computed.jump for computed in jumps),
+    )
+    tell("computing", 1.0)
+    perpendicular = {c.jump.number: c.perpendicular for c in jumps if c.perpendicular is not None}
+    return Analysis(result, measurements, scene, orientation, perpendicular)
+
+
+def _measured(facts: LogFacts, scene: OrientedScene, tell: Progress) -> Measurements:
+    """What the images show of the jumper."""
+    finder = Finder({name: scene.static[name] for name in scene.system.names})
+    step = "looking for the jumper"
+    candidates = find_candidates(facts.path, finder, lambda share: tell(step, share))
+    exposures = {name: camera.exposure_s for name, camera in facts.cameras.items()}
+    jumps = identify(candidates, scene.system, facts.rate_hz, exposures)
+    return Measurements(facts.recording, facts.rate_hz, facts.cameras, tuple(jumps))
+
+
+def _synchrony(jumps: list[ComputedJump]) -> dict[str, CameraOffset]:
+    """Of each camera the offset in the jump that shows it best; an offset that is named goes before."""
+    best: dict[str, CameraOffset] = {}
+    for computed in jumps:
+        for name, offset in computed.synchrony.items():
+            known = best.get(name)
+            rank = (offset.message is None, offset.sigma_ms)
+            if known is None or rank < (known.message is None, known.sigma_ms):
+                best[name] = offset
+    return best

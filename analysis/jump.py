@@ -1,0 +1,71 @@
+"""Computes one jump from what was measured in its images: raw solution, model over time, verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from analysis.measurements.model import JumpMeasurements, Measurements
+from analysis.motion.smoother import Motion, smooth
+from analysis.pulses.solution import RawJump, solve_pulses
+from analysis.result.model import CameraMove, CameraOffset, Jump, PulseState, Quantity, TakeOff, phase_at
+from analysis.scene.camera_system import CameraSystem
+from analysis.verdict import judge
+from rig.clocks import NS_PER_S, UtcNs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ComputedJump:
+    """A jump with what belongs to its recording as a whole.
+
+    Attributes:
+        jump: the measured jump.
+        synchrony: how much later than the others each camera shows the jumper.
+        perpendicular: velocity perpendicular to the table at the take-off, m/s; None where it is not known.
+    """
+
+    jump: Jump
+    synchrony: Mapping[str, CameraOffset]
+    perpendicular: Quantity | None
+
+
+def compute_jump(
+    jump: JumpMeasurements, measurements: Measurements, system: CameraSystem, moved: Sequence[CameraMove] = ()
+) -> ComputedJump:
+    """Compute a jump.
+
+    Args:
+        jump: what was measured.
+        measurements: the recording that it belongs to.
+        system: the cameras as they stood during the jump.
+        moved: cameras that moved and whose pose was not corrected for it, for the verdict.
+    """
+    raw = solve_pulses(jump, measurements, system)
+    motion = smooth(jump, measurements, system)
+    pulses = _pulse_states(jump, measurements, raw, motion)
+    verdict = judge(pulses, motion.takeoff, raw.tests, motion.offsets, moved)
+    return ComputedJump(
+        Jump(jump.number, motion.takeoff, verdict, pulses, raw.tests),
+        motion.offsets,
+        None if motion.table is None else motion.table.perpendicular,
+    )
+
+
+def _pulse_states(
+    jump: JumpMeasurements, measurements: Measurements, raw: RawJump, motion: Motion
+) -> tuple[PulseState, ...]:
+    return tuple(
+        PulseState(
+            pulse.pulse,
+            UtcNs(pulse.time + round(measurements.middle_s * NS_PER_S)),
+            since := _since_takeoff(pulse.pulse, motion.takeoff, jump, measurements.rate_hz),
+            phase_at(since),
+            state,
+            smoothed,
+        )
+        for pulse, state, smoothed in zip(jump.pulses, raw.states, motion.states, strict=True)
+    )
+
+
+def _since_takeoff(pulse: int, takeoff: TakeOff | None, jump: JumpMeasurements, rate_hz: float) -> float:
+    """Seconds; without a take-off since the first pulse of the jump."""
+    zero = jump.pulses[0].pulse if takeoff is None else takeoff.pulse
+    return (pulse - zero) / rate_hz

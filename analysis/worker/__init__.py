@@ -1,0 +1,1 @@
+"""Measures the jumper from published triplets, live or from a replayed log."""

@@ -1,0 +1,66 @@
+"""What a worker finds, and the main figures of a jump for people who wait for them."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Protocol
+
+from analysis.jump import ComputedJump
+from analysis.report.course import course_of
+from analysis.report.figures import EARLY_S, FAR_M
+from analysis.result.model import MeasuredRecording, Quantity
+from rig.clocks import NS_PER_S, UtcNs
+from rig.events import Level
+from rig.jumper import JumperState
+from rig.pulse import PulseNumber
+from rig.status import LastJump, MeasuredValue
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredJump:
+    """A whole jump.
+
+    Attributes:
+        result: the recording with this jump alone.
+        summary: its main figures.
+    """
+
+    result: MeasuredRecording
+    summary: LastJump
+
+
+class Findings(Protocol):
+    """Takes what a worker finds, in the order in which it is found."""
+
+    def state(self, state: JumperState) -> None:
+        """A measured pulse."""
+
+    def scene(self, recording: str, pulse: PulseNumber, time: UtcNs, scene: bytes) -> None:
+        """The scene in 3D at a pulse, an encoded `foxglove.SceneUpdate`."""
+
+    def jump(self, jump: MeasuredJump) -> None:
+        """A whole jump."""
+
+    def message(self, level: Level, text: str) -> None:
+        """Something that people should know, one line."""
+
+
+def summary_of(recording: str, rate_hz: float, computed: ComputedJump) -> LastJump:
+    """The main figures of a jump."""
+    jump, course = computed.jump, course_of(computed.jump, rate_hz)
+    time = jump.pulses[0].time if jump.takeoff is None else jump.takeoff.time
+    return LastJump(
+        recording=recording,
+        jump=jump.number,
+        time=datetime.fromtimestamp(time / NS_PER_S, UTC),
+        ok=jump.verdict.ok,
+        verdict=jump.verdict.message,
+        takeoff_speed=_value(course.at_time("speed", 0.0)),
+        perpendicular=_value(computed.perpendicular),
+        speed_20_m=_value(course.at_distance("speed", FAR_M)),
+        angle_of_attack=_value(course.at_time("angle_of_attack", EARLY_S)),
+        ski_to_body=_value(course.at_time("alpha", EARLY_S)),
+    )
+
+
+def _value(quantity: Quantity | None) -> MeasuredValue | None:
+    return None if quantity is None else MeasuredValue(value=quantity.value, sigma=quantity.sigma)

@@ -1,0 +1,99 @@
+"""`svev analyze`: measures the jumps of a recording."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from analysis.analyze import Analysis, analyze
+from analysis.cameras.source import read_source
+from analysis.measurements.file import read_measurements
+from analysis.report.course import course_of
+from analysis.report.figures import five_figures, plus_minus
+from analysis.result_folder import write_folder
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from svev import console
+from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE
+from svev.commands.logs import AlsoJson, LogPath
+
+
+def analyze_command(
+    log: LogPath,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="folder for the results")],
+    survey: Annotated[
+        Path | None, typer.Option(metavar="SURVEY.json", help="survey of the balls with interior orientations")
+    ] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(metavar="POSES.json", help="poses of the cameras, result of svev orient")
+    ] = None,
+    measurements: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="compute from these measurements; do not look at the jumper")
+    ] = None,
+    by_hand: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="use these measurements beside the automatic ones, first")
+    ] = None,
+    video: Annotated[bool, typer.Option("--video", help="write the overlay video too")] = False,
+    as_json: AlsoJson = False,
+) -> None:
+    """Measure the jumps of a recording: points, skis, angles, height and speed, each with its sigma.
+
+    The balls in the log's own images and their survey orient the cameras; nothing is to be clicked. The folder gets
+    jumper.json and .csv, .c3d and .trc, report.html for the coach and protocol.html for the geodesist.
+
+    Exit codes: 0 measured; 2 bad input; 3 nobody jumps in the log, or the balls do not determine the cameras; 4 the
+    adjustment did not converge, or the disk refuses.
+
+    Example: svev analyze recordings/jump.mcap --survey hill.json --out results/jump
+    """
+    source = read_source(survey, calibration)
+    by_hand_only = None if measurements is None else read_measurements(measurements)
+    more = None if by_hand is None else read_measurements(by_hand)
+    with console.steps() as tell:
+        try:
+            analysis = analyze(
+                log,
+                source,
+                by_hand=more if by_hand_only is None else by_hand_only,
+                images=by_hand_only is None,
+                progress=tell,
+            )
+        except (NotSolvableError, NotConvergedError) as error:
+            console.complain(f"{log}: the balls do not determine the cameras: {error}")
+            raise typer.Exit(NOT_CONVERGED if isinstance(error, NotConvergedError) else NOT_SOLVABLE) from None
+        files = write_folder(analysis, log, out, video=video, progress=tell)
+    for line in _lines(analysis):
+        console.say(line, aside=as_json)
+    if as_json:
+        console.print_json(_summary(analysis, out, files))
+    else:
+        console.say(f"results in {out}; open {out / 'report.html'}")
+
+
+def _lines(analysis: Analysis) -> list[str]:
+    result = analysis.result
+    lines = [*result.orientation.messages, *(move.message for move in result.orientation.moved)]
+    lines += [offset.message for offset in result.synchrony.values() if offset.message is not None]
+    for jump in result.jumps:
+        lines.append(f"jump {jump.number}: {jump.verdict.message}")
+        figures = five_figures(course_of(jump, result.rate_hz), analysis.perpendicular.get(jump.number))
+        lines += [f"  {figure.title}: {plus_minus(figure.quantity, figure.unit)}" for figure in figures]
+    return lines
+
+
+def _summary(analysis: Analysis, out: Path, files: list[Path]) -> dict[str, Any]:
+    return {
+        "recording": analysis.result.recording,
+        "out": str(out),
+        "files": [str(file) for file in files],
+        "messages": list(analysis.result.orientation.messages),
+        "jumps": [
+            {
+                "number": jump.number,
+                "ok": jump.verdict.ok,
+                "message": jump.verdict.message,
+                "takeoff_pulse": None if jump.takeoff is None else jump.takeoff.pulse,
+                "phases": {phase.value: dict(figures) for phase, figures in jump.verdict.phases.items()},
+            }
+            for jump in analysis.result.jumps
+        ],
+    }

@@ -12,7 +12,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
 def load_rig(path: Path) -> RigSettings:
-    """Read and check a rig file, and make the paths of scenario, calibration and keys in it absolute.
+    """Read and check a rig file, and make the paths in it absolute.
 
     Raises:
         BadInputError: the file is missing, is not TOML, or does not describe a rig.
@@ -24,6 +24,10 @@ def load_rig(path: Path) -> RigSettings:
         absolute["simulation"] = rig.simulation.model_copy(update={"scenario": scenario})
     if rig.calibration is not None:
         absolute["calibration"] = (path.parent / rig.calibration).resolve()
+    if rig.analysis is not None:
+        given = {name: getattr(rig.analysis, name) for name in ("survey", "calibration")}
+        files = {name: (path.parent / file).resolve() for name, file in given.items() if file is not None}
+        absolute["analysis"] = rig.analysis.model_copy(update=files)
     if rig.network.curve_key_file is not None:
         keys = (path.parent / rig.network.curve_key_file).resolve()
         absolute["network"] = rig.network.model_copy(update={"curve_key_file": keys})

@@ -155,6 +155,23 @@ class NetworkSettings(StrictModel):
     resend: bool = Field(True, description="ask the camera again for lost packets")
 
 
+class AnalysisSettings(StrictModel):
+    """The analysis that measures the jumper while recordings run; it needs either the survey or the poses."""
+
+    survey: Path | None = Field(
+        None, description="survey of the balls and interior orientations (svev-network/1), relative to the rig file"
+    )
+    calibration: Path | None = Field(
+        None, description="poses of the cameras (result of svev orient), relative to the rig file"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "AnalysisSettings":
+        if (self.survey is None) == (self.calibration is None):
+            raise ValueError("analysis needs the survey of the balls or the poses of the cameras: give one of them")
+        return self
+
+
 class SimulationSettings(StrictModel):
     """Simulated cameras instead of real ones, for tests and demonstrations."""
 
@@ -169,6 +186,7 @@ class RigSettings(StrictModel):
     trigger: TriggerSettings = TriggerSettings()
     recorder: RecorderSettings = RecorderSettings()
     network: NetworkSettings = NetworkSettings()
+    analysis: AnalysisSettings | None = None
     simulation: SimulationSettings | None = None
     calibration: Path | None = Field(
         None,

@@ -18,7 +18,7 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.pulse import Pause, PulseNumber
 from rig.settings.model import RigSettings
-from rig.status import Counts
+from rig.status import Counts, LastJump
 
 
 class Message(msgspec.Struct, kw_only=True, tag=True):
@@ -170,6 +170,38 @@ class TellResult(Message):
 
 
 RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | TellResult | Quit
+
+
+# The analysis
+
+
+class AnalysisConfig(Message):
+    """Configuration of the analysis process.
+
+    Attributes:
+        rig: the rig; its `analysis` says where survey or calibration are.
+    """
+
+    rig: RigSettings
+
+
+class JumpMeasured(Message):
+    """A jump was measured.
+
+    Attributes:
+        jump: its main figures.
+    """
+
+    jump: LastJump
+
+
+class AnalysisTold(Message):
+    """Something that people should know of the analysis."""
+
+    event: Event
+
+
+AnalysisReport = TellResult | JumpMeasured | AnalysisTold
 
 
 class CameraNews(StrEnum):

@@ -1,4 +1,4 @@
-"""Runs the processes of one rig: rings, one grabber process per camera, one recorder process.
+"""Runs the processes of one rig: rings, one grabber process per camera, one recorder process, one for the analysis.
 
 The owner calls `turn` again and again; it passes on the recorder's reports, keeps track of the cameras, and starts dead
 grabbers again. The owner decides what happens when the recorder dies.
@@ -18,10 +18,14 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.settings.model import RigSettings
 from rig.transport.messages import (
+    AnalysisConfig,
+    AnalysisReport,
+    AnalysisTold,
     CameraChanged,
     CameraNews,
     GrabberConfig,
     GrabberDied,
+    JumpMeasured,
     RecorderCommand,
     RecorderConfig,
     RecorderEvent,
@@ -30,6 +34,7 @@ from rig.transport.messages import (
     RecorderReady,
     RecorderReport,
     RecorderWarm,
+    TellResult,
 )
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
 from rig.transport.ring import CameraRing
@@ -37,6 +42,7 @@ from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
 
 RECORDER: Final = "recorder"
+ANALYSIS: Final = "analysis"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +110,8 @@ class RigProcesses:
         self._doorbell = -1
         self._epoch = host_now() if epoch is None else epoch
         self._names = [camera.name for camera in rig.cameras]
-        self._back_offs = {name: BackOff() for name in self._names}
+        self._helpers = [*self._names, *([] if rig.analysis is None else [ANALYSIS])]
+        self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
         self.cameras = [CameraPresence()] * len(rig.cameras)
         self.warm = self.ready = self.recorder_died = False
@@ -120,8 +127,8 @@ class RigProcesses:
                 self._rings.append(ring)
             stack.callback(self._processes.stop)
             self._start_recorder()
-            for index in range(len(self._rig.cameras)):
-                self._start_grabber(index)
+            for name in self._helpers:
+                self._start(name)
             self._exit = stack.pop_all()
         return self
 
@@ -133,11 +140,11 @@ class RigProcesses:
     @property
     def pids(self) -> dict[str, int]:
         """Process ids by row of the process table."""
-        return {name: self._processes[name].pid for name in (*self._names, RECORDER)}
+        return {name: self._processes[name].pid for name in (*self._helpers, RECORDER)}
 
     @property
     def restarts(self) -> dict[str, int]:
-        """How many times each grabber died, by camera."""
+        """How many times each grabber, by camera, and the analysis died."""
         return {name: back_off.deaths for name, back_off in self._back_offs.items()}
 
     @property
@@ -158,15 +165,17 @@ class RigProcesses:
         """Kill a recorder that does not answer; the next `turn` raises ProcessDiedError."""
         self._processes[RECORDER].kill()
 
-    def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport]:
+    def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
+
+        Results of the analysis go on to the recorder.
 
         Args:
             timeout_s: longest wait for the first report, s.
             wake: descriptors that end the wait when they become readable.
 
         Returns:
-            The reports.
+            The reports, and the jumps that were measured.
 
         Raises:
             ProcessDiedError: the recorder died; raised once, after all its reports have been returned.
@@ -174,6 +183,11 @@ class RigProcesses:
         reports = [message for _, message in self._processes.receive(timeout_s, wake)]
         for report in reports:
             match report:
+                case TellResult():
+                    if not self.recorder_died:
+                        self.tell(report)
+                case AnalysisTold():
+                    self._on_event(report.event)
                 case CameraChanged():
                     self._note_camera(report)
                 case RecorderWarm():
@@ -186,7 +200,7 @@ class RigProcesses:
                     self.health = report.health
                     self._note_recovered(report.health)
         self._tend()
-        return reports
+        return [report for report in reports if not isinstance(report, TellResult | AnalysisTold)]
 
     def restart_recorder(self) -> None:
         """Start a recorder in place of the dead one; it takes over cameras that are still streaming at once."""
@@ -210,23 +224,38 @@ class RigProcesses:
         """Start dead grabbers again, after a wait that grows; raise if the recorder died."""
         for child in self._processes.dead():
             if child.spec.name != RECORDER:
-                self._tend_grabber(child)
+                self._tend_helper(child)
             elif child.control.ended and not self.recorder_died:
                 self.recorder_died, self.ready, self.warm, self.health = True, False, False, None
                 self.cameras = [CameraPresence()] * len(self._names)
                 raise ProcessDiedError(f"the recorder process ended ({child.ending()}): if it recurs, run svev doctor")
 
-    def _tend_grabber(self, child: Child) -> None:
+    def _tend_helper(self, child: Child) -> None:
         name, now = child.spec.name, time.monotonic()
         if child not in self._again:
-            reason = f"grabber process ended ({child.ending()})"
+            what = "process" if name == ANALYSIS else "grabber process"
+            reason = f"{what} ended ({child.ending()})"
             wait_s = self._back_offs[name].died(now - child.started)
             self._again[child] = now + wait_s
             self._on_event(Event.now(Level.ERROR, name, f"{reason}; starting it again in {wait_s:g} s"))
-            self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
+            if name != ANALYSIS:
+                self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
         elif now >= self._again[child]:
             del self._again[child]
+            self._start(name)
+
+    def _start(self, name: str) -> None:
+        """Start a grabber, by the name of its camera, or the analysis."""
+        if name == ANALYSIS:
+            self._start_analysis()
+        else:
             self._start_grabber(self._names.index(name))
+
+    def _start_analysis(self) -> None:
+        config = AnalysisConfig(rig=self._rig)
+        self._processes.start(
+            ProcessSpec(ANALYSIS, "service.processes.analysis_process", config, reports=AnalysisReport)
+        )
 
     def _start_recorder(self) -> None:
         fds, options = tuple(ring.fd for ring in self._rings), self._options

@@ -10,6 +10,7 @@ from rig.settings.model import RigSettings
 from rig.status import (
     CameraStatus,
     DiskStatus,
+    LastJump,
     PrerollStatus,
     ProcessStatus,
     PulseStatus,
@@ -58,6 +59,7 @@ class Facts:
     preroll_s: float
     recording: Recording | None
     last_recording: str | None
+    last_jump: LastJump | None
     pids: dict[str, int]
     restarts: dict[str, int]
 
@@ -98,6 +100,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         ),
         recording=facts.recording,
         last_recording=facts.last_recording,
+        last_jump=facts.last_jump,
         processes=tuple(_process(name, pid, facts.restarts.get(name, 0)) for name, pid in facts.pids.items()),
     )
 

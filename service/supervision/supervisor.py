@@ -16,8 +16,8 @@ from rig.errors import ProcessDiedError, StateForbidsError, SvevError
 from rig.events import Event, Level
 from rig.health import Health
 from rig.settings.model import RigSettings
-from rig.status import State, Status
-from rig.transport.messages import RecorderFailed, RecorderOptions, RecorderReport
+from rig.status import LastJump, State, Status
+from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderOptions, RecorderReport
 from service.processes.rig_processes import RECORDER, CameraPresence
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
@@ -106,6 +106,7 @@ class Supervisor:
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
         self.health: Health | None = None
+        self._last_jump: LastJump | None = None
         self._status = self._picture()
         self._thread = threading.Thread(target=self._run, name="supervisor")
 
@@ -249,7 +250,10 @@ class Supervisor:
             select.select([self.commands.bell], [], [], _TURN_S)
             return
         for report in processes.turn(_TURN_S, (self.commands.bell,)):
-            self._hear(report)
+            if isinstance(report, JumpMeasured):
+                self._jump_measured(report.jump)
+            else:
+                self._hear(report)
         if not processes.recorder_died and self._watch.stuck(processes):
             self._session.tell(Event.now(Level.FATAL, RECORDER, f"no sign of life for {STUCK_S:g} s: it is ended"))
             processes.kill_recorder()
@@ -260,6 +264,11 @@ class Supervisor:
         if isinstance(report, RecorderFailed) and self.recordings.current is None:
             self._fault.complain(report.error())
         self.recordings.hear(report)
+
+    def _jump_measured(self, jump: LastJump) -> None:
+        self._last_jump, self._dirty = jump, True
+        level = Level.INFO if jump.ok else Level.WARNING
+        self._session.tell(Event.now(level, "analysis", f"jump {jump.jump} of {jump.recording}: {jump.verdict}"))
 
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""
@@ -323,6 +332,7 @@ class Supervisor:
             preroll_s=self._recorder.preroll_s,
             recording=current.view() if current is not None and not current.opening else None,
             last_recording=self.recordings.last,
+            last_jump=self._last_jump,
             pids={} if processes is None else processes.pids,
             restarts={RECORDER: self._fault.deaths, **(processes.restarts if processes else {})},
         )

@@ -6,6 +6,7 @@ import { startSettings } from "./frame/settings.js";
 import { startLanguage } from "./i18n/i18n.js";
 import { startActions } from "./live/actions.js";
 import { startHealth } from "./live/health.js";
+import { startMeasured } from "./live/measured.js";
 import { startPreview } from "./live/preview.js";
 import { startSession } from "./live/session.js";
 import { startState } from "./live/state.js";
@@ -50,7 +51,7 @@ async function begin() {
 
 startSettings(redraw);
 startLanguage();
-for (const start of [startState, startSession, startActions, startPreview, startHealth, startBanner, startLog]) start();
+for (const start of [startState, startSession, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
 for (const start of [doctor.startDoctor, recordings.startRecordings, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
 startLogin(() => location.reload());
 startRouter(entered);

@@ -27,6 +27,7 @@ from rig.topics import JUMPER
 from rig.transport.messages import (
     CameraChanged,
     CameraNews,
+    JumpMeasured,
     RecorderFailed,
     RecorderHealth,
     RecorderOptions,
@@ -58,7 +59,7 @@ class Running:
     processes: RigProcesses
     preview: PreviewSlot
     folder: Path
-    reports: list[RecorderReport] = field(default_factory=list)
+    reports: list[RecorderReport | JumpMeasured] = field(default_factory=list)
 
     def turn(self) -> None:
         """Receive reports."""

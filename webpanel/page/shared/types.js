@@ -100,6 +100,22 @@
  * @property {string} name
  * @property {string} message
  *
+ * @typedef {object} MeasuredValue
+ * @property {number} value
+ * @property {number} sigma
+ *
+ * @typedef {object} LastJump
+ * @property {string} recording
+ * @property {number} jump
+ * @property {string} time
+ * @property {boolean} ok
+ * @property {string} verdict
+ * @property {MeasuredValue|null} takeoff_speed
+ * @property {MeasuredValue|null} perpendicular
+ * @property {MeasuredValue|null} speed_20_m
+ * @property {MeasuredValue|null} angle_of_attack
+ * @property {MeasuredValue|null} ski_to_body
+ *
  * @typedef {object} Status
  * @property {State} state
  * @property {string} since
@@ -112,6 +128,7 @@
  * @property {DiskStatus} disk
  * @property {Recording|null} recording
  * @property {string|null} last_recording
+ * @property {LastJump|null} last_jump
  * @property {ProcessStatus[]} processes
  *
  * @typedef {object} Finding

@@ -1,0 +1,81 @@
+"""The program of the analysis process: measures the jumper from the triplets that the recorder publishes.
+
+It is nice to the others: recorder and grabbers come first, and what it misses can be analyzed from the log.
+"""
+
+import os
+from typing import Final
+
+from analysis.worker.findings import Findings, MeasuredJump
+from analysis.worker.live import LiveAnalysis
+from analysis.worker.stream import Source, connected
+from recorder.publishing.keys import load_keys
+from rig.clocks import UtcNs
+from rig.errors import SvevError
+from rig.events import Event, Level
+from rig.jumper import JumperState
+from rig.pulse import PulseNumber
+from rig.topics import JUMPER, JUMPER_SCENE
+from rig.transport.channel import ControlChannel
+from rig.transport.child import begin
+from rig.transport.messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Quit, TellResult
+
+#: It holds nothing that could be lost.
+_GRACE_S: Final = 2.0
+_NICE: Final = 10
+_WAKE_S: Final = 0.2
+
+
+class _Reports(Findings):
+    """Sends what the analysis finds to the service."""
+
+    def __init__(self, control: ControlChannel[AnalysisReport]) -> None:
+        self._control = control
+
+    def state(self, state: JumperState) -> None:
+        """A measured pulse."""
+        self._control.send(
+            TellResult(
+                recording=state.recording, topic=JUMPER.name, pulse=state.pulse, time=state.time, data=state.encode()
+            )
+        )
+
+    def scene(self, recording: str, pulse: PulseNumber, time: UtcNs, scene: bytes) -> None:
+        """The scene in 3D at a pulse."""
+        self._control.send(TellResult(recording=recording, topic=JUMPER_SCENE.name, pulse=pulse, time=time, data=scene))
+
+    def jump(self, jump: MeasuredJump) -> None:
+        """A whole jump."""
+        self._control.send(JumpMeasured(jump=jump.summary))
+
+    def message(self, level: Level, text: str) -> None:
+        """Something that people should know."""
+        self._control.send(AnalysisTold(event=Event.now(level, "analysis", text)))
+
+
+def main() -> None:
+    """Measure until told to quit."""
+    child = begin(AnalysisConfig, Quit, _GRACE_S)
+    os.nice(_NICE)
+    rig = child.config.rig
+    reports = _Reports(child.control)
+    if rig.analysis is None:
+        raise SystemExit("analysis: the rig file has no [analysis] table")
+    keys = None if rig.network.curve_key_file is None else load_keys(rig.network.curve_key_file)
+    try:
+        exposures = {camera.name: camera.exposure_us / 1e6 for camera in rig.cameras}
+        analysis = LiveAnalysis(rig.analysis.survey, rig.analysis.calibration, reports, exposures)
+    except SvevError as error:
+        reports.message(Level.ERROR, str(error))
+        raise SystemExit(error.exit_code) from None
+    source = Source(rig.network.publish_ipc or rig.network.publish, public_key=None if keys is None else keys.public)
+    with connected(source) as stream:
+        quiet_s = 0.0
+        while not child.stopping():
+            received = stream.next(_WAKE_S)
+            quiet_s = quiet_s + _WAKE_S if received is None else 0.0
+            analysis.idle(quiet_s) if received is None else analysis.take(received)
+
+
+if __name__ == "__main__":
+    main()

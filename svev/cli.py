@@ -39,6 +39,7 @@ _COMMANDS: Final = {
     "calibrate": ("calibrate", "calibrate", "Calibrate cameras with images of a 3D frame."),
     "orient": ("orient", "orient", "Estimate the poses of the cameras on the hill."),
     "analyze": ("analyze", "analyze_command", "Measure the jumps of a recording."),
+    "compare": ("compare", "compare", "Compare two measured jumps."),
     "plan": ("plan", "plan", "Predict the accuracy of planned cameras."),
     "bench": ("bench", "bench", "Measure how fast this computer records."),
 }

@@ -7,9 +7,10 @@ smoother with a white-noise-on-jerk prior applied to the raw errors). There are 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from analysis.measurements.model import POINTS, SIDES
 from analysis.result.model import (
@@ -80,7 +81,7 @@ class Model:
 
 @cache
 def model(jump_seed: int = 1, leg_deg: float = 0.0) -> Model:
-    """The model of a jump; `leg_deg`: by how much helmet and hip are turned backwards about the bindings."""
+    """The model of a jump; `leg_deg`: by how much helmet and hip are turned backwards in flight."""
     truth, system = true_jump(jump_seed), true_cameras()
     pulses = [p for p in range(1, 200) if -6 <= truth.pose(p).origin[0] <= 24]
     places = np.stack([_places(truth, pulse, leg_deg) for pulse in pulses])
@@ -106,7 +107,7 @@ def model(jump_seed: int = 1, leg_deg: float = 0.0) -> Model:
         by_coordinates,
         posterior * weights[:, None, :],
         posterior,
-        np.asarray(np.gradient(np.eye(n), 1 / RATE_HZ, axis=0)),
+        CubicSpline(np.arange(n) / RATE_HZ, np.eye(n))(np.arange(n) / RATE_HZ, 1),
         system.covariance,
     )
 
@@ -127,12 +128,11 @@ def recording(
         seed: draws the errors of measurement.
         calibration_error: (p,) of the cameras' parameters; see `calibration_error`. None: there is none.
         source: identifies the calibration.
-        leg_deg: by how much this jumper's legs and body are turned backwards about the bindings.
+        leg_deg: by how much this jumper's legs and body are turned backwards about the bindings in flight.
         jumps: how many; the second is another jump of the same jumper.
     """
     found = [
-        _jump(model(jump_seed + k, leg_deg), np.random.default_rng((seed, k)), calibration_error, k + 1)
-        for k in range(jumps)
+        _jump(jump_seed + k, leg_deg, np.random.default_rng((seed, k)), calibration_error, k + 1) for k in range(jumps)
     ]
     session = {"athlete": "A. Jumper", "bib": "7"}
     synchrony = {name: CameraOffset(0.1 * i, 0.2, None) for i, name in enumerate(true_cameras().names)}
@@ -163,7 +163,8 @@ def quantities(state: Floats) -> Floats:
 
 def _places(truth: TrueJump, pulse: int, leg_deg: float) -> Floats:
     pose = truth.pose(pulse)
-    turn = rotation_from_vector(-np.radians(leg_deg) * pose.axes[1])
+    turned = leg_deg if phase_at(truth.since_takeoff(pulse)) is Phase.FLIGHT else 0.0
+    turn = rotation_from_vector(-np.radians(turned) * pose.axes[1])
     body = pose.origin + (pose.markers[:2] - pose.origin) @ turn.T
     half = truth.ski_length / 2
     ends = [pose.markers[2 + s] + sign * half * pose.skis[s] for s in (0, 1) for sign in (-1, 1)]
@@ -176,7 +177,8 @@ def _seen(place: int, i: int) -> bool:
     return not (place >= 6 and LEFT_SKI_GAP[0] <= i < LEFT_SKI_GAP[1])
 
 
-def _jump(m: Model, rng: np.random.Generator, error: Floats | None, number: int) -> Jump:
+def _jump(jump_seed: int, leg_deg: float, rng: np.random.Generator, error: Floats | None, number: int) -> Jump:
+    m, (raw_spreads, smoothed_spreads) = model(jump_seed, leg_deg), _spreads(jump_seed, leg_deg)
     n = len(m.pulses)
     noise = np.einsum("pij,npj->npi", np.linalg.cholesky(m.covariance), rng.standard_normal((n, 8, 3)))
     shift = np.zeros((n, 24)) if error is None else m.by_calibration @ error
@@ -184,7 +186,19 @@ def _jump(m: Model, rng: np.random.Generator, error: Floats | None, number: int)
     smoothed = m.places + np.einsum("pij,jpk->ipk", m.smoother, noise) + shift.reshape(n, 8, 3)
     velocity = m.gradient @ smoothed[:, 2:4].mean(axis=1)
     takeoff = m.truth.takeoff_pulse + TAKEOFF_SIGMA_PULSES * rng.standard_normal()
-    states = [_pulse(m, i, raw, smoothed, velocity, takeoff) for i in range(n)]
+    states = []
+    for i, pulse in enumerate(m.pulses):
+        since = (pulse - takeoff) / RATE_HZ
+        states.append(
+            PulseState(
+                PulseNumber(pulse),
+                UtcNs(START_NS + round(pulse * 1e9 / RATE_HZ)),
+                since,
+                phase_at(since),
+                _raw(i, raw, raw_spreads[i]),
+                _state(i, smoothed[i], velocity[i], smoothed_spreads[i]),
+            )
+        )
     time = UtcNs(START_NS + round(takeoff * 1e9 / RATE_HZ))
     phases = {phase: {"pulses": sum(s.phase is phase for s in states), "chi2_by_dof": 1.02} for phase in Phase}
     tests = tuple(
@@ -201,21 +215,64 @@ def _jump(m: Model, rng: np.random.Generator, error: Floats | None, number: int)
     )
 
 
-def _pulse(m: Model, i: int, raw: Floats, smoothed: Floats, velocity: Floats, takeoff: float) -> PulseState:
-    since = (m.pulses[i] - takeoff) / RATE_HZ
-    time = UtcNs(START_NS + round(m.pulses[i] * 1e9 / RATE_HZ))
-    return PulseState(
-        PulseNumber(m.pulses[i]), time, since, phase_at(since), _raw(m, i, raw), _smoothed(m, i, smoothed, velocity)
+@dataclass(frozen=True, slots=True, eq=False)
+class Spread:
+    """What the errors of a state do, near the true state: gamma has no derivative where the skis are parallel.
+
+    Attributes:
+        whole: (27, 27) covariance of 24 coordinates and the velocity.
+        sigmas: (11,) of `QUANTITIES`.
+        by_calibration: (11, p) of `QUANTITIES`.
+        skis: (2, 2, 2) covariance of slope and heading, degrees^2, right and left.
+    """
+
+    whole: Floats
+    sigmas: Floats
+    by_calibration: Floats
+    skis: Floats
+
+
+@cache
+def _spreads(jump_seed: int, leg_deg: float) -> tuple[list[Spread], list[Spread]]:
+    """Of raw and of smoothed states, pulse by pulse."""
+    m = model(jump_seed, leg_deg)
+    n = len(m.pulses)
+    velocity = m.gradient @ m.places[:, 2:4].mean(axis=1)
+    raw, smoothed = [], []
+    origin_change = m.by_calibration.reshape(n, 8, 3, -1)[:, 2:4].mean(axis=1)
+    factors = np.linalg.cholesky(m.covariance)
+    for i in range(n):
+        near = m.places[i] + np.einsum("pij,pj->pi", factors, np.random.default_rng(i).standard_normal((8, 3)))
+        state = np.concatenate((near.ravel(), velocity[i]))
+        change = np.einsum("n,njp->jp", m.gradient[i], origin_change)
+        noise = m.covariance[2:4].sum(axis=0) / 4 * RATE_HZ**2 / 2
+        raw.append(_spread(m, i, state, m.covariance, noise, change))
+        rates = (m.gradient[i] @ m.posterior[2:4] @ m.gradient[i])[:, None, None]
+        noise = (m.covariance[2:4] * rates).sum(axis=0) / 4
+        smoothed.append(_spread(m, i, state, m.covariance * m.posterior[:, i, i, None, None], noise, change))
+    return raw, smoothed
+
+
+def _spread(m: Model, i: int, state: Floats, places: Floats, velocity: Floats, change: Floats) -> Spread:
+    by_calibration = np.concatenate((m.by_calibration[i], change))
+    whole = by_calibration @ m.calibration @ by_calibration.T
+    for place in range(8):
+        whole[3 * place : 3 * place + 3, 3 * place : 3 * place + 3] += places[place]
+    whole[24:, 24:] += velocity
+    derivative = _derivative(quantities, state)
+    skis = [_derivative(partial(_slope_and_heading, tail=tail), state) for tail in (4, 6)]
+    return Spread(
+        whole,
+        np.sqrt(np.diagonal(derivative @ whole @ derivative.T)),
+        derivative @ by_calibration,
+        np.stack([d @ whole @ d.T for d in skis]),
     )
 
 
-def _raw(m: Model, i: int, raw: Floats) -> JumperState:
-    n = len(m.pulses)
-    before, after = max(i - 1, 0), min(i + 1, n - 1)
-    velocity = (raw[after, 2:4] - raw[before, 2:4]).mean(axis=0) * RATE_HZ / 2
-    change = (m.by_calibration[after] - m.by_calibration[before]).reshape(8, 3, -1)[2:4].mean(axis=0) * RATE_HZ / 2
-    noise = m.covariance[2:4].sum(axis=0) / 4 * RATE_HZ**2 / 2
-    state = _state(m, i, raw, velocity, m.covariance, noise, change, smoothed=False)
+def _raw(i: int, places: Floats, spread: Spread) -> JumperState:
+    before, after = max(i - 1, 0), min(i + 1, len(places) - 1)
+    velocity = (places[after, 2:4] - places[before, 2:4]).mean(axis=0) * RATE_HZ / 2
+    state = _state(i, places[i], velocity, spread, smoothed=False)
     seen = [_seen(place, i) for place in range(8)]
     angles = dict(state.angles)
     if not seen[0]:
@@ -227,76 +284,51 @@ def _raw(m: Model, i: int, raw: Floats) -> JumperState:
         {side: state.skis[side] if seen[4 + 2 * k] else None for k, side in enumerate(SIDES)},
         angles,
         state.height,
-        state.speed if 0 < i < n - 1 else None,
+        state.speed if 0 < i < len(places) - 1 else None,
     )
 
 
-def _smoothed(m: Model, i: int, smoothed: Floats, velocity: Floats) -> SmoothedState:
-    covariance = m.covariance * m.posterior[:, i, i, None, None]
-    rates = (m.gradient[i] @ m.posterior[2:4] @ m.gradient[i])[:, None, None]
-    change = np.einsum("n,npk->pk", m.gradient[i], m.by_calibration).reshape(8, 3, -1)[2:4].mean(axis=0)
-    return _state(m, i, smoothed, velocity[i], covariance, (m.covariance[2:4] * rates).sum(axis=0) / 4, change)
-
-
-def _state(
-    m: Model,
-    i: int,
-    places: Floats,
-    velocity: Floats,
-    covariance: Floats,
-    velocity_noise: Floats,
-    velocity_by_calibration: Floats,
-    *,
-    smoothed: bool = True,
-) -> SmoothedState:
-    by_calibration = np.concatenate((m.by_calibration[i], velocity_by_calibration))
-    noise = np.zeros((27, 27))
-    for place in range(8):
-        noise[3 * place : 3 * place + 3, 3 * place : 3 * place + 3] = covariance[place]
-    noise[24:, 24:] = velocity_noise
-    whole = noise + by_calibration @ m.calibration @ by_calibration.T
-    state = np.concatenate((places[i].ravel(), velocity))
-    derivative = _derivative(quantities, state)
-    values, sigmas = quantities(state), np.sqrt(np.diagonal(derivative @ whole @ derivative.T))
-    found = [Quantity(float(v), float(s)) for v, s in zip(values, sigmas, strict=True)]
+def _state(i: int, places: Floats, velocity: Floats, spread: Spread, *, smoothed: bool = True) -> SmoothedState:
+    state = np.concatenate((places.ravel(), velocity))
+    found = [Quantity(float(v), float(s)) for v, s in zip(quantities(state), spread.sigmas, strict=True)]
     middle = np.zeros((3, 27))
     middle[:, 6:9] = middle[:, 9:12] = np.eye(3) / 2
     status = [_status(place, i, smoothed=smoothed) for place in range(8)]
     points = {
-        name: PointState(places[i, k], whole[3 * k : 3 * k + 3, 3 * k : 3 * k + 3], _cameras(k, i), status[k])
+        name: PointState(places[k], spread.whole[3 * k : 3 * k + 3, 3 * k : 3 * k + 3], _cameras(k, i), status[k])
         for k, name in enumerate(POINTS)
     }
-    skis = {side: _ski(state, whole, 4 + 2 * k, status[4 + 2 * k], i) for k, side in enumerate(SIDES)}
+    skis = {side: _ski(state, 4 + 2 * k, spread.skis[k], status[4 + 2 * k], i) for k, side in enumerate(SIDES)}
     return SmoothedState(
         points,
         skis,
         dict(zip(ANGLES, found[:5], strict=True)),
         found[6],
         found[7],
-        origin=Vector(middle @ state, middle @ whole @ middle.T),
-        velocity=Vector(velocity, whole[24:, 24:]),
+        origin=Vector(middle @ state, middle @ spread.whole @ middle.T),
+        velocity=Vector(velocity, spread.whole[24:, 24:]),
         angle_of_attack=found[5],
-        by_calibration=derivative @ by_calibration,
+        by_calibration=spread.by_calibration,
     )
 
 
-def _ski(state: Floats, whole: Floats, tail: int, status: Status, i: int) -> SkiState:
-    def angles(x: Floats) -> Floats:
-        along = x[3 * tail + 3 : 3 * tail + 6] - x[3 * tail : 3 * tail + 3]
-        return np.array([np.degrees(slope(along)), np.degrees(np.arctan2(along[1], along[0]))])
-
-    derivative = _derivative(angles, state)
-    value, covariance = angles(state), derivative @ whole @ derivative.T
+def _ski(state: Floats, tail: int, covariance: Floats, status: Status, i: int) -> SkiState:
+    slope_deg, heading_deg = _slope_and_heading(state, tail)
     sigma = np.sqrt(np.diagonal(covariance))
     direction = state[3 * tail + 3 : 3 * tail + 6] - state[3 * tail : 3 * tail + 3]
     return SkiState(
         direction / np.linalg.norm(direction),
-        Quantity(float(value[0]), float(sigma[0])),
-        Quantity(float(value[1]), float(sigma[1])),
+        Quantity(float(slope_deg), float(sigma[0])),
+        Quantity(float(heading_deg), float(sigma[1])),
         float(covariance[0, 1] / sigma.prod()),
         _cameras(tail, i),
         status,
     )
+
+
+def _slope_and_heading(state: Floats, tail: int) -> Floats:
+    along = state[3 * tail + 3 : 3 * tail + 6] - state[3 * tail : 3 * tail + 3]
+    return np.array([np.degrees(slope(along)), np.degrees(np.arctan2(along[1], along[0]))])
 
 
 def _status(place: int, i: int, *, smoothed: bool) -> Status:
@@ -317,6 +349,7 @@ def _derivative(function: Callable[[Floats], Floats], x: Floats, step: float = 1
     return np.stack([(function(x + d) - function(x - d)) / (2 * step) for d in steps], axis=-1)
 
 
+@cache
 def _orientation(source: str) -> OrientationResult:
     system = true_cameras()
     sigmas = np.sqrt(np.diagonal(system.covariance))

@@ -1,0 +1,59 @@
+"""How two measurements of one motion differ: the covariance of smoothed values by the errors of measurement alone.
+
+A measured jump states, for each smoothed value, a variance that holds both the errors of measurement and how much the
+motion may have departed from what the smoother expects. Two measurements of the same motion share the latter, so only
+the former says whether two jumps differ. The model over time smooths with a white-noise-on-jerk prior; for a signal
+sampled at equal times this is a filter with the frequency response
+
+    S(w) = 1 / (1 + k (2 - 2 cos w)^3),    variance of the smoothed / of the raw value = mean of S over w,
+
+which gives k from the variances. Errors of measurement then have the spectrum S^2, those of rates w^2 S^2, the stated
+variance belongs to S and w^2 S. Of the stated variance of values errors of measurement are 5/6, of that of rates 1/2,
+if the smoother reaches far. Near the ends of a jump the smoother is one-sided: there nearly all of the variance of
+rates is from errors of measurement, so all of it is taken.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from analysis.comparison.aligned import RATES, Series
+from rig.arrays import Flags, Floats
+
+_FREQUENCIES: Final = 128
+_STIFFNESSES: Final = np.logspace(-4, 9, 131)
+
+
+def noise_covariance(series: Series) -> Floats:
+    """Covariance (11 T, 11 T) of a jump's smoothed values by the errors of measurement, quantity by quantity."""
+    frequencies = (np.arange(_FREQUENCIES) + 0.5) * np.pi / _FREQUENCIES
+    amplitude = _amplitude(series.share, frequencies)
+    one_sided = RATES[:, None] & _near_ends(series)
+    amplitude[one_sided] /= np.linalg.norm(amplitude[one_sided], axis=-1, keepdims=True)
+    amplitude *= np.sqrt(series.variance)[..., None]
+    phase = series.times[:, None] * series.rate_hz * frequencies
+    waves = np.concatenate((amplitude * np.cos(phase), amplitude * np.sin(phase)), axis=-1)
+    count, times = series.share.shape
+    factor = waves.reshape(count * times, -1)
+    blocks = np.kron(series.correlation, np.ones((times, times)))
+    return np.asarray(factor @ factor.T * blocks)
+
+
+def _amplitude(share: Floats, frequencies: Floats) -> Floats:
+    """(11, T, w) of the errors of measurement, for a stated variance of 1."""
+    response = 1 / (1 + _stiffness(share)[..., None] * (2 - 2 * np.cos(frequencies)) ** 3)
+    weight = np.where(RATES[:, None, None], frequencies**2, 1.0)
+    return np.asarray(np.sqrt(weight) * response / np.sqrt((weight * response).sum(axis=-1, keepdims=True)))
+
+
+def _near_ends(series: Series) -> Flags:
+    """Which values (11, T) the smoother's window, 1 / share pulses wide, would take from beyond the ends."""
+    within = np.minimum(series.times - series.ends_s[0], series.ends_s[1] - series.times) * series.rate_hz
+    return np.asarray(within < 0.5 / series.share)
+
+
+def _stiffness(share: Floats) -> Floats:
+    """The k that gives these shares."""
+    frequencies = (np.arange(_FREQUENCIES) + 0.5) * np.pi / _FREQUENCIES
+    shares = (1 / (1 + _STIFFNESSES[:, None] * (2 - 2 * np.cos(frequencies)) ** 3)).mean(axis=-1)
+    return np.asarray(np.exp(np.interp(share, shares[::-1], np.log(_STIFFNESSES)[::-1])))

@@ -1,0 +1,75 @@
+"""`svev compare`: two measured jumps."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from analysis.comparison.aligned import MeasuredJump, comparable, measured_jump
+from analysis.comparison.difference import difference
+from analysis.comparison.report import Comparison, report, summary, to_json
+from analysis.comparison.scatter import scatter
+from analysis.result.file import read
+from analysis.result.model import MeasuredRecording
+from photogrammetry.reports.document import as_html
+from rig.errors import BadInputError
+from svev import console
+
+_Folder = Annotated[Path, typer.Argument(help="folder that svev analyze wrote, or its jumper.json")]
+
+
+def compare(
+    dir_a: _Folder,
+    dir_b: _Folder,
+    out: Annotated[Path, typer.Option("--out", help="folder for comparison.json and comparison.html")],
+    jump_a: Annotated[int, typer.Option("--jump-a", min=1, help="number of the jump in DIR_A")] = 1,
+    jump_b: Annotated[int, typer.Option("--jump-b", min=1, help="number of the jump in DIR_B")] = 1,
+    also: Annotated[
+        list[Path] | None, typer.Option("--also", help="further jumps, for the athlete's own scatter; may be repeated")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="end with one JSON object: the result without series")
+    ] = False,
+) -> None:
+    """Compare two measured jumps: aligned at the take-off, differences with their significance.
+
+    Exit codes: 0 compared, whether they differ or not; 2 bad input.
+
+    Example: svev compare monday tuesday --also wednesday --out compared
+    """
+    recordings = {path: read(path) for path in dict.fromkeys((dir_a, dir_b, *(also or ())))}
+    if recordings[dir_a] is recordings[dir_b] and jump_a == jump_b:
+        raise BadInputError(f"{dir_a}: this is one jump; choose another to compare it with by --jump-b")
+    a = measured_jump(recordings[dir_a], jump_a, str(dir_a))
+    b = measured_jump(recordings[dir_b], jump_b, str(dir_b))
+    found = difference(a, b)
+    comparison = Comparison(a, b, found, scatter(_others(recordings, a, b), found.times))
+    result = to_json(comparison)
+    out.mkdir(parents=True, exist_ok=True)
+    written = json.dumps(result, allow_nan=False, ensure_ascii=False) + "\n"
+    (out / "comparison.json").write_text(written, encoding="utf-8")
+    (out / "comparison.html").write_text(as_html(report(comparison)), encoding="utf-8")
+    for line in [*summary(comparison), f"result in {out / 'comparison.json'} and {out / 'comparison.html'}"]:
+        console.say(line, aside=as_json)
+    if as_json:
+        console.print_json(_without_series(result))
+
+
+def _others(recordings: dict[Path, MeasuredRecording], *compared: MeasuredJump) -> list[MeasuredJump]:
+    """All jumps that can be compared but the two that are."""
+    chosen = [jump.jump for jump in compared]
+    return [
+        MeasuredJump(str(path), recording, jump)
+        for path, recording in recordings.items()
+        for jump in recording.jumps
+        if comparable(jump) and not any(jump is other for other in chosen)
+    ]
+
+
+def _without_series(result: dict[str, Any]) -> dict[str, Any]:
+    quantities = {
+        name: {key: value for key, value in found.items() if not isinstance(value, list)}
+        for name, found in result["quantities"].items()
+    }
+    return {key: value for key, value in result.items() if key != "since_takeoff_s"} | {"quantities": quantities}

@@ -1,0 +1,155 @@
+"""What is found different, and how often, in jumps whose truth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.comparison.aligned import RATES, MeasuredJump, Series, common_times, measured_jump, series
+from analysis.comparison.difference import LEVEL, Difference, difference
+from analysis.comparison.repeatability import noise_covariance
+from analysis.comparison.scatter import scatter
+from analysis.result.model import QUANTITIES, MeasuredRecording
+from rig.arrays import Floats
+from rig.errors import BadInputError
+from tests.analysis.result.recordings import calibration_error, recording, without_takeoff
+
+COMPARISONS = 40
+FEW = 400  #: draws; the limit is known to 2 % from them
+HEIGHT = QUANTITIES.index("height")
+
+
+def measured(seed: int = 0, leg_deg: float = 0.0, error: Floats | None = None, source: str = "one") -> MeasuredJump:
+    given = recording(seed=seed, leg_deg=leg_deg, calibration_error=error, source=source)
+    return measured_jump(given, 1, f"jump {seed}")
+
+
+@pytest.fixture(scope="module")
+def repeated() -> list[Difference]:
+    """The same jump measured twice, each pair with another calibration that both have in common."""
+    return [
+        difference(measured(2 * i, error=calibration_error(i)), measured(2 * i + 1, error=calibration_error(i)), FEW)
+        for i in range(COMPARISONS)
+    ]
+
+
+def test_the_same_jump_is_rarely_found_different(repeated: list[Difference]) -> None:
+    """Of 40 comparisons 2 are expected; more than 7 come with a probability of 0.03 %."""
+    assert sum(bool(d.found()) for d in repeated) <= 7
+
+
+def test_differences_of_repeated_measurements_have_the_stated_sigma(repeated: list[Difference]) -> None:
+    """Some 40 x 10 independent values know a mean square to 7 %; the model of the smoother adds to it."""
+    z = np.concatenate([d.value / d.repeat for d in repeated], axis=1)
+    squares = np.nanmean(z**2, axis=1)
+    assert min(squares) > 0.7
+    assert max(squares) < 1.3
+    assert all((d.repeat <= d.sigma * 1.001).all() for d in repeated)
+
+
+def test_a_change_is_found_as_often_as_predicted(repeated: list[Difference]) -> None:
+    """With 80 % predicted, 24 comparisons find 19 ± 2."""
+    power = repeated[0].power["alpha"]
+    assert power is not None
+    pairs = [difference(measured(i), measured(1000 + i, leg_deg=power.change_80), FEW) for i in range(24)]
+    assert 13 <= sum("alpha" in d.found() for d in pairs) <= 23
+
+
+def test_errors_of_one_calibration_cancel_and_those_of_two_count() -> None:
+    """24 draws know a mean square to 29 %."""
+    errors = [calibration_error(i) for i in range(48)]
+    same = difference(measured(1, error=errors[0]), measured(2, error=errors[0]), FEW)
+    without = difference(measured(1), measured(2), FEW)
+    assert same.value == pytest.approx(without.value, abs=2e-3)  # what is left is not linear
+    two = [
+        difference(measured(i, error=errors[2 * i]), measured(99 + i, error=errors[2 * i + 1], source="other"), 50)
+        for i in range(24)
+    ]
+    assert not two[0].same_calibration
+    middle = len(two[0].times) // 2
+    assert two[0].repeat[HEIGHT, middle] > 1.1 * same.repeat[HEIGHT, middle]
+    z = np.array([d.value[HEIGHT, middle] / d.repeat[HEIGHT, middle] for d in two])
+    assert 0.25 < np.mean(z**2) < 2.0
+
+
+def test_the_sigma_of_the_take_off_counts_where_a_quantity_changes() -> None:
+    one = measured(1)
+    takeoff = one.jump.takeoff
+    assert takeoff is not None
+    vague = replace(one, jump=replace(one.jump, takeoff=replace(takeoff, sigma_pulses=0.3)))
+    sharp, blurred = difference(one, measured(2), FEW), difference(vague, measured(2), FEW)
+    late = series(vague, blurred.times)
+    expected = np.sqrt(sharp.repeat**2 + (late.change / 30) ** 2 * (0.3**2 - takeoff.sigma_pulses**2))
+    assert blurred.repeat == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_greatest_of_all_is_judged_as_the_greatest(repeated: list[Difference]) -> None:
+    d = repeated[0]
+    count = np.isfinite(d.value).sum()
+    assert 11 < d.independent < count  # neighbours in time tell the same
+    z = np.abs(d.value / d.repeat)
+    assert ((d.p_greatest < LEVEL) == (z > d.limit)).all()
+    assert (d.p_greatest >= d.p).all()
+
+
+def test_a_quantity_that_was_not_measured_is_left_out() -> None:
+    one = measured(1)
+    pulses = tuple(
+        replace(p, smoothed=p.smoothed and replace(p.smoothed, angle_of_attack=None, angles={"alpha": None}))
+        for p in one.jump.pulses
+    )
+    d = difference(replace(one, jump=replace(one.jump, pulses=pulses)), measured(2), FEW)
+    assert np.isnan(d.value[:6]).all()
+    assert np.isfinite(d.value[6:]).all()
+    assert d.power["alpha"] is None
+    assert d.power["height"] is not None
+    assert d.greatest(0) is None
+
+
+def test_errors_of_measurement_are_five_sixths_of_the_variance_of_values_and_half_of_that_of_rates() -> None:
+    times = np.arange(-30, 31) / 30
+    count = len(QUANTITIES)
+    shape = (count, len(times))
+    wide = Series(
+        times,
+        np.zeros(shape),
+        np.zeros(shape),
+        np.ones(shape),
+        np.zeros((*shape, 1)),
+        np.full(shape, 0.05),
+        np.eye(count),
+        0.0,
+        30.0,
+        (-9.0, 9.0),
+    )
+    variance = noise_covariance(wide).diagonal().reshape(shape)[:, 30]
+    assert variance == pytest.approx(np.where(RATES, 1 / 2, 5 / 6), abs=0.02)
+
+
+def test_own_scatter_is_that_within_the_athletes() -> None:
+    jumps = [
+        measured_jump(replace(recording(seed=seed), session={"athlete": name}), 1, name)
+        for seed, name in enumerate("AABBC")
+    ]
+    times = common_times(jumps)
+    found = scatter(jumps, times)
+    assert found is not None
+    assert (found.jumps, found.freedom) == (4, 2)
+    values = np.stack([series(jump, times).values for jump in jumps])
+    expected = np.sqrt((np.var(values[:2], axis=0) + np.var(values[2:4], axis=0)) * 2 / 2)
+    assert found.deviation == pytest.approx(expected, nan_ok=True)
+    # with two degrees of freedom P(|t| > 4.303) = 5 %
+    assert found.p(4.303 * np.sqrt(2) * found.deviation) == pytest.approx(0.05, abs=1e-3)
+    assert scatter([jumps[0], jumps[2], jumps[4]], times) is None
+
+
+def test_a_jump_that_cannot_be_aligned_is_refused() -> None:
+    whole: MeasuredRecording = recording(1)
+    with pytest.raises(BadInputError, match="jump 1 has no take-off"):
+        measured_jump(without_takeoff(whole), 1, "monday")
+    with pytest.raises(BadInputError, match=r"monday: has no jump 3 \(it has 1\)"):
+        measured_jump(whole, 3, "monday")
+    jump = measured_jump(whole, 1, "monday")
+    later = tuple(replace(p, since_takeoff_s=p.since_takeoff_s + 5) for p in jump.jump.pulses)
+    with pytest.raises(BadInputError, match="same times since the take-off"):
+        difference(jump, replace(jump, jump=replace(jump.jump, pulses=later)))

@@ -26,6 +26,7 @@ class SkiLines:
     Attributes:
         cameras: the m cameras.
         xy: (n, m, k, 2) px.
+        ray: (n, m, k, 3) unit vectors from the cameras to what appears there.
         weight: (n, m, k) 1 / sigma^2 across the ski, px^-2; 0 where there is no point.
         common: (n, m) standard deviation across the ski that the points of an image share, px.
         seen: (n, m).
@@ -35,6 +36,7 @@ class SkiLines:
 
     cameras: Sequence[PlacedCamera]
     xy: Floats
+    ray: Floats
     weight: Floats
     common: Floats
     seen: Flags
@@ -49,7 +51,7 @@ class SkiLines:
         sight, start = np.zeros((n, 3)), np.zeros((n, 3))
         for image, camera in reversed(list(enumerate(self.cameras))):
             here = seen[:, image]
-            ray = np.where(self.weight[:, image, :, None] > 0, rays(camera, self.xy[:, image]), 0.0)
+            ray = np.where(self.weight[:, image, :, None] > 0, self.ray[:, image], 0.0)
             normal = np.linalg.eigh(np.swapaxes(ray, 1, 2) @ ray)[1][:, :, 0]
             normal = np.where(here[:, None], normal, 0.0)
             centre = camera.position - centroid - self.shift[:, image]
@@ -81,7 +83,7 @@ class SkiLines:
         xy, weight = self.xy[:, image], self.weight[:, image]
         n, k, _ = xy.shape
         origin, direction = state[:, None, :3] + self.shift[:, image, None], state[:, None, 3:]
-        there = _nearest_on_line(origin, direction, camera.position, rays(camera, xy))
+        there = _nearest_on_line(origin, direction, camera.position, self.ray[:, image])
         parts = camera.linearised(there.reshape(-1, 3), xy.reshape(-1, 2))
         v, by_point, by_camera = (part.reshape(n, k, *part.shape[1:]) for part in parts)
         tangent = _unit(np.einsum("nkab,nb->nka", by_point, state[:, 3:]))
@@ -134,6 +136,7 @@ class SkiLines:
         return replace(
             self,
             xy=self.xy[rows],
+            ray=self.ray[rows],
             weight=self.weight[rows],
             common=self.common[rows],
             seen=self.seen[rows],
@@ -145,7 +148,7 @@ class SkiLines:
         """The skis with right and left interchanged in one image; they stand in turn, as `skis_of` puts them."""
         other = np.arange(len(self.seen)) ^ 1
         result = self.subset(np.arange(len(self.seen)))
-        for array in (result.xy, result.weight, result.common, result.seen, result.by_hand):
+        for array in (result.xy, result.ray, result.weight, result.common, result.seen, result.by_hand):
             array[:, image] = array[other, image]
         return result
 
@@ -174,7 +177,8 @@ def skis_of(cameras: Sequence[PlacedCamera], pulses: Sequence[PulseMeasurements]
         xy[i, j, :points], weight[i, j, :points], common[i, j] = ski.xy, ski.sigma**-2.0, ski.common
         xy[i, j, points:] = ski.xy[0]  # with weight 0, but where rays and lines meet
         by_hand[i, j] = ski.source is Source.BY_HAND
-    return SkiLines(cameras, xy, weight, common, _long(xy, weight), by_hand, np.repeat(shift, len(SIDES), axis=0))
+    ray = np.stack([rays(camera, xy[:, j]) for j, camera in enumerate(cameras)], axis=1)
+    return SkiLines(cameras, xy, ray, weight, common, _long(xy, weight), by_hand, np.repeat(shift, len(SIDES), axis=0))
 
 
 def across_axes(direction: Floats) -> tuple[Floats, Floats]:

@@ -18,6 +18,8 @@ from analysis.measurements.model import (
 )
 from analysis.pulses.solution import RawJump, solve_pulses
 from analysis.result.model import JumperState, Status
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope
 from rig.errors import BadInputError
 from tests.analysis.simulated import TrueJump, drawn, simulated_measurements, true_cameras, true_jump
@@ -214,6 +216,70 @@ def test_exposures_of_different_length_belong_to_their_middles() -> None:
     found, true = aware.states[middle].points["P2"], jump.pose(pulse).markers[1]
     assert found is not None
     assert np.abs(found.xyz - true).max() < 5 * np.sqrt(found.covariance.diagonal().max())
+
+
+def turned(system: CameraSystem, degrees: float) -> CameraSystem:
+    """The same cameras in a survey whose frame is turned about Z and has its origin elsewhere."""
+    turn = rotation_from_vector(np.array((0.0, 0.0, np.radians(degrees))))
+    whole, cameras = np.eye(len(system.covariance)), {}
+    for name, camera in system.cameras.items():
+        whole[np.ix_(camera.columns[:3], camera.columns[:3])] = turn
+        position = turn @ camera.position + np.array((300.0, -5000.0, 800.0))
+        cameras[name] = replace(camera, position=position, rotation=turn @ camera.rotation)
+    return CameraSystem(cameras, whole @ system.covariance @ whole.T)
+
+
+@pytest.mark.parametrize("degrees", [90.0, 180.0, -137.0])
+def test_any_survey_frame_gives_the_same_jumper(degrees: float) -> None:
+    measurements = simulated_measurements(true_jump(8), true_cameras(), np.random.default_rng(8))
+    here = solved(measurements)
+    there = solve_pulses(measurements.jumps[0], measurements, turned(true_cameras(), degrees))
+    for one, other in zip(here.states, there.states, strict=True):
+        expected, found = ({name: (v, s) for name, v, s in numbers(state)} for state in (one, other))
+        assert expected.keys() == found.keys()
+        for name in set(expected) - {f"P{i} {axis}" for i in range(1, 5) for axis in "XYZ"} - {"height"}:
+            value, sigma = expected[name]
+            change = found[name][0] - value - (degrees if "heading" in name else 0.0)
+            assert abs((change + 180) % 360 - 180) < 1e-5 * sigma, name
+            assert found[name][1] == pytest.approx(sigma, rel=1e-4) or "heading" in name
+
+
+def all_around(count: int) -> CameraSystem:
+    """Cameras on both sides of the hill with lenses that distort, whose interior orientation is uncertain as well."""
+    cameras, sigma = {}, []
+    model = next(iter(true_cameras().cameras.values())).camera
+    for i in range(count):
+        position = np.array((-5 + 30 * i / (count - 1), (26.0 if i % 2 else -22.0) + i, 2.0 + i % 3))
+        away = (position - np.array((9.0, 0.0, -2.0))) / np.linalg.norm(position - np.array((9.0, 0.0, -2.0)))
+        right = np.cross((0.0, 0.0, 1.0), away) / np.linalg.norm(np.cross((0.0, 0.0, 1.0), away))
+        interior = np.zeros(10)
+        interior[0], interior[3] = 600.0 + 20 * i, 1e-8
+        camera = replace(model, name=f"C{i}", interior=interior)
+        rotation = np.stack((right, np.cross(away, right), away), axis=1)
+        cameras[camera.name] = PlacedCamera(camera, position, rotation, np.arange(4), np.arange(10 * i, 10 * i + 10))
+        sigma += [0.01] * 3 + [2e-4] * 3 + [0.5, 0.3, 0.3, 2e-9]
+    mixed = np.eye(len(sigma)) + 0.3 * np.random.default_rng(0).standard_normal((len(sigma), len(sigma)))
+    joint = mixed @ mixed.T
+    return CameraSystem(cameras, joint * np.outer(sigma, sigma) / np.sqrt(np.outer(np.diag(joint), np.diag(joint))))
+
+
+@pytest.mark.parametrize("count", [2, 6])
+def test_any_number_of_cameras(count: int) -> None:
+    system, rng, draws = all_around(count), np.random.default_rng(9), 12
+    squares: dict[str, list[float]] = {}
+    for draw in range(draws):
+        jump = true_jump(draw % 4)
+        measurements = simulated_measurements(jump, system, rng)
+        middle = len(measurements.jumps[0].pulses) // 2
+        pulses = measurements.jumps[0].pulses[middle - 1 : middle + 2]
+        raw = solve_pulses(JumpMeasurements(1, pulses), measurements, drawn(system, rng))
+        true = truth(jump, pulses[1].pulse)
+        for name, value, sigma in numbers(raw.states[1]):
+            squares.setdefault(name, []).append(((value - true[name]) / sigma) ** 2)
+    assert len(squares) == 23
+    total = sum(np.mean(values) for values in squares.values()) / len(squares)
+    # 23 quantities of which about 12 are independent (20 unknowns, of which the calibration moves many together)
+    assert total == pytest.approx(1, abs=3.5 * np.sqrt(2 / (12 * draws)))
 
 
 def test_sizes_that_do_not_fit_are_refused() -> None:

@@ -26,10 +26,10 @@ _SHARES: Final = 8
 #: Accelerations (m/s^2, rad/s^2) that a channel may gain within `_WITHIN_S`, by regime and share. On the table the
 #: track guides the skis; at the edge a jumper pushes with a few g; in flight he corrects.
 _GAIN: Final = np.array(
-    ((0.5, 0.5, 0.5, 10, 5, 2, 0.5, 0.5), (20, 10, 20, 20, 10, 10, 20, 20), (3, 3, 3, 10, 5, 5, 10, 10)), float
+    ((0.5, 0.5, 0.5, 10, 5, 2, 0.5, 0.5), (20, 10, 20, 20, 10, 10, 20, 20), (2, 2, 2, 5, 3, 3, 5, 5)), float
 )
 _WITHIN_S: Final = 0.1
-_PSEUDO: Final = 2.0  #: observations that the start values count as
+_PSEUDO: Final = 1.0  #: observations that the start values count as
 _BREAK: Final = np.array((20, 10, 40, 20, 10, 10, 20, 20), float)[SHARE]  # m/s^2, rad/s^2: at the take-off
 _SMALLEST: Final = 1e-4  # of the start value: below, a density is as good as none
 

@@ -68,6 +68,11 @@ def smoothed_states(
     ]
 
 
+def known_groups(used: Flags) -> Flags:
+    """(6,) which groups were in two cameras at once in any pulse."""
+    return np.asarray((used.sum(axis=1) >= 2).any(axis=0))
+
+
 def _evaluated(frame: MotionFrame, inputs: Floats) -> Floats:
     """All results (..., 30) of inputs (..., 19), SI units."""
     channels, velocity = inputs[..., :CHANNELS], inputs[..., CHANNELS:] @ frame.rotation.T

@@ -20,14 +20,14 @@ from analysis.motion.bundle import (
 )
 from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
 from analysis.motion.prior import prior, re_estimated, start_densities
-from analysis.motion.quantities import smoothed_states
+from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import Start, start_values
 from analysis.motion.synchrony import Synchrony, judged
 from analysis.motion.table import TableMotion, table_motion
-from analysis.motion.takeoff import Break, find_break
+from analysis.motion.takeoff import Break, find_break, passing
 from analysis.result.model import CameraOffset, Phase, RayTest, SmoothedState, TakeOff, phase_at
 from analysis.scene.camera_system import CameraSystem
-from rig.arrays import Flags, Floats
+from rig.arrays import Floats
 from rig.clocks import NS_PER_S, UtcNs
 
 _FREE_FRAMES: Final = 2.0  #: standard deviation of a camera's lateness before it is known, pulse intervals
@@ -75,13 +75,17 @@ class Motion:
     table: TableMotion | None
 
 
-def smooth(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Motion:
+def smooth(
+    jump: JumpMeasurements, measurements: Measurements, system: CameraSystem, edge: Floats | None = None
+) -> Motion:
     """The bundle over time of one jump.
 
     Args:
         jump: one of `measurements.jumps`.
         measurements: of the recording.
         system: the oriented cameras.
+        edge: (3,) a point of the edge, where the survey knows it; then the path itself tells when O passes it.
+            Otherwise the take-off is when the motion of O and skis stops to be that of the table.
 
     Returns:
         The motion. Without states where fewer than `start_values.FEWEST` pulses have a point in two cameras.
@@ -97,16 +101,16 @@ def smooth(jump: JumpMeasurements, measurements: Measurements, system: CameraSys
     free = _with_free_cameras(observed, system, start, unit)
     rank = free.model.root.shape[1]
     synchrony = judged(observed.names, free.late * unit, free.solution.shared_covariance[rank:, rank:] * unit**2, unit)
-    adjusted, edge = _with_takeoff(_synchronised(free, synchrony))
+    adjusted, takeoff = _with_takeoff(_synchronised(free, synchrony), edge)
     states: list[SmoothedState | None] = [None] * len(jump.pulses)
-    states[sight] = _smoothed(adjusted, edge)
+    states[sight] = _smoothed(adjusted, takeoff)
     return Motion(
         states,
-        _takeoff(jump, measurements.rate_hz, everything.times, edge),
+        _takeoff(jump, measurements.rate_hz, everything.times, takeoff),
         synchrony.offsets,
-        _fit(adjusted, edge),
+        _fit(adjusted, takeoff),
         _removed(adjusted, [int(pulse.pulse) for pulse in jump.pulses[sight]]),
-        None if edge is None else table_motion(adjusted, edge),
+        None if takeoff is None else table_motion(adjusted, takeoff),
     )
 
 
@@ -143,13 +147,13 @@ def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:
     return settled(begun(model, free.states, free.used, shared), _STEPS)
 
 
-def _with_takeoff(adjusted: Adjusted) -> tuple[Adjusted, Break | None]:
+def _with_takeoff(adjusted: Adjusted, known: Floats | None) -> tuple[Adjusted, Break | None]:
     """Take-off and densities of the motion, in turn; then gross errors once more."""
     times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
     densities = start_densities()
     edge = None
     for _ in range(_ROUNDS):
-        edge = find_break(adjusted, densities)
+        edge = find_break(adjusted, densities) if known is None else passing(adjusted, known)
         for _ in range(_COMPONENT_STEPS):
             adjusted = with_prior(adjusted, prior(times, unit, edge.seconds if edge else None, densities))
             densities = _components(adjusted)
@@ -201,11 +205,6 @@ def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
         by_hand,
         known_groups(used),
     )
-
-
-def known_groups(used: Flags) -> Flags:
-    """(6,) which groups were in two cameras at once in any pulse."""
-    return np.asarray((used.sum(axis=1) >= 2).any(axis=0))
 
 
 def _takeoff(jump: JumpMeasurements, rate_hz: float, times: Floats, edge: Break | None) -> TakeOff | None:

@@ -69,6 +69,26 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
     return Break(mean, float(np.sqrt(weight @ (fine - mean) ** 2 + (fine[1] - fine[0]) ** 2 / 12)))
 
 
+def passing(adjusted: Adjusted, edge: Floats) -> Break | None:
+    """When O passes a known edge: the vertical plane across the flight through a point of it.
+
+    Args:
+        adjusted: the bundle.
+        edge: (3,) the point, object system; its own error is not part of the result.
+    """
+    model, states = adjusted.model, adjusted.states
+    times, unit = model.observed.times, model.prior.unit
+    ahead = float((edge - model.frame.origin) @ model.frame.rotation[:, 0]) - states[:, 0]
+    reached = np.flatnonzero((ahead[:-1] > 0) & (ahead[1:] <= 0))
+    if not len(reached):
+        return None
+    k = int(reached[0]) if ahead[reached[0]] < -ahead[reached[0] + 1] else int(reached[0]) + 1
+    speed = states[k, CHANNELS] / unit
+    sigma = float(np.sqrt(adjusted.solution.covariance[k, 0, 0])) / speed
+    seconds = float(times[k] + ahead[k] / speed)
+    return Break(seconds, sigma)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Path:
     """Selected channels (n, c) of each pulse alone, and their covariance (n, c, c)."""

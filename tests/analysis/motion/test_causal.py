@@ -1,0 +1,48 @@
+"""The live filter: its errors are within its sigmas although it knows the past alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.measurements.model import ImageMeasurements, PointMeasurement
+from analysis.motion.causal import CausalFilter
+from analysis.result.model import Status
+from rig.arrays import Floats
+from tests.analysis.simulated import RATE_HZ, drawn, simulated_measurements, true_cameras, true_jump
+
+SEED = 5
+FIRST = 5  # pulses until there is a state
+LARGEST = 4.5  # sigmas; 6e-6 of single errors are larger
+AT_CHANGES = 6.0  # where the motion has just changed, the distribution is a mixture with longer tails
+
+
+def _distance(offset: Floats, covariance: Floats) -> float:
+    return float(np.sqrt(offset @ np.linalg.solve(covariance, offset)))
+
+
+def test_states_err_as_their_covariance_says_and_gaps_are_predicted() -> None:
+    rng, truth = np.random.default_rng(SEED), true_jump(SEED)
+    measured = simulated_measurements(truth, true_cameras(), rng)
+    live = CausalFilter(drawn(true_cameras(), rng), measured.cameras, RATE_HZ)
+    sigmas = {}
+    for k, given in enumerate(measured.jumps[0].pulses):
+        pulse = replace(given, images={}) if k in (20, 21) else given
+        if k == 25:
+            points = pulse.images["K1"].points
+            wrong = {**points, "P1": PointMeasurement(points["P1"].xy + 8.0, points["P1"].covariance)}
+            images = {**pulse.images, "K1": ImageMeasurements(wrong, pulse.images["K1"].skis)}
+            pulse = replace(pulse, images=images)
+        state = live.update(pulse)
+        if k < FIRST:
+            continue
+        assert state is not None
+        for i, point in enumerate(state.points.values()):
+            assert point is not None
+            assert _distance(point.xyz - truth.pose(pulse.pulse).markers[i], point.covariance) < LARGEST
+        assert _distance(state.velocity.value - truth.velocity(pulse.pulse), state.velocity.covariance) < AT_CHANGES
+        helmet = state.points["P1"]
+        assert helmet is not None
+        assert (helmet.status is Status.PREDICTED) == (k in (20, 21) or len(helmet.cameras) < 2)
+        assert k != 25 or helmet.cameras == ("K2", "K3")
+        sigmas[k] = float(np.trace(helmet.covariance)) ** 0.5
+    assert sigmas[19] < sigmas[20] < sigmas[21] > sigmas[22]

@@ -16,6 +16,7 @@ from rig.arrays import Flags, Floats
 #: Half the width of a band, in standard deviations.
 BAND_SIGMAS = 2.0
 _FIG8_POSITIONS = 5
+_WHOLE = 4  # lines of a stick model: body, feet, two skis
 _WIDE = 4.0  # times the median sigma: bands wider than that may be cut off
 _ROOM = 0.06  # of the values' range, above and below
 
@@ -68,7 +69,7 @@ def cursor_places(course: Course) -> list[float | None]:
 
 def fig8(course: Course) -> list[Drawing]:
     """The stick model at evenly distributed pulses, projected on the vertical plane of the flight and from above."""
-    shown = evenly(course, _FIG8_POSITIONS)
+    shown = evenly(course, _FIG8_POSITIONS, range(len(course.pulses)))
     if not shown:
         return []
     sticks = {
@@ -86,12 +87,10 @@ def fig8(course: Course) -> list[Drawing]:
     ]
 
 
-def evenly(course: Course, count: int) -> list[int]:
-    """At most `count` pulses with a whole stick model, evenly distributed."""
+def evenly(course: Course, count: int, among: Sequence[int]) -> list[int]:
+    """At most `count` of these pulses (indices) with a whole stick model, evenly distributed over the distance."""
     whole = [
-        i
-        for i, pulse in enumerate(course.pulses)
-        if len(stick_lines(best_state(pulse))) == 4 and np.isfinite(course.distance[i])
+        i for i in among if len(stick_lines(best_state(course.pulses[i]))) == _WHOLE and np.isfinite(course.distance[i])
     ]
     if not whole:
         return []

@@ -93,8 +93,8 @@ def report_page(
         figures = five_figures(course, perpendicular.get(jump.number))
         shown = JumpShown(jump, course, pulses, overlays, crops, system.names, figures)
         parts.append(jump_section(shown, several=len(result.jumps) > 1))
-    body = [_head(result), *parts] if parts else [_head(result), "<p>There is no jump in this recording.</p>"]
-    return _page(_title(result), "\n".join([*body, _notes(result)]))
+    main = "\n".join(parts) or "<p>There is no jump in this recording.</p>"
+    return _page(_title(result), f"{_head(result)}\n<main>{_alarms(result)}{main}</main>\n{_notes(result)}")
 
 
 def _page(title: str, body: str) -> str:
@@ -131,7 +131,7 @@ def _head(result: MeasuredRecording) -> str:
         facts.append(datetime.fromtimestamp(min(times) // NS_PER_S, UTC).strftime("%-d %B %Y, %H:%M:%S UTC"))
     facts.append(f"recording {result.recording}")
     items = "".join(f"<li>{escape(fact)}</li>" for fact in facts)
-    return f'<header><h1>{escape(_title(result))}</h1><ul class="facts">{items}</ul></header>{_alarms(result)}'
+    return f'<header><h1>{escape(_title(result))}</h1><ul class="facts">{items}</ul></header>'
 
 
 def _alarms(result: MeasuredRecording) -> str:
@@ -144,4 +144,4 @@ def _alarms(result: MeasuredRecording) -> str:
 def _notes(result: MeasuredRecording) -> str:
     pulses = f"Measured at {result.rate_hz:g} pulses per second."
     items = "".join(f"<li>{escape(line)}</li>" for line in (*_NOTES, f"{pulses} {_MORE}"))
-    return f"<footer><h3>What the numbers mean</h3><ul>{items}</ul></footer>"
+    return f"<footer><h2>What the numbers mean</h2><ul>{items}</ul></footer>"

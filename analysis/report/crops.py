@@ -1,6 +1,7 @@
 """The jumper cut out of every image, encoded so that a page with all of them stays small."""
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,13 +42,13 @@ class Window:
     height: int
 
     @property
-    def scale(self) -> float:
-        """Page units per px of the image."""
-        return CROP_WIDTH / self.width
+    def corner(self) -> Floats:
+        """(2,) px, the outer top left corner; (0, 0) is the centre of the image's first pixel."""
+        return np.array((self.left, self.top)) - 0.5
 
-    def on_page(self, xy: Floats) -> Floats:
-        """Page units (..., 2) of image coordinates (..., 2), px, (0, 0) = centre of the top-left pixel."""
-        return np.asarray((xy + 0.5 - (self.left, self.top)) * self.scale)
+    def on_page(self, overlay: Overlay) -> Overlay:
+        """An overlay of the image in page units of the crop."""
+        return overlay.mapped(self.corner, CROP_WIDTH / self.width)
 
     def cut(self, image: Grey) -> Grey:
         """This part of an image, as large as the best level shows it."""
@@ -117,8 +118,9 @@ def crops_of(log: Path, windows: Windows, budget: int) -> dict[tuple[int, str], 
 
 def _window(middle: Floats, width: float, size: Floats) -> Window:
     """A window of the crops' shape about a place, moved and shrunk to lie within the image."""
-    across = min(width, float(size[0]), float(size[1]) * _ASPECT)
-    extent = np.floor((across, across / _ASPECT)).astype(int)
+    step = CROP_WIDTH // math.gcd(CROP_WIDTH, CROP_HEIGHT)  # so that the shape is exact: overlays must fit
+    across = int(min(width, float(size[0]), float(size[1]) * _ASPECT)) // step * step
+    extent = np.array((across, across * CROP_HEIGHT // CROP_WIDTH))
     corner = np.clip(np.rint(middle - extent / 2).astype(int), 0, size.astype(int) - extent)
     return Window(int(corner[0]), int(corner[1]), int(extent[0]), int(extent[1]))
 

@@ -85,9 +85,14 @@ def five_figures(course: Course, perpendicular: Quantity | None) -> tuple[Figure
             "Velocity perpendicular to the table",
             perpendicular,
             "m/s",
-            "at take-off, against the path before it; up is positive",
+            "what the take-off adds, across the path before it; up is positive",
         ),
-        Figure(f"Speed at {FAR_M:g} m", course.at_distance("speed", FAR_M), "m/s", "horizontal distance from take-off"),
+        Figure(
+            f"Speed at {FAR_M:g}\N{NO-BREAK SPACE}m",
+            course.at_distance("speed", FAR_M),
+            "m/s",
+            "horizontal distance from take-off",
+        ),
         Figure(
             "Angle of attack",
             course.at_time("angle_of_attack", EARLY_S),

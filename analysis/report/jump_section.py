@@ -18,6 +18,7 @@ from analysis.result.model import Jump
 from photogrammetry.reports.document import Drawing
 
 _STILLS: Final = 5
+_NO_PICTURE: Final = "no picture of the jumper"
 _STICK = """<figure class="stick"><div class="picture">
 <svg viewBox="0 0 320 240" role="img" aria-label="stick figure"></svg></div><figcaption>\
 <button type="button" data-turn="0,0">side</button><button type="button" data-turn="0,90">above</button>\
@@ -50,7 +51,8 @@ class JumpShown:
 def jump_section(shown: JumpShown, *, several: bool) -> str:
     """The part of the page; `several`: there are other jumps."""
     jump = shown.jump
-    parts = [f"<h2>Jump {jump.number}</h2>" if several else "", _verdict(jump), _five(shown.figures)]
+    hidden = "" if several else ' class="unseen"'
+    parts = [f"<h2{hidden}>Jump {jump.number}</h2>", _verdict(jump), _five(shown.figures)]
     if shown.course.pulses:
         parts += [_scrubber(shown), _charts("Over the distance", bands(shown.course), _band_words(shown.course))]
         words = (
@@ -109,9 +111,11 @@ def _scrubber(shown: JumpShown) -> str:
 <output></output>
 <input type="range" min="0" max="{len(frames) - 1}" value="{start}" step="1" aria-label="pulse">
 </div>
+<label class="lines"><input type="checkbox" checked> draw lines and points over the pictures</label>
 <table class="numbers"><tbody>{rows}</tbody></table>
 <p class="note">Lines: stick model projected into the image; crosses and dots: measured there; ellipses:
-{ELLIPSE_SIGMAS:g} times the standard deviation. Tap a view to enlarge it.
+{ELLIPSE_SIGMAS:g} times the standard deviation, dashed where nothing was measured. Time and distance count from the
+take-off. Numbers in italics: a point is uncertain by more than {LARGEST_SIGMA_M * 10:g} dm. Tap a view to enlarge it.
 Arrow keys step, space plays in slow motion.</p>
 <script type="application/json">{data}</script>
 </section>"""
@@ -123,7 +127,7 @@ def _view(name: str, index: int) -> str:
     return (
         f'<figure class="view" data-view="{index}"><div class="picture">'
         f'<img alt="{words}" width="{CROP_WIDTH}" height="{CROP_HEIGHT}">'
-        f'<svg viewBox="{box}" aria-hidden="true"></svg><p hidden>not in sight</p></div>'
+        f'<svg viewBox="{box}" aria-hidden="true"></svg><p hidden>{_NO_PICTURE}</p></div>'
         f"<figcaption>{escape(name)}</figcaption></figure>"
     )
 
@@ -151,16 +155,15 @@ def _charts(title: str, drawings: Sequence[Drawing], words: str, *, wide: bool =
 def _stills(shown: JumpShown) -> str:
     """Pictures for paper, and for browsers without scripts."""
     rows = []
-    for i in evenly(shown.course, _STILLS):
+    for i in evenly(shown.course, _STILLS, shown.pulses):
         pulse = int(shown.course.pulses[i].pulse)
         pictures = [
-            still_svg(shown.overlays[pulse][name], crop, escape(f"camera {name}"))
+            f"<p>{escape(name)}: {_NO_PICTURE}</p>"
+            if (crop := shown.crops.get((pulse, name))) is None
+            else still_svg(shown.overlays[pulse][name], crop, escape(f"camera {name}"))
             for name in shown.cameras
-            if (crop := shown.crops.get((pulse, name))) is not None
         ]
-        if pictures:
-            when = f"{fixed(float(shown.course.since[i]), 2)} s"
-            rows.append(
-                f"<figure><div>{''.join(pictures)}</div><figcaption>{when}, pulse {pulse}</figcaption></figure>"
-            )
+        if any((pulse, name) in shown.crops for name in shown.cameras):
+            when = f"{fixed(float(shown.course.since[i]), 2)} s, pulse {pulse}"
+            rows.append(f"<figure><div>{''.join(pictures)}</div><figcaption>{when}</figcaption></figure>")
     return f'<div class="stills"><h3>Pictures</h3>{"".join(rows)}</div>' if rows else ""

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.measurements.model import ImageMeasurements
 from analysis.report.course import origin_of
-from analysis.result.model import JumperState
+from analysis.result.model import JumperState, Status
 from analysis.scene.camera_system import PlacedCamera
 from rig.arrays import Floats
 
@@ -28,18 +28,30 @@ class Overlay:
         ellipses: by point its projected place (2,) and its covariance (2, 2).
         points: measured points (2,) by name.
         skis: measured points (k, 2) of the skis by side.
+        predicted: points that were not measured at this pulse.
     """
 
     lines: Mapping[str, Floats]
     ellipses: Mapping[str, tuple[Floats, Floats]]
     points: Mapping[str, Floats]
     skis: Mapping[str, Floats]
+    predicted: frozenset[str]
 
     def places(self) -> Floats:
         """All places (n, 2), n >= 0."""
         measured = [xy[None] for xy in self.points.values()]
         found = [*self.lines.values(), *measured, *self.skis.values(), np.zeros((0, 2))]
         return np.concatenate(found)
+
+    def mapped(self, origin: Floats, scale: float) -> "Overlay":
+        """The overlay in another picture: `origin` (2,) comes to (0, 0), and a pixel becomes `scale` wide."""
+        return Overlay(
+            {part: (line - origin) * scale for part, line in self.lines.items()},
+            {name: ((xy - origin) * scale, c * scale**2) for name, (xy, c) in self.ellipses.items()},
+            {name: (xy - origin) * scale for name, xy in self.points.items()},
+            {side: (xy - origin) * scale for side, xy in self.skis.items()},
+            self.predicted,
+        )
 
 
 def stick_lines(state: JumperState) -> dict[str, Floats]:
@@ -79,6 +91,7 @@ def overlay_of(state: JumperState, measured: ImageMeasurements | None, camera: P
         _ellipses(state, camera),
         points,
         skis,
+        frozenset(n for n, point in state.points.items() if point is not None and point.status is Status.PREDICTED),
     )
 
 

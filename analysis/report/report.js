@@ -3,8 +3,8 @@
 
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const UNITS_PER_M = 72;
-  const MIDDLE = [160, 138];
+  const UNITS_PER_M = 92;
+  const MIDDLE = [160, 150];
   const SLOW_MOTION_MS = 110;
   const DEGREE = Math.PI / 180;
 
@@ -84,10 +84,11 @@
     constructor(jump) {
       const root = one(jump, ".scrubber");
       this.frames = JSON.parse(one(root, "script").textContent);
-      this.range = one(root, "input");
+      this.range = one(root, "input[type=range]");
       this.words = one(root, "output");
       this.play = one(root, ".play");
       this.views = all(root, "[data-view]");
+      this.table = one(root, ".numbers");
       this.numbers = all(root, "[data-number]");
       this.stick = new Stick(one(root, ".stick"));
       this.timer = 0;
@@ -96,6 +97,8 @@
         svg.append(mark);
         return mark;
       });
+      const lines = one(root, ".lines input");
+      lines.addEventListener("change", () => root.classList.toggle("bare", !lines.checked));
       this.range.addEventListener("input", () => this.stop());
       this.range.addEventListener("input", () => this.show());
       this.play.addEventListener("click", () => (this.timer ? this.stop() : this.start()));
@@ -146,6 +149,7 @@
         if (view) image.src = view.src;
         one(figure, "svg").innerHTML = view ? view.over : "";
       });
+      this.table.classList.toggle("unsure", frame.unsure);
       this.numbers.forEach((cell, i) => (cell.textContent = frame.numbers[i]));
       for (const mark of this.marks) {
         mark.toggleAttribute("hidden", frame.cursor === null);

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.measurements.model import ImageMeasurements, JumpMeasurements
 from analysis.report.charts import cursor_places
 from analysis.report.course import Course, best_state
-from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Crop, Window
+from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Crop
 from analysis.report.figures import fixed, plus_minus
 from analysis.report.overlay import Overlay, half_axes, overlay_of, stick_lines
 from analysis.result.model import PulseState, Quantity
@@ -68,13 +68,14 @@ def frames_json(
         views = [
             None
             if (crop := crops.get((number, name))) is None
-            else {"src": crop.data, "over": overlay_svg(overlays[number][name], crop.window)}
+            else {"src": crop.data, "over": overlay_svg(crop.window.on_page(overlays[number][name]))}
             for name in cameras
         ]
         frames.append(
             {
                 "words": _words(course, i),
                 "cursor": cursors[i],
+                "unsure": bool(course.unsure[i]),
                 "views": views,
                 "stick": {part: _rounded(line) for part, line in _own_frame(course, pulse).items()},
                 "numbers": [plus_minus(_quantity(course, name, i), unit) for name, _, unit in READOUT],
@@ -83,21 +84,20 @@ def frames_json(
     return frames
 
 
-def overlay_svg(overlay: Overlay, window: Window) -> str:
-    """The overlay as shapes of an SVG of the crops' size."""
+def overlay_svg(overlay: Overlay) -> str:
+    """An overlay in page units as shapes of an SVG of the crops' size."""
     parts = []
     for part, line in overlay.lines.items():
-        places = " ".join(f"{x:.1f},{y:.1f}" for x, y in window.on_page(line))
+        places = " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
         parts += [f'<polyline class="halo" points="{places}"/>', f'<polyline class="{part}" points="{places}"/>']
-    for place, covariance in overlay.ellipses.values():
-        x, y = window.on_page(place)
-        long, short, turn = half_axes(covariance * window.scale**2)
+    for name, ((x, y), covariance) in overlay.ellipses.items():
+        long, short, turn = half_axes(covariance)
+        kind = ' class="predicted"' if name in overlay.predicted else ""
         move = f"translate({x:.1f} {y:.1f}) rotate({turn:.0f})"
-        parts.append(f'<ellipse rx="{long:.1f}" ry="{short:.1f}" transform="{move}"/>')
+        parts.append(f'<ellipse{kind} rx="{long:.1f}" ry="{short:.1f}" transform="{move}"/>')
     for side, points in overlay.skis.items():
-        parts += [f'<circle class="{side}" cx="{x:.1f}" cy="{y:.1f}" r="1.2"/>' for x, y in window.on_page(points)]
-    for xy in overlay.points.values():
-        x, y = window.on_page(xy)
+        parts += [f'<circle class="{side}" cx="{x:.1f}" cy="{y:.1f}" r="1.2"/>' for x, y in points]
+    for x, y in overlay.points.values():
         cross = f"M{x - _CROSS:.1f} {y:.1f}h{2 * _CROSS:g}M{x:.1f} {y - _CROSS:.1f}v{2 * _CROSS:g}"
         parts.append(f'<path class="halo" d="{cross}"/><path class="point" d="{cross}"/>')
     return "".join(parts)
@@ -108,15 +108,16 @@ def still_svg(overlay: Overlay, crop: Crop, words: str) -> str:
     return (
         f'<svg class="view" viewBox="0 0 {CROP_WIDTH} {CROP_HEIGHT}" role="img" aria-label="{words}">'
         f'<image href="{crop.data}" width="{CROP_WIDTH}" height="{CROP_HEIGHT}"/>'
-        f"<g>{overlay_svg(overlay, crop.window)}</g></svg>"
+        f"<g>{overlay_svg(crop.window.on_page(overlay))}</g></svg>"
     )
 
 
 def _words(course: Course, i: int) -> str:
     """When and where a pulse is."""
-    when = fixed(float(course.since[i]), 3) + (" s after take-off" if course.takeoff_sigma_s is not None else " s")
-    where = f", {fixed(float(course.distance[i]), 1)} m" if np.isfinite(course.distance[i]) else ""
-    return f"{when}{where} · pulse {course.pulses[i].pulse}"
+    where = f" · {fixed(float(course.distance[i]), 1)} m" if np.isfinite(course.distance[i]) else ""
+    return f"{fixed(float(course.since[i]), 3)} s{where} · pulse {course.pulses[i].pulse}".replace(
+        " s", "\N{NO-BREAK SPACE}s"
+    )
 
 
 def _own_frame(course: Course, pulse: PulseState) -> dict[str, Floats]:

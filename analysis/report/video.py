@@ -1,5 +1,7 @@
 """A video of the jumps with the overlay drawn into every triplet: VP9 for browsers, or FFV1 without loss.
 
+Under the triplet, the jumper is enlarged.
+
 Each frame stands at the time of its pulse, to a microsecond where the container allows it (MP4), to a millisecond in
 WebM and Matroska. The pulse number is written into the picture.
 """
@@ -17,12 +19,14 @@ from av.error import FFmpegError
 from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
-from analysis.measurements.model import ImageMeasurements, Measurements
-from analysis.report.course import Course, best_state, course_of
+from analysis.measurements.model import Measurements
+from analysis.report.course import Course, course_of
+from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Windows, windows_of
 from analysis.report.figures import fixed
 from analysis.report.frames import Grey, camera_images, frames_of
-from analysis.report.overlay import Overlay, half_axes, overlay_of
-from analysis.result.model import MeasuredRecording, PulseState
+from analysis.report.overlay import Overlay, half_axes
+from analysis.report.scrubbing import overlays_of
+from analysis.result.model import MeasuredRecording
 from analysis.scene.camera_system import CameraSystem
 from rig.clocks import NS_PER_S
 from rig.errors import BadInputError
@@ -53,11 +57,10 @@ _INK: Final[_Colour] = (255, 255, 255)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """What is drawn at a pulse; `state` is None before and after the jump."""
+    """What is drawn at a pulse: words, and overlays by camera (none before and after the jump)."""
 
     words: str
-    state: PulseState | None
-    images: Mapping[str, ImageMeasurements]
+    overlays: Mapping[str, Overlay]
 
 
 def write_video(
@@ -89,12 +92,13 @@ def write_video(
     """
     if lossless and out.suffix != ".mkv":
         raise BadInputError(f"{out}: a video without loss needs the ending .mkv; choose another name")
-    shown = _shown(result, measurements)
+    shown = _shown(result, measurements, system)
+    windows = windows_of({pulse: one.overlays for pulse, one in shown.items()}, system)
     done = 0
     writer: _Writer | None = None
     try:
         for tag, image in frames_of(log, shown.keys()):
-            picture = _picture(tag, image, shown[int(tag.pulse)], system)
+            picture = _picture(tag, image, shown[int(tag.pulse)], windows)
             if writer is None:
                 writer = _Writer(out, (picture.shape[1], picture.shape[0]), result.rate_hz, lossless=lossless)
             writer.add(picture, tag)
@@ -162,7 +166,7 @@ class _Writer:
         self._file.close()
 
 
-def _shown(result: MeasuredRecording, measurements: Measurements) -> dict[int, _Shown]:
+def _shown(result: MeasuredRecording, measurements: Measurements, system: CameraSystem) -> dict[int, _Shown]:
     """By pulse: those of the jumps and some before and after, in order."""
     measured = {jump.number: jump for jump in measurements.jumps}
     around = round(_AROUND_S * result.rate_hz)
@@ -172,13 +176,12 @@ def _shown(result: MeasuredRecording, measurements: Measurements) -> dict[int, _
             continue
         first, last = int(jump.pulses[0].pulse), int(jump.pulses[-1].pulse)
         for pulse in (*range(max(0, first - around), first), *range(last + 1, last + around + 1)):
-            found.setdefault(pulse, _Shown(f"pulse {pulse}", None, {}))
-        own = measured.get(jump.number)
-        images = {} if own is None else {int(pulse.pulse): pulse.images for pulse in own.pulses}
+            found.setdefault(pulse, _Shown(f"pulse {pulse}", {}))
         course = course_of(jump, result.rate_hz)
-        for i, state in enumerate(jump.pulses):
-            number = int(state.pulse)
-            found[number] = _Shown(_words(course, i), state, images.get(number, {}))
+        everything = range(len(course.pulses))
+        overlays = overlays_of(course, everything, measured.get(jump.number), system)
+        found |= {int(course.pulses[i].pulse): _Shown(_words(course, i), {}) for i in everything}
+        found |= {pulse: _Shown(found[pulse].words, images) for pulse, images in overlays.items()}
     return found
 
 
@@ -189,24 +192,32 @@ def _words(course: Course, i: int) -> str:
     return (words + (f"  {speed:.1f} m/s" if np.isfinite(speed) else "")).replace("\N{MINUS SIGN}", "-")
 
 
-def _picture(tag: TripletTag, image: Grey, shown: _Shown, system: CameraSystem) -> _Picture:
-    """The triplet in colour with its overlay."""
-    picture = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
+def _picture(tag: TripletTag, image: Grey, shown: _Shown, windows: Windows) -> _Picture:
+    """The triplet in colour with its overlay, and under each camera's image the jumper enlarged."""
+    rows, columns = image.shape
+    widest = max(camera.columns[1] - camera.columns[0] for camera in tag.cameras)
+    picture = np.zeros((rows + widest * CROP_HEIGHT // CROP_WIDTH, columns, 3), np.uint8)
+    picture[:rows] = image[:, :, np.newaxis]
     there = camera_images(tag, image)
     for camera in tag.cameras:
-        block = picture[:, camera.columns[0] : camera.columns[1]]
-        if camera.name in there and camera.name in system.cameras and shown.state is not None:
-            overlay = overlay_of(best_state(shown.state), shown.images.get(camera.name), system[camera.name])
-            _draw(block, overlay)
-        _write(block, camera.name, (10, 24))
-    _write(picture, shown.words, (10, picture.shape[0] - 12))
+        left, right = camera.columns
+        overlay, window = shown.overlays.get(camera.name), windows.get((int(tag.pulse), camera.name))
+        if overlay is not None and window is not None and camera.name in there:
+            scale = (right - left) / window.width
+            below = picture[rows : rows + round(window.height * scale), left:right]
+            part = there[camera.name][window.top :, window.left :][: window.height, : window.width]
+            below[:] = cv2.resize(part, below.shape[1::-1], interpolation=cv2.INTER_CUBIC)[:, :, np.newaxis]
+            _draw(below, overlay.mapped(window.corner, scale).mapped(np.full(2, 0.5), 1.0), 2)
+            _draw(picture[:rows, left:right], overlay, 1)
+        _write(picture[:, left:right], camera.name, (10, 24))
+    _write(picture, shown.words, (10, rows - 12))
     return picture
 
 
-def _draw(block: _Picture, overlay: Overlay) -> None:
-    """Draw an overlay into the image of its camera, in place."""
+def _draw(block: _Picture, overlay: Overlay, width: int) -> None:
+    """Draw an overlay into a picture, in place, with lines of so many px."""
     for part, line in overlay.lines.items():
-        cv2.polylines(block, [_fine(line)], False, _COLOURS[part], 1, cv2.LINE_AA, _SHIFT)
+        cv2.polylines(block, [_fine(line)], False, _COLOURS[part], width, cv2.LINE_AA, _SHIFT)
     for place, covariance in overlay.ellipses.values():
         long, short, turn = half_axes(covariance)
         if np.isfinite(place).all() and long < block.shape[1]:
@@ -214,12 +225,12 @@ def _draw(block: _Picture, overlay: Overlay) -> None:
             centre = tuple(_fine(place).tolist())
             cv2.ellipse(block, centre, size, turn, 0, 360, _INK, 1, cv2.LINE_AA, _SHIFT)
     for x, y in overlay.points.values():
-        for dx, dy in ((3.0, 0.0), (0.0, 3.0)):
+        for dx, dy in ((3.0 * width, 0.0), (0.0, 3.0 * width)):
             ends = _fine(np.array([(x - dx, y - dy), (x + dx, y + dy)]))
-            cv2.polylines(block, [ends], False, _POINT, 1, cv2.LINE_AA, _SHIFT)
+            cv2.polylines(block, [ends], False, _POINT, width, cv2.LINE_AA, _SHIFT)
     for side, points in overlay.skis.items():
         for x, y in _fine(points):
-            cv2.circle(block, (int(x), int(y)), 1 << _SHIFT, _COLOURS[side], -1, cv2.LINE_AA, _SHIFT)
+            cv2.circle(block, (int(x), int(y)), width << _SHIFT, _COLOURS[side], -1, cv2.LINE_AA, _SHIFT)
 
 
 def _fine(places: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -228,5 +239,6 @@ def _fine(places: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def _write(picture: _Picture, words: str, at: tuple[int, int]) -> None:
-    cv2.putText(picture, words, at, _FONT, 0.6, (0, 0, 0), 4, cv2.LINE_AA)
+    for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        cv2.putText(picture, words, (at[0] + dx, at[1] + dy), _FONT, 0.6, (0, 0, 0), 1, cv2.LINE_AA)
     cv2.putText(picture, words, at, _FONT, 0.6, _INK, 1, cv2.LINE_AA)

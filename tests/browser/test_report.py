@@ -1,0 +1,91 @@
+"""The coach's page in a real browser: scrubbing, keys, sizes, accessibility."""
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from analysis.report.coach import report_page
+from analysis.result.model import Quantity
+from tests.analysis.report.jumps import measured_recording, measurements, write_jump_log
+from tests.analysis.simulated import true_cameras
+from tests.browser.conftest import Open
+from tests.browser.test_page import AXE
+
+_EVERY = 12  # few pulses have pictures, to save time
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Address of a page."""
+    folder = tmp_path_factory.mktemp("page")
+    write_jump_log(folder / "log.mcap", _EVERY)
+    page = report_page(
+        measured_recording(), measurements(), true_cameras(), folder / "log.mcap", {1: Quantity(2.31, 0.08)}
+    )
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    return (folder / "report.html").as_uri()
+
+
+def _mark(page: Page) -> float:
+    return float(page.locator(".mark").first.get_attribute("x1") or "nan")
+
+
+def test_the_slider_moves_pictures_numbers_and_marks(report: str, open_page: Open) -> None:
+    page = open_page(report)
+    slider, words = page.get_by_role("slider"), page.locator("output")
+    slider.fill(str(2 * _EVERY))
+    first, mark, stick = words.inner_text(), _mark(page), page.locator(".stick polyline.body").get_attribute("points")
+    expect(page.locator(".view img").nth(1)).to_have_js_property("complete", True)
+    assert page.locator(".view img").nth(1).evaluate("image => image.naturalWidth") >= 160
+    slider.press("ArrowRight")
+    expect(words).not_to_have_text(first)
+    assert _mark(page) > mark
+    assert page.locator(".stick polyline.body").get_attribute("points") != stick
+    expect(page.locator(".view p").nth(1)).to_be_visible()  # this pulse has no picture, and says so
+    page.locator("h1").click()
+    page.keyboard.press("ArrowLeft")
+    expect(words).to_have_text(first)
+    page.get_by_role("button", name="one pulse on").click()
+    expect(words).not_to_have_text(first)
+
+
+def test_it_plays_to_the_end_and_stops(report: str, open_page: Open) -> None:
+    page = open_page(report)
+    slider = page.get_by_role("slider")
+    last = int(slider.get_attribute("max") or 0)
+    slider.fill(str(last - 3))
+    page.get_by_role("button", name="Play").click()
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    assert int(slider.input_value()) == last
+
+
+def test_the_stick_figure_turns(report: str, open_page: Open) -> None:
+    page = open_page(report, width=360)
+    skis = page.locator(".stick polyline.right")
+    side = skis.get_attribute("points")
+    page.get_by_role("button", name="above").click()
+    assert skis.get_attribute("points") != side
+    expect(page.get_by_role("button", name="above")).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="side").click()
+    assert skis.get_attribute("points") == side
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_phone_shows_all_without_scrolling_sideways(report: str, open_page: Open, scheme: str) -> None:
+    page = open_page(report, width=360, color_scheme=scheme, bypass_csp=True)
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    small = "[...document.querySelectorAll('button')].map(b => b.getBoundingClientRect()).filter(r => r.height < 44)"
+    assert page.evaluate(f"{small}.length") == 0
+    if not AXE.exists():
+        pytest.fail(f"the npm packages are not installed: run `npm ci` in {AXE.parents[2]}, or `make test`")
+    page.add_script_tag(path=AXE)
+    found = page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])")
+    assert found == []
+
+
+def test_paper_shows_pictures_and_no_buttons(report: str, open_page: Open) -> None:
+    page = open_page(report)
+    expect(page.locator(".stills")).to_be_hidden()
+    page.emulate_media(media="print")
+    expect(page.locator(".stills svg").first).to_be_visible()
+    expect(page.get_by_role("button", name="Play")).to_be_hidden()

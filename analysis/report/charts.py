@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.report.course import Course, best_state
+from analysis.report.course import Course, Series, best_state
 from analysis.report.figures import fixed
 from analysis.report.overlay import stick_lines
 from photogrammetry.reports.document import Drawing
@@ -114,26 +114,42 @@ def _limits(course: Course) -> tuple[float, float] | None:
 
 
 def _band(course: Course, graph: Graph) -> str:
-    """A chart as SVG; empty if there is nothing to draw."""
-    series, limits = course.smoothed[graph.name], _limits(course)
+    """A chart as SVG; empty if there is nothing to draw. Without a model over time, each pulse has its own bar."""
+    limits, raw = _limits(course), course.raw[graph.name]
+    series = course.smoothed[graph.name]
     there = np.isfinite(series.value + series.sigma + course.distance)
-    if limits is None or np.count_nonzero(there) < 2:
+    if smooth := np.count_nonzero(there) > 1:
+        bottom, top = _range(series.value[there], series.sigma[there], graph.least)
+    else:
+        there = np.isfinite(raw.value + raw.sigma + course.distance)
+        if np.count_nonzero(there) < 2:
+            return ""
+        bottom, top = _range(raw.value[there], raw.sigma[there], graph.least)
+    if limits is None:
         return ""
-    bottom, top = _range(series.value[there], series.sigma[there], graph.least)
     chart = Chart(limits, (bottom, top), _x_label(course), f"{graph.symbol} ({graph.unit})")
     if limits[0] < 0 < limits[1]:
         chart.upright(0.0, Colour.SOFT)
+    if smooth:
+        _draw_band(chart, course, series, there, (bottom, top))
+    else:
+        for x, value, sigma in zip(course.distance[there], raw.value[there], raw.sigma[there], strict=True):
+            low, high = np.clip((value - BAND_SIGMAS * sigma, value + BAND_SIGMAS * sigma), bottom, top)
+            chart.spread(float(x), float(low), float(high), Colour.SOFT)
+    with np.errstate(invalid="ignore"):
+        inside = np.isfinite(course.distance) & (raw.value >= bottom) & (raw.value <= top)
+    chart.dots(course.distance[inside], raw.value[inside], Colour.INK, 1.1)
+    return chart.svg.rendered(f"{graph.title}, {graph.unit}, over the distance")
+
+
+def _draw_band(chart: Chart, course: Course, series: Series, there: Flags, limits: tuple[float, float]) -> None:
+    """The smoothed values with their band, cut off at the limits of the axis."""
     half = BAND_SIGMAS * series.sigma
-    low, high = (np.clip(edge, bottom, top) for edge in (series.value - half, series.value + half))
+    low, high = (np.clip(edge, *limits) for edge in (series.value - half, series.value + half))
     for run, unsure in _runs(there, course.unsure):
         colour = Colour.SOFT if unsure else Colour.BLUE
         chart.band(course.distance[run], low[run], high[run], colour)
         chart.curve(course.distance[run], series.value[run], colour)
-    raw = course.raw[graph.name].value
-    with np.errstate(invalid="ignore"):
-        inside = np.isfinite(course.distance) & (raw >= bottom) & (raw <= top)
-    chart.dots(course.distance[inside], raw[inside], Colour.INK, 1.1)
-    return chart.svg.rendered(f"{graph.title}, {graph.unit}, over the distance")
 
 
 def _runs(there: Flags, unsure: Flags) -> Iterator[tuple[slice, bool]]:

@@ -272,7 +272,7 @@ def _refused(jump: Jump, measured: JumpMeasurements | None) -> Iterable[Part]:
             yield f"{name}: measured in fewer than two images, so no solution from single pulses at {_ranges(unseen)}"
         refused = [pulse for pulse in missing if pulse not in unseen]
         if refused:
-            yield f"{name}: measured in two images or more, but refused as contradictory at {_ranges(refused)}"
+            yield f"{name}: measured in two images or more, but no solution was accepted at {_ranges(refused)}"
         two = [pulse for pulse in jump.pulses if _member(pulse.raw, name) is Status.TWO_RAYS]
         if two:
             yield f"{name}: two rays, not controllable, at {_ranges(two)}"

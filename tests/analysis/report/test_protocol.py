@@ -8,9 +8,11 @@ import numpy as np
 
 from analysis.report.protocol import WORST_RAYS, protocol, write_protocol
 from analysis.result.model import CameraMove, CameraOffset, MeasuredRecording, RayTest
+from photogrammetry.procedures.orientation import orient
 from photogrammetry.reports.document import as_text
 from rig.pulse import PulseNumber
 from tests.analysis.report.jumps import measured_recording, measurements
+from tests.photogrammetry.synthetic import hill
 
 
 def _text(result: MeasuredRecording) -> str:
@@ -68,7 +70,7 @@ def test_what_has_no_solution_is_named_with_its_pulses() -> None:
     first = measured_recording().jumps[0].pulses[0].pulse
     refused = _section(_text(measured_recording()), "Jump 1: refused, and why")
     gap = f"pulses {first + 14}-{first + 18}"
-    assert f"P1: measured in two images or more, but refused as contradictory at {gap}" in refused
+    assert f"P1: measured in two images or more, but no solution was accepted at {gap}" in refused
     assert f"P4: two rays, not controllable, at pulses {first + 8}-{first + 11}" in refused
 
 
@@ -79,6 +81,13 @@ def test_phases_have_their_figures() -> None:
     assert "chi2_by_dof" in verdict
     assert "  flight      25         1.02" in verdict
     assert re.search(r"^  flight +P1 +20 +0 +0 +0 +5$", text, re.MULTILINE)
+
+
+def test_the_adjustment_of_the_balls_is_part_of_it() -> None:
+    orientation = orient(hill(1).network)
+    text = as_text(protocol(measured_recording(), measurements(), orientation))
+    assert "Network of balls: Stage 1" in text
+    assert text.index("Jump 1: verdict") < text.index("Network of balls")
 
 
 def test_text_and_page_are_written(tmp_path: Path) -> None:

@@ -138,7 +138,8 @@ class Projection:
 
     def sees(self, pixels: ArrayLike, margin: float = 0.0) -> NDArray[np.bool_]:
         """Whether pixel coordinates, shape (..., 2), lie at least `margin` px inside the image."""
-        x, y = np.moveaxis(np.asarray(pixels, float), -1, 0)
+        places = np.asarray(pixels, float)
+        x, y = places[..., 0], places[..., 1]
         right, bottom = self.width - 1 - margin, self.height - 1 - margin
         inside: NDArray[np.bool_] = (x >= margin) & (x <= right) & (y >= margin) & (y <= bottom)
         return inside

@@ -19,6 +19,16 @@ IN_SIGHT = 0.5  #: a marker is in sight if at least so much of its disc is
 _SUNFLOWER = math.pi * (3 - math.sqrt(5))
 _SAMPLES = 60
 
+
+def _unit_disc() -> Floats:
+    """Points spread evenly over the unit disc, shape (n, 2)."""
+    k = np.arange(_SAMPLES)
+    r = np.sqrt((k + 0.5) / _SAMPLES)
+    return np.stack((r * np.cos(_SUNFLOWER * k), r * np.sin(_SUNFLOWER * k)), axis=1)
+
+
+_DISC = _unit_disc()
+
 Front = Part | Floats  #: a capsule, or a convex outline in px, shape (n, 2)
 
 
@@ -36,27 +46,27 @@ def visible_shares(
     """
     distances, spots = projection.distance(pose.markers), projection.pixels(pose.markers)
     worn = scenario.jumper.worn(jump)
-    seen = [worn[i] and distances[i] > 0 and bool(projection.sees(spots[i])) for i in range(len(spots))]
-    if not any(seen):
-        return [0.0] * len(seen)
+    shares = [float(on) for on in worn & (distances > 0) & projection.sees(spots)]
+    if not any(shares) or not (scenario.jumper.occlusion or fronts):
+        return shares
     order = _order(scenario, pose, projection) if scenario.jumper.occlusion else []
     places = {thing.marker: place for place, thing in enumerate(order)}
     own = [(place, thing.part) for place, thing in enumerate(order) if thing.part is not None]
     shapes = [part for _, part in own] + [front for front in fronts if isinstance(front, Part)]
     ends, radii = body.outlines(shapes, projection)
     outlined = [front for front in fronts if not isinstance(front, Part)]
-    shares = []
     for i, spot in enumerate(spots):
-        if not seen[i]:
-            shares.append(0.0)
+        if not shares[i]:
             continue
         before = [place > places[i] and i not in part.carries for place, part in own]
         hiding = np.array(before + [True] * (len(shapes) - len(own)), bool)
-        disc = _disc(spot, scenario.jumper.marker_radius_m * projection.c / float(distances[i]))
-        hidden = _covered(disc, ends[hiding], radii[hiding])
+        radius = scenario.jumper.marker_radius_m * projection.c / float(distances[i])
+        hiding &= _covered(spot[None], ends, radii + 2 * radius)[:, 0]  # of the others no point can be hidden
+        disc = spot + radius * _DISC
+        hidden = _covered(disc, ends[hiding], radii[hiding]).any(axis=0)
         for polygon in outlined:
             hidden |= inside(polygon, disc)
-        shares.append(1.0 - float(hidden.mean()))
+        shares[i] = 1.0 - float(hidden.mean())
     return shares
 
 
@@ -80,15 +90,8 @@ def _order(scenario: Scenario, pose: Pose, projection: Projection) -> list[Order
     return body.in_order(body.parts(points, scenario.jumper, 0), pose.markers, projection)
 
 
-def _disc(centre: Floats, radius: float) -> Floats:
-    """Points spread evenly over a disc, shape (n, 2)."""
-    k = np.arange(_SAMPLES)
-    r = radius * np.sqrt((k + 0.5) / _SAMPLES)
-    return np.asarray(centre + np.stack((r * np.cos(_SUNFLOWER * k), r * np.sin(_SUNFLOWER * k)), axis=1))
-
-
 def _covered(points: Floats, ends: Floats, radii: Floats) -> Flags:
-    """Whether points, px, shape (n, 2), lie in the image of any capsule.
+    """Which points, px, shape (n, 2), lie in the images of which capsules, shape (m, n).
 
     Args:
         points: the points.
@@ -96,12 +99,12 @@ def _covered(points: Floats, ends: Floats, radii: Floats) -> Flags:
         radii: of the balls, px, shape (m, 2).
     """
     a, along = ends[:, None, 0], (ends[:, 1] - ends[:, 0])[:, None]
-    square = np.sum(along * along, axis=-1)
+    square = (along * along).sum(axis=-1)
     to = points - a
-    share = np.clip(np.sum(to * along, axis=-1) / np.where(square > 0, square, 1.0), 0, 1)
-    away = np.hypot(*np.moveaxis(to - share[..., None] * along, -1, 0))
-    covered: Flags = away < radii[:, :1] + (radii[:, 1:] - radii[:, :1]) * share
-    return np.asarray(covered.any(axis=0))
+    share = ((to * along).sum(axis=-1) / np.where(square > 0, square, 1.0)).clip(0, 1)
+    away = to - share[..., None] * along
+    covered: Flags = np.hypot(away[..., 0], away[..., 1]) < radii[:, :1] + (radii[:, 1:] - radii[:, :1]) * share
+    return covered
 
 
 def _hull(points: Floats) -> Floats:

@@ -41,7 +41,7 @@ def compute_jump(
     raw = solve_pulses(jump, measurements, system)
     motion = smooth(jump, measurements, system)
     pulses = _pulse_states(jump, measurements, raw, motion)
-    verdict = judge(pulses, motion.takeoff, raw.tests, motion.offsets, moved)
+    verdict = judge(pulses, system, motion.takeoff, raw.tests, motion.offsets, moved)
     return ComputedJump(
         Jump(jump.number, motion.takeoff, verdict, pulses, raw.tests),
         motion.offsets,

@@ -16,17 +16,23 @@ from analysis.result.model import (
     TakeOff,
     Verdict,
 )
+from analysis.scene.camera_system import CameraSystem
 
-#: A phase is measured well enough if so many of its pulses are solved by at least two rays each.
-_ENOUGH_SOLVED: Final = 0.8
+#: Share of the pulses in sight in which all points must be solved at the edge and in flight, and both skis in flight.
+_POINTS, _SKIS = 0.8, 0.5
 #: More gross errors among the rays than this say that something is wrong with the whole recording.
-_MANY_REMOVED: Final = 0.05
+_MANY_REMOVED: Final = 0.1
 #: The paper's requirement for coordinates, m (0.2 dm).
 REQUIRED_SIGMA_M: Final = 0.02
+#: Fewest cameras that must have a point in their image for the pulse to count as in sight.
+_CAMERAS: Final = 2
+
+_WORDS: Final = {Phase.TABLE: "on the table", Phase.EDGE: "around the edge", Phase.FLIGHT: "in flight"}
 
 
 def judge(
     pulses: Sequence[PulseState],
+    system: CameraSystem,
     takeoff: TakeOff | None,
     tests: Sequence[RayTest],
     synchrony: Mapping[str, CameraOffset],
@@ -36,37 +42,39 @@ def judge(
 
     Args:
         pulses: of the jump.
+        system: the oriented cameras.
         takeoff: None where it was not found.
         tests: of all rays.
         synchrony: by camera.
         moved: cameras that moved and whose pose was not corrected for it.
     """
-    phases = {phase: figures([pulse for pulse in pulses if pulse.phase is phase]) for phase in Phase}
+    seen = [pulse for pulse in pulses if in_sight(pulse, system)]
+    phases = {phase: figures([pulse for pulse in seen if pulse.phase is phase]) for phase in Phase}
     troubles = [offset.message for offset in synchrony.values() if offset.message is not None]
     troubles += [move.message for move in moved]
     if takeoff is None:
-        troubles.append("the take-off was not found, so phases and times are counted from the first pulse")
-    for phase, of_phase in phases.items():
-        if of_phase["pulses"] and of_phase["solved"] < _ENOUGH_SOLVED * of_phase["pulses"]:
-            troubles.append(f"only {of_phase['solved']} of {of_phase['pulses']} pulses are solved ({_WORDS[phase]})")
+        troubles.append("the take-off was not found, so times are counted from the first pulse")
+    for phase, share in ((Phase.EDGE, _POINTS), (Phase.FLIGHT, _POINTS)):
+        troubles += _too_few(phases[phase], "points", share, f"all points {_WORDS[phase]}")
+    troubles += _too_few(phases[Phase.FLIGHT], "skis", _SKIS, f"both skis {_WORDS[Phase.FLIGHT]}")
     removed = sum(test.removed for test in tests)
     if tests and removed > _MANY_REMOVED * len(tests):
         troubles.append(f"{removed} of {len(tests)} rays were taken out as gross errors; see the protocol")
-    total = sum(of_phase["pulses"] for of_phase in phases.values())
-    solved = sum(of_phase["solved"] for of_phase in phases.values())
-    if not total:
-        troubles.append("no pulse was measured")
-    counted = f"{solved} of {total} pulses solved"
-    message = f"{counted}: {'; '.join(troubles)}" if troubles else f"measured well: {counted}"
+    if not seen:
+        troubles.append("the jumper is never in sight of two cameras")
+    points = sum(of_phase["points"] for of_phase in phases.values())
+    counted = f"all points in {points} of {len(seen)} pulses in sight"
+    message = f"{'; '.join(troubles)} ({counted})" if troubles else f"measured well: {counted}"
     return Verdict(not troubles, message, phases)
 
 
 def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
     """The figures of some pulses, ready for JSON.
 
-    `solved` counts pulses in which all points and skis were measured; `controlled` those of them in which each was seen
-    by three cameras or more; `median_sigma_m` is that of the coordinates of all smoothed points (raw ones where there
-    are none), `coarse` the number of pulses in which one is larger than 0.02 m.
+    `points` counts pulses in which all points were measured, `skis` those in which both skis were, `solved` those in
+    which all of it was; `controlled` those of the last in which each was seen by three cameras or more.
+    `median_sigma_m` is that of the coordinates of all smoothed points (raw ones where there are none), `coarse` the
+    number of pulses in which one is larger than 0.02 m.
     """
     states: list[JumperState | SmoothedState] = [pulse.smoothed or pulse.raw for pulse in pulses]
     sigmas = [
@@ -74,23 +82,41 @@ def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
         for state in states
     ]
     everything = [value for of_pulse in sigmas for sigma in of_pulse for value in sigma.tolist()]
+    points = [all(point is not None for point in pulse.raw.points.values()) for pulse in pulses]
+    skis = [all(ski is not None for ski in pulse.raw.skis.values()) for pulse in pulses]
+    both = [one and other for one, other in zip(points, skis, strict=True)]
     return {
         "pulses": len(pulses),
-        "solved": sum(is_solved(pulse.raw) for pulse in pulses),
-        "controlled": sum(is_solved(pulse.raw) and _controlled(pulse.raw) for pulse in pulses),
+        "points": sum(points),
+        "skis": sum(skis),
+        "solved": sum(both),
+        "controlled": sum(solved and _controlled(pulse.raw) for solved, pulse in zip(both, pulses, strict=True)),
         "median_sigma_m": float(np.median(everything)) if everything else None,
         "coarse": sum(any((sigma > REQUIRED_SIGMA_M).any() for sigma in of_pulse) for of_pulse in sigmas),
     }
 
 
-def is_solved(state: JumperState) -> bool:
-    """Whether all points and skis of a raw solution are there."""
-    return all(part is not None for part in (*state.points.values(), *state.skis.values()))
+def in_sight(pulse: PulseState, system: CameraSystem) -> bool:
+    """Whether all points, measured or predicted, lie within the images of two cameras, as far as they are known."""
+    state = pulse.smoothed or pulse.raw
+    places = [point.xyz for point in state.points.values() if point is not None]
+    if not places:
+        return True  # nothing is known: it counts as a pulse that was not solved
+    seen = np.zeros(len(places), int)
+    for placed in system.cameras.values():
+        xy = placed.project(np.array(places))
+        with np.errstate(invalid="ignore"):
+            seen += ((xy >= 0) & (xy <= placed.size - 1)).all(axis=1)
+    return bool((seen >= _CAMERAS).all())
+
+
+def _too_few(of_phase: Mapping[str, Any], what: str, share: float, words: str) -> list[str]:
+    """A line if too few pulses of a phase show something."""
+    if of_phase[what] >= share * of_phase["pulses"]:
+        return []
+    return [f"only {of_phase[what]} of {of_phase['pulses']} pulses show {words}"]
 
 
 def _controlled(state: JumperState) -> bool:
     parts = [part for part in (*state.points.values(), *state.skis.values()) if part is not None]
-    return all(len(part.cameras) > 2 for part in parts)
-
-
-_WORDS: Final = {Phase.TABLE: "on the table", Phase.EDGE: "around the edge", Phase.FLIGHT: "in flight"}
+    return all(len(part.cameras) > _CAMERAS for part in parts)

@@ -1,4 +1,4 @@
-"""Runs the demonstration on the simulated hill: records, publishes, checks the log, writes pictures."""
+"""Runs the demonstration on the simulated hill: records, publishes, checks the log, measures the jumps."""
 
 import socket
 from collections.abc import Callable
@@ -15,6 +15,7 @@ from rig.settings.model import RigSettings
 from service.headless import HeadlessRig, record
 from service.recordings.storage import new_log_path
 from svev import console
+from svev.demo_analysis import measure
 
 Bus = Literal["gige", "firewire", "sim"]
 
@@ -28,17 +29,21 @@ _GVCP_PORT: Final = 3956
 _BLOCKS: Final = 64
 
 
-def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) -> dict[str, Any]:
-    """Record for `seconds` on the simulated hill, with a subscriber that counts the triplets.
+def run_demo(
+    bus: Bus, seconds: float, out: Path, say: Callable[[str], None], *, analyze: bool = True
+) -> dict[str, Any]:
+    """Record for `seconds` on the simulated hill, with a subscriber that counts the triplets; measure the jumps.
 
     Args:
         bus: how the simulated cameras are connected.
         seconds: length of the recording.
         out: folder for the files.
         say: prints a line for people.
+        analyze: measure the jumps too.
 
     Returns:
-        The recording's result, what the subscriber counted, the verdict of the check, and paths of the files.
+        The recording's result, what the subscriber counted, the verdict of the check, paths of the files, and what was
+        measured.
 
     Raises:
         SvevError: as `service.headless.record`, and if images are missing because of the disk.
@@ -67,6 +72,7 @@ def run_demo(bus: Bus, seconds: float, out: Path, say: Callable[[str], None]) ->
         "verdict": report.verdict,
         "contact_sheet": str(sheet),
         "truth": str(truth_path(path)),
+        "analysis": measure(path, rig, say) if analyze else None,
     }
 
 

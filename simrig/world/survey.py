@@ -1,0 +1,40 @@
+"""The survey of the simulated hill as a surveyor would hand it over: balls with errors, interior orientations."""
+
+from typing import Any
+
+import numpy as np
+
+from simrig.world.scenario import Scenario
+
+SIGMA_M = 0.012  #: of each surveyed coordinate (the paper's estimate)
+_PARAMETERS = ("x0", "y0", "a1", "a2", "a3", "r0", "b1", "b2", "c1", "c2")
+_DIGITS = 4  # of coordinates, m
+
+
+def survey(scenario: Scenario, size: tuple[int, int] = (640, 480), sigma: float = SIGMA_M) -> dict[str, Any]:
+    """The survey as the object of a `svev-network/1` file; the same scenario gives the same errors.
+
+    Args:
+        scenario: the hill. Balls that fell down since are in the survey like all others.
+        size: width and height of the images, px.
+        sigma: of each coordinate, m.
+    """
+    rng = np.random.default_rng((scenario.seed, len(scenario.balls)))
+    points: dict[str, Any] = {}
+    for ball in scenario.balls:
+        errors = rng.normal(0.0, sigma, 3)
+        if ball.role == "control":
+            surveyed = [round(float(x), _DIGITS) for x in np.array(ball.X) + errors]
+            points[ball.name] = {"role": "control", "X": surveyed, "sigma": [sigma] * 3}
+    cameras = {}
+    for camera in scenario.cameras:
+        projection = camera.projection(*size)
+        lens = {} if projection.lens is None else {name: getattr(projection.lens, name) for name in _PARAMETERS}
+        cameras[camera.name] = {"size": list(size), "c": projection.c, **lens, "distortion": "projected"}
+    return {
+        "format": "svev-network/1",
+        "length_unit": "m",
+        "image_frame": "pixel",
+        "cameras": cameras,
+        "points": points,
+    }

@@ -1,0 +1,110 @@
+"""Measures the jumps of the demonstration, and sets them beside the truth of the simulated hill."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from analysis.analyze import analyze
+from analysis.cameras.source import read_source
+from analysis.report.figures import EARLY_S, plus_minus
+from analysis.result.model import Jump, PulseState, Quantity, SmoothedState
+from analysis.result_folder import write_folder
+from recorder.log.truth_path import truth_path
+from rig.errors import NoJumpError
+from rig.settings.model import RigSettings
+from simrig.world.scenario import load_scenario
+from simrig.world.survey import survey
+from svev import console
+
+#: What is shown: name in the result and in the truth, name for people, unit.
+_SHOWN: Final = (
+    ("alpha", "ski to leg, alpha", "°"),
+    ("beta", "hip, beta", "°"),
+    ("gamma", "between the skis, gamma", "°"),
+    ("dphi", "right minus left ski, dphi", "°"),
+    ("phi", "slope of the skis, phi", "°"),
+    ("height", "height, Z0", "m"),
+    ("speed", "speed, v", "m/s"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A number beside its truth.
+
+    Attributes:
+        name: for people.
+        measured: with its standard deviation.
+        true: the truth.
+        unit: of both.
+    """
+
+    name: str
+    measured: Quantity
+    true: float
+    unit: str
+
+    def words(self) -> str:
+        """One line."""
+        return f"{self.name:28}{plus_minus(self.measured, self.unit):24}true {self.true:.2f}"
+
+
+def measure(log: Path, rig: RigSettings, say: Callable[[str], None]) -> dict[str, Any]:
+    """Write the survey of the simulated hill, measure the jumps, write the results into a folder beside the log.
+
+    Args:
+        log: of the simulated rig.
+        rig: the rig.
+        say: prints a line for people.
+
+    Returns:
+        Paths, and for each jump the lines that compare it with the truth; a message alone if nobody jumps in the log.
+
+    Raises:
+        SvevError: as `analysis.analyze.analyze`.
+    """
+    if rig.simulation is None:
+        raise ValueError("only the simulated hill has a survey of its own")
+    scenario, region = load_scenario(rig.simulation.scenario), rig.cameras[0].region
+    surveyed, folder = log.with_suffix(".survey.json"), log.with_suffix("")
+    surveyed.write_text(json.dumps(survey(scenario, (region.width, region.height)), indent=1), encoding="utf-8")
+    say("measuring the jumper")
+    found: dict[str, Any] = {"survey": str(surveyed), "out": None, "report": None, "jumps": [], "message": ""}
+    try:
+        with console.steps() as tell:
+            analysis = analyze(log, read_source(surveyed, None), progress=tell)
+            write_folder(analysis, log, folder, progress=tell)
+    except NoJumpError as error:
+        return found | {"message": str(error)}
+    truth = json.loads(truth_path(log).read_text(encoding="utf-8"))
+    hill = {int(pulse): number for pulse, number in truth["hill_pulse_of_recording"].items()}
+    states = {state["pulse"]: state for state in truth["pulses"]}
+    jumps = []
+    for jump in analysis.result.jumps:
+        pulse = _shown_pulse(jump)
+        true = {} if pulse is None else states.get(hill.get(pulse.pulse, -1), {})
+        lines = [c.words() for c in compared(pulse.smoothed, true)] if pulse and pulse.smoothed and true else []
+        where = "" if pulse is None else f"pulse {pulse.pulse}, {pulse.since_takeoff_s:.2f} s after the take-off"
+        jumps.append({"number": jump.number, "verdict": jump.verdict.message, "at": where, "lines": lines})
+    return found | {"out": str(folder), "report": str(folder / "report.html"), "jumps": jumps}
+
+
+def compared(state: SmoothedState, true: Mapping[str, Any]) -> list[Comparison]:
+    """The figures of a state beside the truth of its pulse."""
+    found = []
+    for key, name, unit in _SHOWN:
+        measured = state.angles.get(key) if key in state.angles else getattr(state, key, None)
+        value = true["angles"].get(key, true.get(key))
+        if measured is not None and value is not None:
+            found.append(Comparison(name, measured, float(value), unit))
+    return found
+
+
+def _shown_pulse(jump: Jump) -> PulseState | None:
+    """The pulse nearest to half a second after the take-off; None if the jump has none near it."""
+    if jump.takeoff is None:
+        return None
+    near = [pulse for pulse in jump.pulses if abs(pulse.since_takeoff_s - EARLY_S) < EARLY_S / 2]
+    return min(near, key=lambda pulse: abs(pulse.since_takeoff_s - EARLY_S), default=None)

@@ -28,6 +28,7 @@ from analysis.report.overlay import Overlay, half_axes
 from analysis.report.scrubbing import overlays_of
 from analysis.result.model import MeasuredRecording
 from analysis.scene.camera_system import CameraSystem
+from rig.arrays import Floats
 from rig.clocks import NS_PER_S
 from rig.errors import BadInputError
 from rig.tag import TripletTag
@@ -38,8 +39,8 @@ Progress = Callable[[int, int], None]
 
 #: Shown before and after each jump, s; between two jumps the video waits as long.
 _AROUND_S: Final = 0.5
-#: Wider pictures are made smaller: decoders in phones stop there.
-_WIDEST_PX: Final = 3840
+#: Wider triplets are made smaller, unless the video is without loss: phones show no more.
+_WIDEST_PX: Final = 1920
 _TIME_BASE: Final = Fraction(1, 1_000_000)
 _VP9: Final = {"crf": "28", "b": "0", "deadline": "realtime", "cpu-used": "6", "g": "30"}
 _SHIFT: Final = 4  # bits of sub-pixels when lines are drawn
@@ -98,7 +99,8 @@ def write_video(
     writer: _Writer | None = None
     try:
         for tag, image in frames_of(log, shown.keys()):
-            picture = _picture(tag, image, shown[int(tag.pulse)], windows)
+            scale = 1.0 if lossless else min(1.0, _WIDEST_PX / image.shape[1])
+            picture = _picture(tag, image, shown[int(tag.pulse)], windows, scale)
             if writer is None:
                 writer = _Writer(out, (picture.shape[1], picture.shape[0]), result.rate_hz, lossless=lossless)
             writer.add(picture, tag)
@@ -128,8 +130,7 @@ class _Writer:
     """
 
     def __init__(self, out: Path, size: tuple[int, int], rate_hz: float, *, lossless: bool) -> None:
-        scale = 1.0 if lossless else min(1.0, _WIDEST_PX / size[0])
-        self._size = tuple(max(2, round(side * scale) // 2 * 2) for side in size)
+        self._size = size if lossless else (size[0] // 2 * 2, size[1] // 2 * 2)  # colours are halved
         self._gap_us = round(_AROUND_S * 1e6)
         options = {"video_track_timescale": str(_TIME_BASE.denominator)} if out.suffix == ".mp4" else {}
         self._file = av.open(str(out), "w", options=options)
@@ -151,8 +152,7 @@ class _Writer:
             step = round((tag.time - self._last.time) * 1e6 / NS_PER_S)
             self._at_us += min(max(step, 1), self._gap_us)
         self._last = tag
-        if picture.shape[1::-1] != self._size:
-            picture = np.asarray(cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+        picture = np.ascontiguousarray(picture[: self._size[1], : self._size[0]])
         frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
         frame.pts, frame.time_base = self._at_us, _TIME_BASE
         self._file.mux(self._stream.encode(frame))
@@ -192,26 +192,33 @@ def _words(course: Course, i: int) -> str:
     return (words + (f"  {speed:.1f} m/s" if np.isfinite(speed) else "")).replace("\N{MINUS SIGN}", "-")
 
 
-def _picture(tag: TripletTag, image: Grey, shown: _Shown, windows: Windows) -> _Picture:
+def _picture(tag: TripletTag, image: Grey, shown: _Shown, windows: Windows, scale: float) -> _Picture:
     """The triplet in colour with its overlay, and under each camera's image the jumper enlarged."""
-    rows, columns = image.shape
-    widest = max(camera.columns[1] - camera.columns[0] for camera in tag.cameras)
-    picture = np.zeros((rows + widest * CROP_HEIGHT // CROP_WIDTH, columns, 3), np.uint8)
-    picture[:rows] = image[:, :, np.newaxis]
     there = camera_images(tag, image)
-    for camera in tag.cameras:
-        left, right = camera.columns
-        overlay, window = shown.overlays.get(camera.name), windows.get((int(tag.pulse), camera.name))
-        if overlay is not None and window is not None and camera.name in there:
-            scale = (right - left) / window.width
-            below = picture[rows : rows + round(window.height * scale), left:right]
-            part = there[camera.name][window.top :, window.left :][: window.height, : window.width]
+    size = round(image.shape[1] * scale), round(image.shape[0] * scale)
+    blocks = {c.name: (round(c.columns[0] * scale), round(c.columns[1] * scale)) for c in tag.cameras}
+    widest = max(right - left for left, right in blocks.values())
+    rows = size[1]
+    picture = np.zeros((rows + widest * CROP_HEIGHT // CROP_WIDTH, size[0], 3), np.uint8)
+    small = image if scale == 1 else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    picture[:rows] = small[:, :, np.newaxis]
+    for name, (left, right) in blocks.items():
+        overlay, window = shown.overlays.get(name), windows.get((int(tag.pulse), name))
+        if overlay is not None and window is not None and name in there:
+            larger = (right - left) / window.width
+            below = picture[rows : rows + round(window.height * larger), left:right]
+            part = there[name][window.top :, window.left :][: window.height, : window.width]
             below[:] = cv2.resize(part, below.shape[1::-1], interpolation=cv2.INTER_CUBIC)[:, :, np.newaxis]
-            _draw(below, overlay.mapped(window.corner, scale).mapped(np.full(2, 0.5), 1.0), 2)
-            _draw(picture[:rows, left:right], overlay, 1)
-        _write(picture[:, left:right], camera.name, (10, 24))
+            _draw(below, _seen(overlay, window.corner, larger), 2)
+            _draw(picture[:rows, left:right], _seen(overlay, np.full(2, -0.5), scale), 1)
+        _write(picture[:, left:right], name, (10, 24))
     _write(picture, shown.words, (10, rows - 12))
     return picture
+
+
+def _seen(overlay: Overlay, corner: Floats, scale: float) -> Overlay:
+    """An overlay in px of a picture that begins at a corner of the image; (0, 0) is the centre of its first pixel."""
+    return overlay.mapped(corner + 0.5 / scale, scale)
 
 
 def _draw(block: _Picture, overlay: Overlay, width: int) -> None:

@@ -7,9 +7,12 @@ three rays competes fairly with one of two, and a spot counts more where few oth
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 
+from analysis.identification.body import USUAL, implausibility
 from analysis.identification.prediction import Prediction
 from analysis.identification.space_points import Rays, SpacePoints, squared_distances
 from analysis.identification.views import Sight, Views, gate
@@ -18,6 +21,8 @@ from rig.arrays import Flags, Floats, Integers
 #: How much likelier than each rival, and than chance, an assignment must be: minus twice the logarithm of 1/1000.
 DECISIVE = 13.8
 DETECTED = 0.9  #: share of the markers in an image that are found as spots
+Strangeness: TypeAlias = dict[tuple[int, int, int, int], float]
+
 MOST_OPTIONS = 5  #: of a marker
 MOST_VAGUE_M = 0.35  #: standard deviation of a prediction that is still of use: less than from binding to binding
 
@@ -58,6 +63,7 @@ def assign(
     delivered: Flags,
     points: Sequence[SpacePoints],
     predicted: Prediction,
+    axes: Floats,
 ) -> Assigned:
     """Assign the spots of t pulses to markers.
 
@@ -67,6 +73,7 @@ def assign(
         delivered: (t, m) whether a camera has an image of a pulse.
         points: in space, that these spots may show, of each pulse.
         predicted: places of n markers.
+        axes: of the flight (`flights.Flight`).
     """
     steps, n, _ = predicted.xyz.shape
     m = len(views)
@@ -84,7 +91,8 @@ def assign(
             found = _points(rays, points[t], predicted.xyz[t, i], predicted.covariance[t, i], rate - missed)
             found += _single_rays(own, rays, expected, rate - missed)
             options[i] += _worthy(found)
-        for i, (option, doubtful) in enumerate(jointly_best(options)):
+        strange = _strangeness(options, points[t], axes)
+        for i, (option, doubtful) in enumerate(jointly_best(options, strange)):
             result.rays[t, i] = np.where(doubtful, -1, option.rays)
             if option.point >= 0 and not doubtful.any():
                 result.xyz[t, i] = points[t].xyz[option.point]
@@ -128,7 +136,7 @@ def _points(rays: Sequence[Rays], points: SpacePoints, xyz: Floats, covariance: 
     options = []
     for j in np.flatnonzero(distance < gate(3)):
         seen = np.flatnonzero(points.rays[j] >= 0).tolist()
-        area = sum(2 * np.log(rays[k].variance[points.rays[j, k]]) for k in seen)
+        area = sum(2 * np.log(rays[k].variance[points.rays[j, k]]) + rays[k].odd[points.rays[j, k]] for k in seen)
         area += np.linalg.slogdet(total[j])[1] - np.linalg.slogdet(points.covariance[j])[1]
         cost = points.misfit[j] + distance[j] + area + rate[seen].sum()
         options.append(Option(float(cost), points.rays[j], int(j)))
@@ -144,7 +152,7 @@ def _single_rays(places: Sequence[_Place], rays: Sequence[Rays], expected: Flags
             area = np.linalg.slogdet(places[k].covariance[0] + rays[k].covariance[s])[1]
             single = np.full(len(rays), -1)
             single[k] = s
-            options.append(Option(float(distances[s] + area + rate[k]), single, -1))
+            options.append(Option(float(distances[s] + rays[k].odd[s] + area + rate[k]), single, -1))
     return options
 
 
@@ -158,33 +166,61 @@ def _worthy(options: Sequence[Option]) -> list[Option]:
     return kept[:MOST_OPTIONS]
 
 
-def jointly_best(options: Sequence[Sequence[Option]]) -> list[tuple[Option, Flags]]:
+def _strangeness(options: Sequence[Sequence[Option]], points: SpacePoints, axes: Floats) -> Strangeness:
+    """Costs of two options being markers of one body: what looks like one costs nothing."""
+
+    def cost(one: int, a: Option, other: int, b: Option) -> float:
+        if a.point < 0 or b.point < 0:
+            return 0.0
+        difference = (points.xyz[b.point] - points.xyz[a.point]) @ axes.T
+        return max(0.0, float(implausibility(one, other, difference[None])[0]) - USUAL)
+
+    return {
+        (i, p, j, q): cost(i, a, j, b)
+        for (i, one), (j, other) in combinations(enumerate(options), 2)
+        for p, a in enumerate(one)
+        for q, b in enumerate(other)
+    }
+
+
+def jointly_best(
+    options: Sequence[Sequence[Option]], strangeness: Strangeness | None = None
+) -> list[tuple[Option, Flags]]:
     """The best option of each marker when no spot is used twice.
 
     Args:
         options: of each marker, nothing among them.
+        strangeness: costs of two options together, by marker, option, other marker and its option.
 
     Returns:
         The option of each, and (m,) the images in which a rival is nearly as good.
     """
-    combinations: list[tuple[Option, ...]] = [()]
-    for of_marker in options:
-        combinations = [(*c, o) for c in combinations for o in of_marker if not _shares(c, o)]
-    costs = np.array([sum(o.cost for o in c) for c in combinations])
-    spots = np.array([[o.rays for o in c] for c in combinations])
+    joint: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
+    for i, of_marker in enumerate(options):
+        joint = [
+            (
+                cost + option.cost + sum((strangeness or {}).get((j, q, i, p), 0.0) for j, q in enumerate(so_far)),
+                (*so_far, p),
+            )
+            for cost, so_far in joint
+            for p, option in enumerate(of_marker)
+            if not any(_share(options[j][q], option) for j, q in enumerate(so_far))
+        ]
+    costs = np.array([cost for cost, _ in joint])
+    spots = np.array([[options[i][p].rays for i, p in enumerate(picked)] for _, picked in joint])
     best = int(costs.argmin())
     rivals = costs - costs[best] < DECISIVE
     rivals[best] = False
     chosen = []
-    for i, option in enumerate(combinations[best]):
-        mine = option.rays
+    for i, p in enumerate(joint[best][1]):
+        mine = options[i][p].rays
         other_spot = (spots[rivals, i] != mine) & (spots[rivals, i] >= 0) & (mine >= 0)
         others = np.delete(spots[rivals], i, axis=1)
         elsewhere = ((others == mine) & (mine >= 0)).any(axis=1)
-        chosen.append((option, np.asarray((other_spot | elsewhere).any(axis=0))))
+        chosen.append((options[i][p], np.asarray((other_spot | elsewhere).any(axis=0))))
     return chosen
 
 
-def _shares(options: Sequence[Option], option: Option) -> bool:
-    """Whether an option uses a spot of others."""
-    return any(((o.rays == option.rays) & (o.rays >= 0)).any() for o in options)
+def _share(one: Option, other: Option) -> bool:
+    """Whether two options use the same spot."""
+    return bool(((one.rays == other.rays) & (one.rays >= 0)).any())

@@ -1,9 +1,8 @@
 """What a jumper looks like in space, loosely: enough to tell which is which, too little to measure anything by it.
 
-The frame is that of the flight: x horizontal along it, y to the left, z up. All numbers are sizes of people and skis.
+The frame is that of `flights.Flight`: x horizontal along it, y to the left, z up. All numbers are sizes of people.
 """
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -29,32 +28,14 @@ _DISTANCES: Final = {
     ("P3", "P1"): (1.30, 0.27),
     ("P4", "P1"): (1.30, 0.27),
 }
+#: Implausibility that nine in ten pairs of points of bodies stay below: chi-square, 4 degrees of freedom.
+USUAL = 7.8
 #: A jumper with skis is not longer than this, m.
 REACH_M = 2.5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FlightFrame:
-    """The frame of a flight.
-
-    Attributes:
-        axes: (3, 3) forward, left and up as rows, in the object system.
-        velocity: (3,) mean velocity in the object system, m/s.
-    """
-
-    axes: Floats
-    velocity: Floats
-
-    @classmethod
-    def along(cls, velocity: Floats) -> "FlightFrame":
-        """The frame of a flight with a mean velocity (3,)."""
-        forward = np.array((velocity[0], velocity[1], 0.0)) / np.hypot(velocity[0], velocity[1])
-        up = np.array((0.0, 0.0, 1.0))
-        return cls(np.stack((forward, np.cross(up, forward), up)), velocity)
-
-
 def implausibility(one: int, other: int, difference: Floats) -> Floats:
-    """How badly differences other - one fit two points of the body: about chi-square with three degrees of freedom.
+    """How badly differences other - one fit two points of the body: about chi-square with four degrees of freedom.
 
     Args:
         one: index into `POINTS`.

@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, Trace
-from analysis.identification.body import FlightFrame
+from analysis.identification.flights import Flight, find_flights
 from analysis.identification.markers import BINDINGS, Markers, follow_markers
-from analysis.identification.naming import NAMELESS, grouped, name_tracks
 from analysis.identification.ski_traces import StraightTrace, straightened
 from analysis.identification.skis import Skis, follow_skis
-from analysis.identification.space_points import find_space_points, rays_of
-from analysis.identification.tracks import Track, find_tracks
+from analysis.identification.space_points import Appearance, find_space_points, rays_of
+from analysis.identification.tracks import find_tracks
 from analysis.identification.views import Views
 from analysis.measurements.model import (
     POINTS,
@@ -27,6 +26,7 @@ from analysis.scene.camera_system import CameraSystem
 _SEARCH_HZ = 30.0  #: tracks are sought in so many pulses per second: displacements that stand out of the noise
 _BEYOND_S = 0.6  #: that markers are followed before the first and after the last point of a track
 _LEAST_NAMES = 2  #: a jumper has more than one point
+_LEAST_PULSES = 3  #: and shows them in more than a glimpse
 
 
 def identify(
@@ -52,43 +52,44 @@ def identify(
     time_s = np.array([float(c.pulse) for c in sought]) / rate_hz
     points = find_space_points(views, [rays_of(views, c) for c in sought])
     jumps: list[JumpMeasurements] = []
-    for tracks in grouped(find_tracks(points, time_s)):
-        longest = max(tracks, key=len)
-        frame = FlightFrame.along(longest.velocity())
-        names = name_tracks(tracks, frame)
-        if len(set(names) - {NAMELESS}) < _LEAST_NAMES:
-            continue
-        named = [(track, name) for track, name in zip(tracks, names, strict=True) if name != NAMELESS]
-        jumps.append(_measured(views, candidates, rate_hz, frame, named, len(jumps) + 1))
+    for flight in find_flights(find_tracks(points, time_s)):
+        pulses = _measured(views, candidates, rate_hz, flight, _appearance(views, sought, flight))
+        if sum(len(_named(pulse)) >= _LEAST_NAMES for pulse in pulses) >= _LEAST_PULSES:
+            jumps.append(JumpMeasurements(len(jumps) + 1, tuple(pulses)))
     return jumps
 
 
+def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Flight) -> Appearance:
+    """What the spots of a flight look like: most points of its tracks are markers."""
+    contrasts = [
+        candidates[step].images[views.names[k]].spots.contrast[spot]
+        for track in flight.tracks
+        for step, spots in zip(track.step.tolist(), track.rays.tolist(), strict=True)
+        for k, spot in enumerate(spots)
+        if spot >= 0
+    ]
+    return Appearance.of(np.array(contrasts))
+
+
+def _named(pulse: PulseMeasurements) -> set[str]:
+    return {label for image in pulse.images.values() for label in image.points}
+
+
 def _measured(
-    views: Views,
-    candidates: Sequence[PulseCandidates],
-    rate_hz: float,
-    frame: FlightFrame,
-    named: Sequence[tuple[Track, int]],
-    number: int,
-) -> JumpMeasurements:
-    """The measurements of one jump from its named tracks."""
-    begin = min(track.time_s[0] for track, _ in named) - _BEYOND_S
-    end = max(track.time_s[-1] for track, _ in named) + _BEYOND_S
+    views: Views, candidates: Sequence[PulseCandidates], rate_hz: float, flight: Flight, appearance: Appearance
+) -> list[PulseMeasurements]:
+    """What was measured of a flight, from its first to its last appearance."""
+    begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
     window = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
     time_s = np.array([c.pulse / rate_hz for c in window])
-    rays = [rays_of(views, c) for c in window]
+    rays = [rays_of(views, c, appearance) for c in window]
     delivered = np.array([[name in c.images for name in views.names] for c in window])
-    start = {
-        (int(np.abs(time_s - time).argmin()), name): (track.xyz[i], track.covariance[i])
-        for track, name in named
-        for i, time in enumerate(track.time_s)
-    }
-    markers = follow_markers(views, time_s, rays, delivered, find_space_points(views, rays), frame, start)
+    markers = follow_markers(views, time_s, rays, delivered, find_space_points(views, rays), flight)
     traces = [[straightened(c.images[name].traces) if name in c.images else [] for name in views.names] for c in window]
-    skis = follow_skis(views, time_s, traces, delivered, frame, markers.places(BINDINGS))
+    skis = follow_skis(views, time_s, traces, delivered, flight, markers.places(BINDINGS))
     pulses = [_pulse(views, c, markers, skis, traces[t], t) for t, c in enumerate(window)]
     found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
-    return JumpMeasurements(number, tuple(pulses[found[0] : found[-1] + 1]))
+    return pulses[found[0] : found[-1] + 1] if found else []
 
 
 def _pulse(

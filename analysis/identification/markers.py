@@ -1,25 +1,36 @@
-"""The markers of one jump: from the tracks that have names to a spot for each marker in every image that shows it.
+"""The markers of one jump: from points in space that have names to a spot for each marker in every image that shows it.
 
 Prediction and assignment take turns: what is assigned at other pulses predicts where a marker is at this one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.identification.assignment import Assigned, assign
-from analysis.identification.body import FlightFrame
-from analysis.identification.prediction import MARKER, Prediction, predict
+from analysis.identification.flights import Flight
+from analysis.identification.naming import name_points
+from analysis.identification.prediction import Part, Prediction, predict
 from analysis.identification.skis import Places
 from analysis.identification.space_points import Rays, SpacePoints
 from analysis.identification.views import Views
 from analysis.measurements.model import POINTS
-from rig.arrays import Flags, Floats
+from rig.arrays import Flags, Floats, Integers
 
 #: Indices of P3 and P4 in `POINTS`.
-BINDINGS = (2, 3)
-_MOST_TURNS = 8
+BINDINGS = [2, 3]
+#: P1, P2, P3 and P4 as sums of P1, P2, the midpoint of the bindings and half the way from P3 to P4.
+_MIXING = np.array([(1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, -1.0), (0.0, 0.0, 1.0, 1.0)])
+_ANYWHERE_M = 100.0
+_VELOCITY_M_S, _ACCELERATION_M_S2 = 6.0, 15.0  #: of a part of the body against the flight, standard deviations
+_LIMBS_M_S2 = 25.0  #: change of the acceleration of helmet and hip within 0.1 s
+_FEET_M_S2 = 15.0  #: of the bindings: they follow the table and then the flight
+_HALF_GAP_M = 0.24  #: from the midpoint to a binding
+_GAP_SIGMA = (0.1, 1.0, 5.0)  #: of it, m, m/s, m/s^2
+_GAP_M_S2 = 4.0  #: change of its acceleration within 0.1 s
+_LEAST_PAIRS = 3
+_MOST_TURNS = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +64,7 @@ def follow_markers(
     pulses: Sequence[Sequence[Rays]],
     delivered: Flags,
     points: Sequence[SpacePoints],
-    frame: FlightFrame,
-    start: Mapping[tuple[int, int], tuple[Floats, Floats]],
+    flight: Flight,
 ) -> Markers:
     """Find the spots of all markers.
 
@@ -64,18 +74,54 @@ def follow_markers(
         pulses: spots of each pulse by camera.
         delivered: (t, m) whether a camera has an image of a pulse.
         points: in space, of each pulse.
-        frame: of the flight.
-        start: place and covariance by pulse and marker, from the tracks.
+        flight: of the jumper.
     """
     xyz = np.full((len(time_s), len(POINTS), 3), np.nan)
     covariance = np.full((len(time_s), len(POINTS), 3, 3), np.nan)
-    for (step, marker), (place, accuracy) in start.items():
-        xyz[step, marker], covariance[step, marker] = place, accuracy
+    named = _trusted(name_points(views, time_s, pulses, delivered, points, flight), points, flight)
+    for t, i in np.argwhere(named >= 0).tolist():
+        xyz[t, i], covariance[t, i] = points[t].xyz[named[t, i]], points[t].covariance[named[t, i]]
+    parts = _parts(flight)
     rays = np.full((len(time_s), len(POINTS), len(views)), -2)
     for _ in range(_MOST_TURNS):
-        predicted = predict(time_s, xyz, covariance, frame.velocity, MARKER)
-        assigned = assign(views, pulses, delivered, points, predicted)
+        predicted = predict(time_s, xyz, covariance, parts, _MIXING)
+        assigned = assign(views, pulses, delivered, points, predicted, flight.axes)
         if (assigned.rays == rays).all():
             break
         rays, xyz, covariance = assigned.rays, assigned.xyz, assigned.covariance
     return Markers(assigned, predicted)
+
+
+def _parts(flight: Flight) -> list[Part]:
+    """What the markers are made of (`_MIXING`)."""
+    body = np.stack((flight.place(flight.middle_s + np.zeros(1))[0], flight.motion[1]))
+    sigma = (_ANYWHERE_M, _VELOCITY_M_S, _ACCELERATION_M_S2)
+    gap = np.stack((_HALF_GAP_M * flight.axes[1], np.zeros(3)))
+    return [
+        Part(body, sigma, _LIMBS_M_S2),
+        Part(body, sigma, _LIMBS_M_S2),
+        Part(body, sigma, _FEET_M_S2),
+        Part(gap, _GAP_SIGMA, _GAP_M_S2),
+    ]
+
+
+def _trusted(named: Integers, points: Sequence[SpacePoints], flight: Flight) -> Integers:
+    """Names (t, 4) to begin with: of bindings those that are seen as a pair, which tell right from left themselves.
+
+    Where there are hardly any pairs, one of them may not be worn; then all are taken as the one on whose side of the
+    body they mostly are.
+    """
+    trusted = named.copy()
+    both = (named[:, BINDINGS] >= 0).all(axis=1)
+    trusted[~both, BINDINGS[0]] = trusted[~both, BINDINGS[1]] = -1
+    if both.sum() >= _LEAST_PAIRS:
+        return trusted
+    aside = {}
+    for t in np.flatnonzero((named[:, BINDINGS] >= 0).any(axis=1) & ~both & (named[:, :2] >= 0).any(axis=1)).tolist():
+        body = np.mean([points[t].xyz[i] for i in named[t, :2] if i >= 0], axis=0)
+        aside[t] = float((points[t].xyz[named[t, BINDINGS].max()] - body) @ flight.axes[1])
+    if aside:
+        only = BINDINGS[0] if np.median(list(aside.values())) < 0 else BINDINGS[1]
+        for t in aside:
+            trusted[t, only] = named[t, BINDINGS].max()
+    return trusted

@@ -1,118 +1,131 @@
-"""Names the tracks of a jump: P1 to P4 by where they are to each other, in all pulses together.
+"""Names points in space: P1 to P4 by what they are to each other in a pulse, and as one path over all pulses.
 
-One track says little. What two tracks that are seen together are to each other, from the crouch to the flight, says
-which is which. All namings are compared; a track whose name would change under another naming of nearly the same worth
-stays unnamed.
+In each pulse the best namings of the points near the flight's path compete: their rays must not share a spot, and they
+must look like a body. The path through all pulses then takes one naming of each, so that the names move as a body does.
 """
 
 from collections.abc import Sequence
-from itertools import combinations
+from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
-from analysis.identification.body import REACH_M, FlightFrame, implausibility
-from analysis.identification.tracks import Track
+from analysis.identification.assignment import DECISIVE, DETECTED
+from analysis.identification.body import REACH_M, implausibility
+from analysis.identification.flights import Flight
+from analysis.identification.space_points import Rays, SpacePoints
+from analysis.identification.views import Views
 from analysis.measurements.model import POINTS
-from rig.arrays import Floats
+from rig.arrays import Flags, Floats, Integers
 
-#: Implausibility at which two tracks are better left without names: chi-square, 4 degrees of freedom, 0.1 %.
-_STRANGE = 18.5
-#: Independent opinions about a pair of tracks at most: a body that is unusual in one pulse is so in all.
-_OPINIONS = 4
-_CALMS = 0.1  #: s after which a body's posture says something new
-_BEAM = 200
-_DECISIVE = 4.0
-NAMELESS = len(POINTS)
-
-
-def grouped(tracks: Sequence[Track]) -> list[list[Track]]:
-    """Tracks that move together, by jump, in the order of time."""
-    groups: list[list[Track]] = []
-    for track in sorted(tracks, key=lambda t: -len(t)):
-        home = next((group for group in groups if any(_together(track, other) for other in group)), None)
-        if home is None:
-            groups.append([track])
-        else:
-            home.append(track)
-    return sorted(groups, key=lambda group: min(track.time_s[0] for track in group))
+_ORDER = (2, 3, 1, 0)  #: bindings, hip, helmet: each restricts the next
+_MOST_POINTS = 24  #: of a pulse
+_BEAM = 60
+_MOST_NAMINGS = 30  #: of a pulse
+_BODY_M = 0.5  #: standard deviation of a point of the body from its middle
+_LIMBS_M_S = 4.0  #: standard deviation of the velocity of a point of the body against the body's
+_FAR = 1e6  #: cost of what cannot be
 
 
-def _together(one: Track, other: Track) -> bool:
-    """Whether two tracks may be parts of one body."""
-    begin, end = max(one.time_s[0], other.time_s[0]), min(one.time_s[-1], other.time_s[-1])
-    time = np.linspace(min(begin, end), max(begin, end), 5)
-    gap = max(0.0, float(begin - end))
-    if gap > 1.0:
-        return False
-    apart = np.linalg.norm(one.at(time) - other.at(time), axis=1)
-    return bool(apart.min() < REACH_M)
+@dataclass(frozen=True, slots=True, eq=False)
+class Namings:
+    """Possible namings of the points of one pulse, the best first.
+
+    Attributes:
+        points: (h, 4) index of the point in space for each of `POINTS`; -1: none.
+        costs: (h,) as in `assignment`.
+    """
+
+    points: Integers
+    costs: Floats
 
 
-def name_tracks(tracks: Sequence[Track], frame: FlightFrame, limit: int = 10) -> list[int]:
-    """Index into `POINTS` of each track; `NAMELESS` where none fits or several do.
+def name_points(
+    views: Views,
+    time_s: Floats,
+    pulses: Sequence[Sequence[Rays]],
+    delivered: Flags,
+    points: Sequence[SpacePoints],
+    flight: Flight,
+) -> Integers:
+    """Points (t, 4) of the body: index of the point in space of each pulse; -1: none.
 
     Args:
-        tracks: of one jump.
-        frame: of the flight.
-        limit: so many of the longest tracks are named.
+        views: the cameras.
+        time_s: (t,) of the pulses.
+        pulses: spots of each pulse by camera.
+        delivered: (t, m) whether a camera has an image of a pulse.
+        points: in space, of each pulse.
+        flight: near whose path the points are sought.
     """
-    order = sorted(range(len(tracks)), key=lambda i: -len(tracks[i]))[:limit]
-    chosen = [tracks[i] for i in order]
-    costs = _pair_costs(chosen, frame)
-    beam: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
-    for i in range(len(chosen)):
-        longer = []
-        for cost, names in beam:
-            for name in range(NAMELESS + 1):
-                more = sum(costs[j, i, names[j], name] for j in range(i))
-                longer.append((cost + more, (*names, name)))
-        beam = sorted(longer)[:_BEAM]
-    best_cost, best = beam[0]
-    result = [NAMELESS] * len(tracks)
-    for i, track in enumerate(order):
-        rivals = [cost for cost, names in beam if names[i] not in {best[i], NAMELESS}]
-        if not rivals or min(rivals) - best_cost > _DECISIVE:
-            result[track] = best[i]
-    return result
+    path, velocity = flight.place(time_s), flight.velocity(time_s)
+    namings = [
+        _namings(points[t], _worths(views, pulses[t], delivered[t], points[t]), path[t], flight.axes)
+        for t in range(len(time_s))
+    ]
+    costs = [namings[0].costs]
+    came = []
+    for t in range(1, len(time_s)):
+        dt = float(time_s[t] - time_s[t - 1])
+        steps = _steps(points[t - 1], points[t], velocity[t] * dt, _LIMBS_M_S * dt)
+        one, other = namings[t - 1].points, namings[t].points
+        total = costs[-1][:, None] + steps[one[:, None], other[None]].sum(axis=2)
+        came.append(total.argmin(axis=0))
+        costs.append(total.min(axis=0) + namings[t].costs)
+    best = int(costs[-1].argmin())
+    path_back = [best]
+    for back in reversed(came):
+        path_back.append(int(back[path_back[-1]]))
+    return np.array([naming.points[h] for naming, h in zip(namings, path_back[::-1], strict=True)])
 
 
-def _opinions(time_s: Floats) -> float:
-    return float(min(_OPINIONS, 1 + np.ptp(time_s) / _CALMS))
+def _worths(views: Views, rays: Sequence[Rays], delivered: Flags, points: SpacePoints) -> Floats:
+    """Cost (n,) of each point being part of a body against chance."""
+    sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
+    rate = 2 * np.log(2 * np.pi / DETECTED * (1 + np.array([len(r.xy) for r in rays])) / sizes)
+    rate = rate + np.where(delivered, 2 * np.log(1 - DETECTED), 0.0)
+    cost = points.misfit + np.linalg.slogdet(points.covariance + _BODY_M**2 * np.eye(3))[1]
+    cost = cost - np.linalg.slogdet(points.covariance)[1]
+    for k, of_camera in enumerate(rays):
+        seen = points.rays[:, k] >= 0
+        spots = points.rays[seen, k]
+        cost[seen] += rate[k] + 2 * np.log(of_camera.variance[spots]) + of_camera.odd[spots]
+    return np.asarray(cost)
 
 
-def _pair_costs(tracks: Sequence[Track], frame: FlightFrame) -> Floats:
-    """Cost (n, n, names, names) of naming two tracks, 0 where one stays nameless.
-
-    Plausible namings cost less than nothing; one name at two places at a time costs infinitely much.
-    """
-    n = len(tracks)
-    costs = np.zeros((n, n, NAMELESS + 1, NAMELESS + 1))
-    for i, j in combinations(range(n), 2):
-        one, other = tracks[i], tracks[j]
-        common = np.intersect1d(one.step, other.step)
-        if len(common):
-            at_one, at_other = np.isin(one.step, common), np.isin(other.step, common)
-            difference = (other.xyz[at_other] - one.xyz[at_one]) @ frame.axes.T
-            opinions = _opinions(one.time_s[at_one])
-        else:
-            begin = min(max(one.time_s[0], other.time_s[0]), max(one.time_s[-1], other.time_s[-1]))
-            end = max(min(one.time_s[-1], other.time_s[-1]), min(one.time_s[0], other.time_s[0]))
-            time = np.array([(begin + end) / 2])
-            difference, opinions = (other.at(time) - one.at(time)) @ frame.axes.T, 1.0
-        for a in range(NAMELESS):
-            for b in range(NAMELESS):
-                if a != b:
-                    strange = np.minimum(implausibility(a, b, difference), 3 * _STRANGE).mean()
-                    costs[i, j, a, b] = opinions * (strange - _STRANGE)
-                elif len(common):
-                    costs[i, j, a, b] = np.inf
-                else:
-                    costs[i, j, a, b] = _same(difference, one, other)
-    return costs
+def _namings(points: SpacePoints, worths: Floats, path: Floats, axes: Floats) -> Namings:
+    """The best namings of one pulse."""
+    near = np.flatnonzero((np.linalg.norm(points.xyz - path, axis=1) < REACH_M) & (worths < -DECISIVE))
+    near = near[np.argsort(worths[near])][:_MOST_POINTS]
+    n = len(near)
+    local = points.xyz[near] @ axes.T
+    apart = (local[None] - local[:, None]).reshape(-1, 3)
+    rays = points.rays[near]
+    shared = ((rays[None] == rays[:, None]) & (rays[None] >= 0)).any(axis=2)
+    pair = np.zeros((len(POINTS), len(POINTS), n + 1, n + 1))  # the last row and column stand for no point
+    for a, b in permutations(range(len(POINTS)), 2):
+        pair[a, b, :n, :n] = implausibility(a, b, apart).reshape(n, n) + _FAR * shared
+    worth = np.append(worths[near], 0.0)
+    chosen, costs = np.full((1, len(POINTS)), n), np.zeros(1)
+    for name in _ORDER:
+        total = costs[:, None] + worth
+        for other in range(len(POINTS)):
+            total = total + pair[other, name][chosen[:, other]]
+        best = np.argsort(total, axis=None)[:_BEAM]
+        row, column = np.unravel_index(best, total.shape)
+        chosen = chosen[row]
+        chosen[:, name] = column
+        costs = total[row, column]
+    chosen, costs = chosen[:_MOST_NAMINGS], costs[:_MOST_NAMINGS]
+    if not (chosen == n).all(axis=1).any():
+        chosen, costs = np.append(chosen, np.full((1, len(POINTS)), n), axis=0), np.append(costs, 0.0)
+    return Namings(np.append(near, -1)[chosen], costs)
 
 
-def _same(difference: Floats, one: Track, other: Track) -> float:
-    """Cost of two tracks at different times being one point: it must be near the other's continuation."""
-    gap = max(other.time_s[0] - one.time_s[-1], one.time_s[0] - other.time_s[-1], 0.0)
-    sigma = 0.05 + 4.0 * gap  # what a point moves off the mean velocity of the track, m and m/s
-    return float((difference**2).sum(axis=1).mean() / sigma**2) - _STRANGE
+def _steps(one: SpacePoints, other: SpacePoints, way: Floats, limbs: float) -> Floats:
+    """Chi-square (n + 1, m + 1) of points of one pulse being at those of the next; 0 where one is none (index -1)."""
+    steps = np.zeros((len(one) + 1, len(other) + 1))
+    off = other.xyz[None] - one.xyz[:, None] - way
+    total = one.covariance[:, None] + other.covariance[None] + limbs**2 * np.eye(3)
+    steps[:-1, :-1] = np.einsum("abi,abi->ab", off, np.linalg.solve(total, off[..., None])[..., 0])
+    return steps

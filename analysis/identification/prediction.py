@@ -1,9 +1,12 @@
 """What is to be expected at a pulse by what was measured before and after it, not at it: two Kalman filters that meet.
 
 Places of markers and angles of skis move alike: their second derivative changes as a random walk (white jerk). The
-strength of the walk is that of a jumper's strongest movements: the prediction is a gate and pulls no measurement.
+strength of the walk is that of a jumper's strongest movements: the prediction is a gate and pulls no measurement. What
+moves stiffly together is described by its parts: both bindings by their midpoint and by half the way between them, so
+that the one that is hidden is where the other one tells.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,27 +14,19 @@ import numpy as np
 from rig.arrays import Flags, Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Mobility:
-    """How freely something moves; standard deviations.
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Something that moves on its own.
 
     Attributes:
-        jerk: spectral density of the third derivative, unit^2/s^5.
-        place: before the first measurement.
-        velocity: against the mean one, per s.
-        acceleration: per s^2.
+        begin: (2, d) value and velocity before anything is measured, in units and units per s.
+        sigma: standard deviations of value, velocity and acceleration then.
+        jerk: by how much the acceleration changes within 0.1 s, standard deviation, units per s^2.
     """
 
+    begin: Floats
+    sigma: tuple[float, float, float]
     jerk: float
-    place: float
-    velocity: float
-    acceleration: float
-
-
-#: Markers, m: an acceleration that changes by 25 m/s^2 within 0.1 s.
-MARKER = Mobility(25.0**2 / 0.1, 100.0, 6.0, 15.0)
-#: Slope and heading of a ski, rad: an angular acceleration that changes by 15 rad/s^2 within 0.1 s.
-SKI = Mobility(15.0**2 / 0.1, 1.0, 1.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,67 +36,82 @@ class Prediction:
     Attributes:
         xyz: (t, n, d) places with d coordinates, or angles.
         covariance: (t, n, d, d).
-        velocity: (t, n, d) per s.
     """
 
     xyz: Floats
     covariance: Floats
-    velocity: Floats
 
 
-def predict(time_s: Floats, xyz: Floats, covariance: Floats, velocity: Floats, mobility: Mobility) -> Prediction:
-    """Predict each thing at each pulse from its measurements at all other pulses.
+def predict(time_s: Floats, xyz: Floats, covariance: Floats, parts: Sequence[Part], mixing: Floats) -> Prediction:
+    """Predict each thing at each pulse from what was measured at all other pulses.
 
     Args:
         time_s: (t,) of the pulses, in order.
         xyz: (t, n, d) measured values; NaN where not measured.
         covariance: (t, n, d, d) of them.
-        velocity: (d,) to begin with.
-        mobility: how freely the things move.
+        parts: p of them.
+        mixing: (n, p) the things as sums of parts.
     """
-    ahead = _filtered(time_s, xyz, covariance, velocity, mobility)
-    back = tuple(part[::-1] for part in _filtered(time_s[::-1], xyz[::-1], covariance[::-1], velocity, mobility))
+    filters = _Filter(xyz.shape[2], parts, mixing)
+    ahead = filters.run(time_s, xyz, covariance)
+    back = tuple(part[::-1] for part in filters.run(time_s[::-1], xyz[::-1], covariance[::-1]))
     one, other = np.linalg.inv(ahead[1]), np.linalg.inv(back[1])
     total = np.linalg.inv(one + other)
-    state = total @ (one @ ahead[0][..., None] + other @ back[0][..., None])
-    d = xyz.shape[2]
-    return Prediction(state[..., :d, 0], total[..., :d, :d], state[..., d : 2 * d, 0])
-
-
-def _filtered(
-    time_s: Floats, xyz: Floats, covariance: Floats, velocity: Floats, mobility: Mobility
-) -> tuple[Floats, Floats]:
-    """States (t, n, 3 d) and covariances (t, n, 3 d, 3 d) before each pulse's own measurement."""
+    state = (total @ (one @ ahead[0][..., None] + other @ back[0][..., None]))[..., 0]
     steps, n, d = xyz.shape
-    measured: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
-    first = np.nanmean(np.where(measured[..., None], xyz, np.nan), axis=(0, 1)) if measured.any() else np.zeros(d)
-    state = np.tile(np.concatenate((first, velocity, np.zeros(d))), (n, 1))
-    spread = np.repeat((mobility.place**2, mobility.velocity**2, mobility.acceleration**2), d)
-    variance = np.tile(np.diag(spread), (n, 1, 1))
-    states, variances = np.empty((steps, n, 3 * d)), np.empty((steps, n, 3 * d, 3 * d))
-    for i in range(steps):
-        if i:
-            dt, begun = float(time_s[i] - time_s[i - 1]), np.asarray(measured[:i].any(axis=0))
-            state, variance = _moved(state, variance, dt, begun, mobility.jerk)
-        states[i], variances[i] = state, variance
-        if (seen := measured[i]).any():
-            state, variance = state.copy(), variance.copy()
-            gain = variance[seen, :, :d] @ np.linalg.inv(variance[seen, :d, :d] + covariance[i, seen])
-            state[seen] += (gain @ (xyz[i, seen] - state[seen, :d])[..., None])[..., 0]
-            variance[seen] -= gain @ variance[seen, :d]
-    return states, variances
+    values = (state @ filters.all_of.T).reshape(steps, n, d)
+    spread = (filters.all_of @ total @ filters.all_of.T).reshape(steps, n, d, n, d)
+    return Prediction(values, np.stack([spread[:, i, :, i] for i in range(n)], axis=1))
 
 
-def _moved(state: Floats, variance: Floats, dt: float, begun: Flags, jerk: float) -> tuple[Floats, Floats]:
-    """States and covariances dt later (earlier where negative); what was not measured yet keeps its covariance."""
-    eye, size = np.eye(state.shape[1] // 3), abs(dt)
-    move = np.kron([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]], eye)
-    sign = np.sign(dt)
-    rows = [
-        [size**5 / 20, sign * size**4 / 8, size**3 / 6],
-        [sign * size**4 / 8, size**3 / 3, sign * size**2 / 2],
-        [size**3 / 6, sign * size**2 / 2, size],
-    ]
-    grown = move @ variance @ move.T + jerk * np.kron(rows, eye)
-    grown = (grown + grown.swapaxes(-1, -2)) / 2
-    return state @ move.T, np.where(begun[:, None, None], grown, variance)
+class _Filter:
+    """A Kalman filter whose state is value, velocity and acceleration of each part in turn."""
+
+    def __init__(self, d: int, parts: Sequence[Part], mixing: Floats) -> None:
+        self._d, self._mixing = d, mixing
+        self._jerk = np.array([part.jerk**2 / 0.1 for part in parts])
+        self._mean = np.concatenate([np.concatenate((part.begin.ravel(), np.zeros(d))) for part in parts])
+        self._sigma = np.concatenate([np.repeat(part.sigma, d) for part in parts])
+        #: (n d, 3 d p): all things by the state.
+        self.all_of = np.kron(mixing, np.kron([[1.0, 0.0, 0.0]], np.eye(d)))
+
+    def run(self, time_s: Floats, xyz: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+        """States (t, 3 d p) and their covariances before each pulse's own measurement."""
+        measured: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
+        state, variance = self._mean, np.diag(self._sigma**2)
+        begun = np.zeros(len(self._jerk), bool)
+        states, variances = np.empty((len(time_s), len(state))), np.empty((len(time_s), len(state), len(state)))
+        for i in range(len(time_s)):
+            if i:
+                state, variance = self._moved(state, variance, float(time_s[i] - time_s[i - 1]), begun)
+            states[i], variances[i] = state, variance
+            if measured[i].any():
+                state, variance = self._updated(state, variance, measured[i], xyz[i], covariance[i])
+                begun |= (self._mixing[measured[i]] != 0).any(axis=0)
+        return states, variances
+
+    def _updated(
+        self, state: Floats, variance: Floats, measured: Flags, xyz: Floats, covariance: Floats
+    ) -> tuple[Floats, Floats]:
+        by_state = self.all_of[np.repeat(measured, self._d)]
+        total = by_state @ variance @ by_state.T
+        for i, own in enumerate(covariance[measured]):
+            block = slice(i * self._d, (i + 1) * self._d)
+            total[block, block] += own
+        gain = np.linalg.solve(total, by_state @ variance).T
+        variance = variance - gain @ by_state @ variance
+        return state + gain @ (xyz[measured].ravel() - by_state @ state), (variance + variance.T) / 2
+
+    def _moved(self, state: Floats, variance: Floats, dt: float, begun: Flags) -> tuple[Floats, Floats]:
+        """State and covariance dt later (earlier where negative); what was not measured yet stays as uncertain."""
+        eye, size, sign = np.eye(self._d), abs(dt), np.sign(dt)
+        move = np.kron(np.eye(len(begun)), np.kron([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]], eye))
+        rows = [
+            [size**5 / 20, sign * size**4 / 8, size**3 / 6],
+            [sign * size**4 / 8, size**3 / 3, sign * size**2 / 2],
+            [size**3 / 6, sign * size**2 / 2, size],
+        ]
+        grown = move @ variance @ move.T + np.kron(np.diag(self._jerk), np.kron(rows, eye))
+        known = np.repeat(begun, 3 * self._d)
+        grown = np.where(known[:, None] & known, grown, variance)
+        return move @ state, (grown + grown.T) / 2

@@ -13,6 +13,7 @@ from analysis.candidates.model import Trace
 from analysis.identification.views import Views, gate
 from rig.arrays import Flags, Floats
 
+_PERSPECTIVE = 0.05  #: share of a distance across the ski that neglects the perspective of 3 m
 _HALF_M = 1.2  #: points so far from A carry the projected line; about half a ski
 
 
@@ -79,6 +80,46 @@ def _break(one: StraightTrace, other: StraightTrace) -> float:
     return float(off @ np.linalg.solve(covariance, off))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Equations:
+    """What a trace says about a ski.
+
+    Attributes:
+        off: (2,) px, how far the ski lies from its ends, across the trace.
+        by_ski: (2, 6) derivatives by A and d.
+        aside: (2,) px, the same across the ski; right also for a trace that runs across the ski.
+        by_ski_aside: (2, 6) derivatives by A and d.
+        covariance: (2, 2) px^2, of the ends.
+        along: (2,) m, where along the ski its ends are, from A.
+    """
+
+    off: Floats
+    by_ski: Floats
+    aside: Floats
+    by_ski_aside: Floats
+    covariance: Floats
+    along: Floats
+
+    def near(self, spread: Floats) -> bool:
+        """Whether the trace lies within the uncertainty of the ski."""
+        total = self.by_ski_aside @ spread @ self.by_ski_aside.T + self.covariance
+        total = total + np.diag((_PERSPECTIVE * self.aside) ** 2)
+        return bool(self.aside @ np.linalg.solve(total, self.aside) < gate(2))
+
+    def misfit(self, state: Floats, spread: Floats) -> tuple[float, float]:
+        """Chi-square for a ski that differs by `state` (6,), and the logarithm of its covariance's determinant."""
+        total = self.by_ski @ spread @ self.by_ski.T + self.covariance
+        (a, b), (_, d) = total
+        x, y = self.off - self.by_ski @ state
+        determinant = a * d - b * b
+        return float((d * x * x - 2 * b * x * y + a * y * y) / determinant), float(np.log(determinant))
+
+    def updated(self, state: Floats, spread: Floats) -> tuple[Floats, Floats]:
+        """The ski with what the trace says."""
+        gain = spread @ self.by_ski.T @ np.linalg.inv(self.by_ski @ spread @ self.by_ski.T + self.covariance)
+        return state + gain @ (self.off - self.by_ski @ state), spread - gain @ self.by_ski @ spread
+
+
 class SeenSkis:
     """n skis in one camera: what traces say about them.
 
@@ -94,20 +135,16 @@ class SeenSkis:
         self._pose = (low.pose + high.pose) / 2
         self.inside: Flags = views.see(k, place).inside
 
-    def equations(self, i: int, line: StraightTrace) -> tuple[Floats, Floats, Floats]:
-        """What a trace says about ski i.
-
-        Returns:
-            Distances (2,) of its ends from the ski, px; derivatives (2, 6) of the ski's distances by A and d; and the
-            covariance (2, 2) of the ends, px^2.
-        """
+    def equations(self, i: int, line: StraightTrace) -> Equations:
+        """What a trace says about ski i."""
         low, high = self._xy[i]
         axis = high - low
         share = (line.ends - low) @ axis / (axis @ axis)
-        off = (line.ends - low - share[:, None] * axis) @ line.normal
-        by_low, by_high = line.normal @ self._by_point[i, 0], line.normal @ self._by_point[i, 1]
-        by_place = np.outer(1 - share, by_low) + np.outer(share, by_high)
         along = _HALF_M * (2 * share - 1)
-        by_ski = np.concatenate((by_place, along[:, None] * by_place), axis=1)
-        pose = line.normal @ self._pose[i] @ line.normal
-        return off, by_ski, line.covariance + pose
+        by_point = np.multiply.outer(1 - share, self._by_point[i, 0]) + np.multiply.outer(share, self._by_point[i, 1])
+        by_ski = np.concatenate((by_point, along[:, None, None] * by_point), axis=2)
+        normal = np.array((-axis[1], axis[0])) / np.linalg.norm(axis)
+        deviation = (line.ends - low) @ normal
+        covariance = line.covariance + normal @ self._pose[i] @ normal
+        off = (line.ends - low - share[:, None] * axis) @ line.normal
+        return Equations(off, line.normal @ by_ski, deviation, normal @ by_ski, covariance, along)

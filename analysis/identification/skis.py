@@ -20,9 +20,9 @@ from analysis.identification.assignment import (
     jointly_best,
     nothing,
 )
-from analysis.identification.body import FlightFrame
-from analysis.identification.prediction import SKI, Prediction, predict
-from analysis.identification.ski_traces import SeenSkis, StraightTrace
+from analysis.identification.flights import Flight
+from analysis.identification.prediction import Part, Prediction, predict
+from analysis.identification.ski_traces import Equations, SeenSkis, StraightTrace
 from analysis.identification.views import Views, gate
 from analysis.measurements.model import SIDES
 from rig.arrays import Flags, Floats, Integers
@@ -32,8 +32,16 @@ _SLOPE, _HEADING = np.radians(25.0), np.radians(15.0)
 _BINDING_M = 0.06  #: standard deviation, across the ski, of a binding's marker from the ski's axis
 _ALONG_M = 0.3  #: likewise along it
 _STEADY_M = 0.01  #: standard deviation of that distance from pulse to pulse
-_MOST_TURNS = 4
+#: Slope and heading (rad) of the right and the left ski as sums of their mean and of half their difference.
+_MIXING = np.array([(1.0, -1.0), (1.0, 1.0)])
+_PARTS = (
+    Part(np.zeros((2, 2)), (0.4, 1.0, 10.0), 15.0),
+    Part(np.zeros((2, 2)), (0.2, 0.5, 5.0), 8.0),
+)
+_MOST_TURNS = 6
 _BEAM = 12
+_KNOWN_RAD = 0.1  #: standard deviation of a direction that tells a ski from a leg
+_BEYOND_M = 0.35  #: more than a boot
 _LENGTH_PX = 40.0  #: of a trace, for the density of traces that are there by chance
 
 
@@ -66,7 +74,7 @@ def follow_skis(
     time_s: Floats,
     traces: Sequence[Sequence[Sequence[StraightTrace]]],
     delivered: Flags,
-    frame: FlightFrame,
+    flight: Flight,
     bindings: Places,
 ) -> Skis:
     """Find the traces of both skis.
@@ -76,15 +84,14 @@ def follow_skis(
         time_s: (t,) of the pulses.
         traces: of each pulse by camera.
         delivered: (t, m) whether a camera has an image of a pulse.
-        frame: of the flight.
+        flight: of the jumper.
         bindings: their places.
     """
-    search = _Search(views, traces, delivered, frame, bindings)
+    search = _Search(views, traces, delivered, flight, bindings)
     steps = len(time_s)
     angles = Prediction(
         np.zeros((steps, 2, 2)),
         np.broadcast_to(np.diag((_SLOPE**2, _HEADING**2)), (steps, 2, 2, 2)),
-        np.zeros((steps, 2, 2)),
     )
     offsets = np.zeros((2, 2)), np.tile(_BINDING_M**2 * np.eye(2), (2, 1, 1))
     broad = search.belief(angles, offsets)
@@ -95,7 +102,7 @@ def follow_skis(
             break
         lines = search.measured(broad, found)
         offsets = search.offsets(lines)
-        angles = predict(time_s, *search.angles(lines), np.zeros(2), SKI)
+        angles = predict(time_s, *search.angles(lines), _PARTS, _MIXING)
         believed = search.belief(angles, offsets)
     return Skis(found)
 
@@ -108,14 +115,14 @@ class _Search:
         views: Views,
         traces: Sequence[Sequence[Sequence[StraightTrace]]],
         delivered: Flags,
-        frame: FlightFrame,
+        flight: Flight,
         bindings: Places,
     ) -> None:
-        self._views, self._traces, self._delivered, self._frame, self._bindings = (
+        self._views, self._traces, self._delivered, self._flight, self._bindings = (
             views,
             traces,
             delivered,
-            frame,
+            flight,
             bindings,
         )
         sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(bindings.covariance, nan=1e6))[..., -1])
@@ -158,7 +165,7 @@ class _Search:
             (-np.sin(heading), np.cos(heading), zero),
             (-np.sin(slope) * np.cos(heading), -np.sin(slope) * np.sin(heading), np.cos(slope)),
         )
-        direction, left, up = (np.stack(part, axis=-1) @ self._frame.axes for part in local)
+        direction, left, up = (np.stack(part, axis=-1) @ self._flight.axes for part in local)
         return direction, left, up
 
     def assigned(self, belief: tuple[Floats, Floats]) -> Integers:
@@ -184,15 +191,15 @@ class _Search:
             chance = (len(self._traces[t][k]) + 1) / self._space[k]
             rate = 2 * np.log(2 * np.pi * chance / DETECTED) + 2 * np.log(1 - DETECTED)
             equations = [seen[k].equations(2 * t + side, line) for line in self._traces[t][k]]
-            near = [i for i, e in enumerate(equations) if _misfit(e, np.zeros(6), covariance)[0] < gate(2)]
+            near = [i for i, e in enumerate(equations) if _near(e, covariance)]
             longer = list(beam)
             for cost, rays, state, spread in beam:
                 for i in near:
-                    misfit, area = _misfit(equations[i], state, spread)
+                    misfit, area = equations[i].misfit(state, spread)
                     if misfit < gate(2):
                         more = rays.copy()
                         more[k] = i
-                        longer.append((cost + misfit + area + rate, more, *_updated(equations[i], state, spread)))
+                        longer.append((cost + misfit + area + rate, more, *equations[i].updated(state, spread)))
             beam = sorted(longer, key=lambda hypothesis: hypothesis[0])[:_BEAM]
         options = [Option(cost, rays, 0) for cost, rays, _, _ in beam if cost < -DECISIVE]
         return options[: 2 * MOST_OPTIONS]
@@ -206,7 +213,7 @@ class _Search:
             state, spread = np.zeros(6), covariance[t, side]
             for k in np.flatnonzero(found[t, side] >= 0).tolist():
                 equations = seen[k].equations(2 * t + side, self._traces[t][k][found[t, side, k]])
-                state, spread = _updated(equations, state, spread)
+                state, spread = equations.updated(state, spread)
             values[t, side] += state
             covariance[t, side] = spread
         return values, covariance, np.asarray((found >= 0).sum(axis=2) >= 2)
@@ -214,14 +221,14 @@ class _Search:
     def angles(self, lines: tuple[Floats, Floats, Flags]) -> tuple[Floats, Floats]:
         """Slope and heading (t, 2, 2) of measured skis with covariance; NaN where not measured."""
         values, covariance, known = lines
-        local = values[..., 3:] @ self._frame.axes.T
+        local = values[..., 3:] @ self._flight.axes.T
         x, y, z = np.moveaxis(local, -1, 0)
         level = np.hypot(x, y)
         angles = np.stack((np.arctan2(z, level), np.arctan2(y, x)), axis=-1)
         square = level**2 + z**2
         by_slope = np.stack((-z * x / level, -z * y / level, level), axis=-1) / square[..., None]
         by_heading = np.stack((-y, x, np.zeros_like(x)), axis=-1) / (level**2)[..., None]
-        jacobian = np.stack((by_slope, by_heading), axis=-2) @ self._frame.axes
+        jacobian = np.stack((by_slope, by_heading), axis=-2) @ self._flight.axes
         spread = jacobian @ covariance[..., 3:, 3:] @ jacobian.swapaxes(-1, -2)
         angles[~known], spread[~known] = np.nan, np.nan
         return angles, spread
@@ -246,18 +253,13 @@ class _Search:
         return mean, spread + _STEADY_M**2 * np.eye(2)
 
 
-def _misfit(equations: tuple[Floats, Floats, Floats], state: Floats, spread: Floats) -> tuple[float, float]:
-    """Chi-square of a trace for a ski that differs by `state`, and the logarithm of its covariance's determinant."""
-    off, by_ski, covariance = equations
-    total = by_ski @ spread @ by_ski.T + covariance
-    (a, b), (_, d) = total
-    x, y = off - by_ski @ state
-    determinant = a * d - b * b
-    return float((d * x * x - 2 * b * x * y + a * y * y) / determinant), float(np.log(determinant))
+def _near(equations: Equations, covariance: Floats) -> bool:
+    """Whether a trace may be the ski.
 
-
-def _updated(equations: tuple[Floats, Floats, Floats], state: Floats, spread: Floats) -> tuple[Floats, Floats]:
-    """The ski with what a trace says."""
-    off, by_ski, covariance = equations
-    gain = spread @ by_ski.T @ np.linalg.inv(by_ski @ spread @ by_ski.T + covariance)
-    return state + gain @ (off - by_ski @ state), spread - gain @ by_ski @ spread
+    As long as the direction of the ski is hardly known, a leg that ends at the binding may look like half a ski. Then
+    the trace must reach beyond the binding to both sides.
+    """
+    if not equations.near(covariance) or equations.misfit(np.zeros(6), covariance)[0] > gate(2):
+        return False
+    known = np.linalg.eigvalsh(covariance[3:, 3:])[-1] < _KNOWN_RAD**2
+    return bool(known or (equations.along.min() < -_BEYOND_M and equations.along.max() > _BEYOND_M))

@@ -14,6 +14,9 @@ from analysis.identification.views import Views, gate
 from photogrammetry.intersection.point_intersection import intersect_points
 from rig.arrays import Floats, Integers
 
+_LIGHT = 0.25  #: standard deviation of a marker's contrast, share of it: light, background and direction change it
+_ODDEST = 16.0  #: a marker may look as odd as this, and no odder: half of it may be in the shade
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpacePoints:
@@ -49,15 +52,36 @@ class Rays:
         covariance: (n, 2, 2) px^2, of the spots alone.
         reduced: (n, 2) without distortion, metric frame.
         variance: (n,) px^2, of a coordinate, with pose and marker size at the scene's centre.
+        odd: (n,) chi-square of how much they look unlike the jumper's markers.
     """
 
     xy: Floats
     covariance: Floats
     reduced: Floats
     variance: Floats
+    odd: Floats
 
 
-def rays_of(views: Views, candidates: PulseCandidates) -> list[Rays]:
+@dataclass(frozen=True, slots=True)
+class Appearance:
+    """What the markers of a jumper look like: contrast of their spots, grey values."""
+
+    contrast: float
+    sigma: float
+
+    @classmethod
+    def of(cls, contrasts: Floats) -> "Appearance":
+        """The appearance of spots (n,) most of which are markers."""
+        middle = float(np.median(contrasts))
+        spread = 1.48 * float(np.median(np.abs(contrasts - middle)))
+        return cls(middle, max(spread, _LIGHT * abs(middle), 1.0))
+
+    def odd(self, spots: Spots) -> Floats:
+        """See `Rays.odd`."""
+        return np.minimum(((spots.contrast - self.contrast) / self.sigma) ** 2, _ODDEST)
+
+
+def rays_of(views: Views, candidates: PulseCandidates, appearance: Appearance | None = None) -> list[Rays]:
     """The spots of a pulse by camera; none where a camera has no image."""
     rays = []
     for k, name in enumerate(views.names):
@@ -68,7 +92,11 @@ def rays_of(views: Views, candidates: PulseCandidates) -> list[Rays]:
         variance = np.trace(spots.covariance, axis1=1, axis2=2) / 2 + views.noise[k]
         rays.append(
             Rays(
-                spots.xy, spots.covariance, np.where(usable[:, None], reduced, 0.0), np.where(usable, variance, np.inf)
+                spots.xy,
+                spots.covariance,
+                np.where(usable[:, None], reduced, 0.0),
+                np.where(usable, variance, np.inf),
+                np.zeros(len(spots)) if appearance is None else appearance.odd(spots),
             )
         )
     return rays

@@ -21,6 +21,7 @@ _STEEPEST = np.sin(np.radians(50.0))  #: of a path, down or up
 _LEAST_POINTS = 4  #: of a track; three fix place, velocity and one check
 _MOST_MISSED_S = 0.12  #: in a track, between one point and the next
 _FITS = float(chi2.ppf(0.999, 3))
+_MOST_USES = 2  #: of a spot, by points of tracks
 _WEAK = 0.5  #: weight of a point that two rays show and nothing controls
 
 
@@ -30,14 +31,14 @@ class Track:
 
     Attributes:
         step: (k,) index of the pulse.
-        point: (k,) index of the point among those of its pulse.
+        rays: (k, m) spots that show it, by camera; -1: none.
         time_s: (k,) of the pulse.
         xyz: (k, 3) m.
         covariance: (k, 3, 3) m^2.
     """
 
     step: Integers
-    point: Integers
+    rays: Integers
     time_s: Floats
     xyz: Floats
     covariance: Floats
@@ -63,14 +64,29 @@ def find_tracks(points: Sequence[SpacePoints], time_s: Floats) -> list[Track]:
         points: of each pulse.
         time_s: of each pulse.
     """
+    points = [_thinned(of_pulse) for of_pulse in points]
     links = _Links(points, time_s)
     tracks = []
     while (chain := links.best_chain()) is not None:
-        step, point = np.array(chain).T
+        step = np.array([s for s, _ in chain])
+        rays = np.array([points[s].rays[p] for s, p in chain])
         xyz = np.array([points[s].xyz[p] for s, p in chain])
         covariance = np.array([points[s].covariance[p] for s, p in chain])
-        tracks.append(Track(step, point, time_s[step], xyz, covariance))
+        tracks.append(Track(step, rays, time_s[step], xyz, covariance))
     return tracks
+
+
+def _thinned(points: SpacePoints) -> SpacePoints:
+    """The points of a pulse without those whose spots better points share: more rays, then a smaller misfit."""
+    order = np.lexsort((points.misfit, -points.count))
+    uses: dict[tuple[int, int], int] = {}
+    kept = []
+    for i in order.tolist():
+        spots = [(k, s) for k, s in enumerate(points.rays[i].tolist()) if s >= 0]
+        if all(uses.get(spot, 0) < _MOST_USES for spot in spots):
+            kept.append(i)
+            uses.update({spot: uses.get(spot, 0) + 1 for spot in spots})
+    return SpacePoints(points.xyz[kept], points.covariance[kept], points.rays[kept], points.misfit[kept])
 
 
 class _Links:

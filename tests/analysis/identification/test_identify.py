@@ -55,7 +55,7 @@ def _share(jumps: Sequence[JumpMeasurements], made: Scene) -> float:
     [
         Disturbed(),
         Disturbed(false_spots=20, false_traces=3),
-        Disturbed(false_spots=20, false_traces=3, body_spots=1, lost=0.1, broken=0.3),
+        Disturbed(false_spots=20, false_traces=3, body_spots=3, lost=0.1, broken=0.3),
     ],
     ids=["clean", "clutter", "clutter and losses"],
 )

@@ -1,6 +1,7 @@
 """Measured jumps as series over common times since the take-off.
 
 Smoothed values are interpolated by cubic splines; their variances, and the derivatives by the calibration, linearly.
+How jumps are aligned: `analysis.comparison.alignment`.
 """
 
 from dataclasses import dataclass
@@ -16,11 +17,12 @@ from rig.errors import BadInputError
 #: Differences closer together than this tell nothing new; it bounds the number of times at high rates.
 LEAST_STEP_S: Final = 0.02
 _LEAST_TIMES: Final = 5
-_HEIGHT: Final = QUANTITIES.index("height")
-_PHI: Final = QUANTITIES.index("phi")
-_ATTACK: Final = QUANTITIES.index("angle_of_attack")
+#: Rows of quantities.
+HEIGHT: Final = QUANTITIES.index("height")
+PHI: Final = QUANTITIES.index("phi")
+ATTACK: Final = QUANTITIES.index("angle_of_attack")
 _SPEED: Final = QUANTITIES.index("speed")
-_VELOCITY: Final = slice(QUANTITIES.index("velocity_x"), QUANTITIES.index("velocity_z") + 1)
+VELOCITY: Final = slice(QUANTITIES.index("velocity_x"), QUANTITIES.index("velocity_z") + 1)
 #: Quantities that are derivatives by time of what is measured.
 RATES: Final = np.array([name == "speed" or name.startswith("velocity") for name in QUANTITIES])
 #: Of the raw variance; keeps the model of the smoother in its range.
@@ -35,11 +37,15 @@ class MeasuredJump:
         name: for people.
         recording: that it belongs to.
         jump: the jump.
+        shift_s: by which its take-off is later than the jump itself says.
+        takeoff_sigma_s: standard deviation of its take-off, without what it shares with the jumps it is aligned with.
     """
 
     name: str
     recording: MeasuredRecording
     jump: Jump
+    shift_s: float
+    takeoff_sigma_s: float
 
     @property
     def athlete(self) -> str:
@@ -48,7 +54,11 @@ class MeasuredJump:
 
     def since_takeoff(self) -> Floats:
         """Times of the pulses with smoothed values, s."""
-        return np.array([pulse.since_takeoff_s for pulse, _ in _smoothed(self.jump)])
+        return np.array([pulse.since_takeoff_s for pulse, _ in self.smoothed()]) - self.shift_s
+
+    def smoothed(self) -> list[tuple[PulseState, SmoothedState]]:
+        """The pulses with smoothed values."""
+        return _smoothed(self.jump)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +73,9 @@ class Series:
         by_calibration: (11, T, p) derivatives by the cameras' parameters.
         share: (11, T) variance of the smoothed value / that of the raw one, both without calibration: says how far in
             time the smoother reaches. For rates it is that of the height.
-        correlation: (11, 11) of errors of measurement of different quantities at one time, as far as it is known.
-        takeoff_sigma_s: standard deviation of the take-off.
+        correlation: (12, 12) of errors of measurement of different quantities at one time, as far as it is known; the
+            last one is the slope of the path, which the angle of attack holds beside phi.
+        takeoff_sigma_s: standard deviation of the take-off; see `MeasuredJump`.
         rate_hz: pulses per second.
         ends_s: first and last time that the smoother knew.
     """
@@ -89,12 +100,12 @@ def measured_jump(recording: MeasuredRecording, number: int, name: str) -> Measu
     """
     for jump in recording.jumps:
         if jump.number == number:
-            if not comparable(jump):
+            if not comparable(jump) or jump.takeoff is None:
                 raise BadInputError(
                     f"{name}: jump {number} has no take-off or no smoothed values, so it cannot be aligned; choose "
                     "another jump, or see its report for what was missing"
                 )
-            return MeasuredJump(name, recording, jump)
+            return MeasuredJump(name, recording, jump, 0.0, jump.takeoff.sigma_pulses / recording.rate_hz)
     numbers = ", ".join(str(jump.number) for jump in recording.jumps) or "none"
     raise BadInputError(f"{name}: has no jump {number} (it has {numbers}); choose one of them")
 
@@ -124,7 +135,7 @@ def common_times(jumps: list[MeasuredJump]) -> Floats:
 
 def series(jump: MeasuredJump, times: Floats) -> Series:
     """A jump at times since the take-off."""
-    found = _smoothed(jump.jump)
+    found = jump.smoothed()
     at = jump.since_takeoff()
     covariance = jump.recording.orientation.covariance
     by_calibration = np.stack([state.by_calibration for _, state in found], axis=1)
@@ -132,17 +143,14 @@ def series(jump: MeasuredJump, times: Floats) -> Series:
     shared = np.einsum("ktp,pq,ktq->kt", by_calibration, covariance, by_calibration)
     variance = sigmas.T**2 - shared
     raw = np.stack([_raw_variances(pulse) for pulse, _ in found], axis=1) - shared
-    takeoff = jump.jump.takeoff
-    if takeoff is None:
-        raise ValueError("a jump without take-off has no times since it")
     return Series(
         times,
         *_splines(at, values.T, times),
         _linear(at, np.maximum(variance, _SHARES[0] * sigmas.T**2), times),
         np.stack([_linear(at, column, times) for column in np.moveaxis(by_calibration, -1, 0)], axis=-1),
         _linear(at, _share(variance, raw), times),
-        _correlation([state for _, state in found], sigmas.T),
-        takeoff.sigma_pulses / jump.recording.rate_hz,
+        _correlation([state for _, state in found]),
+        jump.takeoff_sigma_s,
         jump.recording.rate_hz,
         (float(at[0]), float(at[-1])),
     )
@@ -171,7 +179,7 @@ def _numbers(state: SmoothedState) -> tuple[Floats, Floats]:
 
 
 def _angles(state: JumperState) -> list[Quantity | None]:
-    return [state.angles.get(name) for name in QUANTITIES[:_ATTACK]]
+    return [state.angles.get(name) for name in QUANTITIES[:ATTACK]]
 
 
 def _raw_variances(pulse: PulseState) -> Floats:
@@ -185,8 +193,8 @@ def _raw_variances(pulse: PulseState) -> Floats:
 def _share(variance: Floats, raw: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.clip(variance / raw, *_SHARES)
-    share[_ATTACK] = share[_PHI]
-    share[RATES] = share[_HEIGHT]
+    share[ATTACK] = share[PHI]
+    share[RATES] = share[HEIGHT]
     return np.stack([_filled(row) for row in share])
 
 
@@ -197,20 +205,17 @@ def _filled(row: Floats) -> Floats:
     return np.interp(index, index[known], row[known]) if known.any() else np.full(len(row), 0.5)
 
 
-def _correlation(states: list[SmoothedState], sigmas: Floats) -> Floats:
-    """The speed is part of the velocity, and phi part of the angle of attack; of the others nothing is known."""
-    whole = np.eye(len(QUANTITIES))
+def _correlation(states: list[SmoothedState]) -> Floats:
+    """Speed and slope of the path are functions of the velocity; of the other quantities nothing is known."""
+    whole = np.eye(len(QUANTITIES) + 1)
     covariance = np.mean([state.velocity.covariance for state in states], axis=0)
     along = np.mean([state.velocity.value for state in states], axis=0)
     along /= np.linalg.norm(along)
-    parts = np.vstack((along, np.eye(3)))
+    upwards = np.array((0.0, 0.0, 1.0)) - along[2] * along  # direction in which the slope grows
+    parts = np.vstack((along, np.eye(3), upwards))
     block = parts @ covariance @ parts.T
-    whole[_SPEED : _VELOCITY.stop, _SPEED : _VELOCITY.stop] = block / np.sqrt(
-        np.outer(block.diagonal(), block.diagonal())
-    )
-    with np.errstate(invalid="ignore"):
-        part = np.nanmedian(sigmas[_PHI] / sigmas[_ATTACK]) if np.isfinite(sigmas[_ATTACK]).any() else 0.0
-    whole[_PHI, _ATTACK] = whole[_ATTACK, _PHI] = min(float(part), 1.0)
+    rows = np.r_[_SPEED : VELOCITY.stop, len(QUANTITIES)]
+    whole[np.ix_(rows, rows)] = block / np.sqrt(np.outer(block.diagonal(), block.diagonal()))
     return whole
 
 

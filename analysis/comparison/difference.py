@@ -1,7 +1,7 @@
 """The difference of two jumps over the time since the take-off, with what of it is real.
 
 The covariance of the difference has three parts: errors of measurement of both jumps; errors of the calibration, which
-mostly cancel where both jumps have the same one; and errors of the take-off, which shift a jump in time. The greatest
+mostly cancel where both jumps have the same one; and errors of the take-off, which shift jumps in time. The greatest
 of many differences is judged as the greatest of many: the distribution of the largest test value is simulated from
 the correlations, and expressed by the number of independent differences that has the same 5 % limit.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from analysis.comparison.aligned import MeasuredJump, Series, common_times, series
+from analysis.comparison.alignment import Alignment
 from analysis.comparison.repeatability import noise_covariance
 from analysis.result.model import EDGE_S, QUANTITIES
 from rig.arrays import Flags, Floats
@@ -92,21 +93,21 @@ class Difference:
         return bool(self.p_greatest[QUANTITIES.index(name), at] < LEVEL)
 
 
-def difference(a: MeasuredJump, b: MeasuredJump, draws: int = DRAWS) -> Difference:
+def difference(alignment: Alignment, draws: int = DRAWS) -> Difference:
     """Compare two jumps.
 
     Args:
-        a: the one.
-        b: the other.
+        alignment: the first two of its jumps are compared.
         draws: of the distribution of the greatest difference.
 
     Raises:
         BadInputError: they are not measured at the same times since the take-off.
     """
+    a, b = alignment.jumps[:2]
     times = common_times([a, b])
     one, other = series(a, times), series(b, times)
     same = a.recording.orientation.source == b.recording.orientation.source
-    shared = _calibration(a, one, b, other, same=same) + _takeoff(one, other)
+    shared = _calibration(a, one, b, other, same=same) + _takeoff(one, other, alignment.shared_sigma_s)
     noise = noise_covariance(one) + noise_covariance(other)
     known = np.isfinite(one.values + other.values).ravel()
     covariance = (shared + noise)[np.ix_(known, known)]
@@ -140,10 +141,14 @@ def _calibration(a: MeasuredJump, one: Series, b: MeasuredJump, other: Series, *
     return np.asarray(ja @ a.recording.orientation.covariance @ ja.T + jb @ b.recording.orientation.covariance @ jb.T)
 
 
-def _takeoff(one: Series, other: Series) -> Floats:
+def _takeoff(one: Series, other: Series, shared_sigma_s: float) -> Floats:
     """The share (11 T, 11 T) of the take-off: a jump that seems late is compared with an earlier part of the other."""
-    shares = [np.nan_to_num(x.change.ravel()) * x.takeoff_sigma_s for x in (one, other)]
-    return np.asarray(sum(np.outer(share, share) for share in shares))
+    shifts = (
+        one.change * one.takeoff_sigma_s,
+        other.change * other.takeoff_sigma_s,
+        (other.change - one.change) * shared_sigma_s,
+    )
+    return np.asarray(sum(np.outer(shift, shift) for shift in (np.nan_to_num(shift.ravel()) for shift in shifts)))
 
 
 def _draws(correlation: Floats, draws: int) -> Floats:

@@ -10,46 +10,56 @@ sampled at equal times this is a filter with the frequency response
 which gives k from the variances. Errors of measurement then have the spectrum S^2, those of rates w^2 S^2, the stated
 variance belongs to S and w^2 S. Of the stated variance of values errors of measurement are 5/6, of that of rates 1/2,
 if the smoother reaches far. Near the ends of a jump the smoother is one-sided: there nearly all of the variance of
-rates is from errors of measurement, so all of it is taken.
+rates is from errors of measurement, so all of it is taken. The angle of attack is phi, a value, minus the slope of the
+path, which is a rate.
 """
 
 from typing import Final
 
 import numpy as np
 
-from analysis.comparison.aligned import RATES, Series
+from analysis.comparison.aligned import ATTACK, HEIGHT, PHI, RATES, Series
 from rig.arrays import Flags, Floats
 
 _FREQUENCIES: Final = 128
+#: The slope of the path stands behind `QUANTITIES`; it is a function of the velocity.
+_RATES_AND_PATH: Final = np.append(RATES, True)
+_LEAST_PATH: Final = 0.01  # of the variance of the angle of attack
 _STIFFNESSES: Final = np.logspace(-4, 9, 131)
 
 
 def noise_covariance(series: Series) -> Floats:
     """Covariance (11 T, 11 T) of a jump's smoothed values by the errors of measurement, quantity by quantity."""
+    count, times = series.share.shape
+    path = np.maximum(series.variance[ATTACK] - series.variance[PHI], _LEAST_PATH * series.variance[ATTACK])
+    variance = np.vstack((series.variance, path))
+    share = np.vstack((series.share, series.share[HEIGHT]))
     frequencies = (np.arange(_FREQUENCIES) + 0.5) * np.pi / _FREQUENCIES
-    amplitude = _amplitude(series.share, frequencies)
-    one_sided = RATES[:, None] & _near_ends(series)
+    amplitude = _amplitude(share, frequencies)
+    one_sided = _RATES_AND_PATH[:, None] & _near_ends(series, share)
     amplitude[one_sided] /= np.linalg.norm(amplitude[one_sided], axis=-1, keepdims=True)
-    amplitude *= np.sqrt(series.variance)[..., None]
+    amplitude *= np.sqrt(variance)[..., None]
     phase = series.times[:, None] * series.rate_hz * frequencies
     waves = np.concatenate((amplitude * np.cos(phase), amplitude * np.sin(phase)), axis=-1)
-    count, times = series.share.shape
-    factor = waves.reshape(count * times, -1)
-    blocks = np.kron(series.correlation, np.ones((times, times)))
-    return np.asarray(factor @ factor.T * blocks)
+    factor = waves.reshape(len(variance) * times, -1)
+    whole = factor @ factor.T * np.kron(series.correlation, np.ones((times, times)))
+    blocks = whole.reshape(len(variance), times, len(variance), times)
+    blocks[ATTACK] = blocks[PHI] - blocks[count]
+    blocks[:, :, ATTACK] = blocks[:, :, PHI] - blocks[:, :, count]
+    return np.asarray(blocks[:count, :, :count].reshape(count * times, count * times))
 
 
 def _amplitude(share: Floats, frequencies: Floats) -> Floats:
-    """(11, T, w) of the errors of measurement, for a stated variance of 1."""
+    """(12, T, w) of the errors of measurement, for a stated variance of 1."""
     response = 1 / (1 + _stiffness(share)[..., None] * (2 - 2 * np.cos(frequencies)) ** 3)
-    weight = np.where(RATES[:, None, None], frequencies**2, 1.0)
+    weight = np.where(_RATES_AND_PATH[:, None, None], frequencies**2, 1.0)
     return np.asarray(np.sqrt(weight) * response / np.sqrt((weight * response).sum(axis=-1, keepdims=True)))
 
 
-def _near_ends(series: Series) -> Flags:
-    """Which values (11, T) the smoother's window, 1 / share pulses wide, would take from beyond the ends."""
+def _near_ends(series: Series, share: Floats) -> Flags:
+    """Which values (12, T) the smoother's window, 1 / share pulses wide, would take from beyond the ends."""
     within = np.minimum(series.times - series.ends_s[0], series.ends_s[1] - series.times) * series.rate_hz
-    return np.asarray(within < 0.5 / series.share)
+    return np.asarray(within < 0.5 / share)
 
 
 def _stiffness(share: Floats) -> Floats:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from analysis.comparison.aligned import MeasuredJump
+from analysis.comparison.alignment import Alignment
 from analysis.comparison.difference import LEVEL, Difference, Power
 from analysis.comparison.scatter import Scatter
 from analysis.result.model import QUANTITIES
@@ -47,16 +48,24 @@ class Comparison:
     """Two jumps and what was found.
 
     Attributes:
-        a: the one jump.
-        b: the other.
+        alignment: of all jumps; the first two are compared.
         difference: B minus A.
         scatter: the athlete's own; None if not known.
     """
 
-    a: MeasuredJump
-    b: MeasuredJump
+    alignment: Alignment
     difference: Difference
     scatter: Scatter | None
+
+    @property
+    def a(self) -> MeasuredJump:
+        """The one jump."""
+        return self.alignment.jumps[0]
+
+    @property
+    def b(self) -> MeasuredJump:
+        """The other."""
+        return self.alignment.jumps[1]
 
 
 def summary(comparison: Comparison) -> list[str]:
@@ -84,6 +93,8 @@ def _verdict(comparison: Comparison) -> list[str]:
     )
     same = "both jumps have the same calibration: its errors cancel"
     lines.append(same if d.same_calibration else "the jumps have different calibrations: the errors of both count")
+    if not comparison.alignment.at_one_place:
+        lines.append("the take-offs are not at one place, so each jump has its own: do both recordings show one hill?")
     if comparison.scatter is None:
         return [*lines, "the athlete's own scatter is not known: give further jumps of the athlete with --also"]
     return [*lines, f"the athlete's own scatter is that of {comparison.scatter.jumps} further jumps"]
@@ -266,6 +277,7 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
         },
         "level": LEVEL,
         "same_calibration": d.same_calibration,
+        "takeoffs_at_one_place": comparison.alignment.at_one_place,
         "independent_differences": d.independent,
         "limit": d.limit,
         "different": d.found(),

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from analysis.comparison.aligned import MeasuredJump, comparable, measured_jump
+from analysis.comparison.alignment import align
 from analysis.comparison.difference import difference
 from analysis.comparison.report import Comparison, report, summary, to_json
 from analysis.comparison.scatter import scatter
@@ -43,8 +44,9 @@ def compare(
         raise BadInputError(f"{dir_a}: this is one jump; choose another to compare it with by --jump-b")
     a = measured_jump(recordings[dir_a], jump_a, str(dir_a))
     b = measured_jump(recordings[dir_b], jump_b, str(dir_b))
-    found = difference(a, b)
-    comparison = Comparison(a, b, found, scatter(_others(recordings, a, b), found.times))
+    alignment = align([a, b, *_others(recordings, a, b)])
+    found = difference(alignment)
+    comparison = Comparison(alignment, found, scatter(alignment.jumps[2:], found.times))
     result = to_json(comparison)
     out.mkdir(parents=True, exist_ok=True)
     written = json.dumps(result, allow_nan=False, ensure_ascii=False) + "\n"
@@ -60,7 +62,7 @@ def _others(recordings: dict[Path, MeasuredRecording], *compared: MeasuredJump) 
     """All jumps that can be compared but the two that are."""
     chosen = [jump.jump for jump in compared]
     return [
-        MeasuredJump(str(path), recording, jump)
+        measured_jump(recording, jump.number, str(path))
         for path, recording in recordings.items()
         for jump in recording.jumps
         if comparable(jump) and not any(jump is other for other in chosen)

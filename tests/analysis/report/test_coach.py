@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 
+from analysis.measurements.model import POINTS, SIDES
 from analysis.report.coach import report_page, write_report
 from analysis.report.course import course_of
 from analysis.report.crops import crops_of, windows_of
 from analysis.report.figures import five_figures, value_and_sigma
 from analysis.report.scrubbing import overlays_of
-from analysis.result.model import CameraMove, MeasuredRecording, Quantity
+from analysis.result.model import CameraMove, JumperState, MeasuredRecording, Quantity
+from photogrammetry.jumper.stick_model import ANGLES
 from rig.errors import BadInputError
 from tests.analysis.report.jumps import EVERY, measured_recording, measurements
 from tests.analysis.result.recordings import without_takeoff
@@ -130,6 +132,16 @@ def test_without_a_take_off_nothing_is_invented(jump_log: Path) -> None:
     text = _text(_page(jump_log, replace(result, jumps=(short,))))
     assert text.count("not measured") == 4  # the fifth was given
     assert "distance from the first pulse (m)" in text  # charts of single pulses
+
+
+@pytest.mark.parametrize("pulses", [0, 1, 8])
+def test_jumps_in_which_nothing_was_measured_are_shown_as_such(jump_log: Path, pulses: int) -> None:
+    nothing = JumperState(dict.fromkeys(POINTS), dict.fromkeys(SIDES), dict.fromkeys(ANGLES), None, None)
+    jump = measured_recording().jumps[0]
+    bare = tuple(replace(pulse, raw=nothing, smoothed=None) for pulse in jump.pulses[:pulses])
+    page = _page(jump_log, replace(measured_recording(), jumps=(replace(jump, pulses=bare, takeoff=None),)))
+    assert _text(page).count("not measured") == 4
+    assert all(frame["stick"] == {} for frame in _frames(page))
 
 
 def test_a_recording_without_a_jump_says_so(jump_log: Path) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.candidates.background import Background, Region
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
-from analysis.candidates.spots import find_spots, look_for_spots
+from analysis.candidates.spots import MOST, find_spots, look_for_spots
 from analysis.candidates.traces import find_traces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
@@ -27,6 +27,8 @@ from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
+
+_FITS_OF_SMALL = 12  # places that are fitted in regions other than the largest one
 
 
 class Finder:
@@ -123,7 +125,8 @@ def find_candidates(
 
 
 def _candidates(regions: list[Region]) -> ImageCandidates:
-    spots = Spots.joined([find_spots(region) for region in regions])
+    fits = [MOST if region is regions[0] else _FITS_OF_SMALL for region in regions]
+    spots = Spots.joined([find_spots(region, most) for region, most in zip(regions, fits, strict=True)])
     traces = tuple(trace for region in regions for trace in find_traces(region))
     return ImageCandidates(spots, traces)
 

@@ -1,60 +1,47 @@
-"""Fits one or several long bars to all pixels around them, before a known background.
+"""Fits one or several long bars to all pixels around them, before a known background (`analysis.candidates.bar_model`).
 
-The image of a uniform rectangle of half width h behind a blur s is the product of two differences of the normal
-distribution, across and along:
-
-    cover(u, t) = [F((u + h) / s) - F((u - h) / s)] [F((t - t0) / s) - F((t - t1) / s)].
-
-Bars of one brightness B that cover each other hide what is behind by 1 - product(1 - cover). Width, blur and
-brightness are those of a pair of skis: one for all bars. So two skis that nearly cover each other are separated by
-what is known of each from where it is alone. The adjustment is robust in sections along the bars: a section that is
-not explained (body, boot, marker, a flake of snow) is left out as a whole, because leaving out single pixels would move
-the axis.
+Two skis that nearly cover each other are separated by what is known of each from where it is alone. The adjustment is
+robust in sections along the bars: a section that is not explained (body, boot, marker, a flake of snow) is left out as
+a whole, because leaving out single pixels would move the axis. Which explanation holds, one bar or two, is decided by
+what remains unexplained, with a price for each bar.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from analysis.candidates.background import Region
-from rig.arrays import Floats, Integers
+from analysis.candidates.bar_model import (
+    MARGIN,
+    OF_BAR,
+    SHARED,
+    Bar,
+    Pixels,
+    directions,
+    lines_of,
+    modelled,
+    pixels_around,
+)
+from rig.arrays import Flags, Floats, Integers
 
-_SHARED = 3  # brightness, log of the half width, log of the blur
-_OF_BAR = 4  # rho, theta, t0, t1
-_MARGIN = 2.6  # px beside and beyond a bar that are fitted
 _BLUR, _BLUR_SPREAD = 0.65, 0.4  # px; weak prior of log s: of lens and pixels
+_BLURS = np.log(0.35), np.log(3.0)
 _WIDTH_SPREAD = 0.3  # of log h, around what the edges say
 _END_SPREAD = 3.0  # px
+_BRIGHTNESS_SPREAD = 0.25  # of the contrast
 _ROUNDS, _STEPS = 4, 3  # choice of sections; steps of the adjustment in each
 _SETTLED = 0.01  # px by which an axis still moves
+_LARGEST_STEPS = 0.3, 1.0, 0.05  # of logarithms, rho and theta
 _SECTION = 2.0  # px along the bars
-_POOR = 3.0  # times the median over the sections: mean square of normalized residuals
+_POOR, _TYPICAL = 3.0, 0.35  # mean square of the residuals of a section: times this quantile over the sections
+_ROBUST = 3.0  # residuals over noise that count half in the first steps
 _CAP = 25.0  # squared residuals are counted up to that when explanations are compared
-_HOPELESS = 12.0  # residuals over noise of a first explanation that no other start will mend
-_MODEL = 0.03  # of the contrast: residuals that the model itself leaves
-_OPPOSITE = 1  # px around pixels in front that differ from the background in the other direction
+_HOPELESS = 5.0  # residuals over noise of a first explanation that no other start will mend
+_COMPARED = 700  # pixels with which explanations are compared; the best one is adjusted to all
+_UNSEEN = 1e-3  # 1 / px^2: weight of a bar's shift below which a section says nothing about it
+_AXIS = 0.015  # px by which the middle between the edges of a ski may be off its axis
 _FEWEST = 30  # pixels
-_NORMAL = 1.59577, 0.07056  # logit of the normal distribution: error below 2e-4, one exponential for it and its slope
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Bar:
-    """A bar, px of the region.
-
-    Attributes:
-        ends: (2, 2) ends of its axis.
-        width: px.
-    """
-
-    ends: Floats
-    width: float
-
-    @property
-    def length(self) -> float:
-        """Length, px."""
-        return float(np.hypot(*(self.ends[1] - self.ends[0])))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,104 +81,66 @@ def fit_bars(region: Region, starts: Sequence[Sequence[Bar]], brighter: bool, po
     Returns:
         The bars of the best explanation that are seen; none if nothing is explained.
     """
-    pixels = _pixels(region, [bar for start in starts for bar in start], brighter)
-    if len(pixels.grey) < _FEWEST:
+    pixels = pixels_around(region, [bar for start in starts for bar in start], brighter)
+    if len(pixels) < _FEWEST:
         return []
+    few = pixels.thinned(_COMPARED)
     fits: list[_Fit] = []
     for start in starts:
-        fits.append(_Fit(pixels, start))
+        fits.append(_Fit(few, start))
         fits[-1].round()
         if fits[0].misfit > _HOPELESS:
             return []
         fits[-1].round()
     unit = max(1.0, min(fit.misfit for fit in fits)) ** 2
-    price = unit * _OF_BAR * float(np.log(len(pixels.grey)))
-    best = min(fits, key=lambda fit: fit.cost + price * fit.count)
+    price = unit * OF_BAR * float(np.log(len(few)))
+    chosen = min(fits, key=lambda fit: fit.cost + price * fit.count)
+    best = chosen.on(pixels)
     if not best.solve():
         return []
-    return [bar for k in range(best.count) if (bar := best.measured(k, points)) is not None]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pixels:
-    """The pixels around bars; coordinates from an origin among the bars.
-
-    Attributes:
-        origin: (2,) px of the region.
-        x, y: (n,) px.
-        grey, behind, sigma: (n,) grey value, background, standard deviation.
-        brightness: approximate grey value of the bars.
-    """
-
-    origin: Floats
-    x: Floats
-    y: Floats
-    grey: Floats
-    behind: Floats
-    sigma: Floats
-    brightness: float
-
-
-def _line(bar: Bar, origin: Floats) -> tuple[float, float, float, float]:
-    """rho, theta, t0, t1 of a bar."""
-    a, b = bar.ends - origin
-    theta = float(np.arctan2(b[1] - a[1], b[0] - a[0]))
-    along, across = np.array((np.cos(theta), np.sin(theta))), np.array((-np.sin(theta), np.cos(theta)))
-    return float((a + b) @ across) / 2, theta, float(a @ along), float(b @ along)
-
-
-def _pixels(region: Region, bars: Sequence[Bar], brighter: bool) -> _Pixels:
-    origin = np.mean([bar.ends for bar in bars], axis=(0, 1))
-    rows, columns = region.grey.shape
-    reach = max(bar.width for bar in bars) / 2 + _MARGIN
-    low = np.min([bar.ends for bar in bars], axis=(0, 1)) - reach - _MARGIN
-    high = np.max([bar.ends for bar in bars], axis=(0, 1)) + reach + _MARGIN
-    left, top = np.maximum(0, low.astype(int))
-    right, bottom = np.minimum((columns, rows), high.astype(int) + 2)
-    part = slice(top, bottom), slice(left, right)
-    y, x = np.mgrid[part] - origin[::-1, None, None]
-    near = np.zeros(x.shape, bool)
-    for bar in bars:
-        rho, theta, t0, t1 = _line(bar, origin)
-        t, u = x * np.cos(theta) + y * np.sin(theta), y * np.cos(theta) - x * np.sin(theta) - rho
-        near |= (np.abs(u) <= reach) & (t >= t0 - _MARGIN) & (t <= t1 + _MARGIN)
-    difference = region.grey[part] - region.behind[part]
-    opposite = region.front[part] & ((difference < 0) if brighter else (difference > 0))
-    square = np.ones((2 * _OPPOSITE + 1, 2 * _OPPOSITE + 1), np.uint8)
-    near &= cv2.dilate(opposite.astype(np.uint8), square) == 0
-    grey, behind = region.grey[part][near].astype(float), region.behind[part][near].astype(float)
-    inside = grey[region.front[part][near]]
-    brightness = float(np.percentile(inside, 75 if brighter else 25)) if len(inside) else 0.0
-    sigma = np.hypot(region.sigma[part][near].astype(float), _MODEL * np.abs(brightness - behind))
-    return _Pixels(origin, x[near], y[near], grey, behind, sigma, brightness)
+    rivals = [fit for fit in fits if fit.count > chosen.count and fit.cost < chosen.cost + price * fit.count]
+    doubt = max((fit.farthest(best) for fit in rivals), default=0.0)
+    return [bar for k in range(best.count) if (bar := best.measured(k, points, doubt)) is not None]
 
 
 class _Fit:
-    """The adjustment; unknowns: B, log h, log s, then rho, theta, t0, t1 of each bar."""
+    """The adjustment; unknowns as in `modelled`."""
 
-    def __init__(self, pixels: _Pixels, bars: Sequence[Bar]) -> None:
-        self._pixels, self.count = pixels, len(bars)
+    def __init__(self, pixels: Pixels, bars: Sequence[Bar]) -> None:
+        self._pixels, self._bars, self.count = pixels, bars, len(bars)
         width = float(np.median([bar.width for bar in bars]))
-        lines = [_line(bar, pixels.origin) for bar in bars]
+        lines = [bar.line(pixels.origin) for bar in bars]
         self.theta = np.concatenate(([pixels.brightness, np.log(max(width, 0.8) / 2), np.log(_BLUR)], *lines))
         spread = np.full(len(self.theta), np.inf)
-        spread[1:3] = _WIDTH_SPREAD, _BLUR_SPREAD
-        for k in range(len(bars)):
-            spread[_SHARED + _OF_BAR * k + 2 :][:2] = _END_SPREAD
+        spread[0] = _BRIGHTNESS_SPREAD * (1 + abs(pixels.brightness - float(np.median(pixels.behind))))
+        spread[1:SHARED] = _WIDTH_SPREAD, _BLUR_SPREAD
+        lines_of(spread)[:, 2:] = _END_SPREAD
         self._expected, self._prior = self.theta.copy(), spread**-2.0
-        longest = int(np.argmax([bar.length for bar in bars]))
-        theta = lines[longest][1]
+        theta = lines[int(np.argmax([bar.length for bar in bars]))][1]
         along = pixels.x * np.cos(theta) + pixels.y * np.sin(theta)
         self._section = np.floor((along - along.min()) / _SECTION).astype(int)
-        self._good = np.ones(len(pixels.grey), bool)
-        self._normal = np.eye(len(self.theta))
+        self._in_section = np.bincount(self._section)
+        self._good = np.ones(len(pixels), bool)
+        self._robust = True
         self.misfit = self.cost = np.inf
+        self._accept(self._equations(self.theta))
+
+    def on(self, pixels: Pixels) -> "_Fit":
+        """The same explanation with other pixels, from where this one has come to."""
+        if pixels is self._pixels:
+            return self
+        other = _Fit(pixels, self._bars)
+        other.theta, other._robust = self.theta.copy(), False
+        other._accept(other._equations(other.theta))
+        other._choose()
+        return other
 
     def round(self) -> bool:
         """Some steps and a new choice of sections; whether nothing changes any more."""
         kept = self._good
         moved = self._adjust()
         self._choose()
+        self._robust = False
         return bool(moved < _SETTLED and np.array_equal(kept, self._good))
 
     def solve(self) -> bool:
@@ -206,152 +155,138 @@ class _Fit:
     def _adjust(self) -> float:
         """Some steps with the present sections; by how much the axes moved in the last one, px."""
         damping, moved = 1e-3, np.inf
-        cost, normal, gradient = self._equations(self.theta)
+        self._accept(self._equations(self.theta))
         for _ in range(_STEPS):
-            step = np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient), float)
-            trial = self._bounded(self.theta, step)
+            damped = self._normal + damping * np.diag(np.diag(self._normal))
+            trial = self._bounded(np.asarray(np.linalg.solve(damped, self._gradient), float))
             new = self._equations(trial)
-            if new[0] > cost:
+            if new.cost > self._sum:
                 damping *= 10
                 continue
             moved = self._moved(trial - self.theta)
-            self.theta, (cost, normal, gradient), damping = trial, new, damping / 10
+            self.theta, damping = trial, damping / 10
+            self._accept(new)
             if moved < _SETTLED:
                 break
-        self._normal = normal
         return moved
 
+    def _accept(self, new: "_Equations") -> None:
+        self._sum, self._normal, self._gradient = new.cost, new.normal, new.gradient
+        self._residuals, self._design = new.residuals, new.design
+
     def _moved(self, step: Floats) -> float:
-        lines = step[_SHARED:].reshape(-1, _OF_BAR)
-        reach = float(np.abs(self.theta[_SHARED + 2 :: _OF_BAR]).max())
+        reach = float(np.abs(lines_of(self.theta)[:, 2:]).max())
+        lines = lines_of(step)
         return float((np.abs(lines[:, 0]) + reach * np.abs(lines[:, 1])).max())
 
-    @staticmethod
-    def _bounded(theta: Floats, step: Floats) -> Floats:
+    def _bounded(self, step: Floats) -> Floats:
         step = step.copy()
-        step[1:3] = np.clip(step[1:3], -0.3, 0.3)
-        step[_SHARED::_OF_BAR] = np.clip(step[_SHARED::_OF_BAR], -1.0, 1.0)
-        step[_SHARED + 1 :: _OF_BAR] = np.clip(step[_SHARED + 1 :: _OF_BAR], -0.05, 0.05)
-        new = theta + step
-        new[2] = np.clip(new[2], np.log(0.35), np.log(3.0))
+        logs, rho, turn = _LARGEST_STEPS
+        step[1:SHARED] = np.clip(step[1:SHARED], -logs, logs)
+        lines = lines_of(step)
+        lines[:, 0], lines[:, 1] = np.clip(lines[:, 0], -rho, rho), np.clip(lines[:, 1], -turn, turn)
+        new = self.theta + step
+        new[2] = np.clip(new[2], *_BLURS)
         return np.asarray(new)
 
     def _choose(self) -> None:
         """Keep the sections that are explained about as well as most."""
-        value, _ = self._model(self.theta)
-        square = ((self._pixels.grey - value) / self._pixels.sigma) ** 2
-        count = np.bincount(self._section)
-        mean = np.bincount(self._section, square) / np.maximum(count, 1)
-        typical = max(1.0, float(np.median(mean[count > 0])))
-        poor = (mean > _POOR * typical) & (count > 0)
-        self._good = ~poor[self._section]
+        square = self._residuals**2
+        mean = np.bincount(self._section, square) / np.maximum(self._in_section, 1)
+        there = self._in_section > 0
+        typical = max(1.0, float(np.quantile(mean[there], _TYPICAL)))
+        self._good = ~(mean > _POOR * typical)[self._section]
         self.misfit = float(np.sqrt(square[self._good].mean())) if self._good.any() else np.inf
         self.cost = float(np.minimum(square, _CAP).sum())
 
-    def _equations(self, theta: Floats) -> tuple[float, Floats, Floats]:
-        value, design = self._model(theta)
-        good = self._good
-        v = ((self._pixels.grey - value) / self._pixels.sigma)[good]
-        j = (design / self._pixels.sigma[:, None])[good]
+    def _equations(self, theta: Floats) -> "_Equations":
+        value, design = modelled(self._pixels, theta)
+        design /= self._pixels.sigma
+        v = (self._pixels.grey - value) / self._pixels.sigma
         off = self._expected - theta
-        normal = j.T @ j + np.diag(self._prior + 1e-9)
-        return float(v @ v + self._prior @ off**2), normal, j.T @ v + self._prior * off
+        square = v * v
+        if self._robust:  # Cauchy's estimator
+            weight = self._good / (1 + square / _ROBUST**2)
+            cost = _ROBUST**2 * float(np.log1p(square / _ROBUST**2) @ self._good)
+        else:
+            weight = self._good.astype(float)
+            cost = float(square @ weight)
+        weighted = design * weight
+        normal = weighted @ design.T + np.diag(self._prior + 1e-9)
+        return _Equations(cost + float(self._prior @ off**2), normal, weighted @ v + self._prior * off, v, design)
 
-    def _model(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Grey values (n,) and their derivatives (n, unknowns)."""
-        h, s = float(np.exp(theta[1])), float(np.exp(theta[2]))
-        covers, parts = [], []
-        for k in range(self.count):
-            cover, by = self._cover(theta[_SHARED + _OF_BAR * k :][:_OF_BAR], h, s)
-            covers.append(cover)
-            parts.append(by)
-        open_ = np.prod([1 - c for c in covers], axis=0)
-        contrast = theta[0] - self._pixels.behind
-        design = np.zeros((len(self._pixels.grey), len(theta)))
-        design[:, 0] = 1 - open_
-        for k, by in enumerate(parts):
-            others = np.prod([1 - c for i, c in enumerate(covers) if i != k], axis=0) * contrast
-            design[:, _SHARED + _OF_BAR * k :][:, :_OF_BAR] = by[:, :_OF_BAR] * others[:, None]
-            design[:, 1:3] += by[:, _OF_BAR:] * others[:, None]
-        return self._pixels.behind + contrast * (1 - open_), design
+    def farthest(self, other: "_Fit") -> float:
+        """By how much the axes of this explanation lie aside the nearest axis of another one, at their middles, px."""
+        worst = 0.0
+        for rho, theta, t0, t1 in lines_of(self.theta):
+            along, across = directions(theta)
+            place = (t0 + t1) / 2 * along + rho * across
+            off = [abs(float(place @ directions(a)[1]) - r) for r, a, _, _ in lines_of(other.theta)]
+            worst = max(worst, min(off))
+        return min(worst, MARGIN)
 
-    def _cover(self, line: Floats, h: float, s: float) -> tuple[Floats, Floats]:
-        """Cover (n,) of a bar; derivatives (n, 6) by rho, theta, t0, t1, log h, log s."""
-        rho, theta, t0, t1 = line
-        cosine, sine = np.cos(theta), np.sin(theta)
-        t, w = self._pixels.x * cosine + self._pixels.y * sine, self._pixels.y * cosine - self._pixels.x * sine
-        u = w - rho
-        above, below, front, back = (u + h) / s, (u - h) / s, (t - t0) / s, (t - t1) / s
-        (f_above, d_above), (f_below, d_below), (f_front, d_front), (f_back, d_back) = map(
-            _normal, (above, below, front, back)
-        )
-        across, along = f_above - f_below, f_front - f_back
-        by_u, by_t = (d_above - d_below) / s * along, (d_front - d_back) / s * across
-        by = np.empty((len(u), 6))
-        by[:, 0] = -by_u
-        by[:, 1] = -by_u * t + by_t * w
-        by[:, 2], by[:, 3] = -d_front / s * across, d_back / s * across
-        by[:, 4] = (d_above + d_below) * h / s * along
-        by[:, 5] = -(above * d_above - below * d_below) * along - (front * d_front - back * d_back) * across
-        return across * along, by
+    def measured(self, k: int, points: int, doubt: float) -> FittedBar | None:
+        """Points on the axis of a bar, each from the pixels of a section, with all other unknowns as adjusted.
 
-    def measured(self, k: int, points: int) -> FittedBar | None:
-        """Points on the axis of a bar, each from the pixels of a section, with all other unknowns as adjusted."""
-        theta = self.theta
-        rho, angle, t0, t1 = theta[_SHARED + _OF_BAR * k :][:_OF_BAR]
-        h = float(np.exp(theta[1]))
-        along = self._pixels.x * np.cos(angle) + self._pixels.y * np.sin(angle)
-        value, design = self._model(theta)
+        Args:
+            k: number of the bar.
+            points: on its axis, at most.
+            doubt: px by which another explanation has axes elsewhere.
+        """
+        theta, pixels = self.theta, self._pixels
+        rho, angle, t0, t1 = lines_of(theta)[k]
+        axis, across = directions(angle)
+        along = pixels.x * axis[0] + pixels.y * axis[1]
         sections = max(1, int(min(points, (t1 - t0) / _SECTION)))
         place = np.floor((along - t0) / max(1e-9, t1 - t0) * sections).astype(int)
         good = self._good & (place >= 0) & (place < sections)
-        j = (design[:, _SHARED::_OF_BAR] / self._pixels.sigma[:, None])[good]
-        v = ((self._pixels.grey - value) / self._pixels.sigma)[good]
-        t, shift, sigma = self._shifts(k, j, v, place[good], along[good], sections)
+        t, shift, sigma = self._shifts(k, good, place[good], along[good], sections)
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
         t, shift, sigma = t[fine], shift[fine], max(1.0, self.misfit) * sigma[fine]
-        axis, normal = np.array((np.cos(angle), np.sin(angle))), np.array((-np.sin(angle), np.cos(angle)))
-        xy = self._pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * normal
-        ends = self._pixels.origin + np.array((t0, t1))[:, None] * axis + rho * normal
-        contrast = float(np.median(theta[0] - self._pixels.behind))
-        common = self._common(k, t, sigma)
-        return FittedBar(Bar(ends, 2 * h), xy, sigma, common, float(theta[0]), contrast, self.misfit)
+        xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
+        ends = pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across
+        contrast = float(np.median(theta[0] - pixels.behind))
+        common = float(np.linalg.norm((self._common(k, t, sigma), doubt, _AXIS)))
+        bar = Bar(ends, 2 * float(np.exp(theta[1])))
+        return FittedBar(bar, xy, sigma, common, float(theta[0]), contrast, self.misfit)
 
     def _shifts(
-        self, k: int, j: Floats, v: Floats, place: Integers, along: Floats, sections: int
+        self, k: int, good: Flags, place: Integers, along: Floats, sections: int
     ) -> tuple[Floats, Floats, Floats]:
         """Where along, how far off the axis, and with which sigma, section by section: all bars' shifts together."""
+        j, v = self._design[SHARED::OF_BAR, good], self._residuals[good]
+        normal = np.empty((sections, self.count, self.count))
+        right = np.empty((sections, self.count))
+        for a in range(self.count):
+            right[:, a] = np.bincount(place, j[a] * v, sections)
+            for b in range(self.count):
+                normal[:, a, b] = np.bincount(place, j[a] * j[b], sections)
+        seen = normal[:, k, k] > _UNSEEN
+        inverse = np.linalg.inv(normal[seen] + _UNSEEN * np.eye(self.count))
         t, shift, sigma = (np.full(sections, np.nan) for _ in range(3))
-        for i in range(sections):
-            own = place == i
-            a = j[own]
-            seen = (a**2).sum(axis=0) > 1e-6
-            if not seen[k]:
-                continue
-            normal = a[:, seen].T @ a[:, seen]
-            inverse = np.linalg.pinv(normal + 1e-9 * np.eye(len(normal)))
-            at = int(np.count_nonzero(seen[:k]))
-            weight = a[:, k] ** 2
-            t[i] = weight @ along[own] / weight.sum()
-            shift[i], sigma[i] = (inverse @ (a[:, seen].T @ v[own]))[at], np.sqrt(inverse[at, at])
-        sigma[~(sigma < _MARGIN)] = np.nan
+        t[seen] = np.bincount(place, j[k] ** 2 * along, sections)[seen] / normal[seen, k, k]
+        shift[seen] = np.einsum("na,na->n", inverse[:, k], right[seen])
+        sigma[seen] = np.sqrt(inverse[:, k, k])
+        sigma[~(sigma < MARGIN)] = np.nan
         return t, shift, sigma
 
     def _common(self, k: int, t: Floats, sigma: Floats) -> float:
         """What width, brightness and blur add to the sigma of the axis; all points share it."""
-        first = _SHARED + _OF_BAR * k
+        first = SHARED + OF_BAR * k
         whole = np.linalg.inv(self._normal)[first : first + 2, first : first + 2] * max(1.0, self.misfit) ** 2
         weight = sigma**-2
-        at = float(np.average(t, weights=weight))
-        row = np.array((1.0, at))
+        row = np.array((1.0, float(np.average(t, weights=weight))))
         return float(np.sqrt(max(0.0, row @ whole @ row - 1 / weight.sum())))
 
 
-def _normal(x: Floats) -> tuple[Floats, Floats]:
-    """The normal distribution function and its derivative, approximately."""
-    a, b = _NORMAL
-    square = x * x
-    value = 1 / (1 + np.exp(np.clip(-x * (a + b * square), -500, 500)))
-    return value, value * (1 - value) * (a + 3 * b * square)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equations:
+    """Normal equations, and what they are made of: normalized residuals (n,) and derivatives (unknowns, n)."""
+
+    cost: float
+    normal: Floats
+    gradient: Floats
+    residuals: Floats
+    design: Floats

@@ -174,10 +174,10 @@ class _Batch:
         theta[:, :2] = self._start
         theta[:, 2] = np.log(np.sqrt(self._radius**2 / 4 + _BLUR**2))
         theta[:, 5] = _SHAPE
-        design = self._model(theta, np.arange(len(theta)))[1][..., 6:] * self._weight[..., None]
-        normal = np.einsum("nki,nkj->nij", design, design) + 1e-9 * np.eye(4)
-        right = np.einsum("nki,nk->ni", design, self._grey * self._weight)
-        theta[:, 6:] = np.linalg.solve(normal, right[..., None])[..., 0]
+        design = self._model(theta, np.arange(len(theta)))[1][:, 6:] * self._weight[:, None, :]
+        normal = design @ design.transpose(0, 2, 1) + 1e-9 * np.eye(4)
+        right = design @ (self._grey * self._weight)[..., None]
+        theta[:, 6:] = np.linalg.solve(normal, right)[..., 0]
         self._prior = np.zeros((UNKNOWNS,))
         self._prior[2:6] = _SIZE_SPREAD**-2, _STRETCH_SPREAD**-2, _STRETCH_SPREAD**-2, _SHAPE_SPREAD**-2
         self._expected = np.zeros_like(theta)
@@ -189,34 +189,36 @@ class _Batch:
         value, design = self._model(theta, chosen)
         weight = self._weight[chosen]
         v = (self._grey[chosen] - value) * weight
-        design *= weight[..., None]
+        design *= weight[:, None, :]
         off = self._expected[chosen] - theta
-        transposed = design.transpose(0, 2, 1)
-        normal = transposed @ design + np.diag(self._prior)
-        gradient = (transposed @ v[..., None])[..., 0] + self._prior * off
+        normal = design @ design.transpose(0, 2, 1) + np.diag(self._prior)
+        gradient = (design @ v[..., None])[..., 0] + self._prior * off
         return (v**2).sum(axis=1) + (self._prior * off**2).sum(axis=1), normal, gradient
 
     def _model(self, theta: Floats, chosen: Integers) -> tuple[Floats, Floats]:
-        """Grey values (n, k) and their derivatives (n, k, 10)."""
+        """Grey values (n, k) and their derivatives (n, 10, k)."""
         x, y, log_w, s, t, log_p, contrast, b, bx, by = theta.T[..., None]
         dx, dy = self._x[chosen] - x, self._y[chosen] - y
         p, scale = np.exp(log_p), np.exp(-2 * log_w)
         # stretched coordinates (I + [[s, t], [t, -s]]) d
         u, w = (1 + s) * dx + t * dy, t * dx + (1 - s) * dy
         q = (u * u + w * w) * scale + 1e-12
-        power = q**p
+        log_q = np.log(q)
+        power = np.exp(p * log_q)
         value = np.exp(-0.5 * power)
-        by_q = -0.5 * p * power / q * value * contrast
-        design = np.empty((*dx.shape, UNKNOWNS))
-        design[..., 0] = -by_q * 2 * scale * (u * (1 + s) + w * t) - bx
-        design[..., 1] = -by_q * 2 * scale * (u * t + w * (1 - s)) - by
-        design[..., 2] = by_q * -2 * q
-        design[..., 3] = by_q * 2 * scale * (u * dx - w * dy)
-        design[..., 4] = by_q * 2 * scale * (u * dy + w * dx)
-        design[..., 5] = -0.5 * p * power * np.log(q) * value * contrast
-        design[..., 6] = value
-        design[..., 7] = 1.0
-        design[..., 8], design[..., 9] = dx, dy
+        by_power = -0.5 * contrast * p * power * value
+        by_q = by_power / q
+        along = 2 * scale * by_q
+        design = np.empty((len(dx), UNKNOWNS, dx.shape[1]))
+        design[:, 0] = -along * (u * (1 + s) + w * t) - bx
+        design[:, 1] = -along * (u * t + w * (1 - s)) - by
+        design[:, 2] = -2 * by_power
+        design[:, 3] = along * (u * dx - w * dy)
+        design[:, 4] = along * (u * dy + w * dx)
+        design[:, 5] = by_power * log_q
+        design[:, 6] = value
+        design[:, 7] = 1.0
+        design[:, 8], design[:, 9] = dx, dy
         return contrast * value + b + bx * dx + by * dy, design
 
     def _judged(self, theta: Floats, normal: Floats, cost: Floats) -> _Fitted:

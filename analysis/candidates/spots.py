@@ -19,7 +19,7 @@ _LARGEST = 16  # radii of a marker that a jumper with skis measures at least, fr
 _ANSWER = 5.0  # times its noise: of the Laplacian
 _NOISE_OF_ANSWER = 0.35  # standard deviation of the normalised Laplacian at scale 1 for noise 1; falls as 1 / scale
 _ROUND = 4.0  # ratio of the curvatures of a blob, at most
-_MOST = 40  # fits of a region, the strongest answers
+MOST = 40  #: fits of a region
 _STRENGTH = 6.0  # contrast over its sigma
 _STRETCH = 0.75  # log of the ratio of the axes: a streak of 26 m/s and 2 ms is no longer
 _MISFIT = 0.25  # residuals over contrast
@@ -31,9 +31,15 @@ _GATE = float(chi2.ppf(0.999, 2))
 _NEAR = 2  # px from what is in front
 
 
-def find_spots(region: Region) -> Spots:
-    """Spots of a region, in px of the image, the strongest first."""
+def find_spots(region: Region, most: int = MOST) -> Spots:
+    """Spots of a region, in px of the image, the strongest first.
+
+    Args:
+        region: part of an image.
+        most: places that are fitted, those with the strongest answers.
+    """
     places, radius = _blobs(region)
+    places, radius = places[:most], radius[:most]
     if not len(places):
         return Spots.none()
     discs = fit_soft_discs(region.grey, region.sigma, places, radius)
@@ -54,8 +60,9 @@ def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float
     gate = covariance + _START_SIGMA**2 * np.eye(2)
     near = _squares(places - place, gate) < _GATE
     tried = [radius] if radius is not None else list(_USUAL_RADII)
-    places = np.concatenate((places[near], np.repeat(place[None], len(tried), axis=0)))
-    discs = fit_soft_discs(region.grey, region.sigma, places, np.concatenate((radii[near], tried)))
+    places, radii = places[near][:MOST], radii[near][:MOST]
+    places = np.concatenate((places, np.repeat(place[None], len(tried), axis=0)))
+    discs = fit_soft_discs(region.grey, region.sigma, places, np.concatenate((radii, tried)))
     spots = collected(discs, _sound(discs, _SECOND_STRENGTH), region)
     squares = _squares(spots.xy - xy, covariance + spots.covariance)
     order = np.argsort(squares)
@@ -98,7 +105,7 @@ def _sound(discs: SoftDiscs, strength: float) -> Flags:
 
 
 def _blobs(region: Region, answer: float = _ANSWER) -> tuple[Floats, Floats]:
-    """Places (n, 2) in the region and radii (n,) of blobs, the strongest answers."""
+    """Places (n, 2) in the region and radii (n,) of blobs, the strongest answers first."""
     rows, columns = region.grey.shape
     largest = max(rows, columns) / _LARGEST
     scales = [float(scale) for scale in _SCALES if scale <= max(_SCALES[2], largest / np.sqrt(2) * 1.4)]
@@ -118,7 +125,7 @@ def _blobs(region: Region, answer: float = _ANSWER) -> tuple[Floats, Floats]:
     layer, row, column = layer[inside], row[inside], column[inside]
     keep = _is_round(np.stack(smooth), layer, row, column)
     layer, row, column = layer[keep], row[keep], column[keep]
-    order = np.argsort(-strength[layer, row, column])[:_MOST]
+    order = np.argsort(-strength[layer, row, column])
     places = np.column_stack((column[order], row[order])).astype(float)
     return places, np.sqrt(2) * np.array(scales)[layer[order]]
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.candidates.background import Region
+from analysis.candidates.bar_model import Bar
 from analysis.candidates.bars import Bars, find_bars
 from analysis.candidates.model import Trace
-from analysis.candidates.ski_fit import Bar, FittedBar, fit_bars
+from analysis.candidates.ski_fit import FittedBar, fit_bars
 from rig.arrays import Flags, Floats, Integers
 
-_SLENDER = 5.0  # length over width of a visible part, at least
+_SLENDER = 7.0  # length over width of a visible part, at least
 _SHORTEST = 10  # columns
 _LARGEST_WIDTH = 8  # widths of a ski that the larger side of the region measures at least
 _STEEPEST = 1.05  # slope in the columns' direction; steeper lines are found in the transposed image
@@ -34,6 +35,8 @@ _MISFIT = 4.0  # residuals over noise
 _WORST_SIGMA = 0.5  # px; of a point
 _FEWEST_POINTS = 3
 _PARALLEL = 0.9  # cosine; lines that cross at more than that hardly disturb each other
+_COVERING = 0.97  # cosine of the angle between skis that may nearly cover each other
+_NARROWER = 0.75  # a ski's width over that of two which cover each other, to start from
 _APART = 0.06  # share of their length by which two skis that cover each other may be apart at their ends
 _POINTS = 24  # of a trace
 _ENDS = 0.05  # share of the length at each end that is not measured: tips are bent, tails are round
@@ -99,14 +102,16 @@ def _explanations(bars: list[Bar]) -> list[list[Bar]]:
     """What one line or several near each other may be: these, or two skis that nearly cover each other."""
     longest = bars[0]
     along = (longest.ends[1] - longest.ends[0]) / longest.length
+    found = [[longest, bar] for bar in bars[1:]] or [bars]
+    if bars[1:] and all(abs(along @ (bar.ends[1] - bar.ends[0])) < _COVERING * bar.length for bar in bars[1:]):
+        return found
     aside = np.array((-along[1], along[0])) * longest.width / 4
     shorter = along * _APART * longest.length
-    pairs = []
     for side in (1, -1):
-        one = Bar(longest.ends + side * aside - np.array((np.zeros(2), shorter)), longest.width)
-        two = Bar(longest.ends - side * aside + np.array((shorter, np.zeros(2))), longest.width)
-        pairs.append([one, two])
-    return [bars, *pairs]
+        one = Bar(longest.ends + side * aside - np.array((np.zeros(2), shorter)), _NARROWER * longest.width)
+        two = Bar(longest.ends - side * aside + np.array((shorter, np.zeros(2))), _NARROWER * longest.width)
+        found.append([one, two])
+    return found
 
 
 def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
@@ -217,9 +222,9 @@ def _best_line(middles: _Middles, rows: int) -> tuple[float, float, Flags] | Non
     if len(middles.column) < _SHORTEST:
         return None
     x, y = middles.column.astype(float), middles.row
-    start = float(x.min())
+    start = float(x.min() + x.max()) / 2
     extent = max(1.0, float(np.ptp(x)))
-    slopes = np.linspace(-_STEEPEST, _STEEPEST, max(3, 2 * int(2 * _STEEPEST * extent) // 2 + 1))
+    slopes = np.linspace(-_STEEPEST, _STEEPEST, max(3, int(_STEEPEST * extent)))  # a px off at the ends, at most
     bins = rows + 2 * int(_STEEPEST * extent) + 4
     low = int(_STEEPEST * extent) + 1
     cell = np.floor(y[None, :] - slopes[:, None] * (x - start) + low).astype(int)
@@ -227,7 +232,7 @@ def _best_line(middles: _Middles, rows: int) -> tuple[float, float, Flags] | Non
     votes = votes.reshape(len(slopes), bins)
     pairs = votes[:, :-1] + votes[:, 1:]
     k, b = np.unravel_index(int(pairs.argmax()), pairs.shape)
-    if pairs[k, b] < _SHORTEST * _FILLED:
+    if pairs[k, b] < _SHORTEST:
         return None
     slope, offset = float(slopes[k]), float(b + 1 - low) - float(slopes[k]) * start
     return _refined(middles, offset, slope)
@@ -240,12 +245,13 @@ def _refined(middles: _Middles, offset: float, slope: float) -> tuple[float, flo
         if np.count_nonzero(on) < 3:
             return None
         weight = 1 / middles.sigma[on] ** 2
-        mean_x, mean_y = np.average(x[on], weights=weight), np.average(y[on], weights=weight)
-        square = float(np.sum(weight * (x[on] - mean_x) ** 2))
+        total, u, v = float(weight.sum()), x[on], y[on]
+        mean_u, mean_v = float(weight @ u) / total, float(weight @ v) / total
+        square = float(weight @ (u - mean_u) ** 2)
         if square <= 0:
             return None
-        slope = float(np.sum(weight * (x[on] - mean_x) * (y[on] - mean_y)) / square)
-        offset = float(mean_y - slope * mean_x)
+        slope = float(weight @ ((u - mean_u) * (v - mean_v))) / square
+        offset = mean_v - slope * mean_u
         on = np.abs(y - offset - slope * x) < limit
     return offset, slope, on
 

@@ -22,8 +22,9 @@ from rig.arrays import Flags, Floats
 #: Probability that a jump without gross errors loses any measurement.
 FALSE_REMOVAL_P: Final = 0.05
 _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
-_COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is zero by definition
+_COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is given by definition
 _SETTLED: Final = 0.01  # of a sigma: greatest step of O that ends the iteration
+_FAR: Final = 10.0  # times the median distance from approximate states
 _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
 
 
@@ -39,7 +40,7 @@ class Model:
         prior: of the motion.
         late: (m,) expected lateness of the cameras, in pulse intervals.
         late_sigma: (m,) its standard deviation.
-        clock_is_mean: whether the mean lateness of all cameras is zero by definition, because no camera's is known.
+        clock_is_mean: whether the mean lateness of all cameras is as expected by definition: no camera's is known.
     """
 
     observed: Observations
@@ -98,11 +99,22 @@ def root_of(covariance: Floats) -> Floats:
     return np.asarray(scale[:, None] * vectors[:, use] * np.sqrt(values[use]))
 
 
-def begun(model: Model, states: Floats, used: Flags, shared: Floats | None = None) -> Adjusted:
-    """The first step of an adjustment from approximate states (n, 48)."""
-    if shared is None:
-        shared = np.concatenate((np.zeros(model.root.shape[1]), model.late))
+def begun(model: Model, states: Floats, used: Flags, shared: Floats) -> Adjusted:
+    """The first step of an adjustment from approximate states (n, 48) and shared unknowns (r + m,)."""
     return _stepped(model, used, states, shared)
+
+
+def near(model: Model, states: Floats, shared: Floats) -> Flags:
+    """Which groups (n, m, 6) are about as near to approximate states as most of their kind are.
+
+    An adjustment cannot begin with gross errors: they would turn the cameras. Those that it left out for nothing, it
+    takes back (`without_gross_errors`).
+    """
+    channels = np.einsum("id,ndc->nic", _instants(model, shared), states.reshape(len(states), 3, CHANNELS))
+    v = linearised(model.observed, _cameras(model, shared), model.frame, channels).v
+    seen, square = model.observed.seen, (v**2).sum(axis=-1)
+    usual = np.array([np.median(square[:, :, g][seen[:, :, g]]) if seen[:, :, g].any() else 0.0 for g in range(6)])
+    return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, chi2.median(2))))
 
 
 def settled(adjusted: Adjusted, most: int) -> Adjusted:
@@ -261,6 +273,9 @@ def _add_motion(prior: Prior, states: Floats, diagonal: Floats, right: Floats) -
     mean, start_weight = prior.start()
     diagonal[0] += np.diag(start_weight)
     right[0] -= start_weight * (states[0] - mean)
+    body = prior.body()
+    diagonal[1:] += np.diag(body)
+    right[1:] -= body * (states[1:] - mean)
     return _embedded(-weight @ move)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
-from analysis.motion.bundle import Model, begun, root_of, settled, without_gross_errors
+from analysis.motion.bundle import Model, begun, near, root_of, settled, without_gross_errors
 from analysis.motion.channels import CHANNELS, MotionFrame
 from analysis.motion.observations import GROUPS, Observations, linearised, observations, used_cameras
 from analysis.motion.prior import STATE, prior, start_densities, transitions
@@ -99,7 +99,9 @@ class CausalFilter:
         )
         speed = np.gradient(start.channels, observed.times, axis=0) * self._unit
         states = np.concatenate((start.channels, speed, np.zeros_like(speed)), axis=1)
-        adjusted = without_gross_errors(settled(begun(model, states, observed.seen), _STEPS), _REMOVALS)
+        shared = np.zeros(self._root.shape[1] + m)
+        begin = begun(model, states, near(model, states, shared), shared)
+        adjusted = without_gross_errors(settled(begin, _STEPS), _REMOVALS)
         rank, solution = self._root.shape[1], adjusted.solution
         cross = solution.cross[-1][:, :rank]
         covariance = np.block([[solution.covariance[-1], cross], [cross.T, solution.shared_covariance[:rank, :rank]]])

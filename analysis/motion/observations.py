@@ -5,12 +5,12 @@ points of the ski's image from the axis. A weighted straight line is equivalent 
 one root mean square distance before and behind its centroid; so any number of points on a ski becomes these two.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, SkiMeasurement, Source
 from analysis.motion.channels import CHANNELS, MotionFrame
@@ -75,8 +75,9 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
         np.zeros((n, m, 6), bool),
         np.zeros((n, m, 6), bool),
     )
-    for k, pulse in enumerate(jump.pulses):
-        for i, name in enumerate(names):
+    for i, name in enumerate(names):
+        skis: list[tuple[tuple[int, int, int], SkiMeasurement]] = []
+        for k, pulse in enumerate(jump.pulses):
             if (image := pulse.images.get(name)) is None:
                 continue
             for group, label in enumerate(POINTS):
@@ -84,7 +85,9 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
                     _put(out, (k, i, group), np.stack((point.xy, point.xy)), point.covariance, point.source)
             for group, side in enumerate(SIDES, start=_POINTS):
                 if (ski := image.skis.get(side)) is not None and len(ski.xy) >= 2:
-                    _put(out, (k, i, group), *_two_points(ski, system[name]), ski.source)
+                    skis.append(((k, i, group), ski))
+        for (at, ski), ends, covariance in zip(skis, *_two_points([ski for _, ski in skis], system[name]), strict=True):
+            _put(out, at, ends, covariance, ski.source)
     return out
 
 
@@ -102,23 +105,32 @@ def _put(out: Observations, at: tuple[int, int, int], xy: Floats, covariance: Fl
     out.by_hand[at] = source is Source.BY_HAND
 
 
-def _two_points(ski: SkiMeasurement, placed: PlacedCamera) -> tuple[Floats, Floats]:
-    """Two points of a ski's image (2, 2) that stand for all of it, px, and the covariance of their distances."""
+def _two_points(skis: Sequence[SkiMeasurement], placed: PlacedCamera) -> tuple[Floats, Floats]:
+    """Two points (n, 2, 2) of each ski's image that stand for all of it, px, and covariances of their distances."""
+    if not skis:
+        return np.empty((0, 2, 2)), np.empty((0, 2, 2))
+    flat = placed.reduced(np.concatenate([ski.xy for ski in skis]))  # without distortion, where the skis are straight
+    parts = np.split(flat, np.cumsum([len(ski.xy) for ski in skis])[:-1])
+    fitted = [_straight(part, ski) for part, ski in zip(parts, skis, strict=True)]
+    ends = np.stack([of_ski for of_ski, _ in fitted])
+    depth = np.broadcast_to(placed.camera.interior[0], (len(skis), 2, 1))
+    rays = np.concatenate((ends, -depth), axis=-1) @ placed.rotation.T
+    return placed.project(placed.position + rays), np.stack([covariance for _, covariance in fitted])
+
+
+def _straight(flat: Floats, ski: SkiMeasurement) -> tuple[Floats, Floats]:
+    """The two points (2, 2) of one ski, reduced, and the covariance (2, 2) of their distances from the axis."""
     weight = ski.sigma**-2.0
-    flat = placed.reduced(ski.xy)  # without distortion, where the ski is straight
     centre = weight @ flat / weight.sum()
-    moments = (flat - centre).T @ ((flat - centre) * weight[:, None])
-    axis = np.linalg.eigh(moments)[1][:, 1]
-    along, across = (flat - centre) @ axis, (flat - centre) @ np.array((-axis[1], axis[0]))
+    off = flat - centre
+    axis = np.linalg.eigh((off * weight[:, None]).T @ off)[1][:, 1]
+    along, across = off @ axis, off @ np.array((-axis[1], axis[0]))
     degrees = len(flat) - 2
     scatter = float(weight @ across**2)
-    factor = scatter / degrees if degrees and scatter > chi2.isf(_SCATTER_P, degrees) else 1.0
+    factor = scatter / degrees if degrees and scatter > chdtri(degrees, _SCATTER_P) else 1.0
     spread = np.sqrt(weight @ along**2 / weight.sum())
     ends = centre + np.array((-spread, spread))[:, None] * axis
-    covariance = 2.0 * factor / weight.sum() * np.eye(2) + ski.common**2
-    depth = np.broadcast_to(placed.camera.interior[0], (2, 1))
-    rays = np.concatenate((ends, -depth), axis=1) @ placed.rotation.T
-    return placed.project(placed.position + rays), covariance
+    return ends, 2.0 * factor / weight.sum() * np.eye(2) + ski.common**2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

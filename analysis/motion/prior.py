@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.motion.channels import CHANNELS, START_MEAN, START_SIGMA
+from analysis.motion.channels import CHANNELS, ORIGIN, START_MEAN, START_SIGMA
 from analysis.result.model import EDGE_S
 from rig.arrays import Floats
 
@@ -26,11 +26,12 @@ _SHARES: Final = 8
 #: Accelerations (m/s^2, rad/s^2) that a channel may gain within `_WITHIN_S`, by regime and share. On the table the
 #: track guides the skis; at the edge a jumper pushes with a few g; in flight he corrects.
 _GAIN: Final = np.array(
-    ((0.5, 0.5, 0.5, 10, 5, 2, 0.5, 0.5), (20, 10, 20, 20, 10, 10, 20, 20), (2, 2, 2, 5, 3, 3, 5, 5)), float
+    ((0.5, 0.5, 0.5, 10, 5, 2, 0.5, 0.5), (20, 5, 20, 20, 10, 10, 20, 20), (1, 1, 1, 5, 3, 3, 5, 5)), float
 )
 _WITHIN_S: Final = 0.1
 _PSEUDO: Final = 1.0  #: observations that the start values count as
 _BREAK: Final = np.array((20, 10, 40, 20, 10, 10, 20, 20), float)[SHARE]  # m/s^2, rad/s^2: at the take-off
+_BODY_S: Final = 1.0
 _SMALLEST: Final = 1e-4  # of the start value: below, a density is as good as none
 
 
@@ -71,6 +72,15 @@ class Prior:
         scale = np.array((1.0, self.unit, self.unit**2 / 2))
         mean = np.concatenate((START_MEAN, np.zeros(2 * CHANNELS)))
         return mean, (START_SIGMA * scale[:, None]).ravel() ** -2.0
+
+    def body(self) -> Floats:
+        """Weight (48,) with which the mean of `start` holds at each later pulse: a body stays together.
+
+        It counts as one observation a second, so that it matters only where nothing was measured for long.
+        """
+        weight = self.start()[1].reshape(3, CHANNELS) * self.unit / _BODY_S
+        weight[:, ORIGIN] = 0.0
+        return weight.ravel()
 
 
 def prior(times: Floats, unit: float, takeoff: float | None, density: Floats) -> Prior:

@@ -27,6 +27,8 @@ _NEEDS: Final[Mapping[str, tuple[str, ...]]] = {
     "dphi": ("right", "left"),
     "phi": ("right", "left"),
     "angle_of_attack": ("right", "left"),
+    "height": ("P3", "P4"),
+    "speed": ("P3", "P4"),
 }
 
 

@@ -12,6 +12,7 @@ from analysis.motion.bundle import (
     Adjusted,
     Model,
     begun,
+    near,
     root_of,
     settled,
     statistics,
@@ -21,7 +22,7 @@ from analysis.motion.bundle import (
 from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
 from analysis.motion.prior import prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states
-from analysis.motion.start_values import Start, start_values
+from analysis.motion.start_values import FEWEST, Start, start_values
 from analysis.motion.synchrony import Synchrony, judged
 from analysis.motion.table import TableMotion, table_motion
 from analysis.motion.takeoff import Break, find_break, passing
@@ -35,7 +36,7 @@ _TRIGGER_S: Final = 20e-6  #: of cameras that obey one trigger
 #: Three nodes of Gauss and Hermite stand for a normal distribution: the middle, and so many sigmas either side.
 _NODE: Final = float(np.sqrt(3.0))
 _SIDE_WEIGHT: Final = 1 / 6
-_STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS = 12, 2, 4, 12
+_STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS = 12, 2, 3, 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +66,7 @@ class Motion:
         removed: measurements that contradict all others and were left out, the worst first.
         table: direction of the table and the velocity across it; None without take-off, or where the table was hardly
             in sight.
+        message: why there are no states; None where there are.
     """
 
     states: Sequence[SmoothedState | None]
@@ -73,6 +75,7 @@ class Motion:
     fit: Mapping[Phase, Fit]
     removed: Sequence[RayTest]
     table: TableMotion | None
+    message: str | None = None
 
 
 def smooth(
@@ -88,16 +91,36 @@ def smooth(
             Otherwise the take-off is when the motion of O and skis stops to be that of the table.
 
     Returns:
-        The motion. Without states where fewer than `start_values.FEWEST` pulses have a point in two cameras.
+        The motion; without states, and with the reason, where nothing can be computed.
     """
     everything = observations(jump, measurements, system)
     measured = np.flatnonzero(everything.seen.any(axis=(1, 2)))
     sight = slice(int(measured[0]), int(measured[-1]) + 1) if len(measured) else slice(0, 0)
-    observed = everything.part(sight)
-    start = start_values(observed, system) if len(measured) else None
+    start = start_values(everything.part(sight), system) if len(measured) else None
     if start is None:
-        return Motion([None] * len(jump.pulses), None, {}, {}, [], None)
-    unit = 1.0 / measurements.rate_hz
+        return _nothing(jump, f"fewer than {FEWEST} pulses have a point in two cameras: nothing to smooth")
+    try:
+        return _motion(jump, everything, sight, measurements.rate_hz, system, start, edge)
+    except np.linalg.LinAlgError:
+        return _nothing(
+            jump, "the measurements contradict each other: check the calibration and the names of the cameras"
+        )
+
+
+def _nothing(jump: JumpMeasurements, message: str) -> Motion:
+    return Motion([None] * len(jump.pulses), None, {}, {}, [], None, message)
+
+
+def _motion(
+    jump: JumpMeasurements,
+    everything: Observations,
+    sight: slice,
+    rate_hz: float,
+    system: CameraSystem,
+    start: Start,
+    edge: Floats | None,
+) -> Motion:
+    observed, unit = everything.part(sight), 1.0 / rate_hz
     free = _with_free_cameras(observed, system, start, unit)
     rank = free.model.root.shape[1]
     synchrony = judged(observed.names, free.late * unit, free.solution.shared_covariance[rank:, rank:] * unit**2, unit)
@@ -106,7 +129,7 @@ def smooth(
     states[sight] = _smoothed(adjusted, takeoff)
     return Motion(
         states,
-        _takeoff(jump, measurements.rate_hz, everything.times, takeoff),
+        _takeoff(jump, rate_hz, everything.times, takeoff),
         synchrony.offsets,
         _fit(adjusted, takeoff),
         _removed(adjusted, [int(pulse.pulse) for pulse in jump.pulses[sight]]),
@@ -116,7 +139,7 @@ def smooth(
 
 def _with_free_cameras(observed: Observations, system: CameraSystem, start: Start, unit: float) -> Adjusted:
     """The bundle in which each camera may be late; nothing is known yet of take-off and densities."""
-    m = len(observed.names)
+    m, late = len(observed.names), start.late / unit
     loose = np.repeat(start_densities()[1:2], 3, axis=0)
     model = Model(
         observed,
@@ -124,16 +147,15 @@ def _with_free_cameras(observed: Observations, system: CameraSystem, start: Star
         root_of(system.covariance),
         start.frame,
         prior(observed.times, unit, None, loose),
-        np.zeros(m),
+        np.full(m, late.mean()),
         np.full(m, _FREE_FRAMES),
         clock_is_mean=True,
     )
-    late = start.late / unit
-    shared = np.concatenate((np.zeros(model.root.shape[1]), late - late.mean()))
+    shared = np.concatenate((np.zeros(model.root.shape[1]), late))
     channels = start.channels
     speed = np.gradient(channels, observed.times, axis=0) * unit
     states = np.concatenate((channels, speed, np.zeros_like(channels)), axis=1)
-    return without_gross_errors(settled(begun(model, states, observed.seen, shared), _STEPS), _REMOVALS)
+    return without_gross_errors(settled(begun(model, states, near(model, states, shared), shared), _STEPS), _REMOVALS)
 
 
 def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:

@@ -179,3 +179,39 @@ def test_a_known_edge_gives_the_takeoff() -> None:
     assert found is not None
     assert found.sigma_pulses < 0.01  # 6 mm at 25 m/s
     assert abs(found.pulse - truth.takeoff_pulse) < LARGEST * found.sigma_pulses
+
+
+def test_exposures_of_different_length_are_not_lateness() -> None:
+    truth, system = true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, np.random.default_rng(SEED), late_s={"K1": 0.004})
+    cameras = {name: replace(camera, exposure_s=0.008 * (name == "K1")) for name, camera in measured.cameras.items()}
+    motion = smooth(measured.jumps[0], replace(measured, cameras=cameras), system)
+    assert all(offset.message is None for offset in motion.offsets.values())
+    middle = 0.004 / 3 * truth.rate_hz  # of the cameras' mean exposure, in pulses
+    for k, state in _states(motion)[5:]:
+        expected = truth.pose(measured.jumps[0].pulses[k].pulse + middle).origin
+        assert _distance(state.origin.value - expected, state.origin.covariance) < LARGEST
+
+
+def test_many_gross_errors_do_not_bend_the_path() -> None:
+    rng, truth, system = np.random.default_rng(SEED), true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, rng)
+    pulses, wrong = [], 0
+    for pulse in measured.jumps[0].pulses:
+        images = {}
+        for camera, image in pulse.images.items():
+            off = {label: 15 * rng.standard_normal(2) * (rng.random() < 0.08) for label in image.points}
+            points = {label: replace(point, xy=point.xy + off[label]) for label, point in image.points.items()}
+            swap = rng.random() < 0.1 and len(image.skis) == 2
+            skis = {"right": image.skis["left"], "left": image.skis["right"]} if swap else image.skis
+            images[camera] = ImageMeasurements(points, skis)
+            wrong += sum(bool(step.any()) for step in off.values())
+        pulses.append(replace(pulse, images=images))
+    jump = replace(measured.jumps[0], pulses=tuple(pulses))
+    motion = smooth(jump, measured, drawn(system, rng))
+    assert len(motion.removed) > 0.8 * wrong
+    for k, state in _states(motion):
+        for i, point in enumerate(state.points.values()):
+            assert point is not None
+            markers = truth.pose(jump.pulses[k].pulse).markers
+            assert _distance(point.xyz - markers[i], point.covariance) < LARGEST

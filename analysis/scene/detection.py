@@ -25,6 +25,7 @@ _ROUND = 3.0  # ratio of the curvatures of a blob, at most
 _RADII = (0.8, 16.0)  # px
 _STRETCH = 0.5  # log of the ratio of the axes
 _MISFIT = 0.2  # residuals over contrast
+_MISFIT_AT_START = 0.3  # the same for a disc where the blob is, before it is fitted
 _WORST_SIGMA = 0.35  # px
 _SPOILT = 1.5  # times the noise: with larger residuals something lies close around a ball
 _TIGHT = 1.8  # px around a ball that are fitted then
@@ -88,10 +89,10 @@ def collected(discs: Sequence[Disc]) -> Detections:
 
 def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: float) -> Disc | None:
     """The ball at a place; None if there is none. What lies close around it is left out if it spoils the fit."""
-    wide = fit_disc(grey, sigma, xy, radius)
+    wide = fit_disc(grey, sigma, xy, radius, poor_start=_MISFIT_AT_START)
     if wide is not None and wide.factor < _SPOILT:
         return wide if _is_ball(wide) else None
-    tight = fit_disc(grey, sigma, xy, radius, margin=_TIGHT)
+    tight = fit_disc(grey, sigma, xy, radius, margin=_TIGHT, poor_start=_MISFIT_AT_START)
     balls = [disc for disc in (wide, tight) if disc is not None and _is_ball(disc)]
     return min(balls, key=lambda disc: disc.factor, default=None)
 

@@ -24,13 +24,14 @@ from rig.arrays import Floats
 _UNKNOWNS = 10
 MARGIN: Final = 3.6  #: px beyond the disc that are fitted
 _WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one that is approximate more is needed
+_NODES = 0.3  # blurs between the nodes of a profile
 _SHARP = 8.0  # R / s: from there on the border is that of a half plane, with the curvature's first term
 _BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and blur of a small disc go together
 _STRETCH_SPREAD = 0.2  # weak prior of the stretch
 _STEPS, _ENOUGH = 25, 1e-4  # iterations, px
 _SETTLED = 2e-5  # relative decrease of the square sum: a twentieth of a sigma or less
 _TRIAL_STEPS, _POOR = 4, 0.25  # steps after which the residuals over the contrast must be smaller than that
-_POOR_START = 0.4  # residuals over contrast, before the first step
+POOR_START: Final = 0.4  #: residuals over contrast, before the first step
 _RADII = (0.75, 1.0, 1.33)  # times the approximate radius, to start from
 _LARGEST_STEP = 0.5  # of log R, log s and stretch
 _SMALLEST_SIGMA = 5e-4  # px
@@ -67,7 +68,13 @@ class Disc:
 
 
 def fit_disc(
-    grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None = None, margin: float = MARGIN
+    grey: Floats,
+    sigma: Floats,
+    xy: Floats,
+    radius: float,
+    mask: Floats | None = None,
+    margin: float = MARGIN,
+    poor_start: float = POOR_START,
 ) -> Disc | None:
     """Fit a disc near a place.
 
@@ -78,6 +85,7 @@ def fit_disc(
         radius: approximate radius, px.
         mask: (rows, columns) where the image may be used; everywhere if left out.
         margin: so far beyond the disc its surroundings are one plane, px.
+        poor_start: residuals over contrast from which on a disc of the approximate place and radius is given up.
 
     Returns:
         The disc; None if nothing there is one: no convergence, it leaves the place, or the image ends.
@@ -88,7 +96,7 @@ def fit_disc(
         window = _window(grey, sigma, theta[:2], float(np.exp(theta[2])), mask, margin)
         if window is None:
             return None
-        start = _started(theta, window, _RADII if not again else (1.0,))
+        start = _started(theta, window, _RADII if not again else (1.0,), poor_start)
         fitted = None if start is None else _fitted(start, *window)
         if fitted is None or np.hypot(*(fitted[:2] - xy)) > max(1.5, radius):
             return None
@@ -106,9 +114,28 @@ def cover(r: Floats, radius: float, blur: float) -> tuple[Floats, Floats, Floats
         edge = np.exp(-0.5 * u**2) / (np.sqrt(2 * np.pi) * blur)
         return np.asarray(0.5 * erfc(u / np.sqrt(2))), -edge, edge
     a, b = r / blur, radius / blur
-    value = chndtr(b * b, 2.0, a * a)
     common = (b / blur) * np.exp(-0.5 * (a - b) ** 2)
-    return np.asarray(value), np.asarray(-common * ive(1, a * b)), np.asarray(common * ive(0, a * b))
+    slope = -common * ive(1, a * b)
+    return _share(r, radius, blur), np.asarray(slope), np.asarray(common * ive(0, a * b))
+
+
+def _share(r: Floats, radius: float, blur: float) -> Floats:
+    """The distribution function itself, which is slow: cubic between nodes that are dense enough for 1e-5."""
+    b = radius / blur
+    last = float(r.max(initial=0.0))
+    count = int(last / (_NODES * blur)) + 2
+    if 2 * count > len(r):
+        return np.asarray(chndtr(b * b, 2.0, (r / blur) ** 2))
+    nodes, width = np.linspace(0.0, last, count, retstep=True)
+    a = nodes / blur
+    value = chndtr(b * b, 2.0, a * a)
+    by_r = -(b / blur) * np.exp(-0.5 * (a - b) ** 2) * ive(1, a * b) * width
+    left = np.minimum((r / width).astype(int), count - 2)
+    t = r / width - left
+    first, second = value[left], value[left + 1]
+    return np.asarray(
+        first + t * t * (3 - 2 * t) * (second - first) + t * (1 - t) * ((1 - t) * by_r[left] - t * by_r[left + 1])
+    )
 
 
 _Window = tuple[Floats, Floats, Floats]
@@ -134,28 +161,37 @@ def _window(
     return np.column_stack((x, y)).astype(float), grey[y, x].astype(float), sigma[y, x].astype(float)
 
 
-def _started(theta: Floats, window: _Window, factors: tuple[float, ...]) -> Floats | None:
+def _started(theta: Floats, window: _Window, factors: tuple[float, ...], poor: float) -> Floats | None:
     """Start values with the best of some radii; None if no disc is near: no fit would mend such residuals."""
     places, grey, sigma = window
     dx, dy = places[:, 0] - theta[0], places[:, 1] - theta[1]
     r = np.hypot(dx, dy)
-    best, least = None, np.inf
-    for factor in factors:
-        radius = factor * float(np.exp(theta[2]))
-        # the border as that of a half plane is near enough for a start
-        value = 0.5 * erfc((r - radius) / (np.sqrt(2) * np.exp(theta[3])))
-        design = np.column_stack((value, np.ones(len(r)), dx, dy))
-        linear = np.linalg.lstsq(design / sigma[:, None], grey / sigma, rcond=None)[0]
-        misfit = float(np.sqrt(np.mean(((grey - design @ linear) / sigma) ** 2)) * np.median(sigma))
-        if misfit < least:
-            least = misfit
-            best = np.concatenate((theta[:2], [np.log(radius)], theta[3:6], linear))
-    return None if best is None or least >= _POOR_START * abs(float(best[6])) else best
+    radii = np.array(factors) * float(np.exp(theta[2]))
+    design = np.empty((len(radii), len(r), 4))
+    # the border as that of a half plane is near enough for a start
+    design[:, :, 0] = 0.5 * erfc((r - radii[:, None]) / (np.sqrt(2) * np.exp(theta[3])))
+    design[:, :, 1], design[:, :, 2], design[:, :, 3] = 1.0, dx, dy
+    design /= sigma[:, None]
+    v = grey / sigma
+    turned = design.transpose(0, 2, 1)
+    normal = turned @ design + 1e-12 * np.eye(4)
+    linear = np.linalg.solve(normal, (turned @ v)[..., None])[..., 0]
+    squares = ((v - (design @ linear[..., None])[..., 0]) ** 2).mean(axis=1)
+    best = int(squares.argmin())
+    if not np.sqrt(squares[best]) * _middle(sigma) < poor * abs(float(linear[best, 0])):
+        return None
+    return np.concatenate((theta[:2], [np.log(radii[best])], theta[3:6], linear[best]))
+
+
+def _middle(values: Floats) -> float:
+    """The median, or its upper neighbour."""
+    return float(np.partition(values, len(values) // 2)[len(values) // 2])
 
 
 def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Floats | None:
     """Levenberg-Marquardt; None if it does not converge."""
     damping, cost = 1e-3, np.inf
+    middle = _middle(sigma)
     normal, gradient = np.eye(_UNKNOWNS), np.zeros(_UNKNOWNS)
     best = theta
     for step_number in range(_STEPS):
@@ -165,7 +201,7 @@ def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Float
             best, cost, normal, gradient, damping = theta, new_cost, new_normal, new_gradient, damping / 8
             if gain < _SETTLED * cost:
                 break
-            if step_number >= _TRIAL_STEPS and cost > len(grey) * (_POOR * theta[6] / np.median(sigma)) ** 2:
+            if step_number >= _TRIAL_STEPS and cost > len(grey) * (_POOR * theta[6] / middle) ** 2:
                 return None
         else:
             damping *= 10

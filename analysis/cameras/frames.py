@@ -1,0 +1,66 @@
+"""Single frames of a log by pulse, for measurements in some of them."""
+
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recorder.reading.log_reader import LogReader
+from recorder.reading.triplets import StoredTriplet, stored_triplets
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+
+#: Images (rows, columns) by camera; valid until the next pulse is taken.
+Frames = Mapping[str, NDArray[np.uint8]]
+
+
+class FrameSource(Protocol):
+    """Something that holds frames."""
+
+    @property
+    def pulses(self) -> tuple[PulseNumber, ...]:
+        """All pulses with a frame, in order."""
+
+    def frames(self, pulses: Collection[int]) -> Iterator[tuple[PulseNumber, Frames]]:
+        """The frames of some pulses, in order; those that are not there are left out."""
+
+
+class LogFrames:
+    """The frames of a log; damaged images are left out.
+
+    Args:
+        log: the log; of a damaged one, the part that can be read.
+    """
+
+    def __init__(self, log: Path) -> None:
+        self._log = log
+        with LogReader(log) as reader:
+            stored = stored_triplets(reader)
+        self._stored: dict[PulseNumber, StoredTriplet] = {triplet.tag.pulse: triplet for triplet in stored}
+
+    @property
+    def pulses(self) -> tuple[PulseNumber, ...]:
+        """All pulses with a frame, in order."""
+        return tuple(sorted(self._stored))
+
+    def frames(self, pulses: Collection[int]) -> Iterator[tuple[PulseNumber, Frames]]:
+        """The frames of some pulses, in order; cameras without one are left out."""
+        with LogReader(self._log) as reader:
+            for pulse in self.pulses:
+                if pulse not in pulses:
+                    continue
+                triplet = self._stored[pulse]
+                try:
+                    image = triplet.image(reader)
+                except ValueError:
+                    continue  # `svev verify` names it; other pulses are not touched
+                yield (
+                    pulse,
+                    {
+                        camera.name: image[:, slice(*camera.columns)]
+                        for camera in triplet.tag.cameras
+                        if camera.status is FrameStatus.OK
+                    },
+                )

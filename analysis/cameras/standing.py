@@ -1,0 +1,132 @@
+"""How the cameras stood during a jump: their poses, and the shake of single frames, which is taken out of measurements.
+
+A frame of a camera that was turned by a known small angle shows every point where the camera at rest would show it, but
+for a projective map of the image that does not depend on the distance. Measurements that went through it belong to the
+one pose of the jump, and everything after them need not know of the shake.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
+from analysis.measurements.model import ImageMeasurements, PointMeasurement, PulseMeasurements, SkiMeasurement
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from photogrammetry.geometry.camera_model import distort
+from photogrammetry.geometry.rotation import rotation_from_vector
+from rig.arrays import Floats
+from rig.pulse import PulseNumber
+
+_DIFFERENCE = 1e-6  # rad, for derivatives
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameShake:
+    """How a camera stood in one frame, against its pose in the jump.
+
+    Attributes:
+        turn: (3,) rad, about the camera's own axes.
+        covariance: (3, 3).
+    """
+
+    turn: Floats
+    covariance: Floats
+
+    def reversed(self) -> "FrameShake":
+        """The shake that undoes this one, and is known: it leads from steadied places back to those in the frame."""
+        return FrameShake(-self.turn, np.zeros((3, 3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """The cameras during a jump.
+
+    Attributes:
+        system: their poses.
+        shake: by camera and pulse; cameras that stood still are left out.
+    """
+
+    system: CameraSystem
+    shake: Mapping[str, Mapping[PulseNumber, FrameShake]]
+
+    def candidates(self, seen: PulseCandidates) -> PulseCandidates:
+        """Candidates where the cameras of `system` would show them."""
+        images = {name: self._image_candidates(name, seen.pulse, image) for name, image in seen.images.items()}
+        return replace(seen, images=images)
+
+    def measurements(self, seen: PulseMeasurements) -> PulseMeasurements:
+        """Measurements in the frames as the cameras of `system` would have made them."""
+        return self._measurements(seen, back=False)
+
+    def in_frames(self, steadied: PulseMeasurements) -> PulseMeasurements:
+        """The inverse of `measurements`: where the frames themselves show what was measured. Covariances stay."""
+        return self._measurements(steadied, back=True)
+
+    def _measurements(self, seen: PulseMeasurements, *, back: bool) -> PulseMeasurements:
+        images = {}
+        for name, image in seen.images.items():
+            shake = self.shake.get(name, {}).get(seen.pulse)
+            if shake is None or name not in self.system.cameras:
+                images[name] = image
+            else:
+                images[name] = _image_measurements(self.system[name], shake.reversed() if back else shake, image)
+        return replace(seen, images=images)
+
+    def _image_candidates(self, name: str, pulse: PulseNumber, image: ImageCandidates) -> ImageCandidates:
+        shake = self.shake.get(name, {}).get(pulse)
+        if shake is None or name not in self.system.cameras:
+            return image
+        placed = self.system[name]
+        xy, added = steadied(placed, shake, image.spots.xy)
+        spots: Spots = replace(image.spots, xy=xy, covariance=image.spots.covariance + added)
+        return ImageCandidates(spots, tuple(_trace(placed, shake, trace) for trace in image.traces))
+
+
+def steadied(placed: PlacedCamera, shake: FrameShake, xy: Floats) -> tuple[Floats, Floats]:
+    """Where the camera of the jump shows what a frame shows.
+
+    Args:
+        placed: the camera of the jump.
+        shake: of the frame.
+        xy: (n, 2) px in the frame.
+
+    Returns:
+        (n, 2) px, and (n, 2, 2) the covariance that the uncertainty of the shake adds.
+    """
+    turns = np.concatenate((shake.turn[None], shake.turn + _DIFFERENCE * np.eye(3)))
+    ideal = placed.reduced(xy)
+    c = float(placed.camera.interior[0])
+    rays = np.concatenate((ideal, np.full((*ideal.shape[:-1], 1), -c)), axis=-1)
+    turned = np.einsum("kij,nj->kni", rotation_from_vector(turns), rays)
+    seen = np.asarray(distort(placed.camera.lens(), -c * turned[..., :2] / turned[..., 2:]), float)
+    places = seen * np.array((1.0, -1.0)) + (placed.size - 1) / 2
+    by_turn = ((places[1:] - places[0]) / _DIFFERENCE).transpose(1, 2, 0)
+    return places[0], by_turn @ shake.covariance @ by_turn.transpose(0, 2, 1)
+
+
+def _image_measurements(placed: PlacedCamera, shake: FrameShake, image: ImageMeasurements) -> ImageMeasurements:
+    points: dict[str, PointMeasurement] = {}
+    for name, point in image.points.items():
+        xy, added = steadied(placed, shake, point.xy[None])
+        points[name] = replace(point, xy=xy[0], covariance=point.covariance + added[0])
+    skis: dict[str, SkiMeasurement] = {}
+    for side, ski in image.skis.items():
+        xy, added = steadied(placed, shake, ski.xy)
+        skis[side] = replace(ski, xy=xy, common=_common(ski.common, added))
+    return ImageMeasurements(points, skis)
+
+
+def _trace(placed: PlacedCamera, shake: FrameShake, trace: Trace) -> Trace:
+    xy, added = steadied(placed, shake, trace.xy)
+    ends, _ = steadied(placed, shake, trace.ends)
+    return replace(trace, xy=xy, ends=ends, common=_common(trace.common, added))
+
+
+def _common(before: float, added: Floats) -> float:
+    """The error that all points of a line share: a turn of the camera moves them all alike."""
+    return float(np.sqrt(before**2 + np.trace(added.mean(axis=0)) / 2))
+
+
+NO_SHAKE: Final[Mapping[str, Mapping[PulseNumber, FrameShake]]] = {}  #: of cameras that stood still

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,7 +60,7 @@ def measure(log: Path, rig: RigSettings, say: Callable[[str], None]) -> dict[str
         say: prints a line for people.
 
     Returns:
-        Paths, and for each jump the lines that compare it with the truth; a message alone if nobody jumps in the log.
+        Paths, and for each jump figures with their truth; a message alone if nobody jumps in the log.
 
     Raises:
         SvevError: as `analysis.analyze.analyze`.
@@ -85,9 +85,10 @@ def measure(log: Path, rig: RigSettings, say: Callable[[str], None]) -> dict[str
     for jump in analysis.result.jumps:
         pulse = _shown_pulse(jump)
         true = {} if pulse is None else states.get(hill.get(pulse.pulse, -1), {})
-        lines = [c.words() for c in compared(pulse.smoothed, true)] if pulse and pulse.smoothed and true else []
+        found_there = compared(pulse.smoothed, true) if pulse and pulse.smoothed and true else []
         where = "" if pulse is None else f"pulse {pulse.pulse}, {pulse.since_takeoff_s:.2f} s after the take-off"
-        jumps.append({"number": jump.number, "verdict": jump.verdict.message, "at": where, "lines": lines})
+        figures = [{"name": c.name, **asdict(c.measured), "true": c.true, "words": c.words()} for c in found_there]
+        jumps.append({"number": jump.number, "verdict": jump.verdict.message, "at": where, "figures": figures})
     return found | {"out": str(folder), "report": str(folder / "report.html"), "jumps": jumps}
 
 

@@ -112,10 +112,10 @@ def _say_measured(analysis: dict[str, Any]) -> None:
     for jump in analysis["jumps"]:
         console.say("")
         console.say(f"jump {jump['number']}             {jump['verdict']}")
-        if jump["lines"]:
+        if jump["figures"]:
             console.say(f"                   at {jump['at']}:")
-        for line in jump["lines"]:
-            console.say(f"                   {line}")
+        for figure in jump["figures"]:
+            console.say(f"                   {figure['words']}")
     console.say("")
     console.say(f"results            {analysis['out']}")
     console.say(f"for the coach      {analysis['report']}")

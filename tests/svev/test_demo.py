@@ -11,7 +11,8 @@ import pytest
 
 @pytest.mark.parametrize("bus", ["gige", "firewire", "sim"])
 def test_the_demo_records_publishes_verifies_and_shows(tmp_path: Path, bus: str) -> None:
-    command = [sys.executable, "-m", "svev", "demo", "--seconds", "4", "--bus", bus, "--out", str(tmp_path), "--json"]
+    options = ["--seconds", "4", "--bus", bus, "--out", str(tmp_path), "--no-analyze", "--json"]
+    command = [sys.executable, "-m", "svev", "demo", *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -28,3 +29,19 @@ def test_the_demo_records_publishes_verifies_and_shows(tmp_path: Path, bus: str)
     pulses = truth["hill_pulse_of_recording"]
     assert list(pulses) == [str(number) for number in range(1, 121)]
     assert [pulses[str(number)] - pulses["1"] for number in range(1, 121)] == list(range(120))
+
+
+def test_the_demo_measures_the_jumper_and_shows_the_truth_beside(tmp_path: Path) -> None:
+    """Nine seconds hold a whole jump, whenever they begin: one comes every four seconds and is in sight for 1.3 s."""
+    command = [sys.executable, "-m", "svev", "demo", "--seconds", "9", "--out", str(tmp_path), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=170, check=False)
+    assert done.returncode == 0, done.stderr
+    analysis = json.loads(done.stdout)["analysis"]
+    assert analysis["message"] == ""
+    jumps = [jump for jump in analysis["jumps"] if "measured well" in jump["verdict"]]
+    assert jumps, analysis["jumps"]
+    figures = [figure for jump in jumps for figure in jump["figures"]]
+    assert len(figures) >= 7
+    for figure in figures:
+        assert abs(figure["value"] - figure["true"]) < 5 * figure["sigma"] + 1e-3, figure
+    assert "Take-off speed" in Path(analysis["report"]).read_text(encoding="utf-8")

@@ -1,0 +1,137 @@
+"""`svev analyze` and `svev worker` on a rendered jump: what they measure is true, and what they cannot, they say."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zmq
+
+from tests.analysis.simulated import training
+from tests.support.hill_logs import HillLog, write_hill_log
+from tests.support.loopback import Loopback
+
+#: The jumper is in sight from hill pulse 23 to 60.
+PULSES = range(14, 70)
+
+
+@pytest.fixture(scope="module")
+def jump(tmp_path_factory: pytest.TempPathFactory) -> HillLog:
+    return write_hill_log(tmp_path_factory.mktemp("hill") / "jump", training(), PULSES)
+
+
+def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "svev", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=170, check=False)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(jump: HillLog, tmp_path: Path) -> None:
+    out = tmp_path / "result"
+    summary = json.loads(svev("analyze", jump.path, "--survey", jump.survey, "--out", out, "--json").stdout)
+    result = json.loads((out / "jumper.json").read_text())
+    assert result["format"] == "svev-jumper/1"
+    assert len(result["jumps"]) == 1
+    measured = result["jumps"][0]
+    assert measured["verdict"]["ok"], measured["verdict"]["message"]
+    assert abs(measured["takeoff"]["pulse"] - (30.0 - PULSES[0] + 1)) < 4 * measured["takeoff"]["sigma_pulses"] + 0.05
+    _points_are_true(measured, jump.truth)
+    _angles_are_true(measured, jump.truth)
+    names = {"jumper.csv", "jumper.c3d", "jumper.trc", "report.html", "protocol.html", "protocol.txt"}
+    names |= {"jumper.json", "network.json", "measurements.json"}
+    assert {Path(file).name for file in summary["files"]} == names
+    assert all((out / name).stat().st_size > 100 for name in names)
+    _the_same_from_the_measurements(jump, out, tmp_path / "again")
+
+
+def _points_are_true(measured: dict[str, Any], truth: dict[int, dict[str, Any]]) -> None:
+    """Points in sight of two cameras are solved, to 0.02 m in 95 % of the pulses."""
+    seen = solved = 0
+    errors = []
+    for pulse in measured["pulses"]:
+        true = truth[pulse["pulse"]]
+        for name in ("P1", "P2", "P3", "P4"):
+            if sum(bool(sight[name]) for sight in true["in_sight"].values()) < 2:
+                continue
+            seen += 1
+            point = pulse["points"][name]
+            if point is not None:
+                solved += 1
+                off = np.array(point["X"]) - true["points"][name]
+                sigma = np.sqrt(np.diagonal(np.array(point["covariance"])))
+                assert (np.abs(off) < 5 * sigma).all(), (pulse["pulse"], name, off, sigma)
+                errors.append(np.abs(off).max())
+    assert solved >= 0.95 * seen
+    assert np.quantile(errors, 0.95) < 0.02
+
+
+def _angles_are_true(measured: dict[str, Any], truth: dict[int, dict[str, Any]]) -> None:
+    flight = [pulse for pulse in measured["pulses"] if 0.2 < pulse["since_takeoff_s"] < 0.7]
+    assert len(flight) > 10
+    for pulse in flight:
+        for name, true in truth[pulse["pulse"]]["angles"].items():
+            found = pulse["smoothed"]["angles"][name]
+            assert abs(found["value"] - true) < 5 * found["sigma"] + 0.05, (pulse["pulse"], name, found, true)
+
+
+def _the_same_from_the_measurements(jump: HillLog, out: Path, again: Path) -> None:
+    """What was measured can be computed again without looking at the jumper."""
+    given = ("--survey", jump.survey, "--measurements", out / "measurements.json")
+    svev("analyze", jump.path, *given, "--out", again, "--json")
+    first, second = (json.loads((folder / "jumper.json").read_text())["jumps"][0] for folder in (out, again))
+    for before, after in zip(first["pulses"], second["pulses"], strict=True):
+        assert (before["points"]["P1"] is None) == (after["points"]["P1"] is None)
+        if before["points"]["P1"] is not None:
+            assert after["points"]["P1"]["X"] == pytest.approx(before["points"]["P1"]["X"], abs=1e-4)
+
+
+def test_what_cannot_be_measured_is_said_in_one_line(jump: HillLog, tmp_path: Path) -> None:
+    empty = write_hill_log(tmp_path / "empty", training(), range(75, 100))
+    out = tmp_path / "out"
+    nobody = svev("analyze", empty.path, "--survey", empty.survey, "--out", out, code=3)
+    assert "nobody jumps in it" in nobody.stderr
+    survey = json.loads(jump.survey.read_text())
+    survey["cameras"]["K1"]["size"] = [1280, 960]
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(json.dumps(survey))
+    size = svev("analyze", jump.path, "--survey", wrong, "--out", out, code=2)
+    assert "calibrated for images of 1280 x 960 px" in size.stderr
+    both = svev("analyze", jump.path, "--survey", jump.survey, "--calibration", wrong, "--out", out, code=2)
+    for done in (nobody, size, both):
+        assert len(done.stderr.strip().splitlines()) == 1
+        assert done.stderr.startswith("svev: ")
+    assert not out.exists()
+
+
+def test_a_worker_measures_a_replayed_log(jump: HillLog, tmp_path: Path, loopback: Loopback) -> None:
+    replay = [sys.executable, "-m", "svev", "replay", str(jump.path), "--reliable", "--speed", "max"]
+    address, results = loopback.endpoint(), loopback.endpoint()
+    with (
+        zmq.Context() as context,
+        context.socket(zmq.SUB) as socket,
+        subprocess.Popen([*replay, "--bind", address, "--wait", "60"], stdout=subprocess.DEVNULL) as serving,
+    ):
+        socket.subscribe(b"jumper")
+        socket.connect(results)
+        options = ("--survey", jump.survey, "--bind", results, "--out", tmp_path, "--idle", "3", "--json")
+        summary = json.loads(svev("worker", "--connect", address, "--reliable", *options).stdout)
+        assert serving.wait(20) == 0
+        got = []
+        while socket.poll(500):
+            got.append(socket.recv_multipart())
+    assert summary["pulses"] == len(PULSES)
+    assert summary["jumps"] == 1
+    states = [json.loads(data) for topic, data in got if topic == b"jumper"]
+    jumps = [json.loads(data) for topic, data in got if topic == b"jumper/jump"]
+    assert [state["pulse"] for state in states] == sorted({state["pulse"] for state in states})
+    assert len(states) == summary["states"] > 30
+    assert jumps[0]["jumps"][0]["pulses"]
+    for state in states:
+        true = jump.truth[state["pulse"]]
+        for name, point in state["points"].items():
+            if point is not None:
+                assert np.array(point["X"]) == pytest.approx(np.array(true["points"][name]), abs=0.1)

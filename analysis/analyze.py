@@ -1,15 +1,17 @@
 """The whole analysis of a recording: from its log and the survey of the balls to the measured jumps."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from analysis.cameras.frames import LogFrames
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.cameras.source import Source, orient_from
+from analysis.cameras.steadiness import watch
 from analysis.candidates.finder import Finder, find_candidates
-from analysis.identification.identify import identify
 from analysis.jump import ComputedJump, compute_jump
-from analysis.log_facts import LogFacts, log_facts
+from analysis.jump_search import find_jumps
+from analysis.log_facts import log_facts
 from analysis.measurements.merging import merged
 from analysis.measurements.model import Measurements
 from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
@@ -73,38 +75,39 @@ def analyze(
     tell("looking at the balls", 0.0)
     static = static_images(log)
     scene, orientation = orient_from(static, source)
+    steadiness = watch(scene, LogFrames(log))
+    tell("looking at the balls", 1.0)
     measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, ())
     if images:
-        measurements = _measured(facts, scene, tell)
+        candidates = find_candidates(
+            log,
+            Finder({name: static[name] for name in scene.system.names}),
+            lambda s: tell("looking for the jumper", s),
+        )
+        measurements = replace(measurements, jumps=tuple(find_jumps(candidates, facts, scene, steadiness)))
     if by_hand is not None:
         measurements = merged(measurements, by_hand)
     if not measurements.jumps:
         raise NoJumpError(
             f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording"
         )
-    tell("computing", 0.0)
-    jumps = [compute_jump(jump, measurements, scene.system) for jump in measurements.jumps]
+    jumps: list[ComputedJump] = []
+    for jump in measurements.jumps:
+        tell("computing", len(jumps) / len(measurements.jumps))
+        standing = steadiness.during([pulse.pulse for pulse in jump.pulses])
+        steady = replace(jump, pulses=tuple(standing.measurements(pulse) for pulse in jump.pulses))
+        jumps.append(compute_jump(steady, measurements, standing.system))
     result = MeasuredRecording(
         facts.recording,
         facts.session,
         facts.rate_hz,
-        orientation_result(scene, messages=facts.messages),
+        orientation_result(scene, steadiness.moved, (*facts.messages, *steadiness.messages)),
         _synchrony(jumps),
         tuple(computed.jump for computed in jumps),
     )
     tell("computing", 1.0)
     perpendicular = {c.jump.number: c.perpendicular for c in jumps if c.perpendicular is not None}
     return Analysis(result, measurements, scene, orientation, perpendicular)
-
-
-def _measured(facts: LogFacts, scene: OrientedScene, tell: Progress) -> Measurements:
-    """What the images show of the jumper."""
-    finder = Finder({name: scene.static[name] for name in scene.system.names})
-    step = "looking for the jumper"
-    candidates = find_candidates(facts.path, finder, lambda share: tell(step, share))
-    exposures = {name: camera.exposure_s for name, camera in facts.cameras.items()}
-    jumps = identify(candidates, scene.system, facts.rate_hz, exposures)
-    return Measurements(facts.recording, facts.rate_hz, facts.cameras, tuple(jumps))
 
 
 def _synchrony(jumps: list[ComputedJump]) -> dict[str, CameraOffset]:

@@ -1,0 +1,66 @@
+"""Finds the jumps in the candidates of a recording whose cameras may have moved.
+
+At first the gates are as wide as the cameras moved. For each jump that is found so, the cameras are taken as they stood
+in it, frame by frame, and it is identified once more with gates as narrow as the measurements allow.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.cameras.oriented_scene import OrientedScene
+from analysis.cameras.pose_change import changed
+from analysis.cameras.steadiness import Steadiness
+from analysis.candidates.model import ImageCandidates, PulseCandidates
+from analysis.identification.identify import identify
+from analysis.log_facts import LogFacts
+from analysis.measurements.model import JumpMeasurements
+
+#: Pulses around a jump in which it is looked for again, s.
+_AROUND_S = 0.5
+
+
+def find_jumps(
+    candidates: Sequence[PulseCandidates], facts: LogFacts, scene: OrientedScene, steadiness: Steadiness
+) -> list[JumpMeasurements]:
+    """The jumps of a recording, measured in the frames as they are.
+
+    Args:
+        candidates: of all pulses.
+        facts: of the log.
+        scene: cameras and balls.
+        steadiness: how the cameras stood.
+    """
+    exposures = {name: camera.exposure_s for name, camera in facts.cameras.items()}
+    system = changed(scene.system, scene.changes)
+    moves_px = {
+        move.camera: float(np.radians(np.linalg.norm(move.rotation_deg)) * system[move.camera].ideal().c)
+        for move in steadiness.moved
+    }
+    loose = [_loosened(seen, moves_px) for seen in candidates]
+    found: list[JumpMeasurements] = []
+    for jump in identify(loose, system, facts.rate_hz, exposures):
+        around = round(_AROUND_S * facts.rate_hz)
+        first, last = jump.pulses[0].pulse - around, jump.pulses[-1].pulse + around
+        window = [seen for seen in candidates if first <= seen.pulse <= last]
+        standing = steadiness.during([seen.pulse for seen in window])
+        steady = [standing.candidates(seen) for seen in window]
+        again = identify(steady, standing.system, facts.rate_hz, exposures)
+        best = max(again, key=lambda one: len(one.pulses), default=None)
+        if best is not None:
+            pulses = tuple(standing.in_frames(pulse) for pulse in best.pulses)
+            found.append(JumpMeasurements(len(found) + 1, pulses))
+    return found
+
+
+def _loosened(seen: PulseCandidates, moves_px: dict[str, float]) -> PulseCandidates:
+    """Candidates whose spots may be off by as much as their camera moved."""
+    if not any(moves_px.get(name) for name in seen.images):
+        return seen
+    return replace(seen, images={name: _wider(image, moves_px.get(name, 0.0)) for name, image in seen.images.items()})
+
+
+def _wider(image: ImageCandidates, by_px: float) -> ImageCandidates:
+    covariance = image.spots.covariance + by_px**2 * np.eye(2)
+    return replace(image, spots=replace(image.spots, covariance=covariance))

@@ -87,6 +87,7 @@ class Adjusted:
         by_calibration: (n, u, p) change of the parameters by errors of the calibration.
         chi_square: (n,) of the residuals; NaN where they have no minimum.
         redundancy: (n,).
+        calibration_share: (n,) part of the expected chi-square that comes from errors of the calibration.
         residual: (n, m) length of the residuals of each image, px.
         w: (n, m) test value of each image: standard normal where nothing is wrong, NaN where nothing controls it.
         condition: (n,) values of `Condition`; where it is not OK, the numbers mean nothing.
@@ -98,6 +99,7 @@ class Adjusted:
     by_calibration: Floats
     chi_square: Floats
     redundancy: NDArray[np.int_]
+    calibration_share: Floats
     residual: Floats
     w: Floats
     condition: NDArray[np.int8]
@@ -231,6 +233,8 @@ def _result(
     # weighted residuals and their covariance: W v and W - W A N^-1 A^T W
     force = np.einsum("nrs,ns->nr", weight, v)
     spread = weight - weight @ solution.design @ gain
+    redundancy = 2 * seen.sum(axis=1) - gain.shape[1]
+    of_images = np.einsum("nmab,nmab->n", _blocks(spread), own)
     residual = np.where(seen, np.linalg.norm(v.reshape(n, m, 2), axis=2), np.nan)
     return Adjusted(
         state,
@@ -238,7 +242,8 @@ def _result(
         image_covariance,
         influence,
         np.where(minimal, np.einsum("nr,nr->n", force, v), np.nan),
-        2 * seen.sum(axis=1) - gain.shape[1],
+        redundancy,
+        1 - of_images / np.maximum(redundancy, 1),
         residual,
         np.where(seen, _tests(force.reshape(n, m, 2), _blocks(spread), _blocks(weight)), np.nan),
         condition,

@@ -67,6 +67,15 @@ class Points:
         """The distance from the nearest camera."""
         return np.repeat(nearest(self.cameras, state, self.seen)[:, None], 3, axis=1)
 
+    def scaled(self, factor: float) -> "Points":
+        """The same with all standard deviations of the image measurement times a factor."""
+        return replace(self, covariance=self.covariance * factor**2)
+
+    def sigma(self) -> float:
+        """Median standard deviation of the image measurement, px."""
+        variance = np.trace(self.covariance[self.seen], axis1=1, axis2=2) / 2
+        return float(np.sqrt(np.median(variance))) if len(variance) else 0.0
+
     def subset(self, rows: Integers) -> "Points":
         """The points `rows`, which may repeat."""
         return replace(

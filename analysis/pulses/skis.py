@@ -131,6 +131,15 @@ class SkiLines:
         distance = nearest(self.cameras, state[:, :3], self.seen)
         return np.stack((distance, distance, np.ones(len(state)), np.ones(len(state))), axis=1)
 
+    def scaled(self, factor: float) -> "SkiLines":
+        """The same with all standard deviations of the image measurement times a factor."""
+        return replace(self, weight=self.weight / factor**2, common=self.common * factor)
+
+    def sigma(self) -> float:
+        """Median standard deviation of the image lines across the ski, px."""
+        variance = 1 / self.weight[self.seen].sum(axis=-1) + self.common[self.seen] ** 2
+        return float(np.sqrt(np.median(variance))) if len(variance) else 0.0
+
     def subset(self, rows: Integers) -> "SkiLines":
         """The skis `rows`, which may repeat."""
         return replace(

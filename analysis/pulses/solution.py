@@ -1,6 +1,7 @@
 """Solves the pulses of a jump one by one: the raw solution, for which nothing is assumed about the motion."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -8,12 +9,12 @@ from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measure
 from analysis.pulses.gross_errors import Checked, check_points, check_skis
 from analysis.pulses.least_squares import adjust
 from analysis.pulses.points import points_of
+from analysis.pulses.scaling import scaled_to_fit
 from analysis.pulses.skis import skis_of
 from analysis.pulses.states import Solved, jumper_states
 from analysis.pulses.travel import velocities
 from analysis.result.model import JumperState, RayTest
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
-from rig.arrays import Floats
 from rig.errors import BadInputError
 
 _NS = 1e-9
@@ -28,10 +29,13 @@ class RawJump:
         states: one for each pulse of the measurements, in order, at the middle of the exposures.
         tests: of all rays and image lines, the worst first. Where an error was found, but not the wrong ray, all rays
             of that point are removed.
+        scale: factors by which the sigmas of "points" and "skis" in the images were too small: if they are not 1, most
+            of them agree worse than their sigmas said, and all results are computed with these sigmas times the factor.
     """
 
     states: tuple[JumperState, ...]
     tests: tuple[RayTest, ...]
+    scale: Mapping[str, float] = field(default_factory=dict)
 
 
 def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> RawJump:
@@ -54,21 +58,19 @@ def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: Cam
     late = np.array([measurements.late_s(camera.name) for camera in cameras])
     shift = np.zeros((len(pulses), len(cameras), 3))
     if np.abs(late).max() > _TOGETHER_S:
-        points = adjust(points_of(cameras, pulses, shift), system.covariance).state  # good enough for the velocity
-        shift = late[:, None] * velocities(points.reshape(-1, len(POINTS), 3), times)[:, None]
-    solved = _solve(cameras, pulses, shift, system)
-    numbers = np.array([pulse.pulse for pulse in pulses])
-    tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))
-    return RawJump(jumper_states(solved, numbers, times, system), tuple(tests))
-
-
-def _solve(
-    cameras: list[PlacedCamera], pulses: tuple[PulseMeasurements, ...], shift: Floats, system: CameraSystem
-) -> Solved:
-    points, skis = points_of(cameras, pulses, shift), skis_of(cameras, pulses, shift)
-    return Solved(
+        place = adjust(points_of(cameras, pulses, shift), system.covariance).state  # good enough for the velocity
+        shift = late[:, None] * velocities(place.reshape(-1, len(POINTS), 3), times)[:, None]
+    points, points_scale = scaled_to_fit(points_of(cameras, pulses, shift), system.covariance)
+    skis = skis_of(cameras, pulses, shift)
+    other_names = [skis.interchanged(image) for image in range(len(cameras))]
+    skis, skis_scale = scaled_to_fit(skis, system.covariance, other_names)
+    solved = Solved(
         check_points(points, system.covariance), points.by_hand, check_skis(skis, system.covariance), skis.by_hand
     )
+    numbers = np.array([pulse.pulse for pulse in pulses])
+    tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))
+    scale = {"points": points_scale, "skis": skis_scale}
+    return RawJump(jumper_states(solved, numbers, times, system), tuple(tests), scale)
 
 
 def _check_sizes(cameras: list[PlacedCamera], measurements: Measurements) -> None:

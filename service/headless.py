@@ -184,12 +184,18 @@ class HeadlessRig:
                     on_progress(recording.counts)
                 continue
             if isinstance(outcome, RecordingFinished):
-                self._supervisor.truths.wait()
+                self._await_truth(stop)
                 return outcome
             if isinstance(outcome, ProcessDiedError):
                 kept = f"the log until then is readable: svev verify {self._path}"
                 raise ProcessDiedError(f"{outcome}; {kept}; then start again")
             raise outcome
+
+    def _await_truth(self, stop: Callable[[], int]) -> None:
+        """Wait until the truth of simulated cameras is written, unless a person asks to end."""
+        asked = stop()
+        while self._supervisor.truths.busy and stop() == asked:
+            self._supervisor.truths.wait(_POLL_S)
 
     def _ask(self, command: Callable[["Future[T]"], None]) -> T:
         """Have the supervisor carry out a command; if it has ended, raise the error that ended it."""

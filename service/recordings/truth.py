@@ -1,6 +1,6 @@
 """Writes the truth beside the logs of a simulated rig, after they are closed, while the rig goes on."""
 
-import math
+import contextlib
 import os
 import threading
 import time
@@ -79,12 +79,17 @@ class TruthWriter:
                 self._busy, self._moved = True, time.monotonic()
                 threading.Thread(target=self._run, name="truth writer", daemon=True).start()
 
-    def wait(self, timeout_s: float = math.inf) -> bool:
+    @property
+    def busy(self) -> bool:
+        """Whether something is being written, on a disk that does not hang; any thread may ask."""
+        return self._busy and time.monotonic() < self._moved + _HANGS_S
+
+    def wait(self, timeout_s: float) -> bool:
         """Wait until everything is written; False if it is not after `timeout_s`, or if the disk hangs."""
         until = time.monotonic() + timeout_s
         with self._changed:
-            while self._busy and time.monotonic() < min(until, self._moved + _HANGS_S):
-                self._changed.wait(_LOOK_S)
+            while self.busy and (left := until - time.monotonic()) > 0:
+                self._changed.wait(min(left, _LOOK_S))
             return not self._busy
 
     def end(self, timeout_s: float) -> None:
@@ -94,7 +99,8 @@ class TruthWriter:
             self.wait(timeout_s)
 
     def _run(self) -> None:
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+        with contextlib.suppress(PermissionError):  # a sandbox may forbid it
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
         while True:
             with self._changed:
                 if not self._waiting:

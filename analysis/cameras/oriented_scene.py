@@ -31,6 +31,7 @@ class OrientedScene:
         changes: by camera, the change of its pose from `system` to the static image. Empty if the poses were
             estimated from the static images themselves.
         messages: what a person should know, one line each.
+        given: identifies survey and interior orientation that the cameras were oriented with; empty if not known.
     """
 
     system: CameraSystem
@@ -39,12 +40,13 @@ class OrientedScene:
     static: Mapping[str, StaticImage]
     changes: Mapping[str, PoseChange]
     messages: tuple[str, ...]
+    given: str = ""
 
 
-def scene_of_survey(scene: Scene) -> OrientedScene:
-    """A scene that was oriented from its own images and a survey."""
+def scene_of_survey(scene: Scene, given: str = "") -> OrientedScene:
+    """A scene that was oriented from its own images and a survey; `given` identifies the latter (`survey_id`)."""
     system = camera_system(scene.orientation, tuple(scene.static))
-    return OrientedScene(system, scene.balls, scene.network, scene.static, {}, scene.messages)
+    return OrientedScene(system, scene.balls, scene.network, scene.static, {}, scene.messages, given)
 
 
 def orientation_result(
@@ -71,6 +73,8 @@ def orientation_result(
         parameter_names(system),
         system.covariance,
         calibration_id(system),
+        scene.given if system.given is not None else "",
+        system.given,
     )
 
 
@@ -92,6 +96,19 @@ def calibration_id(system: CameraSystem) -> str:
         for values in (placed.position, placed.rotation, placed.camera.interior):
             digest.update(np.ascontiguousarray(values, "<f8").tobytes())
     digest.update(np.ascontiguousarray(system.covariance, "<f8").tobytes())
+    return digest.hexdigest()[:_DIGITS]
+
+
+def survey_id(survey: Network) -> str:
+    """Identifies what was given: the hash of interior orientations and coordinates with their sigmas."""
+    digest = hashlib.sha256()
+    for camera in survey.cameras:
+        digest.update(f"{camera.name} {camera.balance} {camera.distortion} {sorted(camera.sigma.items())}".encode())
+        digest.update(np.ascontiguousarray(camera.interior, "<f8").tobytes())
+    for point in survey.points:
+        digest.update(f"{point.name} {point.role}".encode())
+        for values in (point.xyz, point.sigma):
+            digest.update(b"-" if values is None else np.ascontiguousarray(values, "<f8").tobytes())
     return digest.hexdigest()[:_DIGITS]
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from analysis.cameras.comparison import scene_of_calibration
-from analysis.cameras.oriented_scene import OrientedScene, scene_of_survey
+from analysis.cameras.oriented_scene import OrientedScene, scene_of_survey, survey_id
 from analysis.cameras.poses_file import Calibration, read_poses
 from analysis.scene.orientation import orient_images
 from analysis.scene.static_image import StaticImage
@@ -38,5 +38,5 @@ def orient_from(static: Mapping[str, StaticImage], source: Source) -> tuple[Orie
     """
     if isinstance(source, Survey):
         scene = orient_images(static, source)
-        return scene_of_survey(scene), scene.orientation
+        return scene_of_survey(scene, survey_id(source.network)), scene.orientation
     return scene_of_calibration(static, source), None

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
-from analysis.comparison.aligned import VELOCITY, MeasuredJump
+from analysis.comparison.aligned import HEIGHT, VELOCITY, MeasuredJump
+from analysis.comparison.shared_calibration import shared_calibration
 from analysis.result.model import PulseState, SmoothedState
 from rig.arrays import Floats
 
@@ -66,8 +67,8 @@ def align(jumps: list[MeasuredJump]) -> Alignment:
     directions = [jump.smoothed()[_nearest(jump)][1].velocity.value for jump in jumps]
     along = np.sum([direction / np.linalg.norm(direction) for direction in directions], axis=0)
     along /= np.linalg.norm(along)
-    one_calibration = len({jump.recording.orientation.source for jump in jumps}) == 1
-    paths = [_path(jump, along, shared=one_calibration) for jump in jumps]
+    shared = shared_calibration([jump.recording for jump in jumps])
+    paths = [_path(jump, along, own) for jump, own in zip(jumps, shared.own, strict=True)]
     places = np.array([path.place for path in paths])
     weights = np.array([(path.speed * path.sigma_s) ** 2 + path.sigma_way**2 for path in paths]) ** -1.0
     edge = float(places @ weights / weights.sum())
@@ -85,18 +86,29 @@ def _nearest(jump: MeasuredJump) -> int:
     return int(np.argmin(np.abs(jump.since_takeoff())))
 
 
-def _path(jump: MeasuredJump, along: Floats, *, shared: bool) -> _Path:
-    """The path of a jump; `shared`: without errors of the calibration, which shift all jumps alike."""
+def _path(jump: MeasuredJump, along: Floats, calibration: Floats) -> _Path:
+    """The path of a jump; `calibration`: covariance of what it does not share with the others."""
     found = jump.smoothed()
     way = CubicSpline(jump.since_takeoff(), [state.origin.value @ along for _, state in found])
     covariance = found[_nearest(jump)][1].origin.covariance
     variance = float(along @ covariance @ along)
-    if shared:
+    part = _own_part(found[_nearest(jump)][1], calibration, jump.recording.orientation.covariance)
+    if part < 1:
         around = found[max(_nearest(jump) - _AROUND, 0) : _nearest(jump) + _AROUND + 1]
         parts = [_of_measurement(*each, along, jump) for each in around]
         known = [part for part in parts if part is not None]
-        variance = min(max(float(np.median(known)), _LEAST_PART * variance), variance) if known else variance
+        if known:
+            measured = min(max(float(np.median(known)), _LEAST_PART * variance), variance)
+            variance = measured + part * (variance - measured)
     return _Path(way, math.sqrt(variance), float(way(0.0)), float(way(0.0, 1)), jump.takeoff_sigma_s)
+
+
+def _own_part(state: SmoothedState, own: Floats, whole: Floats) -> float:
+    """How much of the variance by calibration a jump does not share: as in its height, 1 if that is not known."""
+    by = state.by_calibration[HEIGHT]
+    if not np.isfinite(by).all() or not by @ whole @ by > 0:
+        return 1.0
+    return min(max(float(by @ own @ by) / float(by @ whole @ by), 0.0), 1.0)
 
 
 def _of_measurement(pulse: PulseState, state: SmoothedState, along: Floats, jump: MeasuredJump) -> float | None:

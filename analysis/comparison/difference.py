@@ -1,7 +1,7 @@
 """The difference of two jumps over the time since the take-off, with what of it is real.
 
 The covariance of the difference has three parts: errors of measurement of both jumps; errors of the calibration, which
-mostly cancel where both jumps have the same one; and errors of the take-off, which shift jumps in time. The greatest
+mostly cancel as far as both jumps share them; and errors of the take-off, which shift jumps in time. The greatest
 of many differences is judged as the greatest of many: the distribution of the largest test value is simulated from
 the correlations, and expressed by the number of independent differences that has the same 5 % limit.
 """
@@ -12,9 +12,10 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm
 
-from analysis.comparison.aligned import MeasuredJump, Series, common_times, series
+from analysis.comparison.aligned import Series, common_times, series
 from analysis.comparison.alignment import Alignment
 from analysis.comparison.repeatability import noise_covariance
+from analysis.comparison.shared_calibration import Common, SharedCalibration, shared_calibration
 from analysis.result.model import EDGE_S, QUANTITIES
 from rig.arrays import Flags, Floats
 
@@ -58,7 +59,7 @@ class Difference:
         p_greatest: (11, T) probability that the greatest of all differences is as large, in jumps that are equal.
         independent: how many independent differences have the same 5 % limit.
         limit: the limit of |b - a| / repeat.
-        same_calibration: whether errors of the calibration cancel.
+        common: whose errors cancel.
         power: by quantity; None where it is not known in flight.
     """
 
@@ -71,7 +72,7 @@ class Difference:
     p_greatest: Floats
     independent: float
     limit: float
-    same_calibration: bool
+    common: Common
     power: dict[str, Power | None]
 
     @property
@@ -106,8 +107,8 @@ def difference(alignment: Alignment, draws: int = DRAWS) -> Difference:
     a, b = alignment.jumps[:2]
     times = common_times([a, b])
     one, other = series(a, times), series(b, times)
-    same = a.recording.orientation.source == b.recording.orientation.source
-    shared = _calibration(a, one, b, other, same=same) + _takeoff(one, other, alignment.shared_sigma_s)
+    calibration = shared_calibration([a.recording, b.recording])
+    shared = _calibration(one, other, calibration) + _takeoff(one, other, alignment.shared_sigma_s)
     noise = noise_covariance(one) + noise_covariance(other)
     known = np.isfinite(one.values + other.values).ravel()
     covariance = (shared + noise)[np.ix_(known, known)]
@@ -128,17 +129,18 @@ def difference(alignment: Alignment, draws: int = DRAWS) -> Difference:
         -np.expm1(independent * np.log1p(-np.minimum(p, 1 - 1e-12))),
         independent,
         limit,
-        same,
+        calibration.common,
         _power(extremes, deviation, known, times, limit),
     )
 
 
-def _calibration(a: MeasuredJump, one: Series, b: MeasuredJump, other: Series, *, same: bool) -> Floats:
+def _calibration(one: Series, other: Series, calibration: SharedCalibration) -> Floats:
     """The share (11 T, 11 T) of the calibration."""
     ja, jb = (np.nan_to_num(x.by_calibration.reshape(x.values.size, -1)) for x in (one, other))
-    if same:
-        return np.asarray((jb - ja) @ a.recording.orientation.covariance @ (jb - ja).T)
-    return np.asarray(ja @ a.recording.orientation.covariance @ ja.T + jb @ b.recording.orientation.covariance @ jb.T)
+    own = ja @ calibration.own[0] @ ja.T + jb @ calibration.own[1] @ jb.T
+    if calibration.shared is None:
+        return np.asarray(own)
+    return np.asarray(own + (jb - ja) @ calibration.shared @ (jb - ja).T)
 
 
 def _takeoff(one: Series, other: Series, shared_sigma_s: float) -> Floats:

@@ -10,6 +10,7 @@ from analysis.comparison.aligned import MeasuredJump
 from analysis.comparison.alignment import Alignment
 from analysis.comparison.difference import LEVEL, Difference, Power
 from analysis.comparison.scatter import Scatter
+from analysis.comparison.shared_calibration import Common
 from analysis.result.model import QUANTITIES
 from photogrammetry.reports.document import Drawing, Report, Section, Table
 from photogrammetry.reports.drawing.svg import Colour
@@ -32,6 +33,11 @@ WORDS: Final = {
     "velocity_x": ("velocity along X", "vX", "m/s", 2),
     "velocity_y": ("velocity along Y", "vY", "m/s", 2),
     "velocity_z": ("velocity along Z", "vZ", "m/s", 2),
+}
+_CALIBRATION: Final = {
+    Common.CALIBRATION: "both jumps have the same calibration: its errors cancel",
+    Common.SURVEY: "both recordings were oriented with the same survey: its errors cancel",
+    Common.NOTHING: "the jumps have different calibrations: the errors of both count",
 }
 #: The athlete's own scatter is left out of a chart that it would make so many times higher.
 _MOST_SCATTER: Final = 3.0
@@ -91,8 +97,7 @@ def _verdict(comparison: Comparison) -> list[str]:
         f"the greatest of {int(np.isfinite(d.value).sum())} differences is judged as the greatest of "
         f"{d.independent:.0f} independent ones: its limit is {d.limit:.1f} times the sigma of repeated measurements"
     )
-    same = "both jumps have the same calibration: its errors cancel"
-    lines.append(same if d.same_calibration else "the jumps have different calibrations: the errors of both count")
+    lines.append(_CALIBRATION[d.common])
     if not comparison.alignment.at_one_place:
         lines.append("the take-offs are not at one place, so each jump has its own: do both recordings show one hill?")
     if comparison.scatter is None:
@@ -276,7 +281,8 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
             for key, jump in (("a", comparison.a), ("b", comparison.b))
         },
         "level": LEVEL,
-        "same_calibration": d.same_calibration,
+        "same_calibration": d.common is Common.CALIBRATION,
+        "same_survey": d.common is not Common.NOTHING,
         "takeoffs_at_one_place": comparison.alignment.at_one_place,
         "independent_differences": d.independent,
         "limit": d.limit,

@@ -181,6 +181,8 @@ class OrientationEntry(Struct):
     parameters: list[str]
     covariance: list[list[float]]
     source: str
+    given: str = ""
+    given_covariance: list[list[float]] | None = None
 
 
 class OffsetEntry(Struct):
@@ -229,8 +231,6 @@ def decoded(content: bytes) -> MeasuredRecording:
 
 def _orientation(entry: OrientationEntry) -> OrientationResult:
     count = len(entry.parameters)
-    if [len(row) for row in entry.covariance] != [count] * count:
-        raise ValueError(f'orientation: "covariance" is no matrix of {count} rows and columns, one for each parameter')
     return OrientationResult(
         {
             name: OrientedImage(
@@ -253,9 +253,17 @@ def _orientation(entry: OrientationEntry) -> OrientationResult:
         ),
         tuple(entry.messages),
         tuple(entry.parameters),
-        np.array(entry.covariance, float).reshape(count, count),
+        _matrix(entry.covariance, count, "covariance"),
         entry.source,
+        entry.given,
+        None if entry.given_covariance is None else _matrix(entry.given_covariance, count, "given_covariance"),
     )
+
+
+def _matrix(rows: list[list[float]], count: int, name: str) -> Floats:
+    if [len(row) for row in rows] != [count] * count:
+        raise ValueError(f'orientation: "{name}" is no matrix of {count} rows and columns, one for each parameter')
+    return np.array(rows, float).reshape(count, count)
 
 
 def _jump(entry: JumpEntry, parameters: int) -> Jump:

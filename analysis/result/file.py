@@ -110,6 +110,8 @@ def _orientation(orientation: OrientationResult) -> dict[str, Any]:
         "parameters": list(orientation.parameters),
         "covariance": _list(orientation.covariance),
         "source": orientation.source,
+        "given": orientation.given,
+        "given_covariance": None if orientation.given_covariance is None else _list(orientation.given_covariance),
     }
 
 

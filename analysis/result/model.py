@@ -308,6 +308,9 @@ class OrientationResult:
         parameters: names of the uncertain parameters of the cameras (p of them), such as "K1.X0" or "K2.c".
         covariance: (p, p) of them.
         source: identifies the calibration: results with the same source share its errors.
+        given: identifies survey and interior orientation that it was made with; empty if not known.
+        given_covariance: (p, p) the part of the covariance that comes from them, which results with the same `given`
+            share; None if not known.
     """
 
     images: Mapping[str, OrientedImage]
@@ -317,6 +320,8 @@ class OrientationResult:
     parameters: tuple[str, ...]
     covariance: Floats
     source: str
+    given: str = ""
+    given_covariance: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

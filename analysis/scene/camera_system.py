@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogrammetry.adjustment.equations.relations import Kind
+from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import camera_coordinates, image_point, linearise, undistort
 from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.geometry.rotation import rotation_from_vector
@@ -105,10 +107,13 @@ class CameraSystem:
     Attributes:
         cameras: by name, in the order of the log.
         covariance: (p, p) of all their uncertain parameters; see `PlacedCamera.columns`.
+        given: (p, p) the part of the covariance that comes from what was given, survey and interior orientation, not
+            from the images: other recordings that were oriented with the same share it. None if it is not known.
     """
 
     cameras: Mapping[str, PlacedCamera]
     covariance: Floats
+    given: Floats | None = None
 
     def __getitem__(self, name: str) -> PlacedCamera:
         return self.cameras[name]
@@ -126,7 +131,8 @@ class CameraSystem:
             end = first + len(self[name].columns)
             placed[name] = replace(self[name], columns=np.arange(first, end))
             first = end
-        return CameraSystem(placed, self.covariance[np.ix_(columns, columns)])
+        given = None if self.given is None else self.given[np.ix_(columns, columns)]
+        return CameraSystem(placed, self.covariance[np.ix_(columns, columns)], given)
 
     def moved(self, step: Floats) -> "CameraSystem":
         """The cameras with all uncertain parameters (p,) changed by `step`; the covariance stays.
@@ -164,7 +170,26 @@ def camera_system(orientation: Orientation, order: Sequence[str]) -> CameraSyste
             unknowns.selection[uncertain],
             np.arange(first, first + len(columns[-1])),
         )
-    return CameraSystem(placed, a.covariance(np.concatenate(columns)))
+    chosen = np.concatenate(columns)
+    return CameraSystem(placed, a.covariance(chosen), _of_given(a, chosen))
+
+
+def _of_given(a: Adjustment, columns: Integers) -> Floats:
+    """The part of the covariance of unknowns that comes from surveyed coordinates and given interior orientation.
+
+    Each is an observation of one unknown i with a weight w, so that its part is the sum of w C_i C_i', with the column
+    C_i of the cofactors.
+    """
+    unknowns, relations = a.problem.unknowns, a.problem.relations
+    place = {int(parameter): k for k, parameter in enumerate(unknowns.selection)}
+    control, interior = relations.rows(Kind.CONTROL), relations.rows(Kind.CAMERA)
+    observed = [int(unknowns.point[relations.item[i], relations.part[i]]) for i in control]
+    observed += [int(unknowns.camera[relations.item[i], place[int(relations.part[i])]]) for i in interior]
+    sigma = a.problem.relation_sigma[np.concatenate((control, interior))] * a.ratio
+    free = np.array(observed, np.intp) >= 0
+    rows = np.array(observed, np.intp)[free]
+    cross = a.covariance(np.concatenate((columns, rows)))[: len(columns), len(columns) :] / sigma[free]
+    return np.asarray(cross @ cross.T)
 
 
 def _moved(placed: PlacedCamera, step: Floats) -> PlacedCamera:

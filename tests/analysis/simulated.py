@@ -75,7 +75,8 @@ def true_cameras(survey_sigma: float = 0.012, image_sigma: float = 0.1) -> Camer
     system = camera_system(orientation, [camera.name for camera in scenario.cameras])
     # The observations are without error, so that the a-posteriori sigma0 says nothing: the a-priori one counts.
     ratio = orientation.outcome.adjustment.ratio
-    return CameraSystem(system.cameras, system.covariance / ratio**2)
+    given = None if system.given is None else system.given / ratio**2
+    return CameraSystem(system.cameras, system.covariance / ratio**2, given)
 
 
 def drawn(system: CameraSystem, rng: np.random.Generator) -> CameraSystem:

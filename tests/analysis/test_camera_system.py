@@ -57,3 +57,18 @@ def test_simulated_measurements_have_their_noise() -> None:
     ]
     assert len(offs) > 200
     assert abs(np.std(offs) / SIGMA_PX - 1) < 0.1
+
+
+def test_the_part_of_the_survey_is_what_a_better_survey_would_take_away() -> None:
+    """With errors of the images alone nothing is left; with those of the survey alone all of it."""
+    for survey, image, part in ((1e-6, 0.5, 0.0), (0.05, 1e-4, 1.0)):
+        system = true_cameras(survey, image)
+        assert system.given is not None
+        sigma = np.sqrt(np.diagonal(system.covariance))
+        off = (system.given - part * system.covariance) / np.outer(sigma, sigma)
+        assert np.abs(off).max() < 1e-3
+    both = true_cameras(0.012, 0.1)
+    assert both.given is not None
+    values = np.linalg.eigvals(np.linalg.solve(both.covariance, both.given)).real
+    assert values.min() > -1e-6
+    assert values.max() < 1 + 1e-6

@@ -11,6 +11,7 @@ from analysis.comparison.difference import LEVEL, Difference
 from analysis.comparison.difference import difference as difference_of
 from analysis.comparison.repeatability import noise_covariance
 from analysis.comparison.scatter import scatter
+from analysis.comparison.shared_calibration import Common, shared_calibration
 from analysis.result.model import QUANTITIES, MeasuredRecording, PulseState
 from rig.arrays import Floats
 from rig.errors import BadInputError
@@ -75,11 +76,32 @@ def test_errors_of_one_calibration_cancel_and_those_of_two_count() -> None:
         difference(measured(i, error=errors[2 * i]), measured(99 + i, error=errors[2 * i + 1], source="other"), 50)
         for i in range(24)
     ]
-    assert not two[0].same_calibration
+    assert (same.common, two[0].common) == (Common.CALIBRATION, Common.NOTHING)
     middle = len(two[0].times) // 2
     assert two[0].repeat[HEIGHT, middle] > 1.1 * same.repeat[HEIGHT, middle]
     z = np.array([d.value[HEIGHT, middle] / d.repeat[HEIGHT, middle] for d in two])
     assert 0.25 < np.mean(z**2) < 2.0
+
+
+def test_recordings_with_one_survey_share_its_errors() -> None:
+    def surveyed(jump: MeasuredJump, source: str, part: float) -> MeasuredJump:
+        orientation = jump.recording.orientation
+        changed = replace(orientation, source=source, given="survey", given_covariance=part * orientation.covariance)
+        return replace(jump, recording=replace(jump.recording, orientation=changed))
+
+    one, other = measured(1), measured(2)
+    a, b = surveyed(one, "a", 0.9), surveyed(other, "b", 0.9)
+    shared = shared_calibration([a.recording, b.recording])
+    assert shared.common is Common.SURVEY
+    assert shared.own[1] == pytest.approx(0.1 * one.recording.orientation.covariance)
+    found = [
+        difference(*pair).repeat for pair in ((one, other), (a, b), (surveyed(one, "a", 0), surveyed(other, "b", 0)))
+    ]
+    middle = found[0].shape[1] // 2
+    squares = np.array([repeat[HEIGHT, middle] ** 2 for repeat in found])
+    assert squares[0] < squares[1] < squares[2]
+    # errors of the calibration that are not shared add their own variances, a tenth of those of the whole
+    assert squares[1] - squares[0] == pytest.approx((squares[2] - squares[0]) / 10, rel=0.15)
 
 
 def test_jumps_are_aligned_at_the_place_of_the_edge() -> None:

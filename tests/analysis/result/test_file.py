@@ -80,7 +80,9 @@ def test_numbers_that_are_not_finite_become_null(measured: MeasuredRecording) ->
 
 
 def test_reading_gives_what_was_written(measured: MeasuredRecording, tmp_path: Path) -> None:
-    for given in (measured, without_takeoff(measured)):
+    orientation = measured.orientation
+    shared = replace(orientation, given="survey", given_covariance=orientation.covariance / 2)
+    for given in (measured, without_takeoff(measured), replace(measured, orientation=shared)):
         write(given, tmp_path / "jumper.json")
         _assert_same(read(tmp_path), given)
     assert [path.name for path in tmp_path.iterdir()] == ["jumper.json"]

@@ -16,6 +16,7 @@ from analysis.identification.body import USUAL, implausibility
 from analysis.identification.prediction import Prediction
 from analysis.identification.space_points import Rays, SpacePoints, squared_distances
 from analysis.identification.views import Sight, Views, gate
+from analysis.identification.window import Window
 from rig.arrays import Flags, Floats, Integers
 
 #: How much likelier than each rival, and than chance, an assignment must be: minus twice the logarithm of 1/1000.
@@ -57,46 +58,43 @@ class Assigned:
     covariance: Floats
 
 
-def assign(
-    views: Views,
-    pulses: Sequence[Sequence[Rays]],
-    delivered: Flags,
-    points: Sequence[SpacePoints],
-    predicted: Prediction,
-    axes: Floats,
-) -> Assigned:
+def well_known(covariance: Floats) -> Flags:
+    """Whether predictions with covariances (..., 3, 3) are of use."""
+    return np.asarray(np.linalg.eigvalsh(covariance)[..., -1] < MOST_VAGUE_M**2)
+
+
+def assign(views: Views, window: Window, predicted: Prediction, axes: Floats) -> Assigned:
     """Assign the spots of t pulses to markers.
 
     Args:
         views: the cameras.
-        pulses: spots of each pulse by camera.
-        delivered: (t, m) whether a camera has an image of a pulse.
-        points: in space, that these spots may show, of each pulse.
+        window: the pulses.
         predicted: places of n markers.
         axes: of the flight (`flights.Flight`).
     """
     steps, n, _ = predicted.xyz.shape
     m = len(views)
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
-    known = np.sqrt(np.linalg.eigvalsh(predicted.covariance)[..., -1]) < MOST_VAGUE_M
+    known = well_known(predicted.covariance)
     sights = [_Sights(views.see(k, predicted.xyz.reshape(-1, 3)), predicted.covariance) for k in range(m)]
     result = Assigned(np.full((steps, n, m), -1), np.full((steps, n, 3), np.nan), np.full((steps, n, 3, 3), np.nan))
-    for t, rays in enumerate(pulses):
+    for t, rays in enumerate(window.rays):
+        points = window.points[t]
         rate = 2 * np.log(2 * np.pi / DETECTED * (1 + np.array([len(r.xy) for r in rays])) / sizes)
         options = [[nothing(m)] for _ in range(n)]
         for i in np.flatnonzero(known[t]).tolist():
             own = [sight.of(t * n + i) for sight in sights]
-            expected = delivered[t] & np.array([one.inside for one in own])
+            expected = window.delivered[t] & np.array([one.inside for one in own])
             missed = np.where(expected, -2 * np.log(1 - DETECTED), 0.0)
-            found = _points(rays, points[t], predicted.xyz[t, i], predicted.covariance[t, i], rate - missed)
+            found = _points(rays, points, predicted.xyz[t, i], predicted.covariance[t, i], rate - missed)
             found += _single_rays(own, rays, expected, rate - missed)
             options[i] += _worthy(found)
-        strange = _strangeness(options, points[t], axes)
+        strange = _strangeness(options, points, axes)
         for i, (option, doubtful) in enumerate(jointly_best(options, strange)):
             result.rays[t, i] = np.where(doubtful, -1, option.rays)
             if option.point >= 0 and not doubtful.any():
-                result.xyz[t, i] = points[t].xyz[option.point]
-                result.covariance[t, i] = points[t].covariance[option.point]
+                result.xyz[t, i] = points.xyz[option.point]
+                result.covariance[t, i] = points.covariance[option.point]
     return result
 
 

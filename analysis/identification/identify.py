@@ -9,9 +9,10 @@ from analysis.identification.flights import Flight, find_flights
 from analysis.identification.markers import BINDINGS, Markers, follow_markers
 from analysis.identification.ski_traces import StraightTrace, straightened
 from analysis.identification.skis import Skis, follow_skis
-from analysis.identification.space_points import Appearance, find_space_points, rays_of
+from analysis.identification.space_points import Appearance
 from analysis.identification.tracks import find_tracks
 from analysis.identification.views import Views
+from analysis.identification.window import SecondLook, Window
 from analysis.measurements.model import (
     POINTS,
     SIDES,
@@ -34,6 +35,7 @@ def identify(
     system: CameraSystem,
     rate_hz: float,
     exposures_s: Mapping[str, float] | None = None,
+    look: SecondLook | None = None,
 ) -> list[JumpMeasurements]:
     """Find the jumps of a recording and name what is to be measured.
 
@@ -42,6 +44,7 @@ def identify(
         system: the oriented cameras.
         rate_hz: pulses per second.
         exposures_s: exposure time of each camera; all alike if left out.
+        look: looks again where a marker is expected and no spot was found (`Finder.look_for_spots`).
 
     Returns:
         The jumps in order, each from the first to the last pulse in which the jumper was found. None: nobody jumped.
@@ -49,11 +52,12 @@ def identify(
     views = Views(system, exposures_s)
     stride = max(1, round(rate_hz / _SEARCH_HZ))
     sought = candidates[::stride]
-    time_s = np.array([float(c.pulse) for c in sought]) / rate_hz
-    points = find_space_points(views, [rays_of(views, c) for c in sought])
+    search = Window(views, sought, rate_hz)
     jumps: list[JumpMeasurements] = []
-    for flight in find_flights(find_tracks(points, time_s)):
-        pulses = _measured(views, candidates, rate_hz, flight, _appearance(views, sought, flight))
+    for flight in find_flights(find_tracks(search.points, search.time_s)):
+        begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
+        near = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
+        pulses = _measured(views, Window(views, near, rate_hz, _appearance(views, sought, flight)), flight, look)
         if sum(len(_named(pulse)) >= _LEAST_NAMES for pulse in pulses) >= _LEAST_PULSES:
             jumps.append(JumpMeasurements(len(jumps) + 1, tuple(pulses)))
     return jumps
@@ -75,19 +79,15 @@ def _named(pulse: PulseMeasurements) -> set[str]:
     return {label for image in pulse.images.values() for label in image.points}
 
 
-def _measured(
-    views: Views, candidates: Sequence[PulseCandidates], rate_hz: float, flight: Flight, appearance: Appearance
-) -> list[PulseMeasurements]:
+def _measured(views: Views, window: Window, flight: Flight, look: SecondLook | None) -> list[PulseMeasurements]:
     """What was measured of a flight, from its first to its last appearance."""
-    begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
-    window = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
-    time_s = np.array([c.pulse / rate_hz for c in window])
-    rays = [rays_of(views, c, appearance) for c in window]
-    delivered = np.array([[name in c.images for name in views.names] for c in window])
-    markers = follow_markers(views, time_s, rays, delivered, find_space_points(views, rays), flight)
-    traces = [[straightened(c.images[name].traces) if name in c.images else [] for name in views.names] for c in window]
-    skis = follow_skis(views, time_s, traces, delivered, flight, markers.places(BINDINGS))
-    pulses = [_pulse(views, c, markers, skis, traces[t], t) for t, c in enumerate(window)]
+    markers = follow_markers(views, window, flight, look)
+    traces = [
+        [straightened(c.images[name].traces) if name in c.images else [] for name in views.names]
+        for c in window.candidates
+    ]
+    skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
+    pulses = [_pulse(views, c, markers, skis, traces[t], t) for t, c in enumerate(window.candidates)]
     found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
     return pulses[found[0] : found[-1] + 1] if found else []
 

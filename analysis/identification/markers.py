@@ -8,15 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.identification.assignment import Assigned, assign
+from analysis.candidates.model import Spots
+from analysis.identification.assignment import Assigned, assign, well_known
 from analysis.identification.flights import Flight
 from analysis.identification.naming import name_points
 from analysis.identification.prediction import Part, Prediction, predict
 from analysis.identification.skis import Places
-from analysis.identification.space_points import Rays, SpacePoints
+from analysis.identification.space_points import SpacePoints
 from analysis.identification.views import Views
+from analysis.identification.window import SecondLook, Window
 from analysis.measurements.model import POINTS
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Floats, Integers
 
 #: Indices of P3 and P4 in `POINTS`.
 BINDINGS = [2, 3]
@@ -58,38 +60,53 @@ class Markers:
         return Places((covariance @ right)[..., 0], covariance)
 
 
-def follow_markers(
-    views: Views,
-    time_s: Floats,
-    pulses: Sequence[Sequence[Rays]],
-    delivered: Flags,
-    points: Sequence[SpacePoints],
-    flight: Flight,
-) -> Markers:
+def follow_markers(views: Views, window: Window, flight: Flight, look: SecondLook | None = None) -> Markers:
     """Find the spots of all markers.
 
     Args:
         views: the cameras.
-        time_s: (t,) of the pulses.
-        pulses: spots of each pulse by camera.
-        delivered: (t, m) whether a camera has an image of a pulse.
-        points: in space, of each pulse.
+        window: the pulses; what second looks find is added to its candidates.
         flight: of the jumper.
+        look: the second look at places where a marker is expected and no spot was found.
     """
-    xyz = np.full((len(time_s), len(POINTS), 3), np.nan)
-    covariance = np.full((len(time_s), len(POINTS), 3, 3), np.nan)
-    named = _trusted(name_points(views, time_s, pulses, delivered, points, flight), points, flight)
+    named = _trusted(name_points(views, window, flight), window.points, flight)
+    xyz = np.full((len(window), len(POINTS), 3), np.nan)
+    covariance = np.full((len(window), len(POINTS), 3, 3), np.nan)
     for t, i in np.argwhere(named >= 0).tolist():
-        xyz[t, i], covariance[t, i] = points[t].xyz[named[t, i]], points[t].covariance[named[t, i]]
+        xyz[t, i], covariance[t, i] = window.points[t].xyz[named[t, i]], window.points[t].covariance[named[t, i]]
+    markers = _settled(views, window, flight, xyz, covariance)
+    if look is not None and window.add(_looked(views, window, markers, look)):
+        markers = _settled(views, window, flight, markers.assigned.xyz, markers.assigned.covariance)
+    return markers
+
+
+def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:
+    """The markers after so many turns that nothing changes; xyz (t, 4, 3) with covariance to begin with."""
     parts = _parts(flight)
-    rays = np.full((len(time_s), len(POINTS), len(views)), -2)
+    rays = np.full((len(window), len(POINTS), len(views)), -2)
     for _ in range(_MOST_TURNS):
-        predicted = predict(time_s, xyz, covariance, parts, _MIXING)
-        assigned = assign(views, pulses, delivered, points, predicted, flight.axes)
+        predicted = predict(window.time_s, xyz, covariance, parts, _MIXING)
+        assigned = assign(views, window, predicted, flight.axes)
         if (assigned.rays == rays).all():
             break
         rays, xyz, covariance = assigned.rays, assigned.xyz, assigned.covariance
     return Markers(assigned, predicted)
+
+
+def _looked(views: Views, window: Window, markers: Markers, look: SecondLook) -> dict[tuple[int, int], list[Spots]]:
+    """What second looks find where a marker is expected and has no spot, by pulse and camera."""
+    found: dict[tuple[int, int], list[Spots]] = {}
+    n = len(POINTS)
+    known = well_known(markers.predicted.covariance)
+    for k, camera in enumerate(views.names):
+        sight = views.see(k, markers.predicted.xyz.reshape(-1, 3))
+        spread = sight.by_point @ markers.predicted.covariance.reshape(-1, 3, 3) @ sight.by_point.swapaxes(-1, -2)
+        wanted = known & window.delivered[:, k, None] & (markers.assigned.rays[..., k] < 0)
+        for t, i in np.argwhere(wanted & sight.inside.reshape(-1, n)).tolist():
+            at = t * n + i
+            spots = look(window.candidates[t].pulse, camera, sight.xy[at], spread[at] + sight.noise[at])
+            found.setdefault((t, k), []).append(spots)
+    return found
 
 
 def _parts(flight: Flight) -> list[Part]:

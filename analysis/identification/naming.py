@@ -15,6 +15,7 @@ from analysis.identification.body import REACH_M, implausibility
 from analysis.identification.flights import Flight
 from analysis.identification.space_points import Rays, SpacePoints
 from analysis.identification.views import Views
+from analysis.identification.window import Window
 from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
 
@@ -40,28 +41,19 @@ class Namings:
     costs: Floats
 
 
-def name_points(
-    views: Views,
-    time_s: Floats,
-    pulses: Sequence[Sequence[Rays]],
-    delivered: Flags,
-    points: Sequence[SpacePoints],
-    flight: Flight,
-) -> Integers:
+def name_points(views: Views, window: Window, flight: Flight) -> Integers:
     """Points (t, 4) of the body: index of the point in space of each pulse; -1: none.
 
     Args:
         views: the cameras.
-        time_s: (t,) of the pulses.
-        pulses: spots of each pulse by camera.
-        delivered: (t, m) whether a camera has an image of a pulse.
-        points: in space, of each pulse.
+        window: the pulses.
         flight: near whose path the points are sought.
     """
+    time_s, points = window.time_s, window.points
     path, velocity = flight.place(time_s), flight.velocity(time_s)
     namings = [
-        _namings(points[t], _worths(views, pulses[t], delivered[t], points[t]), path[t], flight.axes)
-        for t in range(len(time_s))
+        _namings(points[t], _worths(views, window.rays[t], window.delivered[t], points[t]), path[t], flight.axes)
+        for t in range(len(window))
     ]
     costs = [namings[0].costs]
     came = []

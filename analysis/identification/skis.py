@@ -24,6 +24,7 @@ from analysis.identification.flights import Flight
 from analysis.identification.prediction import Part, Prediction, predict
 from analysis.identification.ski_traces import Equations, SeenSkis, StraightTrace
 from analysis.identification.views import Views, gate
+from analysis.identification.window import Window
 from analysis.measurements.model import SIDES
 from rig.arrays import Flags, Floats, Integers
 
@@ -42,6 +43,9 @@ _MOST_TURNS = 6
 _BEAM = 12
 _KNOWN_RAD = 0.1  #: standard deviation of a direction that tells a ski from a leg
 _BEYOND_M = 0.35  #: more than a boot
+_LONGEST_M, _LONGEST_SIGMA_M = 1.4, 0.1  #: from a binding to tail or tip: skis of 2.8 m
+_END_SIGMA_M = 0.06  #: of a visible end of a ski
+_LEAST_TRACES = 8  #: of each ski that tell where its ends are
 _LENGTH_PX = 40.0  #: of a trace, for the density of traces that are there by chance
 
 
@@ -71,9 +75,8 @@ class Places:
 
 def follow_skis(
     views: Views,
-    time_s: Floats,
+    window: Window,
     traces: Sequence[Sequence[Sequence[StraightTrace]]],
-    delivered: Flags,
     flight: Flight,
     bindings: Places,
 ) -> Skis:
@@ -81,14 +84,13 @@ def follow_skis(
 
     Args:
         views: the cameras.
-        time_s: (t,) of the pulses.
+        window: the pulses.
         traces: of each pulse by camera.
-        delivered: (t, m) whether a camera has an image of a pulse.
         flight: of the jumper.
         bindings: their places.
     """
-    search = _Search(views, traces, delivered, flight, bindings)
-    steps = len(time_s)
+    search = _Search(views, traces, window.delivered, flight, bindings)
+    steps = len(window)
     angles = Prediction(
         np.zeros((steps, 2, 2)),
         np.broadcast_to(np.diag((_SLOPE**2, _HEADING**2)), (steps, 2, 2, 2)),
@@ -100,9 +102,10 @@ def follow_skis(
         before, found = found, search.assigned(believed)
         if (found == before).all():
             break
+        search.learn_ends(believed, found)
         lines = search.measured(broad, found)
         offsets = search.offsets(lines)
-        angles = predict(time_s, *search.angles(lines), _PARTS, _MIXING)
+        angles = predict(window.time_s, *search.angles(lines), _PARTS, _MIXING)
         believed = search.belief(angles, offsets)
     return Skis(found)
 
@@ -129,6 +132,8 @@ class _Search:
         self._known = sigma < MOST_VAGUE_M
         height = np.array([placed.size.min() for placed in views.placed])
         self._space = height * np.pi / 2 * _LENGTH_PX  # px^2 over which the ends of a trace may lie by chance
+        self._ends = np.tile((-_LONGEST_M, _LONGEST_M), (2, 1))  # of each ski, m from its binding: tail and tip
+        self._ends_sigma = _LONGEST_SIGMA_M
 
     def belief(self, angles: Prediction, offsets: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Values (t, 2, 6) and covariances (t, 2, 6, 6) of skis with angles (slope, heading) and offsets of markers.
@@ -191,7 +196,8 @@ class _Search:
             chance = (len(self._traces[t][k]) + 1) / self._space[k]
             rate = 2 * np.log(2 * np.pi * chance / DETECTED) + 2 * np.log(1 - DETECTED)
             equations = [seen[k].equations(2 * t + side, line) for line in self._traces[t][k]]
-            near = [i for i, e in enumerate(equations) if _near(e, covariance)]
+            beyond = [self._beyond(e, side) for e in equations]
+            near = [i for i, e in enumerate(equations) if _near(e, covariance) and beyond[i] < gate(2)]
             longer = list(beam)
             for cost, rays, state, spread in beam:
                 for i in near:
@@ -199,10 +205,30 @@ class _Search:
                     if misfit < gate(2):
                         more = rays.copy()
                         more[k] = i
-                        longer.append((cost + misfit + area + rate, more, *equations[i].updated(state, spread)))
+                        longer.append(
+                            (cost + misfit + beyond[i] + area + rate, more, *equations[i].updated(state, spread))
+                        )
             beam = sorted(longer, key=lambda hypothesis: hypothesis[0])[:_BEAM]
         options = [Option(cost, rays, 0) for cost, rays, _, _ in beam if cost < -DECISIVE]
         return options[: 2 * MOST_OPTIONS]
+
+    def _beyond(self, equations: Equations, side: int) -> float:
+        """Chi-square of a trace reaching beyond tail or tip; that it may be shorter costs nothing."""
+        tail, tip = self._ends[side]
+        over = max(0.0, tail - equations.along.min()), max(0.0, equations.along.max() - tip)
+        return float(over[0] ** 2 + over[1] ** 2) / self._ends_sigma**2
+
+    def learn_ends(self, belief: tuple[Floats, Floats], found: Integers) -> None:
+        """Where tail and tip are, from the longest of the traces that were found; they stay there all the jump."""
+        seen = [SeenSkis(self._views, k, belief[0].reshape(-1, 6)) for k in range(found.shape[2])]
+        reaches: tuple[list[Floats], list[Floats]] = ([], [])
+        for t, side, k in np.argwhere(found >= 0).tolist():
+            reaches[side].append(seen[k].equations(2 * t + side, self._traces[t][k][found[t, side, k]]).along)
+        if min(len(reach) for reach in reaches) < _LEAST_TRACES:
+            return
+        for side, reach in enumerate(reaches):
+            self._ends[side] = np.quantile(np.min(reach, axis=1), 0.25), np.quantile(np.max(reach, axis=1), 0.75)
+        self._ends_sigma = _END_SIGMA_M
 
     def measured(self, belief: tuple[Floats, Floats], found: Integers) -> tuple[Floats, Floats, Flags]:
         """Skis (t, 2, 6) with covariance, by their traces with little prior; (t, 2) which have two views or more."""

@@ -1,0 +1,74 @@
+"""The pulses in which one jumper may be in sight: their candidates, as rays and as points in space."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
+from analysis.identification.space_points import Appearance, find_space_points, rays_of
+from analysis.identification.views import Views
+from rig.arrays import Flags, Floats
+from rig.pulse import PulseNumber
+
+_SAME_PX = 1.0  #: spots that are nearer to each other than this are one
+
+
+class SecondLook(Protocol):
+    """Looks for spots at a place where one is expected, on weaker evidence than at first sight."""
+
+    def __call__(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+        """Spots near the predicted place xy (2,) with covariance (2, 2), px, the nearest first."""
+        ...
+
+
+class Window:
+    """Candidates of t pulses.
+
+    Attributes:
+        time_s: (t,) of the pulses, since pulse 0.
+        candidates: of the pulses, with what second looks have found.
+        rays: their spots, of each pulse by camera.
+        points: in space, that these spots may show.
+        delivered: (t, m) whether a camera has an image of a pulse.
+    """
+
+    def __init__(
+        self, views: Views, candidates: Sequence[PulseCandidates], rate_hz: float, appearance: Appearance | None = None
+    ) -> None:
+        self._views, self._appearance = views, appearance
+        self.candidates = list(candidates)
+        self.time_s: Floats = np.array([float(c.pulse) for c in candidates]) / rate_hz
+        self.rays = [rays_of(views, c, appearance) for c in candidates]
+        self.points = find_space_points(views, self.rays)
+        self.delivered: Flags = np.array([[name in c.images for name in views.names] for c in candidates], bool)
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    def add(self, found: Mapping[tuple[int, int], Sequence[Spots]]) -> bool:
+        """Add spots of second looks, by pulse and camera; returns whether any is new."""
+        changed = set()
+        for (t, k), spots in found.items():
+            image = self.candidates[t].images[self._views.names[k]]
+            more = _new(image.spots, spots)
+            if len(more) > len(image.spots):
+                images = {**self.candidates[t].images, self._views.names[k]: ImageCandidates(more, image.traces)}
+                self.candidates[t] = replace(self.candidates[t], images=images)
+                changed.add(t)
+        order = sorted(changed)
+        for t in order:
+            self.rays[t] = rays_of(self._views, self.candidates[t], self._appearance)
+        for t, points in zip(order, find_space_points(self._views, [self.rays[t] for t in order]), strict=True):
+            self.points[t] = points
+        return bool(changed)
+
+
+def _new(known: Spots, found: Sequence[Spots]) -> Spots:
+    """Known spots and those found that are none of them."""
+    for spots in found:
+        for i in range(len(spots)):
+            if not len(known) or np.linalg.norm(known.xy - spots.xy[i], axis=1).min() > _SAME_PX:
+                known = Spots.joined([known, spots.only(np.array([i]))])
+    return known

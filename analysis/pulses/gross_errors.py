@@ -41,26 +41,27 @@ class Checked:
     w: Floats
 
 
-def check_points(points: Objects, calibration: Floats) -> Checked:
-    """Adjust objects and leave out wrong images, where the data show which they are.
+def check_points(points: Objects, adjusted: Adjusted, calibration: Floats) -> Checked:
+    """Leave out wrong images, where the data show which they are.
 
     Args:
         points: n objects of any kind.
+        adjusted: from all images.
         calibration: (p, p) covariance of the cameras' uncertain parameters.
     """
     nothing = np.zeros_like(points.seen)
-    return _located(points, calibration, adjust(points, calibration), nothing, nothing[:, 0])
+    return _located(points, calibration, adjusted, nothing, nothing[:, 0])
 
 
-def check_skis(skis: SkiLines, calibration: Floats) -> Checked:
-    """Adjust skis and leave out images in which right and left are interchanged, or that are wrong otherwise.
+def check_skis(skis: SkiLines, adjusted: Adjusted, calibration: Floats) -> Checked:
+    """Leave out images in which right and left are interchanged, or that are wrong otherwise.
 
     Args:
         skis: n skis, right and left in turn.
+        adjusted: from all images.
         calibration: (p, p) covariance of the cameras' uncertain parameters.
     """
-    first = adjust(skis, calibration)
-    return _located(skis, calibration, first, *_interchanged(skis, calibration, first))
+    return _located(skis, calibration, adjusted, *_interchanged(skis, calibration, adjusted))
 
 
 def _located(objects: Objects, calibration: Floats, first: Adjusted, removed: Flags, lost: Flags) -> Checked:

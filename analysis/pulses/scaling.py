@@ -34,7 +34,7 @@ class Scalable(Objects, Protocol):
 
 def scaled_to_fit(
     objects: _Scalable, calibration: Floats, readings: Sequence[_Scalable] = ()
-) -> tuple[_Scalable, float]:
+) -> tuple[_Scalable, Adjusted, float]:
     """Objects with sigmas with which most of them agree, and by what factor those that came with them were too small.
 
     The median of the tests decides, so that single mistakes do not count. Sigmas that are not significantly too small
@@ -45,23 +45,29 @@ def scaled_to_fit(
         calibration: (p, p) covariance of the cameras' uncertain parameters.
         readings: the same measurements with other names, if they might have them: what agrees under another name does
             not speak against the sigmas.
+
+    Returns:
+        The objects, adjusted, and the factor.
     """
-    if not _too_small(adjust(objects, calibration)):
-        return objects, 1.0
-    adjusted = [adjust(each, calibration) for each in (objects, *readings)]
+    first = adjust(objects, calibration)
+    if not _too_small(first):
+        return objects, first, 1.0
+    adjusted = [first, *(adjust(each, calibration) for each in readings)]
     if not all(map(_too_small, adjusted)):
-        return objects, 1.0
+        return objects, first, 1.0
     factor = 1.0
     for _ in range(_MOST_STEPS):
         ratios = _ratios(adjusted)
         step = float(np.sqrt(np.median(ratios))) if len(ratios) else np.inf
         factor *= step
         if factor * objects.sigma() > _LARGEST_PX:
-            return objects, 1.0
+            return objects, first, 1.0
         if step < _ENOUGH:
             break
         adjusted = [adjust(each.scaled(factor), calibration) for each in (objects, *readings)]
-    return (objects.scaled(factor), factor) if factor > 1 else (objects, 1.0)
+    if factor <= 1:
+        return objects, first, 1.0
+    return (scaled := objects.scaled(factor)), adjust(scaled, calibration), factor
 
 
 def _ratios(adjusted: Sequence[Adjusted]) -> Floats:

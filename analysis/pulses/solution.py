@@ -60,12 +60,15 @@ def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: Cam
     if np.abs(late).max() > _TOGETHER_S:
         place = adjust(points_of(cameras, pulses, shift), system.covariance).state  # good enough for the velocity
         shift = late[:, None] * velocities(place.reshape(-1, len(POINTS), 3), times)[:, None]
-    points, points_scale = scaled_to_fit(points_of(cameras, pulses, shift), system.covariance)
-    skis = skis_of(cameras, pulses, shift)
+    points, skis = points_of(cameras, pulses, shift), skis_of(cameras, pulses, shift)
     other_names = [skis.interchanged(image) for image in range(len(cameras))]
-    skis, skis_scale = scaled_to_fit(skis, system.covariance, other_names)
+    points, places, points_scale = scaled_to_fit(points, system.covariance)
+    skis, lines, skis_scale = scaled_to_fit(skis, system.covariance, other_names)
     solved = Solved(
-        check_points(points, system.covariance), points.by_hand, check_skis(skis, system.covariance), skis.by_hand
+        check_points(points, places, system.covariance),
+        points.by_hand,
+        check_skis(skis, lines, system.covariance),
+        skis.by_hand,
     )
     numbers = np.array([pulse.pulse for pulse in pulses])
     tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))

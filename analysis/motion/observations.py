@@ -63,13 +63,11 @@ class Observations:
 def observations(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Observations:
     """Bring the measurements of a jump into arrays; cameras that are not oriented are left out."""
     names = tuple(name for name in system.names if name in measurements.cameras)
-    middle = np.array([measurements.cameras[name].exposure_s / 2 for name in names])
-    reference = mean_delay(measurements, system)
     n, m = len(jump.pulses), len(names)
     out = Observations(
         names,
-        np.array([pulse.time - jump.pulses[0].time for pulse in jump.pulses], float) / NS_PER_S + reference,
-        middle - reference,
+        np.array([pulse.time - jump.pulses[0].time for pulse in jump.pulses], float) / NS_PER_S + measurements.middle_s,
+        np.array([measurements.late_s(name) for name in names]),
         np.zeros((n, m, 6, 2, 2)),
         np.zeros((n, m, 6, 2, 2)),
         np.zeros((n, m, 6), bool),
@@ -89,11 +87,6 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
         for (at, ski), ends, covariance in zip(skis, *_two_points([ski for _, ski in skis], system[name]), strict=True):
             _put(out, at, ends, covariance, ski.source)
     return out
-
-
-def mean_delay(measurements: Measurements, system: CameraSystem) -> float:
-    """Time from the pulse to the middle of the cameras' mean exposure, s."""
-    return float(np.mean([measurements.cameras[n].exposure_s / 2 for n in system.names if n in measurements.cameras]))
 
 
 def _put(out: Observations, at: tuple[int, int, int], xy: Floats, covariance: Floats, source: Source) -> None:

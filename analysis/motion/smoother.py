@@ -123,7 +123,10 @@ def _motion(
     observed, unit = everything.part(sight), 1.0 / rate_hz
     free = _with_free_cameras(observed, system, start, unit)
     rank = free.model.root.shape[1]
-    synchrony = judged(observed.names, free.late * unit, free.solution.shared_covariance[rank:, rank:] * unit**2, unit)
+    took_part = np.asarray(free.used.any(axis=(0, 2)))
+    synchrony = judged(
+        observed.names, took_part, free.late * unit, free.solution.shared_covariance[rank:, rank:] * unit**2, unit
+    )
     adjusted, takeoff = _with_takeoff(_synchronised(free, synchrony), edge)
     states: list[SmoothedState | None] = [None] * len(jump.pulses)
     states[sight] = _smoothed(adjusted, takeoff)

@@ -33,22 +33,27 @@ class Synchrony:
     lateness: Floats
 
 
-def judged(names: tuple[str, ...], lateness: Floats, covariance: Floats, interval: float) -> Synchrony:
+def judged(
+    names: tuple[str, ...], took_part: Flags, lateness: Floats, covariance: Floats, interval: float
+) -> Synchrony:
     """Judge the lateness (m,) of the cameras, s.
 
     Args:
         names: of the cameras.
+        took_part: (m,) whose measurements were used; of the others nothing is said.
         lateness: from the bundle, up to a common constant.
         covariance: (m, m) of them.
         interval: between two pulses, s.
     """
     m = len(names)
-    reference = _reference(lateness, covariance)
+    able = np.flatnonzero(took_part).tolist()
+    reference = _reference(able, lateness, covariance)
     limit = float(norm.isf(FALSE_ALARM_P / (2 * m)))
     offsets: dict[str, CameraOffset] = {}
     late, relative = np.zeros(m, bool), np.zeros(m)
-    for i, name in enumerate(names):
-        others = [k for k in reference if k != i] or [k for k in range(m) if k != i]
+    for i in able if len(able) > 1 else []:
+        name = names[i]
+        others = [k for k in reference if k != i] or [k for k in able if k != i]
         contrast = np.zeros(m)
         contrast[i] = 1.0
         contrast[others] = -_weights(covariance, others)
@@ -60,9 +65,9 @@ def judged(names: tuple[str, ...], lateness: Floats, covariance: Floats, interva
     return Synchrony(offsets, late, relative)
 
 
-def _reference(lateness: Floats, covariance: Floats) -> list[int]:
+def _reference(able: list[int], lateness: Floats, covariance: Floats) -> list[int]:
     """The cameras that agree: one after the other is left out, each time the one that contradicts most."""
-    chosen = list(range(len(lateness)))
+    chosen = able
     while len(chosen) > 1 and _contradiction(lateness, covariance, chosen) > chi2.isf(FALSE_ALARM_P, len(chosen) - 1):
         if len(chosen) == 2:
             return chosen[:1]

@@ -5,6 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bench.analysis.faults import run_faults
+from bench.analysis.jumps import run_jumps
 from bench.photogrammetry.adjustment import run_adjustment
 from bench.photogrammetry.intersection import run_intersection
 from bench.photogrammetry.planning import run_planning
@@ -74,6 +76,26 @@ def _intersection(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _jumps(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_jumps(seconds)
+    path = write_results("jumps", cases, directory)
+    table = []
+    for case in cases:
+        table.append(f"{case['name']}: {case['value']} {case['unit']}, {case['baseline_is']}: {case['baseline']}")
+        table.append(
+            f"  {case['found']} of {case['jumps']} jumps found; of points in sight {case['solved']:.1%} solved, "
+            f"{case['within_0.02_m'] or 0:.1%} of them within 0.02 m"
+        )
+    return {"cases": cases, "file": str(path), "table": table}
+
+
+def _faults(_seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_faults()
+    path = write_results("jump-faults", cases, directory)
+    table = [f"{case['name']}: exit {case['code']}, {'; '.join(case['said'])}" for case in cases]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
     "firewire": _firewire,
@@ -83,4 +105,6 @@ SUITES: dict[str, Suite] = {
     "adjustment": partial(_timed, "adjustment", run_adjustment),
     "intersection": _intersection,
     "planning": partial(_timed, "planning", run_planning),
+    "jumps": _jumps,
+    "jump-faults": _faults,
 }

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import zmq
 
+from bench.analysis.hill_logs import HillLog, write_hill_log
 from tests.analysis.simulated import training
-from tests.support.hill_logs import HillLog, write_hill_log
 from tests.support.loopback import Loopback
 
 #: The jumper is in sight from hill pulse 23 to 60.

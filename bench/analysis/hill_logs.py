@@ -63,7 +63,8 @@ def write_hill_log(
         for number, pulse in enumerate(pulses, 1):
             time = UtcNs(START + round(pulse * NS_PER_S / rate_hz))
             slot = buffers.acquire(timeout_s=10.0)
-            assert slot is not None
+            if slot is None:
+                raise RuntimeError("the log writer does not give its buffers back")
             buffers.write(slot, _triplet(views, size, pulse))
             writer.write_pulse(_tag(number, time, shape, scenario, path.name), slot, time)
     buffers.close()

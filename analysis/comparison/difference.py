@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm
 
-from analysis.comparison.aligned import Series, common_times, series
+from analysis.comparison.aligned import HEIGHT, Series, common_times, series
 from analysis.comparison.alignment import Alignment
 from analysis.comparison.repeatability import noise_covariance
 from analysis.comparison.shared_calibration import Common, SharedCalibration, shared_calibration
@@ -144,13 +144,21 @@ def _calibration(one: Series, other: Series, calibration: SharedCalibration) -> 
 
 
 def _takeoff(one: Series, other: Series, shared_sigma_s: float) -> Floats:
-    """The share (11 T, 11 T) of the take-off: a jump that seems late is compared with an earlier part of the other."""
-    shifts = (
+    """The share (11 T, 11 T) of the take-off: a jump that seems late is compared with an earlier part of the other.
+
+    The place where a jump is aligned and its height err together, because each jump improves the calibration a little
+    on its own; how much is not known, so the height gets the most that it can be.
+    """
+    shifts = [
         one.change * one.takeoff_sigma_s,
         other.change * other.takeoff_sigma_s,
         (other.change - one.change) * shared_sigma_s,
-    )
-    return np.asarray(sum(np.outer(shift, shift) for shift in (np.nan_to_num(shift.ravel()) for shift in shifts)))
+    ]
+    for jump, shift in zip((one, other), list(shifts), strict=False):
+        together = np.zeros_like(shift)
+        together[HEIGHT] = np.sqrt(2 * np.abs(shift[HEIGHT]) * np.sqrt(jump.variance[HEIGHT]))
+        shifts.append(together)
+    return np.asarray(sum(np.outer(shift, shift) for shift in (np.nan_to_num(each.ravel()) for each in shifts)))
 
 
 def _draws(correlation: Floats, draws: int) -> Floats:

@@ -53,8 +53,9 @@ def test_differences_of_repeated_measurements_have_the_stated_sigma(repeated: li
     """Some 32 x 10 independent values know a mean square to 8 %; the model of the smoother adds to it."""
     z = np.concatenate([d.value / d.repeat for d in repeated], axis=1)
     squares = np.nanmean(z**2, axis=1)
-    assert min(squares) > 0.7
-    assert max(squares) < 1.3
+    others = np.arange(len(QUANTITIES)) != HEIGHT  # the height is given the most that its errors can be
+    assert squares[others].min() > 0.7
+    assert squares.max() < 1.3
     assert all((d.repeat <= d.sigma * 1.001).all() for d in repeated)
 
 
@@ -146,7 +147,9 @@ def test_jumps_of_two_hills_keep_their_own_take_offs() -> None:
     sharp, blurred = difference_of(found, FEW), difference_of(vague, FEW)
     change = series(away, blurred.times).change
     expected = np.sqrt(sharp.repeat**2 + change**2 * (0.01**2 - away.takeoff_sigma_s**2))
-    assert blurred.repeat == pytest.approx(expected, rel=1e-6)
+    others = np.arange(len(QUANTITIES)) != HEIGHT  # its errors are taken to go with those of the place of the edge
+    assert blurred.repeat[others] == pytest.approx(expected[others], rel=1e-6)
+    assert (blurred.repeat >= expected * (1 - 1e-6)).all()
 
 
 def test_the_greatest_of_all_is_judged_as_the_greatest(repeated: list[Difference]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.measurements.model import POINTS, PulseMeasurements, Source
 from analysis.pulses.least_squares import Equations
-from analysis.scene.camera_system import PlacedCamera
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from rig.arrays import Flags, Floats, Integers
 
 
@@ -17,6 +17,7 @@ class Points:
 
     Attributes:
         cameras: the m cameras.
+        parameters: number p of their uncertain parameters.
         xy: (n, m, 2) px; anything where not seen.
         covariance: (n, m, 2, 2) px^2.
         seen: (n, m).
@@ -25,6 +26,7 @@ class Points:
     """
 
     cameras: Sequence[PlacedCamera]
+    parameters: int
     xy: Floats
     covariance: Floats
     seen: Flags
@@ -47,8 +49,7 @@ class Points:
         """Collinearity equations (A1)."""
         parts = [camera.linearised(state + self.shift[:, i], self.xy[:, i]) for i, camera in enumerate(self.cameras)]
         n, m = self.seen.shape
-        columns = sum(len(camera.columns) for camera in self.cameras)
-        by_calibration = np.zeros((n, m, 2, columns))
+        by_calibration = np.zeros((n, m, 2, self.parameters))
         for image, (camera, part) in enumerate(zip(self.cameras, parts, strict=True)):
             by_calibration[:, image, :, camera.columns] = np.moveaxis(part[2], -1, 0)
         return Equations(
@@ -88,14 +89,15 @@ class Points:
         )
 
 
-def points_of(cameras: Sequence[PlacedCamera], pulses: Sequence[PulseMeasurements], shift: Floats) -> Points:
+def points_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Floats) -> Points:
     """All points of a jump: P1 to P4 of the first pulse, then of the next.
 
     Args:
-        cameras: m oriented cameras; measurements of others are left out.
+        system: m oriented cameras; measurements of others are left out.
         pulses: of the jump.
         shift: (pulses, m, 3), see `Points.shift`.
     """
+    cameras = tuple(system.cameras.values())
     n, m = len(pulses) * len(POINTS), len(cameras)
     xy, covariance = np.zeros((n, m, 2)), np.tile(np.eye(2), (n, m, 1, 1))
     seen, by_hand = np.zeros((n, m), bool), np.zeros((n, m), bool)
@@ -107,7 +109,7 @@ def points_of(cameras: Sequence[PlacedCamera], pulses: Sequence[PulseMeasurement
                 i = p * len(POINTS) + POINTS.index(name)
                 xy[i, j], covariance[i, j], seen[i, j] = point.xy, point.covariance, True
                 by_hand[i, j] = point.source is Source.BY_HAND
-    return Points(cameras, xy, covariance, seen, by_hand, np.repeat(shift, len(POINTS), axis=0))
+    return Points(cameras, len(system.covariance), xy, covariance, seen, by_hand, np.repeat(shift, len(POINTS), axis=0))
 
 
 def rays(camera: PlacedCamera, xy: Floats) -> Floats:

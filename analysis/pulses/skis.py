@@ -13,7 +13,7 @@ import numpy as np
 from analysis.measurements.model import SIDES, PulseMeasurements, Source
 from analysis.pulses.least_squares import Equations
 from analysis.pulses.points import nearest, rays
-from analysis.scene.camera_system import PlacedCamera
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from rig.arrays import Flags, Floats, Integers
 
 _LARGEST_IMAGE_TURN = 0.1  # rad, sigma of the direction of an image line: with a larger one it is a point
@@ -25,6 +25,7 @@ class SkiLines:
 
     Attributes:
         cameras: the m cameras.
+        parameters: number p of their uncertain parameters.
         xy: (n, m, k, 2) px.
         ray: (n, m, k, 3) unit vectors from the cameras to what appears there.
         weight: (n, m, k) 1 / sigma^2 across the ski, px^-2; 0 where there is no point.
@@ -35,6 +36,7 @@ class SkiLines:
     """
 
     cameras: Sequence[PlacedCamera]
+    parameters: int
     xy: Floats
     ray: Floats
     weight: Floats
@@ -68,9 +70,8 @@ class SkiLines:
     def equations(self, state: Floats) -> Equations:
         """Distances of the measured points from the projected line, reduced to mean and turn for each image."""
         n, m = self.seen.shape
-        columns = sum(len(camera.columns) for camera in self.cameras)
         v, covariance = np.zeros((n, m, 2)), np.zeros((n, m, 2, 2))
-        by_object, by_calibration = np.zeros((n, m, 2, 4)), np.zeros((n, m, 2, columns))
+        by_object, by_calibration = np.zeros((n, m, 2, 4)), np.zeros((n, m, 2, self.parameters))
         in_front = np.zeros((n, m), bool)
         for image, camera in enumerate(self.cameras):
             part = self._image(image, camera, state)
@@ -162,14 +163,15 @@ class SkiLines:
         return result
 
 
-def skis_of(cameras: Sequence[PlacedCamera], pulses: Sequence[PulseMeasurements], shift: Floats) -> SkiLines:
+def skis_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Floats) -> SkiLines:
     """All skis of a jump: right and left one of the first pulse, then of the next.
 
     Args:
-        cameras: m oriented cameras; measurements of others are left out.
+        system: m oriented cameras; measurements of others are left out.
         pulses: of the jump.
         shift: (pulses, m, 3), see `SkiLines.shift`.
     """
+    cameras = tuple(system.cameras.values())
     found = [
         (p * len(SIDES) + SIDES.index(side), j, ski)
         for p, pulse in enumerate(pulses)
@@ -187,7 +189,17 @@ def skis_of(cameras: Sequence[PlacedCamera], pulses: Sequence[PulseMeasurements]
         xy[i, j, points:] = ski.xy[0]  # with weight 0, but where rays and lines meet
         by_hand[i, j] = ski.source is Source.BY_HAND
     ray = np.stack([rays(camera, xy[:, j]) for j, camera in enumerate(cameras)], axis=1)
-    return SkiLines(cameras, xy, ray, weight, common, _long(xy, weight), by_hand, np.repeat(shift, len(SIDES), axis=0))
+    return SkiLines(
+        cameras,
+        len(system.covariance),
+        xy,
+        ray,
+        weight,
+        common,
+        _long(xy, weight),
+        by_hand,
+        np.repeat(shift, len(SIDES), axis=0),
+    )
 
 
 def across_axes(direction: Floats) -> tuple[Floats, Floats]:

@@ -58,9 +58,9 @@ def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: Cam
     late = np.array([measurements.late_s(camera.name) for camera in cameras])
     shift = np.zeros((len(pulses), len(cameras), 3))
     if np.abs(late).max() > _TOGETHER_S:
-        place = adjust(points_of(cameras, pulses, shift), system.covariance).state  # good enough for the velocity
+        place = adjust(points_of(system, pulses, shift), system.covariance).state  # good enough for the velocity
         shift = late[:, None] * velocities(place.reshape(-1, len(POINTS), 3), times)[:, None]
-    points, skis = points_of(cameras, pulses, shift), skis_of(cameras, pulses, shift)
+    points, skis = points_of(system, pulses, shift), skis_of(system, pulses, shift)
     other_names = [skis.interchanged(image) for image in range(len(cameras))]
     points, places, points_scale = scaled_to_fit(points, system.covariance)
     skis, lines, skis_scale = scaled_to_fit(skis, system.covariance, other_names)

@@ -183,6 +183,9 @@ def test_two_rays_one_ray_and_by_hand() -> None:
     assert binding.cameras == ("K2", "K3")
     assert all(np.isnan(test.w) for test in raw.tests if test.what in SIDES)  # two planes always meet
     assert not any(test.what == "P1" for test in raw.tests)
+    fewer = replace(true_cameras(), cameras={name: true_cameras()[name] for name in ("K2", "K3")})
+    alike = solve_pulses(changed(measurements, without).jumps[0], measurements, fewer)
+    np.testing.assert_allclose([n[1:] for n in numbers(alike.states[middle])], [n[1:] for n in numbers(state)])
     assert raw.states[0].speed is None
     assert raw.states[-1].speed is None
 

@@ -25,6 +25,8 @@ _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
 _COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is given by definition
 _SETTLED: Final = 0.01  # of a sigma: greatest step of O that ends the iteration
 _FAR: Final = 10.0  # times the median distance from approximate states
+_MEDIAN: Final = float(chi2.median(2))
+_SIGNIFICANT: Final = 3.1  # sigmas; right ones are held for too small with a probability of 0.001
 _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
 
 
@@ -114,7 +116,7 @@ def near(model: Model, states: Floats, shared: Floats) -> Flags:
     v = linearised(model.observed, _cameras(model, shared), model.frame, channels).v
     seen, square = model.observed.seen, (v**2).sum(axis=-1)
     usual = np.array([np.median(square[:, :, g][seen[:, :, g]]) if seen[:, :, g].any() else 0.0 for g in range(6)])
-    return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, chi2.median(2))))
+    return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, _MEDIAN)))
 
 
 def settled(adjusted: Adjusted, most: int) -> Adjusted:
@@ -129,6 +131,28 @@ def settled(adjusted: Adjusted, most: int) -> Adjusted:
 def with_prior(adjusted: Adjusted, prior: Prior) -> Adjusted:
     """One step with another prior of the motion."""
     return _stepped(replace(adjusted.model, prior=prior), adjusted.used, adjusted.states, adjusted.shared)
+
+
+def fitting_sigmas(adjusted: Adjusted, most: int) -> tuple[Adjusted, Floats]:
+    """Enlarge the sigmas of all points, or of all skis, if most of them agree worse than their sigmas allow.
+
+    The median of the tests decides, so that gross errors do not count. Returns the factors (6,) of the groups too.
+    """
+    factors = np.ones(6)
+    for _ in range(most):
+        tests, step = statistics(adjusted).test, np.ones(6)
+        for kind in (slice(0, 4), slice(4, 6)):
+            own = tests[:, :, kind][adjusted.used[:, :, kind]]
+            ratio = float(np.median(own)) / _MEDIAN if len(own) else 1.0
+            # The median of n exponential numbers scatters by 1 / (sqrt(n) ln 2) of itself.
+            if ratio > 1 + _SIGNIFICANT / (np.sqrt(max(len(own), 1)) * np.log(2.0)):
+                step[kind] = np.sqrt(ratio)
+        if (step == 1.0).all():
+            break
+        factors *= step
+        model = replace(adjusted.model, observed=adjusted.model.observed.scaled(step))
+        adjusted = settled(replace(adjusted, model=model), 2)
+    return adjusted, factors
 
 
 def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:

@@ -59,6 +59,10 @@ class Observations:
         arrays = {name: getattr(self, name)[pulses] for name in ("times", "xy", "whitener", "seen", "by_hand")}
         return replace(self, **arrays)
 
+    def scaled(self, factors: Floats) -> "Observations":
+        """The same with the standard deviations of each kind of group (6,) times a factor."""
+        return replace(self, whitener=self.whitener / factors[:, None, None])
+
 
 def observations(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Observations:
     """Bring the measurements of a jump into arrays; cameras that are not oriented are left out."""

@@ -1,7 +1,7 @@
 """Smooths a jump: the whole procedure from its measurements to the motion with everything that is known about it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from analysis.motion.bundle import (
     Adjusted,
     Model,
     begun,
+    fitting_sigmas,
     near,
     root_of,
     settled,
@@ -36,7 +37,7 @@ _TRIGGER_S: Final = 20e-6  #: of cameras that obey one trigger
 #: Three nodes of Gauss and Hermite stand for a normal distribution: the middle, and so many sigmas either side.
 _NODE: Final = float(np.sqrt(3.0))
 _SIDE_WEIGHT: Final = 1 / 6
-_STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS = 12, 2, 3, 12
+_STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS, _SCALINGS = 12, 2, 3, 12, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,8 @@ class Motion:
         removed: measurements that contradict all others and were left out, the worst first.
         table: direction of the table and the velocity across it; None without take-off, or where the table was hardly
             in sight.
+        scale: factors by which the sigmas of "points" and "skis" in the images were too small: if not 1, most of them
+            agree worse than their sigmas said, and all results are computed with these sigmas times the factor.
         message: why there are no states; None where there are.
     """
 
@@ -75,6 +78,7 @@ class Motion:
     fit: Mapping[Phase, Fit]
     removed: Sequence[RayTest]
     table: TableMotion | None
+    scale: Mapping[str, float] = field(default_factory=dict)
     message: str | None = None
 
 
@@ -108,7 +112,7 @@ def smooth(
 
 
 def _nothing(jump: JumpMeasurements, message: str) -> Motion:
-    return Motion([None] * len(jump.pulses), None, {}, {}, [], None, message)
+    return Motion([None] * len(jump.pulses), None, {}, {}, [], None, message=message)
 
 
 def _motion(
@@ -121,7 +125,7 @@ def _motion(
     edge: Floats | None,
 ) -> Motion:
     observed, unit = everything.part(sight), 1.0 / rate_hz
-    free = _with_free_cameras(observed, system, start, unit)
+    free, factors = _with_free_cameras(observed, system, start, unit)
     rank = free.model.root.shape[1]
     took_part = np.asarray(free.used.any(axis=(0, 2)))
     synchrony = judged(
@@ -137,11 +141,17 @@ def _motion(
         _fit(adjusted, takeoff),
         _removed(adjusted, [int(pulse.pulse) for pulse in jump.pulses[sight]]),
         None if takeoff is None else table_motion(adjusted, takeoff),
+        {"points": float(factors[0]), "skis": float(factors[-1])},
     )
 
 
-def _with_free_cameras(observed: Observations, system: CameraSystem, start: Start, unit: float) -> Adjusted:
-    """The bundle in which each camera may be late; nothing is known yet of take-off and densities."""
+def _with_free_cameras(
+    observed: Observations, system: CameraSystem, start: Start, unit: float
+) -> tuple[Adjusted, Floats]:
+    """The bundle in which each camera may be late; nothing is known yet of take-off and densities.
+
+    Returns the factors (6,), too, by which the sigmas of the measurements were too small.
+    """
     m, late = len(observed.names), start.late / unit
     loose = np.repeat(start_densities()[1:2], 3, axis=0)
     model = Model(
@@ -158,7 +168,9 @@ def _with_free_cameras(observed: Observations, system: CameraSystem, start: Star
     channels = start.channels
     speed = np.gradient(channels, observed.times, axis=0) * unit
     states = np.concatenate((channels, speed, np.zeros_like(channels)), axis=1)
-    return without_gross_errors(settled(begun(model, states, near(model, states, shared), shared), _STEPS), _REMOVALS)
+    free = settled(begun(model, states, near(model, states, shared), shared), _STEPS)
+    free, factors = fitting_sigmas(free, _SCALINGS)
+    return without_gross_errors(free, _REMOVALS), factors
 
 
 def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:

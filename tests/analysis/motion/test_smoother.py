@@ -215,3 +215,25 @@ def test_many_gross_errors_do_not_bend_the_path() -> None:
             assert point is not None
             markers = truth.pose(jump.pulses[k].pulse).markers
             assert _distance(point.xyz - markers[i], point.covariance) < LARGEST
+
+
+def test_sigmas_that_are_too_small_are_found_and_enlarged() -> None:
+    rng, truth, system = np.random.default_rng(SEED), true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, rng)
+    pulses = [
+        replace(pulse, images={name: _surer(image, 2.0) for name, image in pulse.images.items()})
+        for pulse in measured.jumps[0].pulses
+    ]
+    jump = replace(measured.jumps[0], pulses=tuple(pulses))
+    motion = smooth(jump, measured, drawn(system, rng))
+    assert motion.scale["points"] == pytest.approx(2.0, rel=0.2)  # medians of 350 tests scatter by 4 %
+    assert motion.scale["skis"] == 1.0
+    assert len(motion.removed) <= 2
+    for k, state in _states(motion):
+        expected = truth.pose(jump.pulses[k].pulse).origin
+        assert _distance(state.origin.value - expected, state.origin.covariance) < LARGEST
+
+
+def _surer(image: ImageMeasurements, factor: float) -> ImageMeasurements:
+    points = {name: replace(point, covariance=point.covariance / factor**2) for name, point in image.points.items()}
+    return replace(image, points=points)

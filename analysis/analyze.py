@@ -79,34 +79,32 @@ def analyze(
     tell("looking at the balls", 1.0)
     measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, ())
     if images:
-        candidates = find_candidates(
-            log,
-            Finder({name: static[name] for name in scene.system.names}),
-            lambda s: tell("looking for the jumper", s),
-        )
-        measurements = replace(measurements, jumps=tuple(find_jumps(candidates, facts, scene, steadiness)))
+        finder = Finder({name: static[name] for name in scene.system.names})
+        candidates = find_candidates(log, finder, lambda share: tell("looking for the jumper", share))
+        jumps = find_jumps(candidates, facts, scene, steadiness, finder.look_for_spots)
+        measurements = replace(measurements, jumps=tuple(jumps))
     if by_hand is not None:
         measurements = merged(measurements, by_hand)
     if not measurements.jumps:
         raise NoJumpError(
             f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording"
         )
-    jumps: list[ComputedJump] = []
+    computed: list[ComputedJump] = []
     for jump in measurements.jumps:
-        tell("computing", len(jumps) / len(measurements.jumps))
+        tell("computing", len(computed) / len(measurements.jumps))
         standing = steadiness.during([pulse.pulse for pulse in jump.pulses])
         steady = replace(jump, pulses=tuple(standing.measurements(pulse) for pulse in jump.pulses))
-        jumps.append(compute_jump(steady, measurements, standing.system))
+        computed.append(compute_jump(steady, measurements, standing.system))
     result = MeasuredRecording(
         facts.recording,
         facts.session,
         facts.rate_hz,
         orientation_result(scene, steadiness.moved, (*facts.messages, *steadiness.messages)),
-        _synchrony(jumps),
-        tuple(computed.jump for computed in jumps),
+        _synchrony(computed),
+        tuple(each.jump for each in computed),
     )
     tell("computing", 1.0)
-    perpendicular = {c.jump.number: c.perpendicular for c in jumps if c.perpendicular is not None}
+    perpendicular = {c.jump.number: c.perpendicular for c in computed if c.perpendicular is not None}
     return Analysis(result, measurements, scene, orientation, perpendicular)
 
 

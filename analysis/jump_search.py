@@ -12,7 +12,7 @@ import numpy as np
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.pose_change import changed
 from analysis.cameras.steadiness import Steadiness
-from analysis.candidates.model import ImageCandidates, PulseCandidates
+from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook
 from analysis.identification.identify import identify
 from analysis.log_facts import LogFacts
 from analysis.measurements.model import JumpMeasurements
@@ -22,7 +22,11 @@ _AROUND_S = 0.5
 
 
 def find_jumps(
-    candidates: Sequence[PulseCandidates], facts: LogFacts, scene: OrientedScene, steadiness: Steadiness
+    candidates: Sequence[PulseCandidates],
+    facts: LogFacts,
+    scene: OrientedScene,
+    steadiness: Steadiness,
+    look: SecondLook,
 ) -> list[JumpMeasurements]:
     """The jumps of a recording, measured in the frames as they are.
 
@@ -31,6 +35,7 @@ def find_jumps(
         facts: of the log.
         scene: cameras and balls.
         steadiness: how the cameras stood.
+        look: looks again at a place in a frame.
     """
     exposures = {name: camera.exposure_s for name, camera in facts.cameras.items()}
     system = changed(scene.system, scene.changes)
@@ -46,7 +51,7 @@ def find_jumps(
         window = [seen for seen in candidates if first <= seen.pulse <= last]
         standing = steadiness.during([seen.pulse for seen in window])
         steady = [standing.candidates(seen) for seen in window]
-        again = identify(steady, standing.system, facts.rate_hz, exposures)
+        again = identify(steady, standing.system, facts.rate_hz, exposures, standing.look(look))
         best = max(again, key=lambda one: len(one.pulses), default=None)
         if best is not None:
             pulses = tuple(standing.in_frames(pulse) for pulse in best.pulses)

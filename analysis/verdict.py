@@ -18,8 +18,10 @@ from analysis.result.model import (
 )
 from analysis.scene.camera_system import CameraSystem
 
-#: Share of the pulses in sight in which all points must be solved at the edge and in flight, and both skis in flight.
-_POINTS, _SKIS = 0.8, 0.5
+#: Share of the pulses in flight in which all points, and both skis, must be measured.
+_MEASURED: Final = 0.5
+#: Share of the pulses at the edge and in flight in which a point may be less accurate than required.
+_COARSE: Final = 0.25
 #: More gross errors among the rays than this say that something is wrong with the whole recording.
 _MANY_REMOVED: Final = 0.1
 #: The paper's requirement for coordinates, m (0.2 dm).
@@ -27,7 +29,7 @@ REQUIRED_SIGMA_M: Final = 0.02
 #: Fewest cameras that must have a point in their image for the pulse to count as in sight.
 _CAMERAS: Final = 2
 
-_WORDS: Final = {Phase.TABLE: "on the table", Phase.EDGE: "around the edge", Phase.FLIGHT: "in flight"}
+_WORDS: Final = {Phase.EDGE: "around the edge", Phase.FLIGHT: "in flight"}
 
 
 def judge(
@@ -54,9 +56,14 @@ def judge(
     troubles += [move.message for move in moved]
     if takeoff is None:
         troubles.append("the take-off was not found, so times are counted from the first pulse")
-    for phase, share in ((Phase.EDGE, _POINTS), (Phase.FLIGHT, _POINTS)):
-        troubles += _too_few(phases[phase], "points", share, f"all points {_WORDS[phase]}")
-    troubles += _too_few(phases[Phase.FLIGHT], "skis", _SKIS, f"both skis {_WORDS[Phase.FLIGHT]}")
+    troubles += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
+    troubles += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
+    for phase in (Phase.EDGE, Phase.FLIGHT):
+        coarse, count = phases[phase]["coarse"], phases[phase]["pulses"]
+        if coarse > _COARSE * count:
+            troubles.append(
+                f"in {coarse} of {count} pulses {_WORDS[phase]} a point is uncertain by more than {REQUIRED_SIGMA_M} m"
+            )
     removed = sum(test.removed for test in tests)
     if tests and removed > _MANY_REMOVED * len(tests):
         troubles.append(f"{removed} of {len(tests)} rays were taken out as gross errors; see the protocol")
@@ -110,9 +117,9 @@ def in_sight(pulse: PulseState, system: CameraSystem) -> bool:
     return bool((seen >= _CAMERAS).all())
 
 
-def _too_few(of_phase: Mapping[str, Any], what: str, share: float, words: str) -> list[str]:
+def _too_few(of_phase: Mapping[str, Any], what: str, words: str) -> list[str]:
     """A line if too few pulses of a phase show something."""
-    if of_phase[what] >= share * of_phase["pulses"]:
+    if of_phase[what] >= _MEASURED * of_phase["pulses"]:
         return []
     return [f"only {of_phase[what]} of {of_phase['pulses']} pulses show {words}"]
 

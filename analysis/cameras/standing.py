@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
+from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
 from analysis.measurements.model import ImageMeasurements, PointMeasurement, PulseMeasurements, SkiMeasurement
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import distort
@@ -63,6 +63,25 @@ class Standing:
     def in_frames(self, steadied: PulseMeasurements) -> PulseMeasurements:
         """The inverse of `measurements`: where the frames themselves show what was measured. Covariances stay."""
         return self._measurements(steadied, back=True)
+
+    def look(self, look: SecondLook) -> SecondLook:
+        """A second look that takes and gives places as the cameras of `system` would show them.
+
+        Args:
+            look: takes and gives places in the frames (`Finder.look_for_spots`).
+        """
+
+        def steady(pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+            shake = self.shake.get(camera, {}).get(pulse)
+            if shake is None:
+                return look(pulse, camera, xy, covariance)
+            placed = self.system[camera]
+            place, _ = steadied(placed, shake.reversed(), xy[None])
+            spots = look(pulse, camera, place[0], covariance)
+            places, added = steadied(placed, shake, spots.xy)
+            return replace(spots, xy=places, covariance=spots.covariance + added)
+
+        return steady
 
     def _measurements(self, seen: PulseMeasurements, *, back: bool) -> PulseMeasurements:
         images = {}

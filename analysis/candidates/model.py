@@ -5,6 +5,7 @@ Image coordinates are px, pixel frame of `svev-network/1` (x right, y down, (0, 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -106,3 +107,11 @@ class PulseCandidates:
     pulse: PulseNumber
     time: UtcNs
     images: Mapping[str, ImageCandidates]
+
+
+class SecondLook(Protocol):
+    """Looks for spots at a place where one is expected, on weaker evidence than at first sight."""
+
+    def __call__(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+        """Spots near the predicted place xy (2,) with covariance (2, 2), px, the nearest first."""
+        ...

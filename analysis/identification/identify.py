@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.candidates.model import PulseCandidates, Trace
+from analysis.candidates.model import PulseCandidates, SecondLook, Trace
 from analysis.identification.flights import Flight, find_flights
 from analysis.identification.markers import BINDINGS, Markers, follow_markers
 from analysis.identification.ski_traces import StraightTrace, straightened
@@ -12,7 +12,7 @@ from analysis.identification.skis import Skis, follow_skis
 from analysis.identification.space_points import Appearance
 from analysis.identification.tracks import find_tracks
 from analysis.identification.views import Views
-from analysis.identification.window import SecondLook, Window
+from analysis.identification.window import Window
 from analysis.measurements.model import (
     POINTS,
     SIDES,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.candidates.model import Spots
+from analysis.candidates.model import SecondLook, Spots
 from analysis.identification.assignment import Assigned, assign, well_known
 from analysis.identification.flights import Flight
 from analysis.identification.naming import name_points
@@ -16,7 +16,7 @@ from analysis.identification.prediction import Part, Prediction, predict
 from analysis.identification.skis import Places
 from analysis.identification.space_points import SpacePoints
 from analysis.identification.views import Views
-from analysis.identification.window import SecondLook, Window
+from analysis.identification.window import Window
 from analysis.measurements.model import POINTS
 from rig.arrays import Floats, Integers
 

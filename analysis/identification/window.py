@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -10,17 +9,8 @@ from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
 from analysis.identification.space_points import Appearance, find_space_points, rays_of
 from analysis.identification.views import Views
 from rig.arrays import Flags, Floats
-from rig.pulse import PulseNumber
 
 _SAME_PX = 1.0  #: spots that are nearer to each other than this are one
-
-
-class SecondLook(Protocol):
-    """Looks for spots at a place where one is expected, on weaker evidence than at first sight."""
-
-    def __call__(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
-        """Spots near the predicted place xy (2,) with covariance (2, 2), px, the nearest first."""
-        ...
 
 
 class Window:

@@ -160,7 +160,8 @@ class LiveAnalysis:
         recording.unlooked = 0
         newest = recording.candidates[-1].pulse
         exposures = {name: camera.exposure_s for name, camera in self._cameras(recording).items()}
-        for jump in identify(list(recording.candidates), scene.system, recording.rate_hz, exposures):
+        look = None if self._finder is None else self._finder.look_for_spots
+        for jump in identify(list(recording.candidates), scene.system, recording.rate_hz, exposures, look):
             if jump.pulses[-1].pulse <= recording.done:
                 continue
             self._tell_states(recording, scene, jump)

@@ -28,7 +28,7 @@ from rig.tag import CameraTag, TripletTag
 
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
 
-_FITS_OF_SMALL = 12  # places that are fitted in regions other than the largest one
+_FITS_OF_OTHERS = 6  # places that are fitted in regions without skis, but for the largest one
 
 
 class Finder:
@@ -125,10 +125,9 @@ def find_candidates(
 
 
 def _candidates(regions: list[Region]) -> ImageCandidates:
-    fits = [MOST if region is regions[0] else _FITS_OF_SMALL for region in regions]
-    spots = Spots.joined([find_spots(region, most) for region, most in zip(regions, fits, strict=True)])
-    traces = tuple(trace for region in regions for trace in find_traces(region))
-    return ImageCandidates(spots, traces)
+    traces = [find_traces(region) for region in regions]
+    most = [MOST if found or i == 0 else _FITS_OF_OTHERS for i, found in enumerate(traces)]
+    return ImageCandidates(find_spots(regions, most), tuple(trace for found in traces for trace in found))
 
 
 def _stamped(camera: CameraTag) -> tuple[int, int, int] | None:

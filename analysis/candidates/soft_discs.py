@@ -20,10 +20,14 @@ from scipy.special import gamma
 from rig.arrays import Flags, Floats, Integers
 
 UNKNOWNS: Final = 10
+_TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residuals that count half
+_COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
+_HALVES = 4, 6, 10, 16, 24  # px; half sizes of windows
 _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends on it
 _STRETCH_SPREAD, _SHAPE, _SHAPE_SPREAD = 0.25, 0.3, 0.5  # weak priors
 _SIZE_SPREAD = 0.4  # of log size
+_PENALTY = 3.0  # power of the misfit by which the covariance grows: 2 for noise, more for residuals that lie together
 _STEPS, _ENOUGH = 10, 3e-3  # iterations; px
 _POOR_START = 0.4  # residuals over contrast, before the first step
 _LARGEST_STEP = 0.4  # of the logarithms
@@ -57,27 +61,28 @@ class SoftDiscs:
 
 
 def fit_soft_discs(
-    grey: NDArray[np.float32], sigma: NDArray[np.float32], xy: Floats, radius: Floats, margin: float = MARGIN
+    grey: NDArray[np.float32], sigma: NDArray[np.float32], xy: Floats, radius: Floats, *, tight: bool = False
 ) -> SoftDiscs:
-    """Fit spots near places.
+    """Fit spots near places; pixels of infinite noise do not count.
 
     Args:
         grey: (rows, columns) image.
         sigma: (rows, columns) noise of its grey values.
         xy: (n, 2) approximate centres.
         radius: (n,) approximate radii, px.
-        margin: so far beyond a spot its surroundings are one plane, px.
+        tight: something lies close around the spots: what a spot in a smaller window does not explain counts less.
     """
+    margin = _TIGHT if tight else MARGIN
     n = len(xy)
     theta, covariance = np.zeros((n, UNKNOWNS)), np.full((n, UNKNOWNS, UNKNOWNS), np.nan)
     misfit, rms, good = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, bool)
-    half = np.ceil(radius + margin).astype(int)
+    half = np.searchsorted(_HALVES, np.minimum(radius + margin, _HALVES[-1]))
     for size in np.unique(half):
         mine = np.flatnonzero(half == size)
-        fitted = _Batch(grey, sigma, xy[mine], radius[mine], int(size), margin).solved()
+        fitted = _Batch(grey, sigma, xy[mine], radius[mine], _HALVES[size], margin, tight).solved()
         theta[mine], covariance[mine], misfit[mine], rms[mine], good[mine] = fitted
     spread = _second_moment(theta[:, 2], theta[:, 5])
-    factor = np.maximum(1.0, misfit) ** 2
+    factor = np.maximum(1.0, misfit) ** _PENALTY
     return SoftDiscs(
         theta[:, :2],
         covariance[:, :2, :2] * factor[:, None, None],
@@ -111,6 +116,7 @@ class _Batch:
         radius: Floats,
         half: int,
         margin: float,
+        robust: bool,
     ) -> None:
         rows, columns = grey.shape
         steps = np.arange(-half, half + 1)
@@ -127,7 +133,7 @@ class _Batch:
         self._x, self._y = x.reshape(n, -1).astype(float), y.reshape(n, -1).astype(float)
         self._grey = grey[place].reshape(n, -1).astype(float)
         self._weight = np.where(inside & near, 1 / sigma[place], 0.0).reshape(n, -1).astype(float)
-        self._start, self._radius = xy, radius
+        self._start, self._radius, self._robust = xy, radius, robust
 
     def solved(self) -> _Fitted:
         """Unknowns, their covariance a priori, misfit, rms, and whether the fit is good (Levenberg-Marquardt)."""
@@ -166,6 +172,8 @@ class _Batch:
         value, _ = self._model(theta, np.arange(len(theta)))
         used = self._weight > 0
         v = (self._grey - value) * used
+        if self._robust:
+            return np.ones(len(theta), bool)
         rms = np.sqrt((v**2).sum(axis=1) / np.maximum(1, used.sum(axis=1)))
         return np.asarray(rms < _POOR_START * np.abs(theta[:, 6]))
 
@@ -187,13 +195,22 @@ class _Batch:
     def _equations(self, theta: Floats, chosen: Integers) -> tuple[Floats, Floats, Floats]:
         """Cost, normal matrix and right-hand side of the chosen spots, priors included."""
         value, design = self._model(theta, chosen)
+        v = self._grey[chosen] - value
         weight = self._weight[chosen]
-        v = (self._grey[chosen] - value) * weight
+        if self._robust:
+            weight = weight * np.sqrt(self._share(v, weight, theta[:, 6]))
+        v *= weight
         design *= weight[:, None, :]
         off = self._expected[chosen] - theta
         normal = design @ design.transpose(0, 2, 1) + np.diag(self._prior)
         gradient = (design @ v[..., None])[..., 0] + self._prior * off
         return (v**2).sum(axis=1) + (self._prior * off**2).sum(axis=1), normal, gradient
+
+    @staticmethod
+    def _share(v: Floats, weight: Floats, contrast: Floats) -> Floats:
+        """How much residuals (n, k) count (Cauchy): half at some sigmas and a part of the contrast."""
+        half = _HALF_SIGMAS / np.maximum(weight, 1e-9) + _HALF_CONTRAST * np.abs(contrast)[:, None]
+        return np.asarray(1 / (1 + (v / half) ** 2))
 
     def _model(self, theta: Floats, chosen: Integers) -> tuple[Floats, Floats]:
         """Grey values (n, k) and their derivatives (n, 10, k)."""
@@ -227,9 +244,11 @@ class _Batch:
         used = self._weight > 0
         count = used.sum(axis=1)
         v = (self._grey - value) * used
-        square = ((v * self._weight) ** 2).sum(axis=1)
-        misfit = np.asarray(np.sqrt(square / np.maximum(1, count - UNKNOWNS)), float)
-        rms = np.asarray(np.sqrt((v**2).sum(axis=1) / np.maximum(1, count)), float)
+        share = self._share(v, self._weight, theta[:, 6]) * used if self._robust else used.astype(float)
+        counted = share.sum(axis=1)
+        square = (share * (v * self._weight) ** 2).sum(axis=1)
+        misfit = np.asarray(np.sqrt(square / np.maximum(1, counted - UNKNOWNS)), float)
+        rms = np.asarray(np.sqrt((share * v**2).sum(axis=1) / np.maximum(1, counted)), float)
         covariance = np.asarray(np.linalg.inv(normal + 1e-12 * _diagonal(normal)), float)
         away = np.hypot(*(theta[:, :2] - self._start).T)
         spread = np.einsum("nii->ni", covariance)[:, :2]

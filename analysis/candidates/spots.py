@@ -4,6 +4,8 @@ Extrema of the Laplacian over place and scale (`analysis.scene.detection` does t
 discs. What is no spot goes: too long, too large, not explained by the model, too uncertain.
 """
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from scipy.stats import chi2
@@ -23,6 +25,8 @@ MOST = 40  #: fits of a region
 _STRENGTH = 6.0  # contrast over its sigma
 _STRETCH = 0.75  # log of the ratio of the axes: a streak of 26 m/s and 2 ms is no longer
 _MISFIT = 0.25  # residuals over contrast
+_TIGHT, _TIGHT_MISFIT = 14, 0.15  # places that are fitted again in smaller windows, and what is asked of them there
+_GAP = 26  # px between regions on the sheet
 _WORST_SIGMA = 0.5  # px
 _SECOND_ANSWER, _SECOND_STRENGTH = 3.0, 4.0  # where a spot is expected, a few places compete, not a whole image
 _USUAL_RADII = (1.0, 1.6, 2.6)  # px; to start from
@@ -31,19 +35,17 @@ _GATE = float(chi2.ppf(0.999, 2))
 _NEAR = 2  # px from what is in front
 
 
-def find_spots(region: Region, most: int = MOST) -> Spots:
-    """Spots of a region, in px of the image, the strongest first.
+def find_spots(regions: Sequence[Region], most: Sequence[int]) -> Spots:
+    """Spots of all regions of an image, in px of the image, the clearest first.
 
     Args:
-        region: part of an image.
-        most: places that are fitted, those with the strongest answers.
+        regions: parts of an image.
+        most: for each, how many places are fitted, those with the strongest answers.
     """
-    places, radius = _blobs(region)
-    places, radius = places[:most], radius[:most]
-    if not len(places):
-        return Spots.none()
-    discs = fit_soft_discs(region.grey, region.sigma, places, radius)
-    return collected(discs, _sound(discs, _STRENGTH), region)
+    blobs = [_blobs(region) for region in regions]
+    places = [of[0][:count] for of, count in zip(blobs, most, strict=True)]
+    radii = [of[1][:count] for of, count in zip(blobs, most, strict=True)]
+    return _fitted(regions, places, radii, _STRENGTH)
 
 
 def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float | None = None) -> Spots:
@@ -62,8 +64,7 @@ def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float
     tried = [radius] if radius is not None else list(_USUAL_RADII)
     places, radii = places[near][:MOST], radii[near][:MOST]
     places = np.concatenate((places, np.repeat(place[None], len(tried), axis=0)))
-    discs = fit_soft_discs(region.grey, region.sigma, places, np.concatenate((radii, tried)))
-    spots = collected(discs, _sound(discs, _SECOND_STRENGTH), region)
+    spots = _fitted([region], [places], [np.concatenate((radii, tried))], _SECOND_STRENGTH)
     squares = _squares(spots.xy - xy, covariance + spots.covariance)
     order = np.argsort(squares)
     return spots.only(order[squares[order] < _GATE])
@@ -75,31 +76,81 @@ def _squares(off: Floats, covariance: Floats) -> Floats:
     return np.asarray(np.einsum("ni,nij,nj->n", off, inverse, off))
 
 
-def collected(discs: SoftDiscs, chosen: Flags, region: Region) -> Spots:
-    """The chosen discs of a region as spots of the image, the strongest first, none on top of another one."""
-    strength = np.abs(discs.contrast) / np.maximum(discs.sigma_contrast, 1e-9)
-    kept: list[int] = []
-    for i in sorted(np.flatnonzero(chosen).tolist(), key=lambda i: -strength[i]):
-        if all(np.hypot(*(discs.xy[i] - discs.xy[k])) > max(discs.radius[i], discs.radius[k], 1.0) for k in kept):
-            kept.append(i)
-    order = np.array(kept, int)
+def _fitted(regions: Sequence[Region], places: Sequence[Floats], radii: Sequence[Floats], strength: float) -> Spots:
+    """The spots near some places (n, 2) of each region; what lies close around one counts less if it spoils the fit."""
+    if not sum(len(of) for of in places):
+        return Spots.none()
+    sheet = _Sheet(regions)
+    xy = np.concatenate([of + offset for of, offset in zip(places, sheet.offsets, strict=True)])
+    home = np.repeat(sheet.to_image, [len(of) for of in places], axis=0)
+    radius = np.concatenate(radii)
+    wide = fit_soft_discs(sheet.grey, sheet.noise, xy, radius)
+    sound = _sound(wide, strength)
+    first = _spots(wide, sound, home)
+    first = _apart(first.only(np.argsort(-first.strength)))
+    again = _first_of_each(np.flatnonzero(~sound), home)
+    if not len(again):
+        return first
+    tight = fit_soft_discs(sheet.grey, sheet.noise, xy[again], radius[again], tight=True)
+    return _apart(Spots.joined([first, _spots(tight, _sound(tight, strength, _TIGHT_MISFIT), home[again])]))
+
+
+class _Sheet:
+    """Regions one below the other, with unusable pixels between them, so that all spots are fitted at once.
+
+    Attributes:
+        grey, noise: of the sheet.
+        offsets: (regions, 2) places on the sheet minus those in the region.
+        to_image: (regions, 2) places in the image minus those on the sheet.
+    """
+
+    def __init__(self, regions: Sequence[Region]) -> None:
+        rows = np.cumsum([0, *(region.grey.shape[0] + _GAP for region in regions)])
+        columns = max(region.grey.shape[1] for region in regions)
+        self.grey = np.zeros((int(rows[-1]), columns), np.float32)
+        self.noise = np.full_like(self.grey, np.inf)
+        for row, region in zip(rows, regions, strict=False):
+            part = slice(row, row + region.grey.shape[0]), slice(region.grey.shape[1])
+            self.grey[part], self.noise[part] = region.grey, region.noise
+        self.offsets = np.column_stack((np.zeros(len(regions)), rows[:-1]))
+        self.to_image = np.array([(region.x, region.y) for region in regions]) - self.offsets
+
+
+def _first_of_each(chosen: Integers, home: Floats) -> Integers:
+    """Of the chosen places the first few of each region."""
+    kept = [chosen[(home[chosen] == of).all(axis=1)][:_TIGHT] for of in np.unique(home[chosen], axis=0)]
+    return np.sort(np.concatenate(kept)) if kept else chosen
+
+
+def _spots(discs: SoftDiscs, chosen: Flags, home: Floats) -> Spots:
+    """The chosen discs as spots of the image; `home` (n, 2) leads from the sheet to it."""
     return Spots(
-        discs.xy[order] + (region.x, region.y),
-        discs.covariance[order],
-        discs.radius[order],
-        discs.contrast[order],
-        strength[order],
+        discs.xy[chosen] + home[chosen],
+        discs.covariance[chosen],
+        discs.radius[chosen],
+        discs.contrast[chosen],
+        np.abs(discs.contrast[chosen]) / np.maximum(discs.sigma_contrast[chosen], 1e-9),
     )
 
 
-def _sound(discs: SoftDiscs, strength: float) -> Flags:
+def _apart(spots: Spots) -> Spots:
+    """Without those that lie on an earlier one."""
+    kept: list[int] = []
+    for i in range(len(spots)):
+        near = (max(spots.radius[i], spots.radius[k], 1.0) for k in kept)
+        if all(np.hypot(*(spots.xy[i] - spots.xy[k])) > least for k, least in zip(kept, near, strict=True)):
+            kept.append(i)
+    return spots.only(np.array(kept, int))
+
+
+def _sound(discs: SoftDiscs, strength: float, misfit: float = _MISFIT) -> Flags:
     with np.errstate(invalid="ignore"):
         worst = np.sqrt(np.einsum("nii->ni", discs.covariance).max(axis=1))
         return np.asarray(
             discs.good
             & (np.abs(discs.contrast) >= strength * discs.sigma_contrast)
             & (discs.stretch <= _STRETCH)
-            & (discs.rms <= _MISFIT * np.abs(discs.contrast))
+            & (discs.rms <= misfit * np.abs(discs.contrast))
             & (worst <= _WORST_SIGMA)
         )
 
@@ -110,7 +161,7 @@ def _blobs(region: Region, answer: float = _ANSWER) -> tuple[Floats, Floats]:
     largest = max(rows, columns) / _LARGEST
     scales = [float(scale) for scale in _SCALES if scale <= max(_SCALES[2], largest / np.sqrt(2) * 1.4)]
     grey = region.grey
-    noise = float(np.median(region.sigma))
+    noise = float(np.median(region.noise))
     smooth = [np.asarray(cv2.GaussianBlur(grey, (0, 0), scale), np.float32) for scale in scales]
     answers = np.stack([scale**2 * cv2.Laplacian(s, cv2.CV_32F) for scale, s in zip(scales, smooth, strict=True)])
     strength = np.abs(answers)

@@ -80,7 +80,7 @@ class _Middles:
 
 def find_traces(region: Region) -> tuple[Trace, ...]:
     """Traces of a region, in px of the image, the longest first."""
-    noise = float(np.median(region.sigma))
+    noise = float(np.median(region.noise))
     widest = max(region.grey.shape) / _LARGEST_WIDTH
     found: list[_Line] = []
     for steep in (False, True):

@@ -6,10 +6,11 @@ import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
 from analysis.identification.flights import Flight, find_flights
-from analysis.identification.markers import BINDINGS, Markers, follow_markers
+from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.ski_traces import StraightTrace, straightened
 from analysis.identification.skis import Skis, follow_skis
 from analysis.identification.space_points import Appearance
+from analysis.identification.synchrony import lateness
 from analysis.identification.tracks import find_tracks
 from analysis.identification.views import Views
 from analysis.identification.window import Window
@@ -57,7 +58,7 @@ def identify(
     for flight in find_flights(find_tracks(search.points, search.time_s)):
         begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
         near = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
-        pulses = _measured(views, Window(views, near, rate_hz, _appearance(views, sought, flight)), flight, look)
+        pulses = _measured(views, near, rate_hz, flight, _appearance(views, sought, flight), look)
         if sum(len(_named(pulse)) >= _LEAST_NAMES for pulse in pulses) >= _LEAST_PULSES:
             jumps.append(JumpMeasurements(len(jumps) + 1, tuple(pulses)))
     return jumps
@@ -79,12 +80,29 @@ def _named(pulse: PulseMeasurements) -> set[str]:
     return {label for image in pulse.images.values() for label in image.points}
 
 
-def _measured(views: Views, window: Window, flight: Flight, look: SecondLook | None) -> list[PulseMeasurements]:
+def _measured(
+    views: Views,
+    candidates: Sequence[PulseCandidates],
+    rate_hz: float,
+    flight: Flight,
+    appearance: Appearance,
+    look: SecondLook | None,
+) -> list[PulseMeasurements]:
     """What was measured of a flight, from its first to its last appearance."""
-    markers = follow_markers(views, window, flight, look)
+    window = Window(views, candidates, rate_hz, flight, appearance)
+    markers = follow_markers(views, window, flight)
+    late_s = lateness(views, window, markers, flight)
+    if late_s.any():
+        window = Window(views, candidates, rate_hz, flight, appearance, late_s)
+        markers = follow_markers(views, window, flight)
+    if look is not None:
+        markers = follow_further(views, window, flight, markers, look)
     traces = [
-        [straightened(c.images[name].traces) if name in c.images else [] for name in views.names]
-        for c in window.candidates
+        [
+            straightened(c.images[name].traces, window.shift[t, k]) if name in c.images else []
+            for k, name in enumerate(views.names)
+        ]
+        for t, c in enumerate(window.candidates)
     ]
     skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
     pulses = [_pulse(views, c, markers, skis, traces[t], t) for t, c in enumerate(window.candidates)]

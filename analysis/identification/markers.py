@@ -60,24 +60,21 @@ class Markers:
         return Places((covariance @ right)[..., 0], covariance)
 
 
-def follow_markers(views: Views, window: Window, flight: Flight, look: SecondLook | None = None) -> Markers:
-    """Find the spots of all markers.
-
-    Args:
-        views: the cameras.
-        window: the pulses; what second looks find is added to its candidates.
-        flight: of the jumper.
-        look: the second look at places where a marker is expected and no spot was found.
-    """
+def follow_markers(views: Views, window: Window, flight: Flight) -> Markers:
+    """Find the spots of all markers in the candidates of a window."""
     named = _trusted(name_points(views, window, flight), window.points, flight)
     xyz = np.full((len(window), len(POINTS), 3), np.nan)
     covariance = np.full((len(window), len(POINTS), 3, 3), np.nan)
     for t, i in np.argwhere(named >= 0).tolist():
         xyz[t, i], covariance[t, i] = window.points[t].xyz[named[t, i]], window.points[t].covariance[named[t, i]]
-    markers = _settled(views, window, flight, xyz, covariance)
-    if look is not None and window.add(_looked(views, window, markers, look)):
-        markers = _settled(views, window, flight, markers.assigned.xyz, markers.assigned.covariance)
-    return markers
+    return _settled(views, window, flight, xyz, covariance)
+
+
+def follow_further(views: Views, window: Window, flight: Flight, markers: Markers, look: SecondLook) -> Markers:
+    """Look again where a marker is expected and no spot was found; what is found is added to the window."""
+    if not window.add(_looked(views, window, markers, look)):
+        return markers
+    return _settled(views, window, flight, markers.assigned.xyz, markers.assigned.covariance)
 
 
 def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:
@@ -104,7 +101,8 @@ def _looked(views: Views, window: Window, markers: Markers, look: SecondLook) ->
         wanted = known & window.delivered[:, k, None] & (markers.assigned.rays[..., k] < 0)
         for t, i in np.argwhere(wanted & sight.inside.reshape(-1, n)).tolist():
             at = t * n + i
-            spots = look(window.candidates[t].pulse, camera, sight.xy[at], spread[at] + sight.noise[at])
+            place = sight.xy[at] - window.shift[t, k]
+            spots = look(window.candidates[t].pulse, camera, place, spread[at] + sight.noise[at])
             found.setdefault((t, k), []).append(spots)
     return found
 

@@ -5,7 +5,7 @@ A ski is a point A on it, near the binding, and a direction d. Projected, it is 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,8 +34,8 @@ class StraightTrace:
     covariance: Floats
 
 
-def straightened(traces: Sequence[Trace]) -> list[StraightTrace]:
-    """The traces of an image as straight lines; those that continue each other become one."""
+def straightened(traces: Sequence[Trace], shift: Floats) -> list[StraightTrace]:
+    """The traces of an image, moved by `shift` (2,), as straight lines; those that continue each other become one."""
     lines = [_fit(traces, (i,)) for i in range(len(traces)) if len(traces[i].xy) > 1]
     while True:
         joins = [
@@ -45,7 +45,7 @@ def straightened(traces: Sequence[Trace]) -> list[StraightTrace]:
             if (misfit := _break(lines[a], lines[b])) < gate(2)
         ]
         if not joins:
-            return lines
+            return [replace(line, ends=line.ends + shift) for line in lines]
         _, a, b = min(joins)
         joined = _fit(traces, lines[a].parts + lines[b].parts)
         lines = [line for i, line in enumerate(lines) if i not in {a, b}] + [joined]

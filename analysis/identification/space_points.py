@@ -81,18 +81,28 @@ class Appearance:
         return np.minimum(((spots.contrast - self.contrast) / self.sigma) ** 2, _ODDEST)
 
 
-def rays_of(views: Views, candidates: PulseCandidates, appearance: Appearance | None = None) -> list[Rays]:
-    """The spots of a pulse by camera; none where a camera has no image."""
+def rays_of(
+    views: Views, candidates: PulseCandidates, appearance: Appearance | None = None, shift: Floats | None = None
+) -> list[Rays]:
+    """The spots of a pulse by camera; none where a camera has no image.
+
+    Args:
+        views: the cameras.
+        candidates: of the pulse.
+        appearance: of the jumper's markers, where it is known.
+        shift: (m, 2) px, what takes spots of the jumper in each image back to the time of the pulse.
+    """
     rays = []
     for k, name in enumerate(views.names):
         image = candidates.images.get(name)
         spots = Spots.none() if image is None else image.spots
-        reduced = views.placed[k].reduced(spots.xy)
+        xy = spots.xy if shift is None else spots.xy + shift[k]
+        reduced = views.placed[k].reduced(xy)
         usable = np.asarray(np.isfinite(reduced).all(axis=1))
         variance = np.trace(spots.covariance, axis1=1, axis2=2) / 2 + views.noise[k]
         rays.append(
             Rays(
-                spots.xy,
+                xy,
                 spots.covariance,
                 np.where(usable[:, None], reduced, 0.0),
                 np.where(usable, variance, np.inf),

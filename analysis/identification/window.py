@@ -1,14 +1,15 @@
 """The pulses in which one jumper may be in sight: their candidates, as rays and as points in space."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
+from analysis.identification.flights import Flight
 from analysis.identification.space_points import Appearance, find_space_points, rays_of
 from analysis.identification.views import Views
-from rig.arrays import Flags, Floats
+from rig.arrays import Flags, Floats, Integers
 
 _SAME_PX = 1.0  #: spots that are nearer to each other than this are one
 
@@ -22,17 +23,46 @@ class Window:
         rays: their spots, of each pulse by camera.
         points: in space, that these spots may show.
         delivered: (t, m) whether a camera has an image of a pulse.
+        shift: (t, m, 2) px, what takes the jumper in an image back to the time that all cameras share.
     """
 
     def __init__(
-        self, views: Views, candidates: Sequence[PulseCandidates], rate_hz: float, appearance: Appearance | None = None
+        self,
+        views: Views,
+        candidates: Sequence[PulseCandidates],
+        rate_hz: float,
+        flight: Flight | None = None,
+        appearance: Appearance | None = None,
+        late_s: Floats | None = None,
     ) -> None:
-        self._views, self._appearance = views, appearance
+        """Prepare the candidates.
+
+        Args:
+            views: the cameras.
+            candidates: of the pulses.
+            rate_hz: pulses per second.
+            flight: of the jumper, where it is known.
+            appearance: of his markers, likewise.
+            late_s: (m,) how much later than the others each camera shows him, apart from its exposure time.
+        """
+        self._views, self._appearance, self._flight, self._rate_hz = views, appearance, flight, rate_hz
         self.candidates = list(candidates)
         self.time_s: Floats = np.array([float(c.pulse) for c in candidates]) / rate_hz
-        self.rays = [rays_of(views, c, appearance) for c in candidates]
+        late = views.late_s if late_s is None else views.late_s + late_s
+        self.shift = np.zeros((len(candidates), len(views), 2))
+        if flight is not None:
+            for k in range(len(views)):
+                by_point = views.see(k, flight.place(self.time_s)).by_point
+                moved = np.einsum("tij,tj->ti", by_point, flight.velocity(self.time_s)) * late[k]
+                self.shift[:, k] = -np.nan_to_num(moved)
+        self.rays = [rays_of(views, c, appearance, s) for c, s in zip(candidates, self.shift, strict=True)]
         self.points = find_space_points(views, self.rays)
         self.delivered: Flags = np.array([[name in c.images for name in views.names] for c in candidates], bool)
+
+    def part(self, chosen: Integers) -> Callable[[Floats], "Window"]:
+        """Makes windows of some of its pulses with other times of the cameras, (m,) s as in the constructor."""
+        candidates = [self.candidates[t] for t in chosen.tolist()]
+        return lambda late_s: Window(self._views, candidates, self._rate_hz, self._flight, self._appearance, late_s)
 
     def __len__(self) -> int:
         return len(self.candidates)
@@ -49,7 +79,7 @@ class Window:
                 changed.add(t)
         order = sorted(changed)
         for t in order:
-            self.rays[t] = rays_of(self._views, self.candidates[t], self._appearance)
+            self.rays[t] = rays_of(self._views, self.candidates[t], self._appearance, self.shift[t])
         for t, points in zip(order, find_space_points(self._views, [self.rays[t] for t in order]), strict=True):
             self.points[t] = points
         return bool(changed)

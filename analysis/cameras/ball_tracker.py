@@ -144,7 +144,7 @@ class BallTracker:
         weight = np.where(inside[:, None, None], self._weight, 0.0)
         for again in range(2):
             normal, right = _normal_equations(value, slope_x, slope_y, grey, weight)
-            theta = np.linalg.solve(normal + 1e-9 * np.eye(_UNKNOWNS), right[..., None])[..., 0]
+            theta = np.linalg.solve(normal, right[..., None])[..., 0]
             fitted = (
                 theta[:, 0, None, None] * value
                 + theta[:, 1, None, None]
@@ -242,6 +242,6 @@ def _normal_equations(
     n = len(value)
     design = np.stack((value, np.ones_like(value), slope_x, slope_y), axis=1).reshape(n, _UNKNOWNS, -1)
     weighted = design * weight.reshape(n, 1, -1)
-    normal = weighted @ design.transpose(0, 2, 1)
+    normal = weighted @ design.transpose(0, 2, 1) + 1e-9 * np.eye(_UNKNOWNS)  # of a covered ball it is singular
     right = (weighted @ grey.reshape(n, -1, 1))[..., 0]
     return normal.astype(float), right.astype(float)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from math import comb, pi
 
 import numpy as np
-from scipy.stats import chi2
 
 from analysis.cameras.oriented_scene import OrientedScene, displacements
 from analysis.cameras.pose_change import FEWEST, PoseChange, pose_change
@@ -28,7 +27,6 @@ _ALIKE = 0.005  # of the image's width: balls displaced alike differ by less, al
 _CHANCE = 1e-3  # that balls agree although they are others
 _ROUNDS = 4
 _FEWEST_CAMERAS = 2
-_GATE = float(chi2.ppf(0.9999, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +72,7 @@ def scene_of_calibration(
             matches[name] = match
             notes.append(f"camera {name}: {len(match.seen)} of {len(places)} balls of the calibration found")
     used = tuple(name for name in system.names if name not in elsewhere)
-    notes += _verdict(calibration, used, elsewhere)
+    notes += [*_verdict(calibration, used, elsewhere), *_moved_balls(matches)]
     balls = _balls(calibration, matches)
     changes = {name: match.change for name, match in matches.items()}
     chosen = system.only(used)
@@ -100,6 +98,16 @@ def _verdict(calibration: Calibration, used: Sequence[str], elsewhere: Sequence[
         f"camera {name} is left out: its balls are not where {calibration.source} has them, so it was turned far, or "
         "its balls are covered; orient the log with --survey"
         for name in elsewhere
+    ]
+
+
+def _moved_balls(matches: Mapping[str, _Match]) -> list[str]:
+    """Balls that several cameras show elsewhere than the calibration, when what the cameras moved is accounted for."""
+    gone = [ball for match in matches.values() for ball in match.change.left_out]
+    return [
+        f"ball {ball} is not where the calibration has it (cameras {', '.join(where)}); it was moved, survey it again"
+        for ball in dict.fromkeys(gone)
+        if len(where := [name for name, match in matches.items() if ball in match.change.left_out]) > 1
     ]
 
 
@@ -153,12 +161,10 @@ def _alike(there: Floats, found: Floats, size: Floats) -> dict[int, int]:
 
 
 def _near(now: PlacedCamera, placed: PlacedCamera, there: Floats, xyz: Floats, found: Detections) -> dict[int, int]:
-    """Balls and detections where a changed pose puts them."""
+    """Balls and detections near where a changed pose puts them; which of them agree is found out later."""
     predicted = there[:, :2] + now.project(xyz) - placed.project(xyz)
-    off = found.xy[None] - predicted[:, None]
-    total = found.covariance[None] + ((there[:, 2:] ** 2)[:, :, None] * np.eye(2) + MODEL_SIGMA**2 * np.eye(2))[:, None]
-    squares = np.einsum("pdi,pdij,pdj->pd", off, np.linalg.inv(total), off)
-    return _mutual(np.nan_to_num(squares, nan=np.inf), np.full(squares.shape, _GATE))
+    distance = np.linalg.norm(found.xy[None] - predicted[:, None], axis=2)
+    return _mutual(np.nan_to_num(distance, nan=np.inf), np.full(distance.shape, _ALIKE * float(placed.size[0])))
 
 
 def _mutual(distance: Floats, limit: Floats) -> dict[int, int]:

@@ -6,7 +6,7 @@ frame is taken out of what was measured in it (`analysis.cameras.standing`).
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -69,6 +69,10 @@ class Steadiness:
             if shake := _shake(turns, mean, [PulseNumber(p) for p in pulses]):
                 shakes[name] = shake
         return Standing(changed(self._scene.system, changes), shakes)
+
+    def with_scene(self, scene: OrientedScene) -> "Steadiness":
+        """The same after the cameras were oriented anew from the same images, by more points."""
+        return replace(self, _scene=scene, _static=changed(scene.system, scene.changes))
 
     def _mean_change(self, name: str, turns: _Turns) -> PoseChange | None:
         """The change of the pose from the static image to the mean of some frames."""

@@ -23,6 +23,7 @@ _LEAST_CONTRAST = 6.0  # grey values
 _NOISE_FACTOR = 6.0  # contrast over the noise of the static image
 _ROUND = 3.0  # ratio of the curvatures of a blob, at most
 _RADII = (0.8, 16.0)  # px
+_STEPS = 14  # of the fit: balls need 4 to 12
 _STRETCH = 0.5  # log of the ratio of the axes
 _MISFIT = 0.2  # residuals over contrast
 _MISFIT_AT_START = 0.3  # the same for a disc where the blob is, before it is fitted
@@ -89,10 +90,10 @@ def collected(discs: Sequence[Disc]) -> Detections:
 
 def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: float) -> Disc | None:
     """The ball at a place; None if there is none. What lies close around it is left out if it spoils the fit."""
-    wide = fit_disc(grey, sigma, xy, radius, poor_start=_MISFIT_AT_START)
+    wide = fit_disc(grey, sigma, xy, radius, poor_start=_MISFIT_AT_START, steps=_STEPS)
     if wide is not None and wide.factor < _SPOILT:
         return wide if _is_ball(wide) else None
-    tight = fit_disc(grey, sigma, xy, radius, margin=_TIGHT, poor_start=_MISFIT_AT_START)
+    tight = fit_disc(grey, sigma, xy, radius, margin=_TIGHT, poor_start=_MISFIT_AT_START, steps=_STEPS)
     balls = [disc for disc in (wide, tight) if disc is not None and _is_ball(disc)]
     return min(balls, key=lambda disc: disc.factor, default=None)
 
@@ -124,20 +125,22 @@ def _blobs(grey: GreyImage, sigma: float) -> list[tuple[float, float, float]]:
     """Places and radii of blobs, the most contrast first."""
     limit = _DISC_ANSWER * max(_LEAST_CONTRAST, _NOISE_FACTOR * sigma)
     smooth = [np.asarray(cv2.GaussianBlur(grey, (0, 0), float(scale)), np.float32) for scale in _SCALES]
-    answers = np.stack(
-        [-(scale**2) * cv2.Laplacian(image, cv2.CV_32F) for scale, image in zip(_SCALES, smooth, strict=True)]
-    ).astype(np.float32)
-    strength = np.abs(answers)
+    strength = [
+        np.abs(cv2.Laplacian(image, cv2.CV_32F, scale=float(scale**2)))
+        for scale, image in zip(_SCALES, smooth, strict=True)
+    ]
     square = np.ones((3, 3), np.uint8)
-    largest = np.stack([cv2.dilate(layer, square) for layer in strength])
-    around = largest.copy()
-    around[1:] = np.maximum(around[1:], largest[:-1])
-    around[:-1] = np.maximum(around[:-1], largest[1:])
-    layer, row, column = np.nonzero((strength >= around) & (strength > limit))
+    largest = [cv2.dilate(layer, square) for layer in strength]
     found = []
-    for k, y, x in zip(layer, row, column, strict=True):
-        if _is_round(smooth[k], int(y), int(x)):
-            found.append((float(strength[k, y, x]), float(x), float(y), float(_SCALES[k] * np.sqrt(2))))
+    for k, layer in enumerate(strength):
+        row, column = np.nonzero((layer >= largest[k]) & (layer > limit))
+        value = layer[row, column]
+        for other in largest[max(0, k - 1) : k + 2]:
+            stays = value >= other[row, column]
+            row, column, value = row[stays], column[stays], value[stays]
+        for y, x, answer in zip(row.tolist(), column.tolist(), value.tolist(), strict=True):
+            if _is_round(smooth[k], y, x):
+                found.append((answer, float(x), float(y), float(_SCALES[k] * np.sqrt(2))))
     found.sort(reverse=True)
     return [blob[1:] for blob in found[:_MOST_FITS]]
 

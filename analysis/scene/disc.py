@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.special import chndtr, erfc, ive
+from scipy.special import chndtr, erfc, i0e, i1e
 
 from rig.arrays import Floats
 
@@ -28,7 +28,8 @@ _NODES = 0.3  # blurs between the nodes of a profile
 _SHARP = 8.0  # R / s: from there on the border is that of a half plane, with the curvature's first term
 _BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and blur of a small disc go together
 _STRETCH_SPREAD = 0.2  # weak prior of the stretch
-_STEPS, _ENOUGH = 25, 1e-4  # iterations, px
+STEPS: Final = 25  #: iterations
+_ENOUGH = 1e-4  # px
 _SETTLED = 2e-5  # relative decrease of the square sum: a twentieth of a sigma or less
 _TRIAL_STEPS, _POOR = 4, 0.25  # steps after which the residuals over the contrast must be smaller than that
 POOR_START: Final = 0.4  #: residuals over contrast, before the first step
@@ -75,6 +76,7 @@ def fit_disc(
     mask: Floats | None = None,
     margin: float = MARGIN,
     poor_start: float = POOR_START,
+    steps: int = STEPS,
 ) -> Disc | None:
     """Fit a disc near a place.
 
@@ -86,6 +88,7 @@ def fit_disc(
         mask: (rows, columns) where the image may be used; everywhere if left out.
         margin: so far beyond the disc its surroundings are one plane, px.
         poor_start: residuals over contrast from which on a disc of the approximate place and radius is given up.
+        steps: iterations at most; few are enough for a clear disc.
 
     Returns:
         The disc; None if nothing there is one: no convergence, it leaves the place, or the image ends.
@@ -97,7 +100,7 @@ def fit_disc(
         if window is None:
             return None
         start = _started(theta, window, _RADII if not again else (1.0,), poor_start)
-        fitted = None if start is None else _fitted(start, *window)
+        fitted = None if start is None else _fitted(start, *window, steps)
         if fitted is None or np.hypot(*(fitted[:2] - xy)) > max(1.5, radius):
             return None
         wider = abs(fitted[2] - theta[2]) > 0.15
@@ -115,8 +118,8 @@ def cover(r: Floats, radius: float, blur: float) -> tuple[Floats, Floats, Floats
         return np.asarray(0.5 * erfc(u / np.sqrt(2))), -edge, edge
     a, b = r / blur, radius / blur
     common = (b / blur) * np.exp(-0.5 * (a - b) ** 2)
-    slope = -common * ive(1, a * b)
-    return _share(r, radius, blur), np.asarray(slope), np.asarray(common * ive(0, a * b))
+    slope = -common * i1e(a * b)
+    return _share(r, radius, blur), np.asarray(slope), np.asarray(common * i0e(a * b))
 
 
 def _share(r: Floats, radius: float, blur: float) -> Floats:
@@ -129,7 +132,7 @@ def _share(r: Floats, radius: float, blur: float) -> Floats:
     nodes, width = np.linspace(0.0, last, count, retstep=True)
     a = nodes / blur
     value = chndtr(b * b, 2.0, a * a)
-    by_r = -(b / blur) * np.exp(-0.5 * (a - b) ** 2) * ive(1, a * b) * width
+    by_r = -(b / blur) * np.exp(-0.5 * (a - b) ** 2) * i1e(a * b) * width
     left = np.minimum((r / width).astype(int), count - 2)
     t = r / width - left
     first, second = value[left], value[left + 1]
@@ -188,13 +191,13 @@ def _middle(values: Floats) -> float:
     return float(np.partition(values, len(values) // 2)[len(values) // 2])
 
 
-def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Floats | None:
+def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats, steps: int) -> Floats | None:
     """Levenberg-Marquardt; None if it does not converge."""
     damping, cost = 1e-3, np.inf
     middle = _middle(sigma)
     normal, gradient = np.eye(_UNKNOWNS), np.zeros(_UNKNOWNS)
     best = theta
-    for step_number in range(_STEPS):
+    for step_number in range(steps):
         new_cost, new_normal, new_gradient = _normal_equations(theta, places, grey, sigma)
         if new_cost <= cost:
             gain = cost - new_cost

@@ -132,14 +132,24 @@ class _Image:
     def _tried(self, search: Search, most: int, triples: slice, found: list[Naming]) -> list[Naming]:
         """The best distinct namings after more triples of balls; an overwhelming one ends the search."""
         for triple in spread_triples(self.known.xyz, triples.stop)[triples]:
-            found = self._with(found, search.of_triple(triple, most))
+            hypotheses = search.of_triple(triple, most)
+            found = self._with(found, hypotheses, self._chances(search) + _OVERWHELMING)
             if found and found[0].decades - self._chances(search) > _OVERWHELMING:
                 break
         return found
 
-    def _with(self, found: Sequence[Naming], hypotheses: Sequence[Hypothesis]) -> list[Naming]:
-        refined = (self._refined(hypothesis) for hypothesis in hypotheses)
-        return self._distinct([*found, *(naming for naming in refined if naming)])
+    def _with(self, found: Sequence[Naming], hypotheses: Sequence[Hypothesis], enough: float = np.inf) -> list[Naming]:
+        """The best distinct namings after more hypotheses; one of more than `enough` decades ends it."""
+        more = list(found)
+        for hypothesis in hypotheses:
+            if any(_is_part(hypothesis, naming) for naming in more):
+                continue
+            naming = self._refined(hypothesis)
+            if naming is not None:
+                more.append(naming)
+                if naming.decades > enough:
+                    break
+        return self._distinct(more)
 
     def _with_rivals(self, search: Search, found: list[Naming]) -> list[Naming]:
         """Other namings of the same detections: what is as good as the best one must name some of these three, too."""
@@ -255,6 +265,13 @@ class _Image:
                 "show balls beside it"
             )
         return best_one
+
+
+def _is_part(hypothesis: Hypothesis, naming: Naming) -> bool:
+    """Whether a naming has all names of a hypothesis, which would only lead to it again."""
+    names = dict(zip(naming.points.tolist(), naming.spots.tolist(), strict=True))
+    pairs = zip(hypothesis.points.tolist(), hypothesis.detections.tolist(), strict=True)
+    return all(names.get(point) == spot for point, spot in pairs)
 
 
 def _words(naming: Naming) -> str:

@@ -143,7 +143,7 @@ def orient_images(
     messages += [f"camera {name} of the survey has no image in the log" for name in missing]
     messages += [*notes, *_misfit(orientation)]
     messages += [finding.message for stage in orientation.stages for finding in stage.findings]
-    return _scene(network, orientation, static, failures, messages)
+    return scene_of(network, orientation, static, failures, messages)
 
 
 def _checked(image: StaticImage, camera: Camera, survey: Survey) -> Camera:
@@ -252,13 +252,14 @@ def _misfit(orientation: Orientation) -> list[str]:
     return [line]
 
 
-def _scene(
+def scene_of(
     network: Network,
     orientation: Orientation,
     static: Mapping[str, StaticImage],
     failures: Mapping[str, str],
     messages: Sequence[str],
 ) -> Scene:
+    """The scene of an oriented network with one image of each camera."""
     a = orientation.outcome.adjustment
     unknowns = a.problem.unknowns
     cameras = {

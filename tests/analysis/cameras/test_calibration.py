@@ -111,6 +111,15 @@ def test_a_sigma_makes_an_interior_parameter_uncertain(tmp_path: Path) -> None:
     assert [camera.estimate for camera in survey.network.cameras] == [(), ("c",), ()]
 
 
+def test_a_ball_that_was_moved_is_named(read: Read) -> None:
+    data = json.loads(json.dumps(_poses()))
+    data["points"]["B7"]["X"][2] += 0.05
+    scene = read(data)
+    (line,) = [message for message in scene.messages if "B7" in message]
+    assert line == "ball B7 is not where the calibration has it (cameras K1, K2, K3); it was moved, survey it again"
+    assert "B7" not in scene.balls
+
+
 def _without(camera: str) -> Callable[[dict[str, Any]], None]:
     def spoil(data: dict[str, Any]) -> None:
         del data["images"][camera]

@@ -1,10 +1,12 @@
 """Says whether a measured jump can be trusted, in words for people, with the figures by phase that it rests on."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
+from analysis.measurements.model import POINTS
 from analysis.result.model import (
     CameraMove,
     CameraOffset,
@@ -16,7 +18,8 @@ from analysis.result.model import (
     TakeOff,
     Verdict,
 )
-from analysis.scene.camera_system import CameraSystem
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from rig.arrays import Flags, Floats
 
 #: Share of the pulses in flight in which all points, and both skis, must be measured.
 _MEASURED: Final = 0.5
@@ -26,6 +29,8 @@ _COARSE: Final = 0.25
 _MANY_REMOVED: Final = 0.1
 #: The paper's requirement for coordinates, m (0.2 dm).
 REQUIRED_SIGMA_M: Final = 0.02
+#: A camera that has so many points of the jumper in its images must contribute this share of them.
+_ENOUGH, _FITTING = 20, 0.25
 #: Fewest cameras that must have a point in their image for the pulse to count as in sight.
 _CAMERAS: Final = 2
 
@@ -56,6 +61,7 @@ def judge(
     troubles += [move.message for move in moved]
     if takeoff is None:
         troubles.append("the take-off was not found, so times are counted from the first pulse")
+    troubles += _contradicting(seen, system, tests)
     troubles += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
     troubles += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
     for phase in (Phase.EDGE, Phase.FLIGHT):
@@ -105,16 +111,38 @@ def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
 
 def in_sight(pulse: PulseState, system: CameraSystem) -> bool:
     """Whether all points, measured or predicted, lie within the images of two cameras, as far as they are known."""
-    state = pulse.smoothed or pulse.raw
-    places = [point.xyz for point in state.points.values() if point is not None]
-    if not places:
+    places = _places(pulse)
+    if not len(places):
         return True  # nothing is known: it counts as a pulse that was not solved
-    seen = np.zeros(len(places), int)
-    for placed in system.cameras.values():
-        xy = placed.project(np.array(places))
-        with np.errstate(invalid="ignore"):
-            seen += ((xy >= 0) & (xy <= placed.size - 1)).all(axis=1)
-    return bool((seen >= _CAMERAS).all())
+    seen = sum(_inside(placed, places).astype(int) for placed in system.cameras.values())
+    return bool((np.asarray(seen) >= _CAMERAS).all())
+
+
+def _contradicting(pulses: Sequence[PulseState], system: CameraSystem, tests: Sequence[RayTest]) -> list[str]:
+    """A line for each camera that has the jumper in its image and hardly any point where the others see it."""
+    used = Counter(test.camera for test in tests if not test.removed and test.what in POINTS)
+    lines = []
+    for name, placed in system.cameras.items():
+        there = sum(int(_inside(placed, places).sum()) for pulse in pulses if len(places := _places(pulse)))
+        if there >= _ENOUGH and used[name] < _FITTING * there:
+            lines.append(
+                f"camera {name} has the jumper's points in its images {there} times, and only {used[name]} times where "
+                "the other cameras see them: check its trigger, and whether it was moved"
+            )
+    return lines
+
+
+def _places(pulse: PulseState) -> Floats:
+    """(n, 3) the points of a pulse, measured or predicted."""
+    state = pulse.smoothed or pulse.raw
+    return np.array([point.xyz for point in state.points.values() if point is not None]).reshape(-1, 3)
+
+
+def _inside(placed: PlacedCamera, places: Floats) -> Flags:
+    """(n,) which points lie within a camera's image."""
+    xy = placed.project(places)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((xy >= 0) & (xy <= placed.size - 1)).all(axis=1))
 
 
 def _too_few(of_phase: Mapping[str, Any], what: str, words: str) -> list[str]:

@@ -24,6 +24,9 @@ from rig.arrays import Flags, Floats
 _FREQUENCIES: Final = 128
 #: The slope of the path stands behind `QUANTITIES`; it is a function of the velocity.
 _RATES_AND_PATH: Final = np.append(RATES, True)
+#: Mean square of what the model over time makes of repeated measurements / that by this approximation: the model
+#: estimates how smooth a jump is from the jump itself, so that no two jumps are smoothed quite alike.
+_APPROXIMATE: Final = 1.1
 _LEAST_PATH: Final = 0.01  # of the variance of the angle of attack
 _STIFFNESSES: Final = np.logspace(-4, 9, 131)
 
@@ -46,7 +49,7 @@ def noise_covariance(series: Series) -> Floats:
     blocks = whole.reshape(len(variance), times, len(variance), times)
     blocks[ATTACK] = blocks[PHI] - blocks[count]
     blocks[:, :, ATTACK] = blocks[:, :, PHI] - blocks[:, :, count]
-    return np.asarray(blocks[:count, :, :count].reshape(count * times, count * times))
+    return np.asarray(_APPROXIMATE * blocks[:count, :, :count].reshape(count * times, count * times))
 
 
 def _amplitude(share: Floats, frequencies: Floats) -> Floats:

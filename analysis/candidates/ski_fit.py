@@ -40,6 +40,7 @@ _CAP = 25.0  # squared residuals are counted up to that when explanations are co
 _HOPELESS = 5.0  # residuals over noise of a first explanation that no other start will mend
 _COMPARED = 700  # pixels with which explanations are compared; the best one is adjusted to all
 _UNSEEN = 1e-3  # 1 / px^2: weight of a bar's shift below which a section says nothing about it
+_POINT = 0.03  # px by which the drawn or real border of a ski waves along it
 _AXIS = 0.015  # px by which the middle between the edges of a ski may be off its axis
 _FEWEST = 30  # pixels
 
@@ -244,7 +245,7 @@ class _Fit:
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
-        t, shift, sigma = t[fine], shift[fine], max(1.0, self.misfit) * sigma[fine]
+        t, shift, sigma = t[fine], shift[fine], np.hypot(max(1.0, self.misfit) * sigma[fine], _POINT)
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
         ends = pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across
         contrast = float(np.median(theta[0] - pixels.behind))

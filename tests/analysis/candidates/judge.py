@@ -188,7 +188,7 @@ def _judge_traces(verdict: Verdict, traces: tuple[Trace, ...], lines: dict[str, 
         verdict.skis += inside
         options = []
         for k, trace in enumerate(traces):
-            across, along = _to_line(line, trace.xy)
+            across, along = to_line(line, trace.xy)
             worst = float(np.sqrt(np.mean(across**2)))
             if worst < _NEAR and -0.05 < np.median(along) < 1.05:
                 options.append((worst, k, across, along))
@@ -205,7 +205,7 @@ def _judge_traces(verdict: Verdict, traces: tuple[Trace, ...], lines: dict[str, 
         verdict.turns.append(turn)
 
 
-def _to_line(line: Floats, xy: Floats) -> tuple[Floats, Floats]:
+def to_line(line: Floats, xy: Floats) -> tuple[Floats, Floats]:
     """Distances (n,) of points from a line, and where along it they are, 0 to 1."""
     length = float(np.hypot(*(line[-1] - line[0])))
     u = (line[-1] - line[0]) / length

@@ -1,0 +1,109 @@
+"""Soft discs and bars against images that are drawn without the models."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from analysis.candidates.background import Background, Region
+from analysis.candidates.bar_model import Bar, pixels_around
+from analysis.candidates.bar_model import modelled as model_of_bars
+from analysis.candidates.ski_fit import fit_bars
+from analysis.candidates.soft_discs import fit_soft_discs
+from analysis.scene.static_image import StaticImage
+from rig.arrays import Floats
+from tests.analysis.scene.rendering import Spot, clean_image
+
+NOISE = 2.5
+_PARTS = 8  # of a pixel, along each axis
+
+
+def test_centres_of_streaks_have_sigmas_that_hold() -> None:
+    rng = np.random.default_rng(7)
+    count, pitch = 60, 24
+    places = np.column_stack((np.full(count, 12.0), 12.0 + pitch * np.arange(count))) + rng.uniform(
+        -0.5, 0.5, (count, 2)
+    )
+    half = np.array((0.6, 0.2))  # px of motion, a third of it down
+    discs = [
+        Spot(float(x), float(y), 1.6, 15.0) for xy in places for x, y in xy + np.linspace(-1, 1, 12)[:, None] * half
+    ]
+    clean = clean_image((24, pitch * count), discs, 40.0, 0.6)
+    noisy = (clean + NOISE * rng.standard_normal(clean.shape)).astype(np.float32)
+    fitted = fit_soft_discs(noisy, np.full(clean.shape, NOISE, np.float32), np.rint(places), np.full(count, 1.6))
+    assert fitted.good.all()
+    off = fitted.xy - places
+    squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(fitted.covariance), off) / 2
+    # 120 squares scatter by 2 / sqrt(120) = 0.18 about 1
+    assert 0.55 < squares.mean() < 1.45
+    assert abs(float(np.median(fitted.radius)) - 1.6) < 0.3
+
+
+def test_derivatives_of_bars() -> None:
+    region = _region(np.full((30, 60), 60.0), np.full((30, 60), 60.0))
+    bars = [Bar(np.array(((8.0, 10.0), (50.0, 14.0))), 3.0), Bar(np.array(((10.0, 12.0), (52.0, 15.0))), 3.0)]
+    pixels = pixels_around(region, bars, brighter=True)
+    theta = np.concatenate(([180.0, 0.3, -0.4], *(bar.line(pixels.origin) for bar in bars)))
+    _, design = model_of_bars(pixels, theta)
+    for i in range(len(theta)):
+        step = np.zeros(len(theta))
+        step[i] = 1e-5
+        numeric = (model_of_bars(pixels, theta + step)[0] - model_of_bars(pixels, theta - step)[0]) / 2e-5
+        np.testing.assert_allclose(design[i], numeric, atol=2e-4)
+
+
+def test_two_skis_that_nearly_cover_each_other_are_told_apart() -> None:
+    rng = np.random.default_rng(3)
+    truth = [((8.3, 20.2), (78.0, 17.1)), ((15.1, 21.4), (85.2, 18.6))]
+    clean = np.full((40, 95), 90.0)
+    for a, b in truth:
+        clean += _share(clean.shape, np.array(a), np.array(b), 1.35) * (210.0 - clean)
+    clean = gaussian_filter(clean, 0.55)
+    found = []
+    for _ in range(8):
+        region = _region(clean + NOISE * rng.standard_normal(clean.shape), np.full(clean.shape, 90.0))
+        merged = Bar(np.array(((8.0, 20.5), (85.0, 18.0))), 3.6)
+        apart = [Bar(np.array(((8.0, 19.8), (80.0, 17.5))), 2.7), Bar(np.array(((13.0, 21.2), (85.0, 18.5))), 2.7)]
+        found.append(fit_bars(region, [[merged], apart], brighter=True, points=24))
+    assert [len(bars) for bars in found] == [2] * 8
+    for k, (a, b) in enumerate(truth):
+        for bars in found:
+            u = (np.array(b) - a) / np.hypot(*(np.array(b) - a))
+            off = (bars[k].xy - a) @ np.array((-u[1], u[0]))
+            middle = np.average(off, weights=bars[k].sigma ** -2)
+            assert abs(middle) < 0.1, "px: a thirtieth of the width"
+
+
+def test_changing_light_and_shake_are_no_movement() -> None:
+    rng = np.random.default_rng(5)
+    scene = gaussian_filter(rng.uniform(0, 1, (120, 160)), 3.0)
+    scene = 60 + 100 * (scene - scene.min()) / np.ptp(scene)
+    static = StaticImage("K1", scene.astype(np.float32), np.full(scene.shape, NOISE, np.float32), 31)
+    moved = np.roll(scene, 1, axis=1) * 0.3 + scene * 0.7  # 0.3 px to the right
+    image = 0.75 * moved + 9.0 + NOISE * rng.standard_normal(scene.shape)
+    background = Background(static)
+    assert background.regions(_uint8(image)) == []
+    image[50:64, 70:92] += 40.0
+    (region,) = background.regions(_uint8(image))
+    assert region.holds(np.array((80.0, 57.0)))
+    assert abs(float(np.median(region.noise)) / NOISE - 1) < 0.2
+
+
+def _uint8(image: Floats) -> NDArray[np.uint8]:
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def _region(grey: Floats, behind: Floats) -> Region:
+    sigma = np.full(grey.shape, NOISE, np.float32)
+    front = np.abs(grey - behind) > 4 * NOISE
+    return Region(0, 0, grey.astype(np.float32), behind.astype(np.float32), sigma, sigma, front)
+
+
+def _share(shape: tuple[int, ...], a: Floats, b: Floats, half: float) -> Floats:
+    """Which share of each pixel a rectangle about an axis covers."""
+    steps = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
+    y = (np.arange(shape[0])[:, None] + steps).ravel()[:, None] - a[1]
+    x = (np.arange(shape[1])[:, None] + steps).ravel() - a[0]
+    length = float(np.hypot(*(b - a)))
+    u = (b - a) / length
+    inside = (np.abs(y * u[0] - x * u[1]) < half) & (x * u[0] + y * u[1] > 0) & (x * u[0] + y * u[1] < length)
+    return np.asarray(inside.reshape(shape[0], _PARTS, shape[1], _PARTS).mean(axis=(1, 3)))

@@ -8,7 +8,7 @@ three rays competes fairly with one of two, and a spot counts more where few oth
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,6 +24,7 @@ DECISIVE = 13.8
 DETECTED = 0.9  #: share of the markers in an image that are found as spots
 Strangeness: TypeAlias = dict[tuple[int, int, int, int], float]
 
+_LITTLE = 0.03  #: change of a prediction, in its standard deviations, that changes no assignment
 MOST_OPTIONS = 5  #: of a marker
 MOST_VAGUE_M = 0.35  #: standard deviation of a prediction that is still of use: less than from binding to binding
 
@@ -63,7 +64,13 @@ def well_known(covariance: Floats) -> Flags:
     return np.asarray(np.linalg.eigvalsh(covariance)[..., -1] < MOST_VAGUE_M**2)
 
 
-def assign(views: Views, window: Window, predicted: Prediction, axes: Floats) -> Assigned:
+def assign(
+    views: Views,
+    window: Window,
+    predicted: Prediction,
+    axes: Floats,
+    before: tuple[Prediction, Assigned] | None = None,
+) -> Assigned:
     """Assign the spots of t pulses to markers.
 
     Args:
@@ -71,6 +78,7 @@ def assign(views: Views, window: Window, predicted: Prediction, axes: Floats) ->
         window: the pulses.
         predicted: places of n markers.
         axes: of the flight (`flights.Flight`).
+        before: what was assigned to other predictions; pulses with nearly the same ones keep it.
     """
     steps, n, _ = predicted.xyz.shape
     m = len(views)
@@ -78,7 +86,12 @@ def assign(views: Views, window: Window, predicted: Prediction, axes: Floats) ->
     known = well_known(predicted.covariance)
     sights = [_Sights(views.see(k, predicted.xyz.reshape(-1, 3)), predicted.covariance) for k in range(m)]
     result = Assigned(np.full((steps, n, m), -1), np.full((steps, n, 3), np.nan), np.full((steps, n, 3, 3), np.nan))
+    same = np.zeros(steps, bool) if before is None else _same(before[0], predicted)
     for t, rays in enumerate(window.rays):
+        if before is not None and same[t]:
+            for new, old in zip(_parts(result), _parts(before[1]), strict=True):
+                new[t] = old[t]
+            continue
         points = window.points[t]
         rate = 2 * np.log(2 * np.pi / DETECTED * (1 + np.array([len(r.xy) for r in rays])) / sizes)
         options = [[nothing(m)] for _ in range(n)]
@@ -96,6 +109,18 @@ def assign(views: Views, window: Window, predicted: Prediction, axes: Floats) ->
                 result.xyz[t, i] = points.xyz[option.point]
                 result.covariance[t, i] = points.covariance[option.point]
     return result
+
+
+def _parts(assigned: Assigned) -> tuple[Any, Any, Any]:
+    return assigned.rays, assigned.xyz, assigned.covariance
+
+
+def _same(one: Prediction, other: Prediction) -> Flags:
+    """Pulses (t,) whose predictions differ by little of their accuracy."""
+    sigma = np.sqrt(np.diagonal(other.covariance, axis1=2, axis2=3))
+    ratio = sigma / np.sqrt(np.diagonal(one.covariance, axis1=2, axis2=3))
+    moved = np.abs(one.xyz - other.xyz) / sigma
+    return np.asarray(((moved < _LITTLE) & (np.abs(ratio - 1) < _LITTLE)).all(axis=(1, 2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,6 +218,7 @@ def jointly_best(
     Returns:
         The option of each, and (m,) the images in which a rival is nearly as good.
     """
+    used = [[{(k, s) for k, s in enumerate(o.rays.tolist()) if s >= 0} for o in of_marker] for of_marker in options]
     joint: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
     for i, of_marker in enumerate(options):
         joint = [
@@ -202,7 +228,7 @@ def jointly_best(
             )
             for cost, so_far in joint
             for p, option in enumerate(of_marker)
-            if not any(_share(options[j][q], option) for j, q in enumerate(so_far))
+            if all(used[j][q].isdisjoint(used[i][p]) for j, q in enumerate(so_far))
         ]
     costs = np.array([cost for cost, _ in joint])
     spots = np.array([[options[i][p].rays for i, p in enumerate(picked)] for _, picked in joint])
@@ -217,8 +243,3 @@ def jointly_best(
         elsewhere = ((others == mine) & (mine >= 0)).any(axis=1)
         chosen.append((options[i][p], np.asarray((other_spot | elsewhere).any(axis=0))))
     return chosen
-
-
-def _share(one: Option, other: Option) -> bool:
-    """Whether two options use the same spot."""
-    return bool(((one.rays == other.rays) & (one.rays >= 0)).any())

@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
-from analysis.identification.flights import Flight, find_flights
+from analysis.identification.flights import Flight, find_flights, find_tracks
 from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.ski_traces import StraightTrace, straightened
 from analysis.identification.skis import Skis, follow_skis
 from analysis.identification.space_points import Appearance
 from analysis.identification.synchrony import lateness
-from analysis.identification.tracks import find_tracks
 from analysis.identification.views import Views
 from analysis.identification.window import Window
 from analysis.measurements.model import (

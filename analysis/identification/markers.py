@@ -81,11 +81,13 @@ def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covarian
     """The markers after so many turns that nothing changes; xyz (t, 4, 3) with covariance to begin with."""
     parts = _parts(flight)
     rays = np.full((len(window), len(POINTS), len(views)), -2)
+    before: tuple[Prediction, Assigned] | None = None
     for _ in range(_MOST_TURNS):
         predicted = predict(window.time_s, xyz, covariance, parts, _MIXING)
-        assigned = assign(views, window, predicted, flight.axes)
+        assigned = assign(views, window, predicted, flight.axes, before)
         if (assigned.rays == rays).all():
             break
+        before = predicted, assigned
         rays, xyz, covariance = assigned.rays, assigned.xyz, assigned.covariance
     return Markers(assigned, predicted)
 

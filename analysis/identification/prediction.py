@@ -72,8 +72,26 @@ class _Filter:
         self._jerk = np.array([part.jerk**2 / 0.1 for part in parts])
         self._mean = np.concatenate([np.concatenate((part.begin.ravel(), np.zeros(d))) for part in parts])
         self._sigma = np.concatenate([np.repeat(part.sigma, d) for part in parts])
+        self._movements: dict[float, tuple[Floats, Floats]] = {}
         #: (n d, 3 d p): all things by the state.
         self.all_of = np.kron(mixing, np.kron([[1.0, 0.0, 0.0]], np.eye(d)))
+
+    def _movement(self, dt: float) -> tuple[Floats, Floats]:
+        """What becomes of a state after dt, and the covariance that is added."""
+        if dt not in self._movements:
+            eye, size, sign = np.eye(self._d), abs(dt), float(np.sign(dt))
+            taylor = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+            move = np.kron(np.eye(len(self._jerk)), np.kron(taylor, eye))
+            rows = np.array(
+                [
+                    [size**5 / 20, sign * size**4 / 8, size**3 / 6],
+                    [sign * size**4 / 8, size**3 / 3, sign * size**2 / 2],
+                    [size**3 / 6, sign * size**2 / 2, size],
+                ]
+            )
+            noise = np.kron(np.diag(self._jerk), np.kron(rows, eye))
+            self._movements[dt] = np.asarray(move, float), np.asarray(noise, float)
+        return self._movements[dt]
 
     def run(self, time_s: Floats, xyz: Floats, covariance: Floats) -> tuple[Floats, Floats]:
         """States (t, 3 d p) and their covariances before each pulse's own measurement."""
@@ -104,14 +122,8 @@ class _Filter:
 
     def _moved(self, state: Floats, variance: Floats, dt: float, begun: Flags) -> tuple[Floats, Floats]:
         """State and covariance dt later (earlier where negative); what was not measured yet stays as uncertain."""
-        eye, size, sign = np.eye(self._d), abs(dt), np.sign(dt)
-        move = np.kron(np.eye(len(begun)), np.kron([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]], eye))
-        rows = [
-            [size**5 / 20, sign * size**4 / 8, size**3 / 6],
-            [sign * size**4 / 8, size**3 / 3, sign * size**2 / 2],
-            [size**3 / 6, sign * size**2 / 2, size],
-        ]
-        grown = move @ variance @ move.T + np.kron(np.diag(self._jerk), np.kron(rows, eye))
+        move, noise = self._movement(round(dt, 6))
+        grown = move @ variance @ move.T + noise
         known = np.repeat(begun, 3 * self._d)
         grown = np.where(known[:, None] & known, grown, variance)
         return move @ state, (grown + grown.T) / 2

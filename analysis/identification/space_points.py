@@ -158,7 +158,7 @@ def _epipolar_pairs(views: Views, pulses: Sequence[Sequence[Rays]]) -> tuple[Int
             by_i = ((across_j @ views.ideal[i].R[:, :2]) ** 2).sum(axis=1)
             by_j = ((across_i @ views.ideal[j].R[:, :2]) ** 2).sum(axis=1)
             variance = rays[i].variance[:, None] * by_i + rays[j].variance[:, None].T * by_j[:, None]
-            a, b = np.nonzero(closure**2 < gate(1) * variance)
+            a, b = np.nonzero((closure**2 < gate(1) * variance) & np.isfinite(variance))
             pair = np.full((len(a), m), -1)
             pair[:, i], pair[:, j] = a, b
             found.append(pair)

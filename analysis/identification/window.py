@@ -6,11 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
+from analysis.identification.body import REACH_M
 from analysis.identification.flights import Flight
-from analysis.identification.space_points import Appearance, find_space_points, rays_of
+from analysis.identification.space_points import Appearance, Rays, find_space_points, rays_of
 from analysis.identification.views import Views
 from rig.arrays import Flags, Floats, Integers
 
+_MOST_SPOTS = 60  #: of an image, in the search for a jumper; the strongest of a snowfall
+_REACH = 1.5  #: times a body's length: further from the path nothing belongs to it, even if it is nearer to the camera
 _SAME_PX = 1.0  #: spots that are nearer to each other than this are one
 
 
@@ -50,14 +53,31 @@ class Window:
         self.time_s: Floats = np.array([float(c.pulse) for c in candidates]) / rate_hz
         late = views.late_s if late_s is None else views.late_s + late_s
         self.shift = np.zeros((len(candidates), len(views), 2))
+        self._path = np.full(self.shift.shape, np.nan)
         if flight is not None:
             for k in range(len(views)):
-                by_point = views.see(k, flight.place(self.time_s)).by_point
-                moved = np.einsum("tij,tj->ti", by_point, flight.velocity(self.time_s)) * late[k]
+                sight = views.see(k, flight.place(self.time_s))
+                moved = np.einsum("tij,tj->ti", sight.by_point, flight.velocity(self.time_s)) * late[k]
                 self.shift[:, k] = -np.nan_to_num(moved)
-        self.rays = [rays_of(views, c, appearance, s) for c, s in zip(candidates, self.shift, strict=True)]
+                self._path[:, k] = sight.xy
+        self.rays = [self._rays(t) for t in range(len(self.candidates))]
         self.points = find_space_points(views, self.rays)
         self.delivered: Flags = np.array([[name in c.images for name in views.names] for c in candidates], bool)
+
+    def _rays(self, t: int) -> list[Rays]:
+        """The spots of a pulse; those that no body reaches, or too many to compare, are there but of no use."""
+        rays = rays_of(self._views, self.candidates[t], self._appearance, self.shift[t])
+        for k, (name, of_camera) in enumerate(zip(self._views.names, rays, strict=True)):
+            if self._flight is not None:
+                reach = _REACH * REACH_M * self._views.scale[k]
+                useless = ~(np.linalg.norm(of_camera.xy - self._path[t, k], axis=1) < reach)
+            elif len(of_camera.xy) > _MOST_SPOTS:
+                strength = self.candidates[t].images[name].spots.strength
+                useless = strength < np.sort(strength)[-_MOST_SPOTS]
+            else:
+                continue
+            of_camera.variance[useless] = np.inf
+        return rays
 
     def part(self, chosen: Integers) -> Callable[[Floats], "Window"]:
         """Makes windows of some of its pulses with other times of the cameras, (m,) s as in the constructor."""
@@ -79,7 +99,7 @@ class Window:
                 changed.add(t)
         order = sorted(changed)
         for t in order:
-            self.rays[t] = rays_of(self._views, self.candidates[t], self._appearance, self.shift[t])
+            self.rays[t] = self._rays(t)
         for t, points in zip(order, find_space_points(self._views, [self.rays[t] for t in order]), strict=True):
             self.points[t] = points
         return bool(changed)

@@ -34,9 +34,6 @@ from rig.clocks import NS_PER_S, UtcNs
 
 _FREE_FRAMES: Final = 2.0  #: standard deviation of a camera's lateness before it is known, pulse intervals
 _TRIGGER_S: Final = 20e-6  #: of cameras that obey one trigger
-#: Three nodes of Gauss and Hermite stand for a normal distribution: the middle, and so many sigmas either side.
-_NODE: Final = float(np.sqrt(3.0))
-_SIDE_WEIGHT: Final = 1 / 6
 _STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS, _SCALINGS = 12, 2, 3, 12, 4
 
 
@@ -212,11 +209,11 @@ def _over_takeoff(adjusted: Adjusted, edge: Break | None) -> tuple[Floats, Float
     if edge is None:
         return adjusted.states, solution.covariance, solution.cross
     model = adjusted.model
-    others = [
-        with_prior(adjusted, prior(model.observed.times, model.prior.unit, edge.seconds + node, model.prior.density))
-        for node in (-_NODE * edge.sigma, _NODE * edge.sigma)
-    ]
-    weighted = list(zip((1 - 2 * _SIDE_WEIGHT, _SIDE_WEIGHT, _SIDE_WEIGHT), (adjusted, *others), strict=True))
+    before, after = (
+        with_prior(adjusted, prior(model.observed.times, model.prior.unit, node, model.prior.density))
+        for node in (edge.nodes[0], edge.nodes[2])
+    )
+    weighted = list(zip(edge.weights, (before, adjusted, after), strict=True))
     states = sum(w * a.states for w, a in weighted)
     shared = sum(w * a.shared for w, a in weighted)
     covariance, cross = np.zeros_like(solution.covariance), np.zeros_like(solution.cross)

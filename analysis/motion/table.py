@@ -23,8 +23,9 @@ class TableMotion:
     Attributes:
         direction: (3,) unit vector along the table, in the direction of the motion.
         slope: of the table above the horizontal, degrees (negative: downwards).
-        perpendicular: m/s, velocity of O perpendicular to the table, `EDGE_S` after the take-off, when the skis move
-            with the body, without what gravity has taken since: that of the take-off itself, if the air did nothing.
+        perpendicular: m/s, mean velocity of O perpendicular to the table from half of `EDGE_S` to three halves of it
+            after the take-off, when the skis begin to move with the body, without what gravity has taken until then:
+            about that of the body at the take-off.
     """
 
     direction: Vector
@@ -33,19 +34,22 @@ class TableMotion:
 
 
 def table_motion(adjusted: Adjusted, edge: Break) -> TableMotion | None:
-    """Table and take-off; None where fewer than three pulses lie on the table or none lies behind the edge."""
+    """Table and take-off; None where fewer than three pulses lie on the table, or the sight ends at the edge."""
     times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
     on_table = np.flatnonzero(times < edge.seconds)
-    at = int(np.searchsorted(times, edge.seconds + EDGE_S, side="right")) - 1
-    if len(on_table) < _FEWEST or edge.seconds + EDGE_S > times[-1]:
+    begin, end = edge.seconds + EDGE_S / 2, edge.seconds + 3 * EDGE_S / 2
+    if len(on_table) < _FEWEST or end > times[-1]:
         return None
-    ahead = edge.seconds + EDGE_S - times[at]
     by_states = np.zeros((*adjusted.states.shape, 9))
     centred = times[on_table] - times[on_table].mean()
     for axis in range(3):
         by_states[on_table, axis, axis] = centred / (centred @ centred)
-        by_states[at, CHANNELS + axis, 3 + axis] = 1 / unit
-        by_states[at, 2 * CHANNELS + axis, [3 + axis, 6 + axis]] = (2 * ahead / unit**2, 2 / unit**2)
+    for sign, at in ((-1, begin), (1, end)):
+        for k, share in _around(times, at):
+            value, speed = (sign * share / EDGE_S * row for row in _rows((at - times[k]) / unit))
+            for axis in range(3):
+                by_states[k, axis::CHANNELS, 3 + axis] += value
+                by_states[k, axis::CHANNELS, 6 + axis] += speed / unit
     values = np.einsum("nsf,ns->f", by_states, adjusted.states)
     covariance = adjusted.solution.covariance_of(by_states)
     whole = np.kron(np.eye(3), adjusted.model.frame.rotation)
@@ -61,14 +65,26 @@ def table_motion(adjusted: Adjusted, edge: Break) -> TableMotion | None:
     )
 
 
+def _around(times: Floats, at: float) -> tuple[tuple[int, float], tuple[int, float]]:
+    """The pulses before and after a time, with the share of each in what is between them."""
+    k = min(int(np.searchsorted(times, at, side="right")), len(times) - 1) - 1
+    share = (at - times[k]) / (times[k + 1] - times[k])
+    return (k, 1 - share), (k + 1, share)
+
+
+def _rows(steps: float) -> tuple[Floats, Floats]:
+    """Value and speed (per unit) of a channel after some steps, by its state (3,)."""
+    return np.array((1.0, steps, steps**2)), np.array((0.0, 1.0, 2 * steps))
+
+
 def _results(values: Floats) -> Floats:
     """Direction, slope, perpendicular velocity and its growth with the take-off time.
 
-    From mean velocity on the table, velocity and acceleration behind the edge.
+    From the mean velocities on the table and behind the edge, and the mean acceleration there.
     """
     along = values[:3] / np.linalg.norm(values[:3])
     normal = np.array((0.0, 0.0, 1.0)) - along[2] * along
     normal /= np.linalg.norm(normal)
     perpendicular = values[3:6] @ normal + GRAVITY * EDGE_S * normal[2]
-    growth = values[6:9] @ normal + GRAVITY * normal[2]
+    growth = values[6:9] @ normal
     return np.concatenate((along, (np.arcsin(along[2]), perpendicular, growth)))

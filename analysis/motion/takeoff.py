@@ -17,6 +17,7 @@ from analysis.motion.prior import Prior, prior
 from rig.arrays import Floats
 
 _COARSE_S: Final = 1 / 60  # steps of the search
+_SPREAD, _MOST_LEAN = 3.0, 2.0  # a b and |b - a| of the outer nodes mean - a and mean + b, in sigmas
 _FINE: Final = 41  # times of the final grid
 _SUPPORT: Final = 8.0  # of log-likelihood below the greatest: less likely times do not count
 #: Acceleration of O in the first pulse, m/s^2 (Z up): of a table, and of a flight. Their spread covers any in-run.
@@ -35,10 +36,14 @@ class Break:
     Attributes:
         seconds: its mean.
         sigma: its standard deviation, s.
+        nodes: possible times that with their weights stand for its distribution; the middle one is `seconds`.
+        weights: of the nodes; their sum is 1.
     """
 
     seconds: float
     sigma: float
+    nodes: tuple[float, float, float]
+    weights: tuple[float, float, float]
 
 
 def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
@@ -66,7 +71,8 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
     mean = float(weight @ fine)
     if not first <= mean <= last:
         return None
-    return Break(mean, float(np.sqrt(weight @ (fine - mean) ** 2 + (fine[1] - fine[0]) ** 2 / 12)))
+    sigma = float(np.sqrt(weight @ (fine - mean) ** 2 + (fine[1] - fine[0]) ** 2 / 12))
+    return Break(mean, sigma, *_three_nodes(mean, sigma, float(weight @ (fine - mean) ** 3)))
 
 
 def passing(adjusted: Adjusted, edge: Floats) -> Break | None:
@@ -86,7 +92,22 @@ def passing(adjusted: Adjusted, edge: Floats) -> Break | None:
     speed = states[k, CHANNELS] / unit
     sigma = float(np.sqrt(adjusted.solution.covariance[k, 0, 0])) / speed
     seconds = float(times[k] + ahead[k] / speed)
-    return Break(seconds, sigma)
+    return Break(seconds, sigma, *_three_nodes(seconds, sigma, 0.0))
+
+
+def _three_nodes(
+    mean: float, sigma: float, third: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Mean and two nodes around it that, weighted, have the mean, variance and third moment of a distribution.
+
+    For a normal distribution they are those of Gauss and Hermite: sqrt(3) sigma aside, with a weight of 1/6 each.
+    """
+    lean = float(np.clip(third / sigma**2, -_MOST_LEAN * sigma, _MOST_LEAN * sigma))
+    # Nodes mean - a and mean + b: variance p a^2 + q b^2, third moment q b^3 - p a^3; b - a = lean, a b = 3 sigma^2.
+    a = (-lean + np.sqrt(lean**2 + 4 * _SPREAD * sigma**2)) / 2
+    b = a + lean
+    p, q = sigma**2 / (a * (a + b)), sigma**2 / (b * (a + b))
+    return (mean - a, mean, mean + b), (p, 1 - p - q, q)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

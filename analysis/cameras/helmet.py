@@ -17,7 +17,7 @@ from analysis.scene.orientation import scene_of
 from photogrammetry.geometry.rotation import vector_from_rotation
 from photogrammetry.network.file import pixel_to_metric
 from photogrammetry.network.model import ImageObservations, Network, Point, Role
-from photogrammetry.procedures.orientation import orient
+from photogrammetry.procedures.orientation import Orientation, orient
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
@@ -40,8 +40,8 @@ class HelmetFlight:
 
 def with_helmet(
     scene: OrientedScene, flights: Sequence[HelmetFlight], cameras: Mapping[str, MeasuredCamera], rate_hz: float
-) -> OrientedScene:
-    """The scene, oriented by the balls and the helmet.
+) -> tuple[OrientedScene, Orientation]:
+    """The scene, oriented by the balls and the helmet, and the adjustment.
 
     Args:
         scene: oriented from its own images and a survey.
@@ -69,8 +69,8 @@ def with_helmet(
     notes = [f"{len(places)} places of the helmet tie the images beside the balls"]
     found = [finding.message for stage in orientation.stages for finding in stage.findings]
     notes += [message for message in found if message not in scene.messages]
-    again = scene_of_survey(scene_of(network, orientation, scene.static, {}, (*scene.messages, *notes)))
-    return replace(again, balls={name: ball for name, ball in again.balls.items() if name in scene.balls})
+    again = scene_of_survey(scene_of(network, orientation, scene.static, {}, (*scene.messages, *notes)), scene.given)
+    return replace(again, balls={n: ball for n, ball in again.balls.items() if n in scene.balls}), orientation
 
 
 def _places(

@@ -54,9 +54,10 @@ def test_the_helmet_ties_the_images() -> None:
         cameras = {name: MeasuredCamera(SIZE, 0.004 * (name == "K3")) for name in scene.system.names}
         rng = np.random.default_rng(seed)
         measured = simulated_measurements(true_jump(seed), true_cameras(), rng, late_s={"K3": 0.002})
-        better = with_helmet(scene, [HelmetFlight(measured.jumps[0], scene.system)], cameras, RATE_HZ)
+        better, orientation = with_helmet(scene, [HelmetFlight(measured.jumps[0], scene.system)], cameras, RATE_HZ)
         places = sum(point.name.startswith("H") for point in better.network.points)
         assert places > 20
+        assert orientation.notes[0] == f"alternative 2: {places} moving points tie the images beside the static ones"
         assert better.messages[0] == f"{places} places of the helmet tie the images beside the balls"
         assert set(better.balls) == set(scene.balls)
         ratios.append(np.sqrt(np.diagonal(better.system.covariance) / np.diagonal(scene.system.covariance)))

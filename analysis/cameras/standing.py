@@ -7,7 +7,6 @@ one pose of the jump, and everything after them need not know of the shake.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -146,6 +145,3 @@ def _trace(placed: PlacedCamera, shake: FrameShake, trace: Trace) -> Trace:
 def _common(before: float, added: Floats) -> float:
     """The error that all points of a line share: a turn of the camera moves them all alike."""
     return float(np.sqrt(before**2 + np.trace(added.mean(axis=0)) / 2))
-
-
-NO_SHAKE: Final[Mapping[str, Mapping[PulseNumber, FrameShake]]] = {}  #: of cameras that stood still

@@ -5,15 +5,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.cameras.frames import LogFrames
+from analysis.cameras.helmet import HelmetFlight, with_helmet
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.cameras.source import Source, orient_from
-from analysis.cameras.steadiness import watch
+from analysis.cameras.steadiness import Steadiness, watch
 from analysis.candidates.finder import Finder, find_candidates
 from analysis.jump import ComputedJump, compute_jump
 from analysis.jump_search import find_jumps
 from analysis.log_facts import log_facts
 from analysis.measurements.merging import merged
-from analysis.measurements.model import Measurements
+from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import static_images
@@ -54,6 +55,7 @@ def analyze(
     *,
     by_hand: Measurements | None = None,
     images: bool = True,
+    helmet: bool = False,
     progress: Progress | None = None,
 ) -> Analysis:
     """Measure the jumps of a recording.
@@ -63,6 +65,7 @@ def analyze(
         source: survey of the balls, or poses of the cameras.
         by_hand: measurements that are used beside automatic ones, or instead of them at the same place.
         images: look for the jumper in the images; otherwise `by_hand` is all there is.
+        helmet: let the moving helmet tie the images beside the balls (paper, step 2, alternative 2).
         progress: told what is being done.
 
     Raises:
@@ -89,12 +92,15 @@ def analyze(
         raise NoJumpError(
             f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording"
         )
+    flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
+    if helmet:
+        scene = with_helmet(scene, flights, facts.cameras, facts.rate_hz)
+        steadiness = watch(scene, LogFrames(log))
+        flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
     computed: list[ComputedJump] = []
-    for jump in measurements.jumps:
-        tell("computing", len(computed) / len(measurements.jumps))
-        standing = steadiness.during([pulse.pulse for pulse in jump.pulses])
-        steady = replace(jump, pulses=tuple(standing.measurements(pulse) for pulse in jump.pulses))
-        computed.append(compute_jump(steady, measurements, standing.system))
+    for flight in flights:
+        tell("computing", len(computed) / len(flights))
+        computed.append(compute_jump(flight.measurements, measurements, flight.system))
     result = MeasuredRecording(
         facts.recording,
         facts.session,
@@ -106,6 +112,14 @@ def analyze(
     tell("computing", 1.0)
     perpendicular = {c.jump.number: c.perpendicular for c in computed if c.perpendicular is not None}
     return Analysis(result, measurements, scene, orientation, perpendicular)
+
+
+def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> HelmetFlight:
+    """A jump as it would have been measured in frames that do not shake, and the cameras as they stood in it."""
+    standing = steadiness.during([pulse.pulse for pulse in jump.pulses])
+    return HelmetFlight(
+        replace(jump, pulses=tuple(standing.measurements(pulse) for pulse in jump.pulses)), standing.system
+    )
 
 
 def _synchrony(jumps: list[ComputedJump]) -> dict[str, CameraOffset]:

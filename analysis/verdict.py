@@ -61,7 +61,8 @@ def judge(
     troubles += [move.message for move in moved]
     if takeoff is None:
         troubles.append("the take-off was not found, so times are counted from the first pulse")
-    troubles += _contradicting(seen, system, tests)
+    unexplained = [name for name in system.names if name not in synchrony or synchrony[name].message is None]
+    troubles += _contradicting(seen, {name: system[name] for name in unexplained}, tests)
     troubles += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
     troubles += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
     for phase in (Phase.EDGE, Phase.FLIGHT):
@@ -118,11 +119,13 @@ def in_sight(pulse: PulseState, system: CameraSystem) -> bool:
     return bool((np.asarray(seen) >= _CAMERAS).all())
 
 
-def _contradicting(pulses: Sequence[PulseState], system: CameraSystem, tests: Sequence[RayTest]) -> list[str]:
+def _contradicting(
+    pulses: Sequence[PulseState], cameras: Mapping[str, PlacedCamera], tests: Sequence[RayTest]
+) -> list[str]:
     """A line for each camera that has the jumper in its image and hardly any point where the others see it."""
     used = Counter(test.camera for test in tests if not test.removed and test.what in POINTS)
     lines = []
-    for name, placed in system.cameras.items():
+    for name, placed in cameras.items():
         there = sum(int(_inside(placed, places).sum()) for pulse in pulses if len(places := _places(pulse)))
         if there >= _ENOUGH and used[name] < _FITTING * there:
             lines.append(

@@ -64,8 +64,8 @@ def _said(analysis: Analysis) -> list[str]:
 def _with_camera(name: str, **changes: Any) -> Scenario:
     """The training scenario with another setting of one camera."""
     scenario = scenario_of("training", _SEED)
-    cameras = tuple(c.model_copy(update=changes) if c.name == name else c for c in scenario.cameras)
-    return Scenario.model_validate(scenario.model_dump() | {"cameras": [c.model_dump() for c in cameras]})
+    cameras = [c.model_dump() | (changes if c.name == name else {}) for c in scenario.cameras]
+    return Scenario.model_validate(scenario.model_dump() | {"cameras": cameras})
 
 
 def _late(milliseconds: float) -> Callable[[Path], HillLog]:

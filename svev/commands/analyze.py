@@ -1,5 +1,6 @@
 """`svev analyze`: measures the jumps of a recording."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +18,13 @@ from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE
 from svev.commands.logs import AlsoJson, LogPath
 
 
+class Alternative(StrEnum):
+    """Which points tie the images of the cameras together (paper, step 2)."""
+
+    BALLS = "1"
+    HELMET_TOO = "2"
+
+
 def analyze_command(
     log: LogPath,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="folder for the results")],
@@ -26,6 +34,9 @@ def analyze_command(
     calibration: Annotated[
         Path | None, typer.Option(metavar="POSES.json", help="poses of the cameras, result of svev orient")
     ] = None,
+    alternative: Annotated[
+        Alternative, typer.Option(help="1: balls alone orient the cameras; 2: the moving helmet too")
+    ] = Alternative.BALLS,
     measurements: Annotated[
         Path | None, typer.Option(metavar="FILE", help="compute from these measurements; do not look at the jumper")
     ] = None,
@@ -55,6 +66,7 @@ def analyze_command(
                 source,
                 by_hand=more if by_hand_only is None else by_hand_only,
                 images=by_hand_only is None,
+                helmet=alternative is Alternative.HELMET_TOO,
                 progress=tell,
             )
         except (NotSolvableError, NotConvergedError) as error:

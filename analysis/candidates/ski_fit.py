@@ -40,7 +40,7 @@ _CAP = 25.0  # squared residuals are counted up to that when explanations are co
 _HOPELESS = 5.0  # residuals over noise of a first explanation that no other start will mend
 _COMPARED = 700  # pixels with which explanations are compared; the best one is adjusted to all
 _UNSEEN = 1e-3  # 1 / px^2: weight of a bar's shift below which a section says nothing about it
-_POINT = 0.03  # px by which the drawn or real border of a ski waves along it
+_POINT = 0.012  # of the width: a ski's border waves by that, and it is nearer to the camera at one end
 _AXIS = 0.015  # px by which the middle between the edges of a ski may be off its axis
 _FEWEST = 30  # pixels
 
@@ -241,16 +241,15 @@ class _Fit:
         sections = max(1, int(min(points, (t1 - t0) / _SECTION)))
         place = np.floor((along - t0) / max(1e-9, t1 - t0) * sections).astype(int)
         good = self._good & (place >= 0) & (place < sections)
+        bar = Bar(pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across, 2 * float(np.exp(theta[1])))
         t, shift, sigma = self._shifts(k, good, place[good], along[good], sections)
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
-        t, shift, sigma = t[fine], shift[fine], np.hypot(max(1.0, self.misfit) * sigma[fine], _POINT)
+        t, shift, sigma = t[fine], shift[fine], np.hypot(max(1.0, self.misfit) * sigma[fine], _POINT * bar.width)
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
-        ends = pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across
         contrast = float(np.median(theta[0] - pixels.behind))
         common = float(np.linalg.norm((self._common(k, t, sigma), doubt, _AXIS)))
-        bar = Bar(ends, 2 * float(np.exp(theta[1])))
         return FittedBar(bar, xy, sigma, common, float(theta[0]), contrast, self.misfit)
 
     def _shifts(

@@ -37,6 +37,13 @@ def test_most_skis_have_a_trace(hill: Hill) -> None:
     assert verdict.traced >= 0.75 * verdict.skis > 10
 
 
+def test_numbers_written_into_the_images_are_no_candidates() -> None:
+    stamped = Hill(scenario().model_copy(update={"stamp": True}))
+    for image in stamped.find(85).images.values():
+        assert len(image.spots) == 0
+        assert image.traces == ()
+
+
 def test_nothing_moves_nothing_found(hill: Hill) -> None:
     for image in hill.find(85).images.values():  # between two jumps, with flakes of snow in the air
         assert len(image.spots) == 0

@@ -28,7 +28,7 @@ _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends
 _STRETCH_SPREAD, _SHAPE, _SHAPE_SPREAD = 0.25, 0.3, 0.5  # weak priors
 _SIZE_SPREAD = 0.4  # of log size
 _PENALTY = 3.0  # power of the misfit by which the covariance grows: 2 for noise, more for residuals that lie together
-_STEPS, _ENOUGH = 10, 3e-3  # iterations; px
+_STEPS, _ENOUGH = 7, 5e-3  # iterations; px
 _POOR_START = 0.4  # residuals over contrast, before the first step
 _LARGEST_STEP = 0.4  # of the logarithms
 

@@ -156,8 +156,20 @@ def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
     if np.count_nonzero(inner) < _FEWEST_POINTS:
         return None
     offset = np.array((region.x, region.y), float)
-    xy = fitted.xy[inner] + offset
-    return Trace(xy, fitted.sigma[inner], fitted.common, bar.ends + offset, bar.width, fitted.contrast)
+    xy, sigma = fitted.xy[inner], fitted.sigma[inner]
+    sigma = sigma * _bent(t[inner], (xy - bar.ends[0]) @ np.array((-along[1], along[0])), sigma)
+    return Trace(xy + offset, sigma, fitted.common, bar.ends + offset, bar.width, fitted.contrast)
+
+
+def _bent(t: Floats, off: Floats, sigma: Floats) -> float:
+    """By how much points scatter more about a straight line than their sigmas say; 1 if they do not.
+
+    A line through parts of two skis, of which a body hides the rest, is such a case.
+    """
+    design = np.column_stack((np.ones(len(t)), t)) / sigma[:, None]
+    values = off / sigma
+    v = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    return max(1.0, float(np.sqrt(v @ v / max(1, len(t) - 2))))
 
 
 def _groups(lines: Sequence[_Line]) -> list[list[_Line]]:

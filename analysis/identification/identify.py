@@ -65,14 +65,15 @@ def identify(
 
 def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Flight) -> Appearance:
     """What the spots of a flight look like: most points of its tracks are markers."""
-    contrasts = [
-        candidates[step].images[views.names[k]].spots.contrast[spot]
+    seen = [
+        (spots.contrast[i], spots.radius[i] / views.scale[k])
         for track in flight.tracks
-        for step, spots in zip(track.step.tolist(), track.rays.tolist(), strict=True)
-        for k, spot in enumerate(spots)
-        if spot >= 0
+        for step, rays in zip(track.step.tolist(), track.rays.tolist(), strict=True)
+        for k, i in enumerate(rays)
+        if i >= 0 and (spots := candidates[step].images[views.names[k]].spots)
     ]
-    return Appearance.of(np.array(contrasts))
+    contrasts, radii = np.array(seen).T
+    return Appearance.of(contrasts, radii)
 
 
 def _named(pulse: PulseMeasurements) -> set[str]:

@@ -15,7 +15,8 @@ from photogrammetry.intersection.point_intersection import intersect_points
 from rig.arrays import Floats, Integers
 
 _LIGHT = 0.25  #: standard deviation of a marker's contrast, share of it: light, background and direction change it
-_ODDEST = 16.0  #: a marker may look as odd as this, and no odder: half of it may be in the shade
+_SIZE = 0.35  #: standard deviation of the logarithm of a spot's radius
+_ODDEST = 30.0  #: the greatest chi-square: five standard deviations may have a reason that nobody thought of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,21 +65,30 @@ class Rays:
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """What the markers of a jumper look like: contrast of their spots, grey values."""
+    """What the markers of a jumper look like.
+
+    Attributes:
+        contrast: of their spots, grey values.
+        sigma: standard deviation of it.
+        radius: of their spots, m at the scene's centre.
+    """
 
     contrast: float
     sigma: float
+    radius: float
 
     @classmethod
-    def of(cls, contrasts: Floats) -> "Appearance":
-        """The appearance of spots (n,) most of which are markers."""
+    def of(cls, contrasts: Floats, radii: Floats) -> "Appearance":
+        """The appearance of spots (n,), most of which are markers; radii in m."""
         middle = float(np.median(contrasts))
         spread = 1.48 * float(np.median(np.abs(contrasts - middle)))
-        return cls(middle, max(spread, _LIGHT * abs(middle), 1.0))
+        return cls(middle, max(spread, _LIGHT * abs(middle), 1.0), float(np.median(radii)))
 
-    def odd(self, spots: Spots) -> Floats:
-        """See `Rays.odd`."""
-        return np.minimum(((spots.contrast - self.contrast) / self.sigma) ** 2, _ODDEST)
+    def odd(self, spots: Spots, scale: float) -> Floats:
+        """See `Rays.odd`; scale in px per m."""
+        light = (spots.contrast - self.contrast) / self.sigma
+        size = np.log(np.maximum(spots.radius, 1e-3) / (self.radius * scale)) / _SIZE
+        return np.minimum(light**2 + size**2, _ODDEST)
 
 
 def rays_of(
@@ -106,7 +116,7 @@ def rays_of(
                 spots.covariance,
                 np.where(usable[:, None], reduced, 0.0),
                 np.where(usable, variance, np.inf),
-                np.zeros(len(spots)) if appearance is None else appearance.odd(spots),
+                np.zeros(len(spots)) if appearance is None else appearance.odd(spots, float(views.scale[k])),
             )
         )
     return rays

@@ -97,7 +97,7 @@ def smooth(
     everything = observations(jump, measurements, system)
     measured = np.flatnonzero(everything.seen.any(axis=(1, 2)))
     sight = slice(int(measured[0]), int(measured[-1]) + 1) if len(measured) else slice(0, 0)
-    start = start_values(everything.part(sight), system) if len(measured) else None
+    start = start_values(everything.part(sight), system) if len(measured) >= FEWEST else None
     if start is None:
         return _nothing(jump, f"fewer than {FEWEST} pulses have a point in two cameras: nothing to smooth")
     try:

@@ -165,12 +165,16 @@ def test_synchronous_cameras_raise_no_alarm(clean: tuple[TrueJump, JumpMeasureme
     assert all(offset.sigma_ms < 1.0 for offset in clean[2].offsets.values())
 
 
-def test_a_jump_without_measurements_has_no_states() -> None:
+@pytest.mark.parametrize("measured_pulses", [0, 1, 3])
+def test_a_jump_with_few_measurements_has_no_states(measured_pulses: int) -> None:
     measured = simulated_measurements(true_jump(SEED), true_cameras(), np.random.default_rng(SEED))
-    empty = replace(measured.jumps[0], pulses=tuple(replace(pulse, images={}) for pulse in measured.jumps[0].pulses))
-    motion = smooth(empty, measured, true_cameras())
+    jump = measured.jumps[0]
+    some = range(15, 15 + measured_pulses)
+    pulses = tuple(pulse if k in some else replace(pulse, images={}) for k, pulse in enumerate(jump.pulses))
+    motion = smooth(replace(jump, pulses=pulses), measured, true_cameras())
     assert motion.takeoff is None
     assert set(motion.states) == {None}
+    assert motion.message is not None
 
 
 def test_a_known_edge_gives_the_takeoff() -> None:

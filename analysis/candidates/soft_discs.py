@@ -89,7 +89,7 @@ def fit_soft_discs(
         2 * np.sqrt(np.maximum(spread - _BLUR**2, 0.04)),
         2 * np.arctanh(np.minimum(0.99, np.hypot(theta[:, 3], theta[:, 4]))),
         theta[:, 6],
-        np.sqrt(np.maximum(covariance[:, 6, 6] * factor, 0)),
+        np.sqrt(np.maximum(covariance[:, 6, 6], 0)) * np.maximum(1.0, misfit),
         misfit,
         rms,
         good,

@@ -4,20 +4,23 @@ It is nice to the others: recorder and grabbers come first, and what it misses c
 """
 
 import os
+import re
+import time
 from typing import Final
 
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.live import LiveAnalysis
-from analysis.worker.stream import Source, connected
+from analysis.worker.stream import Source, Stream, connected
 from recorder.publishing.keys import load_keys
 from rig.clocks import UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.jumper import JumperState
 from rig.pulse import PulseNumber
+from rig.settings.model import AnalysisSettings, NetworkSettings, RigSettings
 from rig.topics import JUMPER, JUMPER_SCENE
 from rig.transport.channel import ControlChannel
-from rig.transport.child import begin
+from rig.transport.child import ChildContext, begin
 from rig.transport.messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Quit, TellResult
 
 #: It holds nothing that could be lost.
@@ -58,23 +61,48 @@ def main() -> None:
     child = begin(AnalysisConfig, Quit, _GRACE_S)
     os.nice(_NICE)
     rig = child.config.rig
-    reports = _Reports(child.control)
     if rig.analysis is None:
         raise SystemExit("analysis: the rig file has no [analysis] table")
-    keys = None if rig.network.curve_key_file is None else load_keys(rig.network.curve_key_file)
-    try:
-        exposures = {camera.name: camera.exposure_us / 1e6 for camera in rig.cameras}
-        analysis = LiveAnalysis(rig.analysis.survey, rig.analysis.calibration, reports, exposures)
-    except SvevError as error:
-        reports.message(Level.ERROR, str(error))
-        raise SystemExit(error.exit_code) from None
-    source = Source(rig.network.publish_ipc or rig.network.publish, public_key=None if keys is None else keys.public)
-    with connected(source) as stream:
-        quiet_s = 0.0
-        while not child.stopping():
-            received = stream.next(_WAKE_S)
-            quiet_s = quiet_s + _WAKE_S if received is None else 0.0
-            analysis.idle(quiet_s) if received is None else analysis.take(received)
+    reports = _Reports(child.control)
+    if (analysis := _opened(child, rig, rig.analysis, reports)) is not None:
+        with connected(_source(rig.network)) as stream:
+            _measure(child, stream, analysis)
+
+
+def _opened(
+    child: ChildContext[AnalysisConfig], rig: RigSettings, settings: AnalysisSettings, reports: _Reports
+) -> LiveAnalysis | None:
+    """The analysis with survey or poses; while their file is wrong, says so once and looks at it again and again.
+
+    Returns:
+        None if the process was told to quit meanwhile.
+    """
+    exposures = {camera.name: camera.exposure_us / 1e6 for camera in rig.cameras}
+    said = None
+    while not child.stopping():
+        try:
+            return LiveAnalysis(settings.survey, settings.calibration, reports, exposures)
+        except SvevError as error:
+            if str(error) != said:
+                said = str(error)
+                reports.message(Level.ERROR, f"no jump is measured before this is put right: {said}")
+            time.sleep(_WAKE_S)
+    return None
+
+
+def _source(network: NetworkSettings) -> Source:
+    """Where the recorder of this computer publishes."""
+    address = network.publish_ipc or re.sub(r"^tcp://(\*|0\.0\.0\.0):", "tcp://127.0.0.1:", network.publish)
+    keys = None if network.curve_key_file is None else load_keys(network.curve_key_file)
+    return Source(address, public_key=None if keys is None else keys.public)
+
+
+def _measure(child: ChildContext[AnalysisConfig], stream: Stream, analysis: LiveAnalysis) -> None:
+    quiet_s = 0.0
+    while not child.stopping():
+        received = stream.next(_WAKE_S)
+        quiet_s = quiet_s + _WAKE_S if received is None else 0.0
+        analysis.idle(quiet_s) if received is None else analysis.take(received)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from playwright.sync_api import Page, Route, expect
 
 from rig.errors import StateForbidsError
 from rig.frame import FrameStatus
-from rig.status import Recording, RecordingOrder, State
+from rig.status import LastJump, MeasuredValue, Recording, RecordingOrder, State
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK
 from tests.support.loopback import Loopback
@@ -93,6 +94,49 @@ def test_every_state_has_its_word_and_its_button(
     expect(page.locator("#next-step")).to_have_text(button)
     wanted = expect(page.locator("#next-step"))
     wanted.to_be_enabled() if state is State.FAULT else wanted.to_be_disabled()
+
+
+def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page(panel.url)
+    expect(page.locator("#state-word")).to_have_text("Armed")
+    expect(page.locator("#measured")).to_be_hidden()
+    values = {
+        "takeoff_speed": MeasuredValue(value=26.104, sigma=0.0151),
+        "perpendicular": MeasuredValue(value=2.1085, sigma=0.115),
+        "speed_20_m": MeasuredValue(value=25.489, sigma=0.004),
+        "angle_of_attack": MeasuredValue(value=19.5121, sigma=0.5),
+    }
+    why = "only 3 of 17 pulses show both skis in flight (all points in 32 of 35 pulses in sight)"
+    service.last_jump = LastJump(
+        recording="jump-1", jump=1, time=datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC), ok=False, verdict=why, **values
+    )
+    service._become(State.ARMED)
+    figures = page.locator("#measured-figures > div")
+    expect(figures).to_have_text(
+        [
+            "Take-off speed26.10\u202f±\u202f0.02\u202fm/s",
+            "Perpendicular to the table2.1\u202f±\u202f0.1\u202fm/s",
+            "Speed at 20 m25.489\u202f±\u202f0.004\u202fm/s",
+            "Angle of attack, 0.5 s19.5\u202f±\u202f0.5\u202f°",
+            "Ski to body, 0.5 s\N{EN DASH}",
+        ]
+    )
+    expect(page.locator("#measured-verdict")).to_have_attribute("data-level", "warning")
+    expect(page.locator("#measured-why")).to_have_text(why)
+    service.last_jump = service.last_jump.model_copy(update={"ok": True})
+    norwegian = open_page(panel.url, width=360, height=780, locale="nb-NO")
+    expect(norwegian.locator("#measured-verdict")).to_have_text("Godt målt")
+    expect(norwegian.locator("#measured-why")).to_be_hidden()
+    expect(norwegian.locator("#measured-figures > div").first).to_have_text(
+        "Fart på kanten26,10\u202f±\u202f0,02\u202fm/s"
+    )
+    wide = (
+        "[...document.querySelectorAll('#measured *')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth)"
+    )
+    assert norwegian.evaluate(f"{wide}.map(e => e.outerHTML)") == []
 
 
 def test_a_refusal_is_shown_with_what_to_do(

@@ -24,6 +24,7 @@ from rig.status import (  # fmt: skip
     DoctorReport,
     Event,
     Finding,
+    LastJump,
     Level,
     PrerollStatus,
     ProcessStatus,
@@ -56,6 +57,7 @@ class MemoryService(Archive):
         state: may be set by tests.
         well: what `healthy` says.
         broken: raised by `status`, if set.
+        last_jump: what the analysis measured last, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -65,6 +67,7 @@ class MemoryService(Archive):
         self.state = State.IDLE
         self.well = True
         self.broken: Exception | None = None
+        self.last_jump: LastJump | None = None
         self.preview_calls = 0
         self._since = datetime.now(UTC)
         self._armed_at = time.monotonic()
@@ -100,6 +103,7 @@ class MemoryService(Archive):
                 disk=DiskStatus(free_gb=100.0, reserve_gb=2.0, seconds_left=3500.0, jumps_left=350, jump_s=10.0),
                 recording=self._recording,
                 last_recording=self._last,
+                last_jump=self.last_jump,
                 processes=(ProcessStatus(name="recorder", pid=1),),
             )
 

@@ -92,11 +92,11 @@ export const nb = {
   "camera.reconnects": "koblet til på nytt {count} ×",
 
   "last.title": "Siste hopp",
-  "measured.title": "Målt",
+  "measured.title": "Sist målt",
   "measured.ok": "Godt målt",
   "measured.doubtful": "Usikkert",
   "measured.takeoff_speed": "Fart på kanten",
-  "measured.perpendicular": "På tvers av bordet",
+  "measured.perpendicular": "Vinkelrett på bordet",
   "measured.speed_20_m": "Fart ved 20 m",
   "measured.angle_of_attack": "Angrepsvinkel, 0,5 s",
   "measured.ski_to_body": "Ski mot kropp, 0,5 s",

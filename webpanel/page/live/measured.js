@@ -18,6 +18,7 @@ function drawMeasured() {
   setText($("measured-time"), timeOfDay(jump.time));
   $("measured-verdict").dataset.level = jump.ok ? "good" : "warning";
   setText($("measured-verdict"), jump.ok ? t("measured.ok") : t("measured.doubtful"));
+  $("measured-why").hidden = jump.ok;
   setText($("measured-why"), jump.ok ? "" : jump.verdict);
   fillList($("measured-figures"), [
     [t("measured.takeoff_speed"), withSigma(jump.takeoff_speed, "m/s")],
@@ -29,13 +30,13 @@ function drawMeasured() {
 }
 
 /**
- * A value with its standard deviation, both to the same place: two digits of the standard deviation at most.
+ * A value with its standard deviation, both to the same place: the first digit of the standard deviation.
  *
  * @param {MeasuredValue|null} measured
  * @param {string} unit
  */
 function withSigma(measured, unit) {
   if (!measured) return "–";
-  const digits = measured.sigma >= 1 ? 0 : measured.sigma >= 0.1 ? 1 : 2;
+  const digits = Math.min(4, Math.max(0, -Math.floor(Math.log10(measured.sigma))));
   return `${number(measured.value, digits)}\u202f±\u202f${number(measured.sigma, digits)}\u202f${unit}`;
 }

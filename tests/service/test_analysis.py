@@ -1,0 +1,81 @@
+"""The analysis as a process of `svev serve`: it measures the jumps of a recording, and never harms it."""
+
+import json
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+from recorder.checking.verify import verify
+from recorder.reading.log_reader import LogReader
+from rig.jumper import JumperState
+from rig.topics import JUMPER, JUMPER_SCENE
+from simrig.world.survey import survey
+from tests.analysis.simulated import training
+from tests.capture.rigs import write_rig
+from tests.service.serving import PATIENCE_S, Serving, serving
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+#: A jump needs 9 s: 4 s for the static images, 4 s until it comes, 1 s to be over. The analysis is nice to all others.
+_MEASURED_S = 3 * PATIENCE_S
+
+
+def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopback) -> None:
+    rig, surveyed = write_rig(tmp_path, "sim", loopback), tmp_path / "survey.json"
+    rig.write_text(rig.read_text() + '[analysis]\nsurvey = "survey.json"\n')
+    surveyed.write_text("{}")
+    with serving(tmp_path, rig, loopback) as service:
+        assert service.arm()["last_jump"] is None, "a wrong survey does not prevent recordings"
+        _await_said(service, "no jump is measured before this is put right")
+        surveyed.write_text(json.dumps(survey(training())))
+        recording = service.post("/api/recordings", {"preroll_s": 0.0})["id"]
+        jump, pid = _await_jump(service), service.pids()["analysis"]
+        os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: service.pids()["analysis"] != pid, "a new process", PATIENCE_S, 0.1)
+        assert service.state() == "recording"
+        ended = service.post(f"/api/recordings/{recording}/stop")
+        rows = {row["name"]: row for row in service.get("/api/status")["processes"]}
+        said = service.log.read_text()
+    assert said.count("no jump is measured before this is put right") == 1
+    assert f"jump {jump['jump']} of {recording}: {jump['verdict']}" in said
+    assert rows["analysis"]["restarts"] == 1
+    assert ended["state"] == "finished"
+    _figures_are_true(jump, recording)
+    _results_are_in_the_log(service.data / f"{recording}.mcap", jump)
+
+
+def _await_jump(service: Serving) -> dict[str, Any]:
+    """The first jump whose take-off was recorded; the recording may begin in the middle of one."""
+
+    def measured() -> bool:
+        jump = service.get("/api/status")["last_jump"]
+        return jump is not None and jump["takeoff_speed"] is not None
+
+    wait_until(measured, "a measured jump", _MEASURED_S, 0.1)
+    found: dict[str, Any] = service.get("/api/status")["last_jump"]
+    return found
+
+
+def _figures_are_true(jump: dict[str, Any], recording: str) -> None:
+    """The simulated jumper leaves the table at 26 m/s; pulses have the times that a busy computer gives them."""
+    assert jump["recording"] == recording
+    assert abs(jump["takeoff_speed"]["value"] - 26.1) < 1.0
+    for name in ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body"):
+        assert 0 < jump[name]["sigma"] < 1.0, name
+
+
+def _results_are_in_the_log(log: Path, jump: dict[str, Any]) -> None:
+    assert verify(log).verdict in {"clean", "incomplete"}
+    with LogReader(log) as reader:
+        states = [(m.sequence, JumperState.decode(bytes(m.data or b""))) for m in reader.messages(JUMPER.name)]
+        scenes = [(m.sequence, bytes(m.data or b"")) for m in reader.messages(JUMPER_SCENE.name)]
+    assert len(states) > 20
+    assert [pulse for pulse, _ in scenes] == [pulse for pulse, _ in states] == [state.pulse for _, state in states]
+    assert {state.recording for _, state in states} == {jump["recording"]}
+    assert sum(point is not None for _, state in states for point in state.points.values()) > 2 * len(states)
+    assert min(len(scene) for _, scene in scenes) > 0
+
+
+def _await_said(service: Serving, words: str) -> None:
+    wait_until(lambda: words in service.log.read_text(), f"an event that says: {words}", PATIENCE_S, 0.1)

@@ -15,6 +15,7 @@ import typer.main
 from _pytest.mark.structures import ParameterSet
 from typer.core import TyperGroup
 
+from analysis.scene.survey import read_survey
 from recorder.publishing.keys import make_keys
 from svev import cli
 from tests.service.serving import Serving, serving
@@ -120,6 +121,13 @@ def test_troubleshooting_quotes_the_code() -> None:
         pieces = [re.escape(piece.strip()) for piece in words.split("…") if piece.strip()]
         pattern = re.compile(".*".join(pieces), re.DOTALL)
         assert any(pattern.search(message) for message in messages), words
+
+
+def test_the_survey_of_the_page_on_measuring_is_read(tmp_path: Path) -> None:
+    (example,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "measuring.md").read_text(), re.DOTALL)
+    path = tmp_path / "hill.json"
+    path.write_text(example)
+    assert read_survey(path).surveyed().names == ("B1", "B2", "B3", "B4")
 
 
 @pytest.fixture(scope="module")

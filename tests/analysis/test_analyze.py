@@ -1,6 +1,8 @@
 """`svev analyze` and `svev worker` on a rendered jump: what they measure is true, and what they cannot, they say."""
 
+import functools
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,8 @@ import numpy as np
 import pytest
 import zmq
 
+from analysis.analyze import analyze
+from analysis.measurements.file import read_measurements
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from tests.analysis.simulated import training
 from tests.support.loopback import Loopback
@@ -30,7 +34,9 @@ def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[s
     return done
 
 
-def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(jump: HillLog, tmp_path: Path) -> None:
+def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(
+    jump: HillLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "result"
     summary = json.loads(svev("analyze", jump.path, "--survey", jump.survey, "--out", out, "--json").stdout)
     result = json.loads((out / "jumper.json").read_text())
@@ -46,6 +52,7 @@ def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(jump: HillLog
     assert {Path(file).name for file in summary["files"]} == names
     assert all((out / name).stat().st_size > 100 for name in names)
     _the_same_from_the_measurements(jump, out, tmp_path / "again")
+    _the_example_of_the_documentation_runs(jump, out, tmp_path / "documented", monkeypatch, capsys)
 
 
 def _points_are_true(measured: dict[str, Any], truth: dict[int, dict[str, Any]]) -> None:
@@ -87,6 +94,19 @@ def _the_same_from_the_measurements(jump: HillLog, out: Path, again: Path) -> No
         assert (before["points"]["P1"] is None) == (after["points"]["P1"] is None)
         if before["points"]["P1"] is not None:
             assert after["points"]["P1"]["X"] == pytest.approx(before["points"]["P1"]["X"], abs=1e-4)
+
+
+def _the_example_of_the_documentation_runs(
+    jump: HillLog, out: Path, again: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As it stands there, except that it does not look for the jumper once more."""
+    page = Path(__file__).resolve().parents[2] / "docs" / "measuring.md"
+    (example,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    known = functools.partial(analyze, by_hand=read_measurements(out / "measurements.json"), images=False)
+    monkeypatch.setattr("analysis.analyze.analyze", known)
+    exec(example, {"LOG": str(jump.path), "SURVEY": str(jump.survey), "OUT": str(again)})  # noqa: S102
+    assert "1 measured well" in capsys.readouterr().out
+    assert (again / "report.html").exists()
 
 
 def test_what_cannot_be_measured_is_said_in_one_line(jump: HillLog, tmp_path: Path) -> None:

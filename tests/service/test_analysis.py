@@ -58,7 +58,7 @@ def _await_jump(service: Serving) -> dict[str, Any]:
 
 
 def _figures_are_true(jump: dict[str, Any], recording: str) -> None:
-    """The simulated jumper leaves the table at 26 m/s; pulses have the times that a busy computer gives them."""
+    """The simulated jumpers leave the table at about 26 m/s, each at a speed of his own."""
     assert jump["recording"] == recording
     assert abs(jump["takeoff_speed"]["value"] - 26.1) < 1.0
     for name in ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body"):

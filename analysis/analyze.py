@@ -94,8 +94,8 @@ def analyze(
         )
     flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
     if helmet:
-        scene = with_helmet(scene, flights, facts.cameras, facts.rate_hz)
-        steadiness = watch(scene, LogFrames(log))
+        scene, orientation = with_helmet(scene, flights, facts.cameras, facts.rate_hz)
+        steadiness = steadiness.with_scene(scene)
         flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
     computed: list[ComputedJump] = []
     for flight in flights:

@@ -15,6 +15,8 @@ from rig.arrays import Flags, Floats
 
 #: Probability that cameras without fault give any alarm.
 FALSE_ALARM_P: Final = 0.002
+#: What is less than this is no fault of a trigger: 3 mm of the jumper's way, much less than exposures differ by.
+_LEAST_S: Final = 1e-4
 _MS = 1e3
 
 
@@ -59,7 +61,7 @@ def judged(
         contrast[others] = -_weights(covariance, others)
         value, sigma = float(contrast @ lateness), float(np.sqrt(contrast @ covariance @ contrast))
         relative[i] = value
-        late[i] = i not in reference and abs(value) > limit * sigma
+        late[i] = i not in reference and abs(value) > max(limit * sigma, _LEAST_S)
         message = _message(name, [names[k] for k in others], value, interval) if late[i] else None
         offsets[name] = CameraOffset(value * _MS, sigma * _MS, message)
     return Synchrony(offsets, late, relative)

@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from analysis.analyze import analyze
 from analysis.cameras.source import read_source
+from analysis.procedure.analyze import analyze
+from analysis.procedure.result_folder import write_folder
 from analysis.report.figures import EARLY_S, plus_minus
 from analysis.result.model import Jump, PulseState, Quantity, SmoothedState
-from analysis.result_folder import write_folder
 from recorder.log.truth_path import truth_path
 from rig.errors import NoJumpError
 from rig.settings.model import RigSettings
@@ -63,7 +63,7 @@ def measure(log: Path, rig: RigSettings, say: Callable[[str], None]) -> dict[str
         Paths, and for each jump figures with their truth; a message alone if nobody jumps in the log.
 
     Raises:
-        SvevError: as `analysis.analyze.analyze`.
+        SvevError: as `analysis.procedure.analyze.analyze`.
     """
     if rig.simulation is None:
         raise ValueError("only the simulated hill has a survey of its own")

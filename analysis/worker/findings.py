@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Protocol
 
-from analysis.jump import ComputedJump
+from analysis.procedure.jump import ComputedJump
 from analysis.report.course import course_of
 from analysis.report.figures import EARLY_S, FAR_M
 from analysis.result.model import MeasuredRecording, Quantity

@@ -20,8 +20,8 @@ from analysis.candidates.finder import Finder
 from analysis.candidates.model import PulseCandidates
 from analysis.export.scene_update import scene_update
 from analysis.identification.identify import identify
-from analysis.jump import compute_jump
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements
+from analysis.procedure.jump import compute_jump
 from analysis.pulses.solution import solve_pulses
 from analysis.result.model import MeasuredRecording
 from analysis.scene.static_image import StaticImage, static_image

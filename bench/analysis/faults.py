@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from analysis.analyze import Analysis, analyze
 from analysis.cameras.source import read_source
+from analysis.procedure.analyze import Analysis, analyze
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.analysis.judge import Judged
 from bench.analysis.jumps import PULSES, scenario_of

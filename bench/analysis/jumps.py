@@ -8,8 +8,8 @@ from typing import Any
 
 import cv2
 
-from analysis.analyze import analyze
 from analysis.cameras.source import read_source
+from analysis.procedure.analyze import analyze
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.analysis.judge import Judged
 from recorder.reading.triplets import triplets

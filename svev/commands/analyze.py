@@ -6,12 +6,12 @@ from typing import Annotated, Any
 
 import typer
 
-from analysis.analyze import Analysis, analyze
 from analysis.cameras.source import read_source
 from analysis.measurements.file import read_measurements
+from analysis.procedure.analyze import Analysis, analyze
+from analysis.procedure.result_folder import write_folder
 from analysis.report.course import course_of
 from analysis.report.figures import five_figures, plus_minus
-from analysis.result_folder import write_folder
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
 from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import zmq
 
-from analysis.analyze import analyze
 from analysis.measurements.file import read_measurements
+from analysis.procedure.analyze import analyze
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from tests.analysis.simulated import training
 from tests.support.loopback import Loopback
@@ -103,7 +103,7 @@ def _the_example_of_the_documentation_runs(
     page = Path(__file__).resolve().parents[2] / "docs" / "measuring.md"
     (example,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     known = functools.partial(analyze, by_hand=read_measurements(out / "measurements.json"), images=False)
-    monkeypatch.setattr("analysis.analyze.analyze", known)
+    monkeypatch.setattr("analysis.procedure.analyze.analyze", known)
     exec(example, {"LOG": str(jump.path), "SURVEY": str(jump.survey), "OUT": str(again)})  # noqa: S102
     assert "1 measured well" in capsys.readouterr().out
     assert (again / "report.html").exists()

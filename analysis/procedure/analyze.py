@@ -10,11 +10,11 @@ from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.cameras.source import Source, orient_from
 from analysis.cameras.steadiness import Steadiness, watch
 from analysis.candidates.finder import Finder, find_candidates
-from analysis.jump import ComputedJump, compute_jump
-from analysis.jump_search import find_jumps
-from analysis.log_facts import log_facts
 from analysis.measurements.merging import merged
 from analysis.measurements.model import JumpMeasurements, Measurements
+from analysis.procedure.jump import ComputedJump, compute_jump
+from analysis.procedure.jump_search import find_jumps
+from analysis.procedure.log_facts import log_facts
 from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import static_images

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from analysis.analyze import Analysis
 from analysis.export import motion_files
 from analysis.measurements.file import write_measurements
+from analysis.procedure.analyze import Analysis
 from analysis.report.coach import write_report
 from analysis.report.protocol import write_protocol
 from analysis.report.video import write_video

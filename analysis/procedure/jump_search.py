@@ -14,8 +14,8 @@ from analysis.cameras.pose_change import changed
 from analysis.cameras.steadiness import Steadiness
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook
 from analysis.identification.identify import identify
-from analysis.log_facts import LogFacts
 from analysis.measurements.model import JumpMeasurements
+from analysis.procedure.log_facts import LogFacts
 
 #: Pulses around a jump in which it is looked for again, s.
 _AROUND_S = 0.5

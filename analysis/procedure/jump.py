@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.motion.smoother import Motion, smooth
+from analysis.procedure.verdict import judge
 from analysis.pulses.solution import RawJump, solve_pulses
 from analysis.result.model import CameraMove, CameraOffset, Jump, PulseState, Quantity, TakeOff, phase_at
 from analysis.scene.camera_system import CameraSystem
-from analysis.verdict import judge
 from rig.clocks import NS_PER_S, UtcNs
 
 

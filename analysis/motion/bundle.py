@@ -156,18 +156,23 @@ def fitting_sigmas(adjusted: Adjusted, most: int) -> tuple[Adjusted, Floats]:
 
 
 def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
-    """Leave out measurements that contradict all others, the worst around first; take back those that no longer do."""
+    """Leave out measurements that contradict all others, the worst around first; take back those that no longer do.
+
+    Where two of a point's rays had to go and a single one is left, nothing tells that it is the right one: it goes too.
+    """
     seen = adjusted.model.observed.seen
     limit = float(chi2.isf(FALSE_REMOVAL_P / max(int(seen.sum()), 1), 2))
+    doubtful = np.zeros((len(seen), 1, 6), bool)
     for _ in range(most):
         tests = statistics(adjusted).test
         worst = np.where(adjusted.used, tests, 0.0).max(axis=(1, 2))
         around = np.lib.stride_tricks.sliding_window_view(np.pad(worst, 1), 3).max(axis=1)
         leave = adjusted.used & (tests > limit) & (tests >= around[:, None, None])
-        back = seen & ~adjusted.used & (tests < limit)
-        if not (leave | back).any():
+        kept = adjusted.used & ~leave
+        doubtful |= (kept.sum(axis=1, keepdims=True) == 1) & ((seen & ~kept).sum(axis=1, keepdims=True) >= 2)
+        used = (kept | (seen & ~adjusted.used & (tests < limit))) & ~doubtful
+        if (used == adjusted.used).all():
             return adjusted
-        used = (adjusted.used & ~leave) | back
         adjusted = settled(replace(adjusted, used=used), 2)
     return adjusted
 

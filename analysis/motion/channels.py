@@ -28,7 +28,11 @@ _SKI_WEIGHTS: Final = np.array((((1, 0.5, 0, 0), (0, 0, 1, -0.5)), ((1, -0.5, 0,
 #: channel in the first pulse. They are wide and matter only where nothing was measured.
 START_MEAN: Final = np.array((0, 0, 0, 0, 0, 0.8, 0.3, 0, 0.5, 0, 0.3, 0, 0, 0, 0, 0), float)
 START_SIGMA: Final = np.array(
-    ([100.0] * 3 + [1.0] * 9 + [1.0] * 4, [50.0] * 3 + [5.0] * 9 + [10.0] * 4, [30.0] * 3 + [50.0] * 9 + [100.0] * 4)
+    (
+        [100.0] * 3 + [1.0] * 9 + [1.0] * 4,
+        [50.0, 5.0, 20.0] + [5.0] * 9 + [10.0] * 4,  # the frame's X is along the motion
+        [10.0, 5.0, 10.0] + [50.0] * 9 + [100.0] * 4,  # g, and half of it across
+    )
 )
 
 

@@ -23,7 +23,7 @@ _SUPPORT: Final = 8.0  # of log-likelihood below the greatest: less likely times
 #: Acceleration of O in the first pulse, m/s^2 (Z up): of a table, and of a flight. Their spread covers any in-run.
 _ON_TABLE: Final = (np.array((0.0, 0.0, 0.0)), np.array((5.0, 3.0, 3.0)))
 _IN_FLIGHT: Final = (np.array((-2.0, 0.0, -6.0)), np.array((3.0, 3.0, 3.0)))
-_AT_END: Final = 2.0  # pulses: a break nearer to the ends of the sight is none
+_AT_END: Final = 2.0  # pulses: a break nearer to the first or last intersected binding is none
 _LOOSE: Final = 1e4  # m or rad: weak weight that keeps undetermined pulses solvable
 #: Channels that the table guides: O and the slope of the skis.
 _SELECTED: Final = (*range(ORIGIN.start, ORIGIN.stop), SLOPE)
@@ -55,10 +55,10 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
     """
     times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
     path = _path(adjusted)
-    first, last = times[0] + _AT_END * unit, times[-1] - _AT_END * unit
-    coarse = np.arange(first, last, max(_COARSE_S, unit / 2))
-    if not len(coarse):
-        return None
+    bindings = (adjusted.used[:, :, 2:4].sum(axis=1) >= 2).any(axis=1)
+    known = times[bindings] if bindings.any() else times
+    first, last = known[0] + _AT_END * unit, known[-1] - _AT_END * unit
+    coarse = np.arange(times[0], times[-1], max(_COARSE_S, unit / 2))
     likelihood = _log_likelihood(path, times, [prior(times, unit, t, densities) for t in coarse], _ON_TABLE)
     if likelihood.max() < _without(path, times, unit, densities):
         return None

@@ -169,8 +169,9 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
         around = np.lib.stride_tricks.sliding_window_view(np.pad(worst, 1), 3).max(axis=1)
         leave = adjusted.used & (tests > limit) & (tests >= around[:, None, None])
         kept = adjusted.used & ~leave
-        doubtful |= (kept.sum(axis=1, keepdims=True) == 1) & ((seen & ~kept).sum(axis=1, keepdims=True) >= 2)
-        used = (kept | (seen & ~adjusted.used & (tests < limit))) & ~doubtful
+        used = kept | (seen & ~adjusted.used & (tests < limit))
+        doubtful |= (used.sum(axis=1, keepdims=True) == 1) & ((seen & ~used).sum(axis=1, keepdims=True) >= 2)
+        used &= ~doubtful
         if (used == adjusted.used).all():
             return adjusted
         adjusted = settled(replace(adjusted, used=used), 2)

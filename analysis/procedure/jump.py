@@ -41,7 +41,8 @@ def compute_jump(
     raw = solve_pulses(jump, measurements, system)
     motion = smooth(jump, measurements, system)
     pulses = _pulse_states(jump, measurements, raw, motion)
-    verdict = judge(pulses, system, motion.takeoff, raw.tests, motion.offsets, moved)
+    troubles = [motion.message] if motion.message else []
+    verdict = judge(pulses, system, motion.takeoff, raw.tests, motion.offsets, moved, troubles, motion.scale)
     return ComputedJump(
         Jump(jump.number, motion.takeoff, verdict, pulses, raw.tests),
         motion.offsets,

@@ -52,6 +52,10 @@ def log_facts(path: Path) -> LogFacts:
     tags = about.first.cameras
     unknown = [tag.name for tag in tags if tag.name not in exposures]
     messages = [f"exposure time of {', '.join(unknown)} is unknown: taken as {_EXPOSURE_US:g} us"] if unknown else []
+    if about.truncated or not about.closed:
+        messages.append(
+            "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"
+        )
     rows = about.first.shape[0]
     cameras = {
         tag.name: MeasuredCamera((tag.columns[1] - tag.columns[0], rows), exposures.get(tag.name, _EXPOSURE_US) / 1e6)

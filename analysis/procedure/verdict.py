@@ -31,6 +31,8 @@ _MANY_REMOVED: Final = 0.1
 REQUIRED_SIGMA_M: Final = 0.02
 #: A camera that has so many points of the jumper in its images must contribute this share of them.
 _ENOUGH, _FITTING = 20, 0.25
+#: Sigmas in the images that had to be enlarged by more than this are mentioned.
+_ENLARGED: Final = 1.2
 #: Fewest cameras that must have a point in their image for the pulse to count as in sight.
 _CAMERAS: Final = 2
 
@@ -44,6 +46,8 @@ def judge(
     tests: Sequence[RayTest],
     synchrony: Mapping[str, CameraOffset],
     moved: Iterable[CameraMove] = (),
+    troubles: Iterable[str] = (),
+    scale: Mapping[str, float] | None = None,
 ) -> Verdict:
     """The verdict on a jump.
 
@@ -54,32 +58,38 @@ def judge(
         tests: of all rays.
         synchrony: by camera.
         moved: cameras that moved and whose pose was not corrected for it.
+        troubles: what else speaks against the jump, one line each.
+        scale: by what factors the sigmas of points and skis in the images were too small; they were enlarged.
     """
+    found = [*troubles]
     seen = [pulse for pulse in pulses if in_sight(pulse, system)]
     phases = {phase: figures([pulse for pulse in seen if pulse.phase is phase]) for phase in Phase}
-    troubles = [offset.message for offset in synchrony.values() if offset.message is not None]
-    troubles += [move.message for move in moved]
+    found += [offset.message for offset in synchrony.values() if offset.message is not None]
+    found += [move.message for move in moved]
     if takeoff is None:
-        troubles.append("the take-off was not found, so times are counted from the first pulse")
+        found.append("the take-off was not found, so times are counted from the first pulse")
     unexplained = [name for name in system.names if name not in synchrony or synchrony[name].message is None]
-    troubles += _contradicting(seen, {name: system[name] for name in unexplained}, tests)
-    troubles += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
-    troubles += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
+    found += _contradicting(seen, {name: system[name] for name in unexplained}, tests)
+    found += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
+    found += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
     for phase in (Phase.EDGE, Phase.FLIGHT):
         coarse, count = phases[phase]["coarse"], phases[phase]["pulses"]
         if coarse > _COARSE * count:
-            troubles.append(
+            found.append(
                 f"in {coarse} of {count} pulses {_WORDS[phase]} a point is uncertain by more than {REQUIRED_SIGMA_M} m"
             )
     removed = sum(test.removed for test in tests)
     if tests and removed > _MANY_REMOVED * len(tests):
-        troubles.append(f"{removed} of {len(tests)} rays were taken out as gross errors; see the protocol")
+        found.append(f"{removed} of {len(tests)} rays were taken out as gross errors; see the protocol")
     if not seen:
-        troubles.append("the jumper is never in sight of two cameras")
+        found.append("the jumper is never in sight of two cameras")
     points = sum(of_phase["points"] for of_phase in phases.values())
     counted = f"all points in {points} of {len(seen)} pulses in sight"
-    message = f"{'; '.join(troubles)} ({counted})" if troubles else f"measured well: {counted}"
-    return Verdict(not troubles, message, phases)
+    enlarged = [f"{what} {factor:.1f} times" for what, factor in (scale or {}).items() if factor > _ENLARGED]
+    if enlarged:
+        counted += f"; sigmas in the images were too small and are enlarged: {', '.join(enlarged)}"
+    message = f"{'; '.join(found)} ({counted})" if found else f"measured well: {counted}"
+    return Verdict(not found, message, phases)
 
 
 def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:

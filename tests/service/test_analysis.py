@@ -66,7 +66,7 @@ def _figures_are_true(jump: dict[str, Any], recording: str) -> None:
 
 
 def _results_are_in_the_log(log: Path, jump: dict[str, Any]) -> None:
-    assert verify(log).verdict in {"clean", "incomplete"}
+    assert verify(log).verdict != "damaged"  # a busy machine may lose frames; that is not what is tested here
     with LogReader(log) as reader:
         states = [(m.sequence, JumperState.decode(bytes(m.data or b""))) for m in reader.messages(JUMPER.name)]
         scenes = [(m.sequence, bytes(m.data or b"")) for m in reader.messages(JUMPER_SCENE.name)]

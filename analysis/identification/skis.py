@@ -26,6 +26,7 @@ from analysis.identification.ski_traces import Equations, SeenSkis, StraightTrac
 from analysis.identification.views import Views, gate
 from analysis.identification.window import Window
 from analysis.measurements.model import SIDES
+from photogrammetry.jumper.stick_model import slope_and_heading
 from rig.arrays import Flags, Floats, Integers
 
 #: Slope and heading of skis against the horizontal direction of the flight, rad: standard deviations.
@@ -250,7 +251,7 @@ class _Search:
         local = values[..., 3:] @ self._flight.axes.T
         x, y, z = np.moveaxis(local, -1, 0)
         level = np.hypot(x, y)
-        angles = np.stack((np.arctan2(z, level), np.arctan2(y, x)), axis=-1)
+        angles = slope_and_heading(local)
         square = level**2 + z**2
         by_slope = np.stack((-z * x / level, -z * y / level, level), axis=-1) / square[..., None]
         by_heading = np.stack((-y, x, np.zeros_like(x)), axis=-1) / (level**2)[..., None]

@@ -9,7 +9,7 @@ from analysis.motion.channels import CHANNELS, START_MEAN, VECTORS, MotionFrame,
 from analysis.motion.observations import Observations
 from analysis.scene.camera_system import CameraSystem
 from photogrammetry.intersection.point_intersection import intersect_points
-from photogrammetry.jumper.stick_model import slope
+from photogrammetry.jumper.stick_model import slope_and_heading
 from rig.arrays import Flags, Floats
 
 _LATEST_FRAMES: Final = 2.0  #: a camera's lateness is searched so far either way
@@ -172,7 +172,7 @@ def _ski(observed: Observations, system: CameraSystem, frame: MotionFrame, side:
     values, vectors = np.linalg.eigh(np.einsum("nmi,nmj->nij", normals, normals))
     direction = vectors[:, :, 0] @ frame.rotation
     direction = direction * np.where(direction[:, :1] < 0, -1.0, 1.0)
-    both = np.stack((slope(direction), np.arctan2(direction[:, 1], direction[:, 0])), axis=1)
+    both = slope_and_heading(direction)
     return np.where((values[:, 1] > _MIN_ANGLE**2)[:, None], both, np.nan)
 
 

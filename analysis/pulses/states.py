@@ -16,8 +16,7 @@ from analysis.pulses.skis import across_axes
 from analysis.pulses.travel import speeds, way_ahead
 from analysis.result.model import JumperState, PointState, Quantity, SkiState, Status
 from analysis.scene.camera_system import CameraSystem
-from photogrammetry.jumper.stick_model import ANGLES, body_angles
-from photogrammetry.jumper.stick_model import slope as slope_of
+from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope_and_heading
 from rig.arrays import Flags, Floats, Integers
 
 _STEP = 1e-6  # of numerical derivatives, m and rad: errors of 1e-9 of them
@@ -80,7 +79,10 @@ def jumper_states(solved: Solved, pulses: Integers, times: Floats, system: Camer
     joint = _joint(solved, times, system.covariance)
     covariance = joint.covariance
     angles = _with_sigma(_angles, joint.values, covariance)
-    courses = [_with_sigma(_course, joint.values[:, i : i + 3], covariance[:, i : i + 3, i : i + 3]) for i in (12, 15)]
+    courses = [
+        _with_sigma(slope_and_heading, joint.values[:, i : i + 3], covariance[:, i : i + 3, i : i + 3])
+        for i in (12, 15)
+    ]
     mean = np.zeros((3, 18))
     mean[:, 6:9] = mean[:, 9:12] = np.eye(3) / 2
     origin = joint.values[:, 6:12].reshape(-1, 2, 3).mean(axis=1)
@@ -136,11 +138,6 @@ def _angles(values: Floats) -> Floats:
     """Angles (..., 5) of vectors (..., 18), rad."""
     helmet, hip, right, left, right_ski, left_ski = (values[..., i : i + 3] for i in range(0, 18, 3))
     return body_angles(helmet, hip, (right + left) / 2, right_ski, left_ski)
-
-
-def _course(direction: Floats) -> Floats:
-    """Slope and heading (..., 2) of directions (..., 3), rad."""
-    return np.stack((slope_of(direction), np.arctan2(direction[..., 1], direction[..., 0])), axis=-1)
 
 
 def _with_sigma(function: Callable[[Floats], Floats], values: Floats, covariance: Floats) -> tuple[Floats, Floats]:

@@ -48,9 +48,14 @@ def slope(direction: Floats) -> Floats:
     return np.asarray(np.arctan2(direction[..., 2], np.hypot(direction[..., 0], direction[..., 1])))
 
 
-def direction_of(slope_and_heading: Floats) -> Floats:
-    """Unit vectors (..., 3) of slope and heading (..., 2), rad; heading counts from X towards Y."""
-    up, aside = slope_and_heading[..., 0], slope_and_heading[..., 1]
+def slope_and_heading(direction: Floats) -> Floats:
+    """Slope above the horizontal, and heading from X towards Y, of directions (..., 3): (..., 2) rad."""
+    return np.stack((slope(direction), np.arctan2(direction[..., 1], direction[..., 0])), axis=-1)
+
+
+def direction_of(angles: Floats) -> Floats:
+    """Unit vectors (..., 3) of slope and heading (..., 2), rad; the inverse of `slope_and_heading`."""
+    up, aside = angles[..., 0], angles[..., 1]
     return np.stack((np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1)
 
 

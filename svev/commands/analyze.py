@@ -14,7 +14,7 @@ from analysis.report.course import course_of
 from analysis.report.figures import five_figures, plus_minus
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
-from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE
+from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE, PosesOption, SurveyOption
 from svev.commands.logs import AlsoJson, LogPath
 
 
@@ -28,12 +28,8 @@ class Alternative(StrEnum):
 def analyze_command(
     log: LogPath,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="folder for the results")],
-    survey: Annotated[
-        Path | None, typer.Option(metavar="SURVEY.json", help="survey of the balls with interior orientations")
-    ] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(metavar="POSES.json", help="poses of the cameras, result of svev orient")
-    ] = None,
+    survey: SurveyOption = None,
+    calibration: PosesOption = None,
     alternative: Annotated[
         Alternative, typer.Option(help="1: balls alone orient the cameras; 2: the moving helmet too")
     ] = Alternative.BALLS,

@@ -17,6 +17,12 @@ from svev import console
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")]
 ReportOption = Annotated[Path | None, typer.Option("--report", help="folder for the report, as text and as a page")]
 JsonOption = Annotated[bool, typer.Option("--json", help="end with one JSON object: the result without its lists")]
+SurveyOption = Annotated[
+    Path | None, typer.Option("--survey", metavar="SURVEY.json", help="survey of the balls with interior orientations")
+]
+PosesOption = Annotated[
+    Path | None, typer.Option("--calibration", metavar="POSES.json", help="poses of the cameras, result of svev orient")
+]
 ReweightOption = Annotated[
     bool,
     typer.Option(

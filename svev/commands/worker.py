@@ -21,6 +21,7 @@ from rig.jumper import JumperState
 from rig.pulse import PulseNumber
 from rig.topics import DEFAULT_PUBLISH, JUMPER
 from svev import console
+from svev.commands.delivery import PosesOption, SurveyOption
 from svev.commands.logs import AlsoJson
 
 _TOPIC: Final = live_topic(JUMPER)
@@ -33,12 +34,8 @@ _MARKS: Final = {Level.ERROR: "error: ", Level.WARNING: "warning: "}
 
 def worker_command(
     connect: Annotated[str, typer.Option(metavar="ADDRESS", help="where triplets are published")] = DEFAULT_PUBLISH,
-    survey: Annotated[
-        Path | None, typer.Option(metavar="SURVEY.json", help="survey of the balls with interior orientations")
-    ] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(metavar="POSES.json", help="poses of the cameras, result of svev orient")
-    ] = None,
+    survey: SurveyOption = None,
+    calibration: PosesOption = None,
     reliable: Annotated[bool, typer.Option("--reliable", help="the address is that of svev replay --reliable")] = False,
     bind_to: Annotated[
         str, typer.Option("--bind", metavar="ADDRESS", help="where to publish what is measured")

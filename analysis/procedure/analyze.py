@@ -14,7 +14,7 @@ from analysis.measurements.merging import merged
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.procedure.jump import ComputedJump, compute_jump
 from analysis.procedure.jump_search import find_jumps
-from analysis.procedure.log_facts import log_facts
+from analysis.procedure.log_facts import LogFacts, log_facts
 from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import static_images
@@ -80,12 +80,8 @@ def analyze(
     scene, orientation = orient_from(static, source)
     steadiness = watch(scene, LogFrames(log))
     tell("looking at the balls", 1.0)
-    measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, ())
-    if images:
-        finder = Finder({name: static[name] for name in scene.system.names})
-        candidates = find_candidates(log, finder, lambda share: tell("looking for the jumper", share))
-        jumps = find_jumps(candidates, facts, scene, steadiness, finder.look_for_spots)
-        measurements = replace(measurements, jumps=tuple(jumps))
+    jumps = _jumps_in_images(facts, scene, steadiness, tell) if images else []
+    measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, tuple(jumps))
     if by_hand is not None:
         measurements = merged(measurements, by_hand)
     if not measurements.jumps:
@@ -112,6 +108,15 @@ def analyze(
     tell("computing", 1.0)
     perpendicular = {c.jump.number: c.perpendicular for c in computed if c.perpendicular is not None}
     return Analysis(result, measurements, scene, orientation, perpendicular)
+
+
+def _jumps_in_images(
+    facts: LogFacts, scene: OrientedScene, steadiness: Steadiness, tell: Progress
+) -> list[JumpMeasurements]:
+    """What the images show of the jumper."""
+    finder = Finder({name: scene.static[name] for name in scene.system.names})
+    candidates = find_candidates(facts.path, finder, lambda share: tell("looking for the jumper", share))
+    return find_jumps(candidates, facts, scene, steadiness, finder.look_for_spots)
 
 
 def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> HelmetFlight:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.analysis.faults import run_faults
+from bench.analysis.honesty import run_honesty
 from bench.analysis.jumps import run_jumps
 from bench.photogrammetry.adjustment import run_adjustment
 from bench.photogrammetry.intersection import run_intersection
@@ -89,6 +90,20 @@ def _jumps(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _honesty(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_honesty(seconds)
+    path = write_results("jump-honesty", cases, directory)
+    table = []
+    for case in cases:
+        table.append(f"{case['name']}, {case['found']} of {case['draws']} times found")
+        table += [
+            f"  {key:32}{of['n']:7} mean square {of['mean_square']:6.2f}, within 2 sigma {of['within_2_sigma']:6.1%}, "
+            f"sigma / scatter {of['sigma_over_scatter']:5.2f}"
+            for key, of in case["honesty"].items()
+        ]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 def _faults(_seconds: float, directory: Path) -> dict[str, Any]:
     cases = run_faults()
     path = write_results("jump-faults", cases, directory)
@@ -107,4 +122,5 @@ SUITES: dict[str, Suite] = {
     "planning": partial(_timed, "planning", run_planning),
     "jumps": _jumps,
     "jump-faults": _faults,
+    "jump-honesty": _honesty,
 }

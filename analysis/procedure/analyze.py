@@ -10,19 +10,35 @@ from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.cameras.source import Source, orient_from
 from analysis.cameras.steadiness import Steadiness, watch
 from analysis.candidates.finder import Finder, find_candidates
+from analysis.candidates.model import PulseCandidates
 from analysis.measurements.merging import merged
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.procedure.jump import ComputedJump, compute_jump
 from analysis.procedure.jump_search import find_jumps
-from analysis.procedure.log_facts import LogFacts, log_facts
+from analysis.procedure.log_facts import log_facts
 from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
-from analysis.scene.static_image import static_images
+from analysis.scene.static_image import StaticImage, static_images
 from photogrammetry.procedures.orientation import Orientation
 from rig.errors import NoJumpError
 
 #: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
 Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenLog:
+    """What the images of a recording show, before anything is known of the cameras.
+
+    Attributes:
+        static: static image of each camera.
+        finder: looks again at a place in a frame.
+        candidates: of all pulses.
+    """
+
+    static: Mapping[str, StaticImage]
+    finder: Finder
+    candidates: list[PulseCandidates]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +65,22 @@ class Analysis:
         return self.scene.system
 
 
+def look(log: Path, static: Mapping[str, StaticImage], progress: Progress | None = None) -> SeenLog:
+    """Look for the jumper in the images of a recording.
+
+    Args:
+        log: the log.
+        static: static image of each camera; cameras without one are left out.
+        progress: told what is being done.
+
+    Raises:
+        BadInputError: the log is none, or the images are not as large as the static ones.
+    """
+    tell = progress or _nobody
+    finder = Finder(static)
+    return SeenLog(static, finder, find_candidates(log, finder, lambda share: tell("looking for the jumper", share)))
+
+
 def analyze(
     log: Path,
     source: Source,
@@ -56,6 +88,7 @@ def analyze(
     by_hand: Measurements | None = None,
     images: bool = True,
     helmet: bool = False,
+    seen: SeenLog | None = None,
     progress: Progress | None = None,
 ) -> Analysis:
     """Measure the jumps of a recording.
@@ -66,6 +99,7 @@ def analyze(
         by_hand: measurements that are used beside automatic ones, or instead of them at the same place.
         images: look for the jumper in the images; otherwise `by_hand` is all there is.
         helmet: let the moving helmet tie the images beside the balls (paper, step 2, alternative 2).
+        seen: what `look` found in this log, for those who measure it several times; all its cameras must have balls.
         progress: told what is being done.
 
     Raises:
@@ -73,14 +107,17 @@ def analyze(
         NoJumpError: nobody jumps in the log.
         NotSolvableError, NotConvergedError: the balls do not determine the cameras.
     """
-    tell = progress or (lambda _step, _share: None)
+    tell = progress or _nobody
     facts = log_facts(log)
     tell("looking at the balls", 0.0)
-    static = static_images(log)
+    static = static_images(log) if seen is None else seen.static
     scene, orientation = orient_from(static, source)
     steadiness = watch(scene, LogFrames(log))
     tell("looking at the balls", 1.0)
-    jumps = _jumps_in_images(facts, scene, steadiness, tell) if images else []
+    jumps: list[JumpMeasurements] = []
+    if images:
+        seen = seen or look(log, {name: scene.static[name] for name in scene.system.names}, tell)
+        jumps = find_jumps(seen.candidates, facts, scene, steadiness, seen.finder.look_for_spots)
     measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, tuple(jumps))
     if by_hand is not None:
         measurements = merged(measurements, by_hand)
@@ -110,15 +147,6 @@ def analyze(
     return Analysis(result, measurements, scene, orientation, perpendicular)
 
 
-def _jumps_in_images(
-    facts: LogFacts, scene: OrientedScene, steadiness: Steadiness, tell: Progress
-) -> list[JumpMeasurements]:
-    """What the images show of the jumper."""
-    finder = Finder({name: scene.static[name] for name in scene.system.names})
-    candidates = find_candidates(facts.path, finder, lambda share: tell("looking for the jumper", share))
-    return find_jumps(candidates, facts, scene, steadiness, finder.look_for_spots)
-
-
 def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> HelmetFlight:
     """A jump as it would have been measured in frames that do not shake, and the cameras as they stood in it."""
     standing = steadiness.during([pulse.pulse for pulse in jump.pulses])
@@ -137,3 +165,7 @@ def _synchrony(jumps: list[ComputedJump]) -> dict[str, CameraOffset]:
             if known is None or rank < (known.message is None, known.sigma_ms):
                 best[name] = offset
     return best
+
+
+def _nobody(_step: str, _share: float) -> None:
+    """Is told of the progress where nobody listens."""

@@ -24,14 +24,14 @@ class Judged:
         in_sight: points that at least two cameras see, over all pulses.
         solved: how many of them are measured.
         errors_m: largest coordinate error of each measured point.
-        normalized: by part ("raw" or "smoothed"), phase and quantity: errors over their sigmas.
+        errors: by part ("raw" or "smoothed"), phase and quantity: errors beside their sigmas.
         takeoff: errors of the take-off over their sigmas.
     """
 
     in_sight: int = 0
     solved: int = 0
     errors_m: list[float] = field(default_factory=list)
-    normalized: dict[tuple[str, str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
+    errors: dict[tuple[str, str, str], list[tuple[float, float]]] = field(default_factory=lambda: defaultdict(list))
     takeoff: list[float] = field(default_factory=list)
 
     def jump(self, jump: Jump, truth: Mapping[int, Mapping[str, Any]]) -> None:
@@ -47,11 +47,8 @@ class Judged:
             self.takeoff.append((jump.takeoff.pulse - edge) / jump.takeoff.sigma_pulses)
 
     def figures(self) -> dict[str, Any]:
-        """Shares, errors, and per part, phase and quantity the mean squared normalized error."""
-        honesty = {
-            " ".join(key): {"n": len(z), "mean_square": _mean_square(z), "within_2_sigma": _within(z)}
-            for key, z in sorted(self.normalized.items())
-        }
+        """Shares, errors, and per part, phase and quantity whether the sigmas hold."""
+        honesty = {" ".join(key): _honesty(np.array(pairs)) for key, pairs in sorted(self.errors.items())}
         errors = np.array(self.errors_m)
         return {
             "points_in_sight": self.in_sight,
@@ -78,22 +75,30 @@ class Judged:
     def _state(self, part: str, phase: str, state: JumperState | SmoothedState, true: Mapping[str, Any]) -> None:
         for name, point in state.points.items():
             if point is not None:
-                z = (point.xyz - np.array(true["points"][name])) / np.sqrt(np.diagonal(point.covariance))
-                self._add(part, phase, "points", z)
+                error = point.xyz - np.array(true["points"][name])
+                self._add(part, phase, "points", error, np.sqrt(np.diagonal(point.covariance)))
         quantities = {**state.angles, "height": state.height, "speed": state.speed}
         for name, quantity in quantities.items():
             if quantity is not None:
                 value = true["angles"].get(name, true.get(name))
-                self._add(part, phase, name, np.array([(quantity.value - float(value)) / quantity.sigma]))
+                self._add(part, phase, name, np.array([quantity.value - float(value)]), np.array([quantity.sigma]))
 
-    def _add(self, part: str, phase: str, quantity: str, z: Floats) -> None:
-        self.normalized[part, phase, quantity] += z.tolist()
+    def _add(self, part: str, phase: str, quantity: str, errors: Floats, sigmas: Floats) -> None:
+        self.errors[part, phase, quantity] += zip(errors.tolist(), sigmas.tolist(), strict=True)
+
+
+def _honesty(pairs: Floats) -> dict[str, Any]:
+    """Of errors beside their sigmas (n, 2): mean squared normalized error, share within 2 sigma, sigma / scatter."""
+    error, sigma = pairs.T
+    z = error / sigma
+    return {
+        "n": len(z),
+        "mean_square": _mean_square(z),
+        "within_2_sigma": round(float(np.mean(np.abs(z) < 2.0)), 3),
+        "sigma_over_scatter": round(float(np.sqrt(np.mean(sigma**2) / np.mean(error**2))), 3),
+    }
 
 
 def _mean_square(z: Iterable[float]) -> float | None:
     values = np.array(list(z))
     return round(float(np.mean(values**2)), 3) if len(values) else None
-
-
-def _within(z: Iterable[float]) -> float:
-    return round(float(np.mean(np.abs(np.array(list(z))) < 2.0)), 3)

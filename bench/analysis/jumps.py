@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 
 from analysis.cameras.source import read_source
-from analysis.procedure.analyze import analyze
+from analysis.procedure.analyze import SeenLog, analyze
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.analysis.judge import Judged
 from recorder.reading.triplets import triplets
@@ -18,7 +18,8 @@ from simrig.world.scenario import Scenario, load_scenario
 
 #: Hill pulses of one jump at 30 Hz: two seconds in which the jumper comes, flies and leaves.
 PULSES = range(15, 75)
-_SCENARIOS = ("training", "hard")
+#: Shipped scenarios with jumps to be measured.
+SCENARIOS = ("training", "hard")
 
 
 def run_jumps(seconds: float) -> list[dict[str, Any]]:
@@ -30,7 +31,7 @@ def run_jumps(seconds: float) -> list[dict[str, Any]]:
     Returns:
         Cases with name, value, unit, baseline and what the baseline is, and the figures of `Judged`.
     """
-    return [_case(name, seconds / len(_SCENARIOS)) for name in _SCENARIOS]
+    return [_case(name, seconds / len(SCENARIOS)) for name in SCENARIOS]
 
 
 def scenario_of(name: str, seed: int) -> Scenario:
@@ -63,9 +64,9 @@ def _case(name: str, seconds: float) -> dict[str, Any]:
     }
 
 
-def measured(log: HillLog, judged: Judged) -> int:
-    """Analyze a log and judge what was measured; returns the number of jumps found."""
-    result = analyze(log.path, read_source(log.survey, None)).result
+def measured(log: HillLog, judged: Judged, seen: SeenLog | None = None) -> int:
+    """Analyze a log, perhaps looked at before, and judge what was measured; returns the number of jumps found."""
+    result = analyze(log.path, read_source(log.survey, None), seen=seen).result
     for jump in result.jumps:
         judged.jump(jump, log.truth)
     return len(result.jumps)

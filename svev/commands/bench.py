@@ -25,7 +25,8 @@ def bench(
     the simulated cameras. firewire: the same on an emulated FireWire bus. parts: pairing, composing, checksum and
     drawing, each alone. api: answer times of the service while it records at 30 Hz; the baseline is the idle service.
     intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
-    covariance; the baseline is scipy's least_squares.
+    covariance; the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and
+    with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas.
 
     Example: svev bench saturated --seconds 10
     """

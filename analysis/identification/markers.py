@@ -4,21 +4,23 @@ Prediction and assignment take turns: what is assigned at other pulses predicts 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.candidates.model import SecondLook, Spots
 from analysis.identification.assignment import Assigned, assign, well_known
+from analysis.identification.body import USUAL, implausibility
 from analysis.identification.flights import Flight
+from analysis.identification.left_right import name_bindings
 from analysis.identification.naming import name_points
-from analysis.identification.prediction import Part, Prediction, predict
+from analysis.identification.prediction import Part, PathFilter, Prediction, predict
 from analysis.identification.skis import Places
 from analysis.identification.space_points import SpacePoints
 from analysis.identification.views import Views
 from analysis.identification.window import Window
 from analysis.measurements.model import POINTS
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 
 #: Indices of P3 and P4 in `POINTS`.
 BINDINGS = [2, 3]
@@ -33,6 +35,8 @@ _GAP_SIGMA = (0.1, 1.0, 5.0)  #: of it, m, m/s, m/s^2
 _GAP_M_S2 = 4.0  #: change of its acceleration within 0.1 s
 _LEAST_PAIRS = 3
 _MOST_TURNS = 12
+_MOST_RENAMINGS = 3
+_AS_THEY_ARE = np.array((0, 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +82,57 @@ def follow_further(views: Views, window: Window, flight: Flight, markers: Marker
 
 
 def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:
-    """The markers after so many turns that nothing changes; xyz (t, 4, 3) with covariance to begin with."""
+    """The markers after so many turns that nothing changes; xyz (t, 4, 3) with covariance to begin with.
+
+    Then the bindings are named once more as one path. Where that names them otherwise, prediction and assignment go on
+    from there, and what is still named otherwise in the end is left out.
+    """
+    markers = _assigned(views, window, flight, xyz, covariance)
+    for _ in range(_MOST_RENAMINGS):
+        names = _names(window, flight, markers.assigned)
+        if not np.any((names >= 0) & (names != _AS_THEY_ARE)):
+            break
+        markers = _assigned(views, window, flight, *_renamed(markers.assigned, names))
+    else:
+        names = _names(window, flight, markers.assigned)
+    return _without(markers, names != _AS_THEY_ARE)
+
+
+def _names(window: Window, flight: Flight, assigned: Assigned) -> Integers:
+    """Names (t, 2) of the bindings as one path; as they are where there are hardly any pairs that tell the sides."""
+    xyz, covariance = assigned.xyz[:, BINDINGS], assigned.covariance[:, BINDINGS]
+    there: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
+    if np.count_nonzero(np.all(there, axis=1)) < _LEAST_PAIRS:
+        return np.broadcast_to(_AS_THEY_ARE, there.shape)
+    bindings = PathFilter(3, [_parts(flight)[i] for i in BINDINGS], _MIXING[np.ix_(BINDINGS, BINDINGS)])
+    apart = np.nan_to_num(xyz[:, 1] - xyz[:, 0]) @ flight.axes.T
+    strange = np.stack([implausibility(BINDINGS[0], BINDINGS[1], difference) for difference in (apart, -apart)], axis=1)
+    return name_bindings(window.time_s, xyz, covariance, np.maximum(strange - USUAL, 0.0), bindings)
+
+
+def _renamed(assigned: Assigned, names: Integers) -> tuple[Floats, Floats]:
+    """Points (t, 4, 3) and covariances after the bindings got other names (t, 2)."""
+    xyz, covariance = assigned.xyz.copy(), assigned.covariance.copy()
+    for place, marker in enumerate(BINDINGS):
+        known = names[:, place] >= 0
+        source = np.array(BINDINGS)[names[:, place]]
+        rows = np.arange(len(names))
+        xyz[:, marker] = np.where(known[:, None], assigned.xyz[rows, source], np.nan)
+        covariance[:, marker] = np.where(known[:, None, None], assigned.covariance[rows, source], np.nan)
+    return xyz, covariance
+
+
+def _without(markers: Markers, left_out: Flags) -> Markers:
+    """The markers without points of some bindings, left_out (t, 2)."""
+    out = np.zeros(markers.assigned.rays.shape[:2], bool)
+    out[:, BINDINGS] = left_out & np.isfinite(markers.assigned.xyz[:, BINDINGS, 0])
+    rays, xyz = markers.assigned.rays.copy(), markers.assigned.xyz.copy()
+    rays[out], xyz[out] = -1, np.nan
+    return replace(markers, assigned=replace(markers.assigned, rays=rays, xyz=xyz))
+
+
+def _assigned(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:
+    """Prediction and assignment in turns until nothing changes."""
     parts = _parts(flight)
     rays = np.full((len(window), len(POINTS), len(views)), -2)
     before: tuple[Prediction, Assigned] | None = None

@@ -52,7 +52,7 @@ def predict(time_s: Floats, xyz: Floats, covariance: Floats, parts: Sequence[Par
         parts: p of them.
         mixing: (n, p) the things as sums of parts.
     """
-    filters = _Filter(xyz.shape[2], parts, mixing)
+    filters = PathFilter(xyz.shape[2], parts, mixing)
     ahead = filters.run(time_s, xyz, covariance)
     back = tuple(part[::-1] for part in filters.run(time_s[::-1], xyz[::-1], covariance[::-1]))
     one, other = np.linalg.inv(ahead[1]), np.linalg.inv(back[1])
@@ -64,16 +64,26 @@ def predict(time_s: Floats, xyz: Floats, covariance: Floats, parts: Sequence[Par
     return Prediction(values, np.stack([spread[:, i, :, i] for i in range(n)], axis=1))
 
 
-class _Filter:
-    """A Kalman filter whose state is value, velocity and acceleration of each part in turn."""
+class PathFilter:
+    """A Kalman filter whose state is value, velocity and acceleration of each part in turn.
+
+    Attributes:
+        all_of: (n d, 3 d p) all things by the state.
+        mixing: (n, p) the things as sums of parts.
+        begin: state (3 d p,) before anything is measured, and its standard deviations.
+
+    Args:
+        d: coordinates of a thing.
+        parts: p of them.
+        mixing: (n, p) the things as sums of parts.
+    """
 
     def __init__(self, d: int, parts: Sequence[Part], mixing: Floats) -> None:
-        self._d, self._mixing = d, mixing
+        self._d, self.mixing = d, mixing
         self._jerk = np.array([part.jerk**2 / 0.1 for part in parts])
-        self._mean = np.concatenate([np.concatenate((part.begin.ravel(), np.zeros(d))) for part in parts])
-        self._sigma = np.concatenate([np.repeat(part.sigma, d) for part in parts])
+        mean = np.concatenate([np.concatenate((part.begin.ravel(), np.zeros(d))) for part in parts])
+        self.begin = mean, np.concatenate([np.repeat(part.sigma, d) for part in parts])
         self._movements: dict[float, tuple[Floats, Floats]] = {}
-        #: (n d, 3 d p): all things by the state.
         self.all_of = np.kron(mixing, np.kron([[1.0, 0.0, 0.0]], np.eye(d)))
 
     def _movement(self, dt: float) -> tuple[Floats, Floats]:
@@ -96,16 +106,16 @@ class _Filter:
     def run(self, time_s: Floats, xyz: Floats, covariance: Floats) -> tuple[Floats, Floats]:
         """States (t, 3 d p) and their covariances before each pulse's own measurement."""
         measured: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
-        state, variance = self._mean, np.diag(self._sigma**2)
+        state, variance = self.begin[0], np.diag(self.begin[1] ** 2)
         begun = np.zeros(len(self._jerk), bool)
         states, variances = np.empty((len(time_s), len(state))), np.empty((len(time_s), len(state), len(state)))
         for i in range(len(time_s)):
             if i:
-                state, variance = self._moved(state, variance, float(time_s[i] - time_s[i - 1]), begun)
+                state, variance = self.moved(state, variance, float(time_s[i] - time_s[i - 1]), begun)
             states[i], variances[i] = state, variance
             if measured[i].any():
                 state, variance = self._updated(state, variance, measured[i], xyz[i], covariance[i])
-                begun |= (self._mixing[measured[i]] != 0).any(axis=0)
+                begun |= (self.mixing[measured[i]] != 0).any(axis=0)
         return states, variances
 
     def _updated(
@@ -120,10 +130,13 @@ class _Filter:
         variance = variance - gain @ by_state @ variance
         return state + gain @ (xyz[measured].ravel() - by_state @ state), (variance + variance.T) / 2
 
-    def _moved(self, state: Floats, variance: Floats, dt: float, begun: Flags) -> tuple[Floats, Floats]:
-        """State and covariance dt later (earlier where negative); what was not measured yet stays as uncertain."""
+    def moved(self, state: Floats, variance: Floats, dt: float, begun: Flags) -> tuple[Floats, Floats]:
+        """States (..., 3 d p) and covariances dt later (earlier where negative).
+
+        Parts that were not measured yet, begun (..., p), stay as uncertain as they are.
+        """
         move, noise = self._movement(round(dt, 6))
         grown = move @ variance @ move.T + noise
-        known = np.repeat(begun, 3 * self._d)
-        grown = np.where(known[:, None] & known, grown, variance)
-        return move @ state, (grown + grown.T) / 2
+        known = np.repeat(begun, 3 * self._d, axis=-1)
+        grown = np.where(known[..., :, None] & known[..., None, :], grown, variance)
+        return state @ move.T, (grown + grown.swapaxes(-1, -2)) / 2

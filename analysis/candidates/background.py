@@ -25,6 +25,7 @@ _ROUNDING = np.float32(1 / 12)  # variance of whole numbers
 _RESTLESS = 2.0  # times the usual noise of its grey value: a pixel that is not static
 _FEWEST = 50  # calm pixels of a bin
 _MAD_TO_SIGMA = 1.4826
+_STRIP = 32 << 10  # pixels that are compared at a time
 _FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
 _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
 _THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
@@ -84,10 +85,13 @@ class Background:
         step = max(1, int(np.sqrt(grey.size / _SAMPLES)))
         self._grid = slice(step // 2, None, step), slice(step // 2, None, step)
         sampled = [layer[self._grid].ravel().astype(float) for layer in (grey, self._right, self._down)]
-        self._design = np.column_stack((sampled[0], np.ones(len(sampled[0])), *sampled[1:]))
+        self._design = np.stack((sampled[0], np.ones(len(sampled[0])), *sampled[1:]))
         self._weight = 1 / np.sqrt(noise**2 + self._shift)[self._grid].ravel().astype(float)
-        self._calm = (self._ratio == 1)[self._grid].ravel()
-        self._bins = np.array_split(np.argsort(sampled[0]), _BINS)
+        self._weighted = self._design * self._weight
+        calm = (self._ratio == 1)[self._grid].ravel()
+        bins = (part[calm[part]] for part in np.array_split(np.argsort(sampled[0]), _BINS))
+        self._bins = [part for part in bins if len(part) >= _FEWEST]
+        self._strip = max(1, _STRIP // grey.shape[1])
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -102,70 +106,77 @@ class Background:
             stamped: row, first column and count of pixels that are no picture.
         """
         moment = self._moment(image)
-        grey = image.astype(np.float32)
-        difference = cv2.subtract(grey, moment.behind)
-        square = np.float32(_FRONT**2) * moment.variance
-        front = np.asarray(cv2.compare(cv2.multiply(difference, difference), square, cv2.CMP_GT), np.uint8)
+        front = np.empty(image.shape, np.uint8)
+        for top in range(0, len(image), self._strip):  # what is computed at a time stays in the processor's cache
+            part = slice(top, top + self._strip), slice(None)
+            behind, variance = self._expected(part, moment)
+            difference = cv2.subtract(image[part].astype(np.float32), behind)
+            variance *= np.float32(_FRONT**2)
+            np.greater(cv2.multiply(difference, difference), variance, out=front[part].view(np.bool_))
         if stamped is not None:
             front[stamped[0], stamped[1] : stamped[1] + stamped[2]] = 0
-        return [self._region(grey, moment, front, box) for box in _boxes(front)]
+        return [self._region(image, moment, front, box) for box in _boxes(front)]
 
     def _region(
-        self, grey: GreyImage, moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]
+        self, image: NDArray[np.uint8], moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]
     ) -> Region:
         left, top, right, bottom = box
         part = slice(top, bottom), slice(left, right)
-        own = grey[part].copy()
+        own = image[part].astype(np.float32)
         noise = np.sqrt(np.maximum(moment.read + moment.photon * cv2.blur(own, (3, 3)), _ROUNDING))
         restless = self._ratio[part] > 1
-        sigma = np.sqrt(moment.variance[part])
-        return Region(left, top, own, moment.behind[part].copy(), sigma, noise, (front[part] > 0) | restless)
+        behind, variance = self._expected(part, moment)
+        return Region(left, top, own, behind, np.sqrt(variance), noise, (front[part] > 0) | restless)
+
+    def _expected(self, part: tuple[slice, slice], moment: "_Moment") -> tuple[GreyImage, GreyImage]:
+        """What the static scene shows in a part of an image, and the variance of differences from it."""
+        shifted = cv2.addWeighted(self._right[part], moment.right, self._down[part], moment.down, moment.offset)
+        behind = np.asarray(cv2.scaleAdd(self._grey[part], moment.gain, shifted), np.float32)
+        variance = behind * moment.photon
+        variance += moment.read
+        np.maximum(variance, _ROUNDING, out=variance)
+        variance *= self._ratio[part]
+        variance += self._shift[part]
+        return behind, variance
 
     def _moment(self, image: NDArray[np.uint8]) -> "_Moment":
-        unknown, residuals = self._light(image)
-        gain, offset, right, down = unknown.tolist()
-        shifted = cv2.addWeighted(self._right, right, self._down, down, offset)
-        behind = np.asarray(cv2.scaleAdd(self._grey, gain, shifted), np.float32)
-        read, photon = self._noise(self._design @ unknown, residuals)
-        variance = np.maximum(behind * photon + read, _ROUNDING) * self._ratio + self._shift
-        return _Moment(behind, variance.astype(np.float32), read, photon)
-
-    def _light(self, image: NDArray[np.uint8]) -> tuple[Floats, Floats]:
-        """Gain, offset and shift of an image; residuals of the grid, grey values."""
+        """Light, shift and noise of an image (robust adjustment of the grid)."""
         sample = image[self._grid].ravel().astype(float)
-        rows: Floats = self._design * self._weight[:, None]
-        values = sample * self._weight
-        keep = np.ones(len(values), bool)
+        rows, values = self._weighted, sample * self._weight
+        keep = np.ones(len(values))
         unknown = np.array([1.0, 0.0, 0.0, 0.0])
         for _ in range(_ROUNDS):
-            normal = rows[keep].T @ rows[keep]
+            kept = rows * keep
+            normal = kept @ rows.T
             normal += np.diag(1e-9 * np.diag(normal) + 1e-12)
-            unknown = np.asarray(np.linalg.solve(normal, rows[keep].T @ values[keep]), float)
-            v = np.abs(values - rows @ unknown)
-            keep = v < _CLIP * max(1e-3, _MAD_TO_SIGMA * float(np.median(v)))
-        return unknown, sample - self._design @ unknown
+            unknown = np.asarray(np.linalg.solve(normal, kept @ values), float)
+            v = np.abs(values - unknown @ rows)
+            keep = (v < _CLIP * max(1e-3, _MAD_TO_SIGMA * float(np.median(v)))).astype(float)
+        grey = unknown @ self._design
+        gain, offset, right, down = unknown.tolist()
+        return _Moment(gain, offset, right, down, *self._noise(grey, np.abs(sample - grey)))
 
-    def _noise(self, grey: Floats, residuals: Floats) -> tuple[np.float32, np.float32]:
+    def _noise(self, grey: Floats, off: Floats) -> tuple[np.float32, np.float32]:
         """Variance of a grey value in this image: of reading, and per grey value (photons)."""
-        at, level = [], []
-        for part in self._bins:
-            calm = part[self._calm[part]]
-            if len(calm) >= _FEWEST:
-                at.append(float(grey[calm].mean()))
-                level.append((_MAD_TO_SIGMA * float(np.median(np.abs(residuals[calm])))) ** 2)
-        if not at:
+        if not self._bins:
             return np.float32(np.median(self._weight) ** -2), np.float32(0)
-        slope = max(0.0, float(np.polyfit(at, level, 1)[0])) if np.ptp(at) > 1 else 0.0
-        read = max(float(_ROUNDING), float(np.median(np.array(level) - slope * np.array(at))))
+        at = np.array([grey[part].mean() for part in self._bins])
+        level = np.array([np.median(off[part]) for part in self._bins])
+        level = (_MAD_TO_SIGMA * level) ** 2
+        from_mean = at - at.mean()
+        slope = max(0.0, float(from_mean @ level / (from_mean @ from_mean))) if np.ptp(at) > 1 else 0.0
+        read = max(float(_ROUNDING), float(np.median(level - slope * at)))
         return np.float32(read), np.float32(slope)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Moment:
-    """The static scene in the light of an image, the variance of differences from it, and the noise model."""
+    """An image beside the static scene: gain, offset, shift, px, and variance of reading and per grey value."""
 
-    behind: GreyImage
-    variance: GreyImage
+    gain: float
+    offset: float
+    right: float
+    down: float
     read: np.float32
     photon: np.float32
 
@@ -180,20 +191,26 @@ def _usual(grey: GreyImage, noise: GreyImage) -> GreyImage:
 
 def _boxes(front: NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
     """Boxes around what moves: columns and rows of the first and behind the last pixel, the largest first."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(front, connectivity=8)
-    large = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _SMALLEST
-    large &= np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _THINNEST
-    large[0] = False
-    if count < 2 or not large.any():
-        return []
-    boxes = [(x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area) for x, y, w, h, area in stats[large].tolist()]
-    rows, columns = labels.shape
-    grown = sorted(_joined(boxes), key=lambda box: -box[4])[:_MOST]
+    contours, hierarchy = cv2.findContours(front, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    boxes = []
+    for contour, (_, _, _, inside) in zip(contours, () if hierarchy is None else hierarchy[0].tolist(), strict=True):
+        x, y, w, h = cv2.boundingRect(contour)
+        if inside < 0 and max(w, h) >= _SMALLEST and min(w, h) >= _THINNEST:
+            area = _area(front[y : y + h, x : x + w], contour[0, 0] - (x, y))
+            boxes.append((x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area))
+    rows, columns = front.shape
+    grown = sorted(_joined(boxes[::-1]), key=lambda box: -box[4])[:_MOST]
     spare = _MARGIN - _JOIN
     return [
         (max(0, x - spare), max(0, y - spare), min(columns, right + spare), min(rows, bottom + spare))
         for x, y, right, bottom, _ in grown
     ]
+
+
+def _area(front: NDArray[np.uint8], place: NDArray[np.int32]) -> int:
+    """Pixels of what holds a place, column and row."""
+    _, labels = cv2.connectedComponents(front, connectivity=8)
+    return int(np.count_nonzero(labels == labels[place[1], place[0]]))
 
 
 def _joined(boxes: list[tuple[int, int, int, int, int]]) -> list[tuple[int, int, int, int, int]]:

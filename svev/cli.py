@@ -21,10 +21,10 @@ from rig.errors import BadInputError, SvevError
 from svev import console
 
 #: Commands in the order of the help: module in `svev.commands`, function in it, one line of help. Only the module of
-#: the called command is imported, so that `svev ctl` starts at once and the service does not load photogrammetry.
+#: the called command is imported, so that `svev ctl` starts at once, and `record` and `serve` load no analysis.
 _COMMANDS: Final = {
-    "demo": ("recording", "demo", "Record jumps on the simulated hill; needs no camera."),
-    "record": ("recording", "record", "Record once with the cameras of a rig file."),
+    "demo": ("demo", "demo", "Record jumps on the simulated hill; needs no camera."),
+    "record": ("record", "record", "Record once with the cameras of a rig file."),
     "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
     "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
     "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),

@@ -36,6 +36,13 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(f"\n  {command} " in listed for command in _commands())
 
 
+def test_recording_loads_nothing_that_measures() -> None:
+    """Its processes start at once, and a library that only the analysis needs cannot prevent a recording."""
+    loaded = "import sys, svev.commands.record, svev.commands.serve; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, timeout=60, check=True)
+    assert not {"analysis.procedure.analyze", "photogrammetry", "scipy"} & set(done.stdout.split())
+
+
 def test_schema_is_the_rig_files_schema(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert cli.main(["schema"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(rig_schema())

@@ -1,4 +1,4 @@
-"""`svev record` and `svev demo`: one recording, with the cameras of a rig file or on the simulated hill."""
+"""`svev record`: one recording with the cameras of a rig file."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +16,6 @@ from service.headless import HeadlessRig
 from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
-from svev.demo import Bus, run_demo
 
 
 def record(
@@ -44,7 +43,7 @@ def record(
     _check_session(session)
     check_publication(settings.network)
     path = new_log_path(out)
-    with HeadlessRig(settings, rig.read_text(encoding="utf-8"), _aside) as running:
+    with HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running:
         result, disk_error = record_with(
             running, settings, path, seconds, allow_absent=allow_absent, session={"session": session},
             progress=console.progress,
@@ -52,7 +51,7 @@ def record(
     if as_json:
         console.print_json(result)
     else:
-        console.say(f"{result['pulses']} pulses, {result['complete']} complete{_causes(result)}")
+        console.say(f"{result['pulses']} pulses, {result['complete']} complete{causes(result)}")
         for log in result["logs"][:-1]:
             console.say(f"the first part is in {log}")
         console.say(f"{result['bytes'] / 1e6:.1f} MB in {result['log']}")
@@ -65,60 +64,6 @@ def record(
             f"{result['log']}: {first}{f', and {more} more pauses' if more else ''}; look at the trigger, or at what "
             "the log says of the cameras at that time: svev verify"
         )
-
-
-def demo(
-    seconds: Annotated[float, typer.Option(min=0.5, max=3600, help="length of the recording, seconds")] = 10.0,
-    bus: Annotated[Bus, typer.Option(help="how the simulated cameras are connected")] = "gige",
-    out: Annotated[Path, typer.Option(help="folder for the files; made if missing")] = Path("demo"),
-    analyze: Annotated[bool, typer.Option(help="measure the jumps after recording them")] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
-) -> None:
-    """Record jumps on the simulated hill, measure them and show the result. Needs no camera.
-
-    Three simulated cameras send their frames as real ones do: as GigE Vision packets over this computer's network, or,
-    with --bus firewire, over an emulated FireWire bus. The frames are paired by trigger pulse, written to a log and
-    published; a subscriber counts what it receives. Then the balls in the log's images orient the cameras, the jumper
-    is measured, and what was found is printed beside the truth. Beside the log you find a contact sheet (a picture of
-    its frames), the survey of the balls, the truth, and a folder with the results: open report.html there.
-
-    Example: svev demo --seconds 5
-
-    Example: svev demo --bus firewire
-    """
-    result = run_demo(bus, seconds, out, _aside, analyze=analyze)
-    if as_json:
-        console.print_json(result)
-        return
-    counted, latency = result["subscriber"], result["subscriber"]["latency_ms"]
-    console.say("")
-    console.say(f"pulses             {result['pulses']} at {result['rate_hz']:g} Hz")
-    console.say(f"complete triplets  {result['complete']}{_causes(result)}")
-    console.say(f"subscriber got     {counted['received']}, missing {counted['missing']}")
-    if latency["median"] is not None:
-        console.say(f"latency            {latency['median']:.1f} ms median, {latency['p99']:.1f} ms at 99 %")
-    console.say(f"log                {result['log']} ({result['bytes'] / 1e6:.1f} MB), {result['verdict']}")
-    console.say(f"contact sheet      {result['contact_sheet']}")
-    console.say(f"truth              {result['truth']}")
-    if result["analysis"] is not None:
-        _say_measured(result["analysis"])
-
-
-def _say_measured(analysis: dict[str, Any]) -> None:
-    """What was measured, beside the truth."""
-    if analysis["message"]:
-        console.say(f"nothing measured   {analysis['message']}")
-        return
-    for jump in analysis["jumps"]:
-        console.say("")
-        console.say(f"jump {jump['number']}             {jump['verdict']}")
-        if jump["figures"]:
-            console.say(f"                   at {jump['at']}:")
-        for figure in jump["figures"]:
-            console.say(f"                   {figure['words']}")
-    console.say("")
-    console.say(f"results            {analysis['out']}")
-    console.say(f"for the coach      {analysis['report']}")
 
 
 def _check_session(session: str) -> None:
@@ -136,11 +81,12 @@ def _check_session(session: str) -> None:
         ) from error
 
 
-def _aside(line: str) -> None:
+def aside(line: str) -> None:
+    """Say what happens meanwhile, on standard error."""
     console.say(line, aside=True)
 
 
-def _causes(result: dict[str, Any]) -> str:
+def causes(result: dict[str, Any]) -> str:
     """What became of the frames that are missing, in brackets; nothing if none is missing."""
-    causes = ", ".join(f"{count} {cause}" for cause, count in result["causes"].items() if count)
-    return f" (frames: {causes})" if causes else ""
+    missing = ", ".join(f"{count} {cause}" for cause, count in result["causes"].items() if count)
+    return f" (frames: {missing})" if missing else ""

@@ -67,10 +67,12 @@ class Hill(FiniteModel):
         height: Floats = knoll - steep * np.maximum(x - self.p_x_m, 0.0)
         return height
 
-    def snow(self, x: float, y: float) -> float:
-        """Height of the snow at any place, m: beside the knoll it rises to the left and falls gently to the right."""
-        beside = max(0.0, abs(y) - self.knoll_width_m / 2)
-        return float(self.ground(x)) + (0.12 if y > 0 else -0.05) * beside
+    def snow(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Height of the snow at any places, m: beside the knoll it rises to the left and falls gently to the right."""
+        y = np.asarray(y, float)
+        beside = np.maximum(0.0, np.abs(y) - self.knoll_width_m / 2)
+        height: Floats = self.ground(x) + np.where(y > 0, 0.12, -0.05) * beside
+        return height
 
 
 class Jumper(FiniteModel):

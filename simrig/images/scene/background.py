@@ -14,6 +14,7 @@ from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, REFERENCE_WIDTH, Scenario
 
 _NEAREST_M = 2.0
+_QUAD_M = 3.0  #: length and width of a quad of snow
 _TABLE_END_M = -45.0
 
 
@@ -44,10 +45,14 @@ class _Painter:
         self.canvas = Canvas(_sky(projection))
 
     def paint_land_and_forest(self) -> None:
-        things = [(self._far(quad), quad, grey) for quad, grey in self._land()]
-        things += [(self._far(tree[:1]), tree, grey) for trees in self._trees() for tree, grey in trees]
-        for _, corners, grey in sorted(things, key=lambda thing: -thing[0]):
-            self._fill(corners, grey)
+        (land, snow), (trees, needles) = self._land(), self._trees()
+        far = np.concatenate([self._projection.distance(land).mean(axis=1), self._projection.distance(trees[:, 0])])
+        places = [*self._places(land), *self._places(trees)]
+        greys = np.concatenate([snow, needles])
+        for index in np.argsort(-far, kind="stable"):
+            corners = places[index]
+            if corners is not None:
+                self.canvas.polygon(corners, float(greys[index]))
 
     def paint_table(self) -> None:
         """The take-off table: a wedge of boards with two tracks and a dark line at the edge."""
@@ -67,49 +72,67 @@ class _Painter:
                 for y in (-0.17, 0.17):
                     self._fill([(a, y - 0.06, za), (b, y - 0.06, zb), (b, y + 0.06, zb), (a, y + 0.06, za)], 128.0)
 
-    def _land(self) -> list[tuple[Floats, float]]:
-        """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest."""
-        xs, ys = np.arange(-60.0, 150.0, 3.0), np.arange(-27.0, 75.0, 3.0)
-        if self._left:
-            ys = -3.0 - ys
-        quads = []
-        for x in xs:
-            for y in ys:
-                corners = np.array(
-                    [(u, v, self._hill.snow(u, v)) for u, v in ((x, y), (x + 3, y), (x + 3, y + 3), (x, y + 3))]
-                )
-                normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
-                light = float(normal @ (-0.45, -0.2, 0.87)) / float(np.linalg.norm(normal))
-                knoll = abs(y + 1.5) < self._hill.knoll_width_m / 2 and x >= 0
-                quads.append((corners, 106 + 62 * light + (9 if knoll else self._rng.normal(0, 2.0))))
-        return quads
+    def _land(self) -> tuple[Floats, Floats]:
+        """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest.
 
-    def _trees(self) -> list[list[tuple[Floats, float]]]:
-        """Spruces in rows; the farther a row, the more mist lies over it."""
+        Returns:
+            Corners, m, shape (n, 4, 3), and grey values, shape (n,).
+        """
+        xs, ys = np.arange(-60.0, 150.0, _QUAD_M), np.arange(-27.0, 75.0, _QUAD_M)
+        if self._left:
+            ys = -_QUAD_M - ys
+        x, y = (axis.ravel() for axis in np.meshgrid(xs, ys, indexing="ij"))
+        u = np.stack((x, x + _QUAD_M, x + _QUAD_M, x), axis=1)
+        v = np.stack((y, y, y + _QUAD_M, y + _QUAD_M), axis=1)
+        corners = np.stack((u, v, self._hill.snow(u, v)), axis=-1)
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
+        light = normals @ (-0.45, -0.2, 0.87) / np.linalg.norm(normals, axis=1)
+        knoll = (np.abs(y + _QUAD_M / 2) < self._hill.knoll_width_m / 2) & (x >= 0)
+        own = np.full(len(x), 9.0)
+        own[~knoll] = self._rng.normal(0, 2.0, np.count_nonzero(~knoll))
+        return corners, 106 + 62 * light + own
+
+    def _trees(self) -> tuple[Floats, Floats]:
+        """Spruces in rows; the farther a row, the more mist lies over it.
+
+        Returns:
+            Corners of their triangles, m, shape (n, 3, 3), and grey values, shape (n,).
+        """
         trees = []
         for y, gap, mist in ((70.0, 2.0, 128.0), (52.0, 2.2, 116.0), (38.0, 2.6, 106.0), (26.0, 4.0, 98.0)):
             for x in np.arange(-60.0, 150.0, gap):
                 where = (x + self._rng.uniform(-1, 1), (y + self._rng.uniform(-3, 3)) * (-1 if self._left else 1))
-                trees.append(self._spruce(*where, self._rng.uniform(7, 15), mist + self._rng.normal(0, 4)))
-        return trees
+                trees.append((*where, self._rng.uniform(7, 15), mist + self._rng.normal(0, 4)))
+        return self._spruces(*np.array(trees).T)
 
-    def _spruce(self, x: float, y: float, tall: float, grey: float) -> list[tuple[Floats, float]]:
-        """A tree as four tiers of triangles that face the camera, each with snow on one flank."""
-        foot, right = np.array((x, y, self._hill.snow(x, y))), self._projection.R[:, 0]
-        up, tiers = np.array((0.0, 0.0, tall)), []
+    def _spruces(self, x: Floats, y: Floats, tall: Floats, grey: Floats) -> tuple[Floats, Floats]:
+        """Trees as four tiers of triangles that face the camera, each with snow on one flank; arguments (n,)."""
+        feet, right = np.stack((x, y, self._hill.snow(x, y)), axis=1), self._projection.R[:, 0]
+        up, across = tall[:, None] * (0.0, 0.0, 1.0), tall[:, None] * right
+        triangles, greys = [], []
         for k in range(4):
-            low, high, wide = 0.08 + 0.22 * k, min(1.0, 0.45 + 0.2 * k), 0.19 * tall * (1 - 0.2 * k)
-            left, tip = foot + low * up - wide * right, foot + high * up
-            tiers.append((np.stack((left, foot + low * up + wide * right, tip)), grey))
-            tiers.append((np.stack((left, foot + (low + 0.05) * up - 0.5 * wide * right, tip)), grey + 34))
-        return tiers
+            low, high, wide = 0.08 + 0.22 * k, min(1.0, 0.45 + 0.2 * k), 0.19 * (1 - 0.2 * k)
+            left, tip = feet + low * up - wide * across, feet + high * up
+            triangles.append(np.stack((left, feet + low * up + wide * across, tip), axis=1))
+            triangles.append(np.stack((left, feet + (low + 0.05) * up - 0.5 * wide * across, tip), axis=1))
+            greys += [grey, grey + 34]
+        return np.stack(triangles, axis=1).reshape(-1, 3, 3), np.stack(greys, axis=1).ravel()
 
-    def _far(self, corners: ArrayLike) -> float:
-        return float(np.mean(self._projection.distance(corners)))
+    def _places(self, polygons: Floats) -> list[Floats | None]:
+        """Corners in px of those polygons, shape (n, k, 3), that are in front of the camera and in its image."""
+        near = self._projection.distance(polygons).min(axis=1) > _NEAREST_M
+        places: list[Floats | None] = [None] * len(polygons)
+        pixels = self._projection.pixels(polygons[near])
+        size = self._projection.width, self._projection.height
+        inside = (pixels.max(axis=1) >= -1).all(axis=1) & (pixels.min(axis=1) <= size).all(axis=1)
+        for index, corners, seen in zip(np.flatnonzero(near), pixels, inside, strict=True):
+            places[index] = corners if seen else None
+        return places
 
     def _fill(self, corners: ArrayLike, grey: float) -> None:
-        if np.min(self._projection.distance(corners)) > _NEAREST_M:
-            self.canvas.polygon(self._projection.pixels(corners), grey)
+        for places in self._places(np.asarray(corners, float)[None]):
+            if places is not None:
+                self.canvas.polygon(places, grey)
 
 
 def _sky(projection: Projection) -> NDArray[np.uint8]:

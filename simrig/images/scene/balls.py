@@ -19,7 +19,7 @@ def put_poles(image: Image, scenario: Scenario, projection: Projection) -> None:
     """Draw the poles into an image, far ones first, in place."""
     for _, ball in _far_first(scenario, projection):
         x, y, z = ball.X
-        top, foot = projection.pixels([(x, y, z), (x, y, min(scenario.hill.snow(x, y), z))])
+        top, foot = projection.pixels([(x, y, z), (x, y, min(float(scenario.hill.snow(x, y)), z))])
         stroke(image, top, foot, 0.4, 0.4, _POLE)
 
 

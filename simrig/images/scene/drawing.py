@@ -1,6 +1,7 @@
 """Anti-aliased drawing with sub-pixel accuracy: polygons, capsules (limbs, skis, poles) and small bright discs."""
 
 import math
+from functools import cache
 from typing import Any
 
 import cv2
@@ -105,11 +106,18 @@ class Blob:
 
 def _blurred_disc(radii: Floats, disc: float, sigma: float) -> Floats:
     """Radial profile of a disc convolved with a Gaussian: quadrature over the chords of the disc."""
-    nodes, weights = np.polynomial.legendre.leggauss(96)
+    nodes, weights = _quadrature()
     u = disc * nodes
     chord = np.array([math.erf(math.sqrt(disc**2 - v**2) / (math.sqrt(2) * sigma)) for v in u])
     line = np.exp(-((radii[:, None] - u) ** 2) / (2 * sigma**2)) / (math.sqrt(2 * math.pi) * sigma)
     return np.asarray(line @ (chord * weights * disc))
+
+
+@cache
+def _quadrature() -> tuple[Floats, Floats]:
+    """Nodes and weights of Gauss and Legendre in [-1, 1], each of shape (96,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(96)
+    return nodes, weights
 
 
 def fill(image: Image, corners: ArrayLike, grey: float) -> None:

@@ -36,8 +36,7 @@ class Reflections:
         rng = np.random.default_rng((scenario.seed, 47))
         count = scenario.light.reflections
         x, y = rng.uniform(-4, 40, count), rng.uniform(-9, 14, count)
-        heights = [scenario.hill.snow(u, v) for u, v in zip(x, y, strict=True)]
-        self._places = np.stack((x, y, np.array(heights)), axis=1).reshape(count, 3)
+        self._places = np.stack((x, y, scenario.hill.snow(x, y)), axis=1)
         own = np.random.default_rng((scenario.seed, camera, 48))
         self._rates = own.uniform(0.8, 6.0, count)
         self._phases = own.uniform(0, 2 * math.pi, count)

@@ -101,8 +101,9 @@ class DiskStatus(Model):
     """Room for recordings."""
 
     free_gb: float
+    trash_gb: float = Field(0.0, description="held by the trash; it is made free when the room is needed")
     reserve_gb: float = Field(description="recording stops before less than this is free")
-    seconds_left: float = Field(description="so much can still be recorded")
+    seconds_left: float = Field(description="so much can still be recorded, with the room of the trash")
     jumps_left: int = Field(description="so many jumps of `jump_s` seconds")
     jump_s: float
 
@@ -215,6 +216,13 @@ class Recording(Model):
     session: SessionFields
     verdict: Statement
     deleted: bool = False
+
+
+class Trash(Model):
+    """What lies in the trash, or was removed from it for good."""
+
+    recordings: int
+    bytes: int = Field(description="room on the disk that their removal gives")
 
 
 class PulseSummary(Model):

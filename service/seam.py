@@ -11,7 +11,7 @@ from prometheus_client.metrics_core import Metric
 
 from rig.frame import FrameStatus
 from rig.pulse import RigPulse
-from rig.status import DoctorReport, Event, Pulses, Recording, RecordingOrder, RigView, SessionChange, Status
+from rig.status import DoctorReport, Event, Pulses, Recording, RecordingOrder, RigView, SessionChange, Status, Trash
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +70,18 @@ class RigService(Protocol):
 
     def restore_recording(self, recording_id: str) -> Recording:
         """Take a recording out of the trash. If it is not there, nothing changes."""
+        ...
+
+    def trash(self) -> Trash:
+        """How much lies in the trash."""
+        ...
+
+    def empty_trash(self) -> Trash:
+        """Remove everything in the trash for good; returns what was removed."""
+        ...
+
+    def remove_recording(self, recording_id: str) -> Trash:
+        """Remove a recording of the trash for good. StateForbidsError: it does not lie there."""
         ...
 
     def recordings(self, *, deleted: bool) -> list[Recording]:

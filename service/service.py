@@ -17,6 +17,7 @@ from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, 
 from rig.transport.preview import PreviewSlot
 from service.recordings.archive import Archive, as_recording
 from service.recordings.control import Outcome
+from service.recordings.trash_keeper import TrashKeeper
 from service.seam import Preview
 from service.status.measurements import measurements
 from service.supervision.commands import at_once
@@ -37,6 +38,7 @@ class Service(Archive):
     Args:
         supervisor: owns the rig.
         catalogue: of the folder of the recordings.
+        keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
         examine: the doctor; examines what disturbs nothing in the given state.
     """
@@ -45,16 +47,17 @@ class Service(Archive):
         self,
         supervisor: Supervisor,
         catalogue: Catalogue,
+        keeper: TrashKeeper,
         slot: PreviewSlot,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
         super().__init__(catalogue)
-        self._supervisor, self._slot, self._examine = supervisor, slot, examine
+        self._supervisor, self._keeper, self._slot, self._examine = supervisor, keeper, slot, examine
         self._closing = threading.Event()
 
     def status(self) -> Status:
-        """The present status."""
-        return self._supervisor.status
+        """The present status; the room on the disk counts what the trash holds."""
+        return self._keeper.counted_in(self._supervisor.status)
 
     def arm(self) -> Status:
         """Begin to arm."""
@@ -65,8 +68,10 @@ class Service(Archive):
         return self._supervisor.commands.ask(at_once(self._supervisor.disarm), _SOON_S)
 
     def start_recording(self, order: RecordingOrder) -> Recording:
-        """Start; returns when the log is open."""
+        """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
         supervisor = self._supervisor
+        if self.status().state is State.ARMED:
+            self._keeper.make_room(supervisor.rig.recorder.jump_s if order.duration_s is None else order.duration_s)
 
         def start(opened: "Future[Recording]") -> None:
             supervisor.recordings.start(order, opened)

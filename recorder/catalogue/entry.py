@@ -86,10 +86,10 @@ def read_entry(path: Path) -> Entry:
         FileNotFoundError: the file is no longer there.
     """
     stat = path.lstat()
+    if not S_ISREG(stat.st_mode):
+        folder = f"{path}: is a folder or a device, no log; move it out of the folder"
+        return _trouble(path, stat, link_text(path) if S_ISLNK(stat.st_mode) else folder)
     try:
-        stat = path.stat()
-        if not S_ISREG(stat.st_mode):
-            return _trouble(path, stat, f"{path}: is a folder or a device, no log; move it out of the folder")
         found = info(path, original=True)
     except ForeignFileError:
         text = f"{path}: is no log of svev, or its beginning is damaged; try svev recover, or move it out of the folder"
@@ -99,10 +99,7 @@ def read_entry(path: Path) -> Entry:
         return _trouble(path, stat, str(error))
     except OSError as error:
         path.lstat()
-        text = f"{path}: cannot be looked at ({error.strerror}); check its permissions"
-        if S_ISLNK(stat.st_mode):
-            text = f"{path}: is a link that leads nowhere ({error.strerror}); correct or remove it"
-        return _trouble(path, stat, text)
+        return _trouble(path, stat, f"{path}: cannot be looked at ({error.strerror}); check its permissions")
     except Exception as error:  # noqa: BLE001 - whatever is odd about one file, the others are listed
         text = f"{path}: cannot be read ({type(error).__name__}); see what is wrong with svev verify"
         return _trouble(path, stat, text)
@@ -115,6 +112,11 @@ def read_entry(path: Path) -> Entry:
         cameras=found.cameras, shape=found.shape, session=found.session,
         disk=found.trouble,
     )  # fmt: skip
+
+
+def link_text(path: Path) -> str:
+    """What is wrong with a link under the name of a log."""
+    return f"{path}: is a link, and links are not followed; put the log itself here, or remove the link"
 
 
 def _trouble(path: Path, stat: os.stat_result, text: str) -> Entry:

@@ -1,35 +1,43 @@
 """The recordings of a folder and its trash: lists and reads them, changes session fields, deletes and restores.
 
-Deleted recordings wait in the subfolder `.trash` until they are restored, or old enough to be removed for good.
+Deleted recordings wait in the subfolder `.trash` until they are restored, or removed for good: when somebody empties
+it, when they are old, or when the disk needs their room.
 """
 
 import os
 import re
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from stat import S_ISDIR
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.catalogue.entry import Entry, with_changes
+from recorder.catalogue.entry import Entry, link_text, with_changes
 from recorder.catalogue.log_cache import LogCache
-from recorder.log.session_changes import session_changes, session_path, write_session_changes
-from recorder.log.truth_path import truth_path
+from recorder.catalogue.trash import (
+    SUFFIX,
+    TrashContents,
+    TrashedLog,
+    beside,
+    oldest_until,
+    remove_for_good,
+    trash_contents,
+    trash_of,
+    trashed_logs,
+)
+from recorder.log.session_changes import session_changes, write_session_changes
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
-from rig.errors import LogDamagedError, StorageError, UnknownRecordingError
+from rig.errors import BadInputError, LogDamagedError, StorageError, UnknownRecordingError
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
-_SUFFIX: Final = ".mcap"
-_TRASH: Final = ".trash"
 _ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", re.ASCII)
 _STEM_MAX: Final = 90
 
@@ -46,7 +54,7 @@ class Catalogue:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self._trash = directory / _TRASH
+        self._trash = trash_of(directory)
         self._logs = LogCache(directory)
         self._changing = threading.Lock()
 
@@ -58,7 +66,7 @@ class Catalogue:
         """
         folder = self._folder(deleted=deleted)
         try:
-            paths = [path for path in folder.iterdir() if path.suffix == _SUFFIX and _ID.fullmatch(path.stem)]
+            paths = [path for path in folder.iterdir() if path.suffix == SUFFIX and _ID.fullmatch(path.stem)]
         except FileNotFoundError:
             return []
         except OSError as error:
@@ -69,13 +77,13 @@ class Catalogue:
         self._logs.save()
         return sorted(found, key=lambda entry: (entry.started or entry.modified, entry.id), reverse=True)
 
-    def entry(self, recording: str) -> Entry:
-        """One recording, in the folder or in its trash.
+    def entry(self, recording: str, *, prefer_deleted: bool = False) -> Entry:
+        """One recording, in the folder or in its trash; `prefer_deleted`: if both hold the id, that in the trash.
 
         Raises:
             UnknownRecordingError: no recording has this id.
         """
-        path = self._path(recording)
+        path = self._path(recording, prefer_deleted=prefer_deleted)
         entry = self._entry(path)
         if entry is None:
             raise _unknown(recording)
@@ -88,7 +96,7 @@ class Catalogue:
             UnknownRecordingError: no recording has this id.
             BadInputError: it may not be read, or is no regular file.
         """
-        path = self._path(recording)
+        path = self._log(recording)
         FileWindow(path, direct=False).close()
         return path
 
@@ -99,7 +107,7 @@ class Catalogue:
             UnknownRecordingError: no recording has this id.
             BadInputError: the log cannot be read.
         """
-        return tuple(tags(self._path(recording)))
+        return tuple(tags(self._log(recording)))
 
     def image(self, recording: str, pulse: int) -> NDArray[np.uint8]:
         """The image of one pulse, (rows, columns), uint8, a copy. Reads no other image.
@@ -109,7 +117,7 @@ class Catalogue:
             BadInputError: the log cannot be read.
             LogDamagedError: the image is damaged.
         """
-        path = self._path(recording)
+        path = self._log(recording)
         place = self._logs.image_places(path, pulse).get(PulseNumber(pulse))
         if place is None:
             raise UnknownRecordingError(f"recording {recording} has no image of pulse {pulse}: choose another pulse")
@@ -165,26 +173,51 @@ class Catalogue:
                 log.rename(path)
         return self.entry(path.stem)
 
-    def purge(self, older_than_s: float) -> list[str]:
+    def trash(self) -> TrashContents:
+        """How much lies in the trash."""
+        return trash_contents(self.directory)
+
+    def remove(self, recording: str) -> TrashContents:
+        """Remove a recording of the trash for good.
+
+        Returns:
+            What was removed.
+
+        Raises:
+            UnknownRecordingError: the trash holds no recording of this id; a folder is none.
+            StorageError: the disk refuses.
+        """
+        with self._change():
+            logs = [log for log in trashed_logs(self.directory) if log.path.stem == recording]
+            if not logs:
+                text = f"no recording {recording[:100]!r} in the trash: only what was deleted can be removed for good"
+                raise UnknownRecordingError(text)
+            return _remove(logs)
+
+    def purge(self, *, older_than_s: float = 0.0) -> TrashContents:
         """Remove for good what has been in the trash for more than `older_than_s`; folders stay there.
 
         Returns:
-            The ids.
+            What was removed.
 
         Raises:
             StorageError: the disk refuses.
         """
-        gone = []
         with self._change():
-            for log in self._trash.glob(f"*{_SUFFIX}"):
-                # Nobody writes into a deleted log, so its inode changed last when it was moved here.
-                stat = log.lstat()
-                if not S_ISDIR(stat.st_mode) and stat.st_ctime <= time.time() - older_than_s:
-                    log.unlink()
-                    for beside in _beside(log):
-                        beside.unlink(missing_ok=True)
-                    gone.append(log.stem)
-        return gone
+            before = time.time() - older_than_s
+            return _remove([log for log in trashed_logs(self.directory) if log.since <= before])
+
+    def make_room(self, wanted_bytes: float) -> TrashContents:
+        """Remove for good what has been in the trash for longest, until so much room is won or the trash is empty.
+
+        Returns:
+            What was removed.
+
+        Raises:
+            StorageError: the disk refuses.
+        """
+        with self._change():
+            return _remove(list(oldest_until(trashed_logs(self.directory), wanted_bytes)))
 
     @contextmanager
     def _change(self) -> Iterator[None]:
@@ -205,10 +238,22 @@ class Catalogue:
         """The log of a recording, looked for in the folder first or, if `prefer_deleted`, in the trash first."""
         if _ID.fullmatch(recording):
             for deleted in (prefer_deleted, not prefer_deleted):
-                path = self._folder(deleted=deleted) / f"{recording}{_SUFFIX}"
+                path = self._folder(deleted=deleted) / f"{recording}{SUFFIX}"
                 if os.path.lexists(path):
                     return path
         raise _unknown(recording)
+
+    def _log(self, recording: str) -> Path:
+        """The log of a recording, to be read.
+
+        Raises:
+            UnknownRecordingError: no recording has this id.
+            BadInputError: it is a link: whatever it leads to does not lie in this folder.
+        """
+        path = self._path(recording)
+        if path.is_symlink():
+            raise BadInputError(link_text(path))
+        return path
 
     def _entry(self, path: Path) -> Entry | None:
         """The entry of a file, None if the file has just been removed."""
@@ -223,18 +268,19 @@ class Catalogue:
         name, numbers = log.name, count(2)
         if os.path.lexists(target / name):
             while os.path.lexists(self.directory / name) or os.path.lexists(self._trash / name):
-                name = f"{log.stem[:_STEM_MAX]}-{next(numbers)}{_SUFFIX}"
+                name = f"{log.stem[:_STEM_MAX]}-{next(numbers)}{SUFFIX}"
         return target / name
 
 
-def _beside(log: Path) -> tuple[Path, ...]:
-    """The files that belong to a log, whether they are there or not."""
-    return session_path(log), truth_path(log)
+def _remove(logs: Sequence[TrashedLog]) -> TrashContents:
+    for log in logs:
+        remove_for_good(log)
+    return TrashContents(len(logs), sum(log.bytes for log in logs))
 
 
 def _move_beside(log: Path, target: Path) -> None:
-    for before, after in zip(_beside(log), _beside(target), strict=True):
-        if before.exists():
+    for before, after in zip(beside(log), beside(target), strict=True):
+        if os.path.lexists(before):
             before.rename(after)
 
 

@@ -39,12 +39,12 @@ class KeptEntry:
 
 
 def file_key(path: Path) -> FileKey:
-    """The key of a file.
+    """The key of a file, or of the link itself.
 
     Raises:
         OSError: the file is not there, or may not be looked at.
     """
-    stat = path.stat()
+    stat = path.lstat()
     return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
 
 

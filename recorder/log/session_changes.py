@@ -4,6 +4,7 @@ They stand in a small file beside the log, `jump.session.json` for `jump.mcap`: 
 changed field by name.
 """
 
+import errno
 import json
 import os
 from collections.abc import Mapping
@@ -35,6 +36,8 @@ def session_changes(log: Path) -> dict[str, str]:
     except FileNotFoundError:
         return {}
     except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise BadInputError(f"{path}: is a link, and links are not followed; remove it") from None
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
     if len(text) > _BYTES_MAX:
         raise BadInputError(f"{path}: is larger than {_BYTES_MAX >> 10} KiB; shorten it, or remove it")
@@ -52,7 +55,8 @@ def write_session_changes(log: Path, changes: Mapping[str, str]) -> None:
     """
     path = session_path(log)
     half_done = path.with_name(f".{path.name}.new")
-    with half_done.open("w", encoding="utf-8") as file:
+    half_done.unlink(missing_ok=True)
+    with half_done.open("x", encoding="utf-8") as file:
         json.dump(dict(changes), file, ensure_ascii=False, indent=1)
         file.flush()
         os.fsync(file.fileno())
@@ -61,7 +65,7 @@ def write_session_changes(log: Path, changes: Mapping[str, str]) -> None:
 
 def _read(path: Path) -> bytes:
     """The file, no more of it than a byte above the limit. A pipe of this name is empty: nobody waits for it."""
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOFOLLOW)
     try:
         return os.read(fd, _BYTES_MAX + 1)
     finally:

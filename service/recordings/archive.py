@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from analysis.images.activity import liveliest_pulse
 from recorder.catalogue.entry import Entry, LogState
 from recorder.catalogue.folder import Catalogue
+from recorder.catalogue.trash import TrashContents
 from rig.clocks import NS_PER_S
-from rig.errors import StillRecordingError
+from rig.errors import StateForbidsError, StillRecordingError
 from rig.status import (
     Causes,
     Counts,
@@ -23,6 +24,7 @@ from rig.status import (
     SessionFields,
     Statement,
     Status,
+    Trash,
 )
 from rig.tag import TripletTag
 from triggering.ledger import pauses_in_words
@@ -59,6 +61,24 @@ class Archive(ABC):
         current = self.status().recording
         return current if current and current.id == recording_id else as_recording(self._catalogue.entry(recording_id))
 
+    def trash(self) -> Trash:
+        """How much lies in the trash."""
+        return _as_trash(self._catalogue.trash())
+
+    def empty_trash(self) -> Trash:
+        """Remove everything in the trash for good."""
+        return _as_trash(self._catalogue.purge())
+
+    def remove_recording(self, recording_id: str) -> Trash:
+        """Remove one recording of the trash for good.
+
+        Raises:
+            StateForbidsError: it does not lie in the trash.
+        """
+        if not self._catalogue.entry(recording_id, prefer_deleted=True).deleted:
+            raise StateForbidsError(f"recording {recording_id} is not in the trash: delete it first")
+        return _as_trash(self._catalogue.remove(recording_id))
+
     def log_file(self, recording_id: str) -> Path:
         """Path of the log of a recording that has ended.
 
@@ -81,7 +101,7 @@ class Archive(ABC):
 
     def liveliest_pulse(self, recording_id: str) -> int:
         """The pulse to show a recording by: the middle of the stretch in which most moves."""
-        return liveliest_pulse(self._catalogue.entry(recording_id).path)
+        return liveliest_pulse(self._catalogue.file(recording_id))
 
 
 def as_recording(entry: Entry) -> Recording:
@@ -100,6 +120,10 @@ def as_recording(entry: Entry) -> Recording:
         verdict=verdict(entry),
         deleted=entry.deleted,
     )
+
+
+def _as_trash(contents: TrashContents) -> Trash:
+    return Trash(recordings=contents.recordings, bytes=contents.bytes)
 
 
 def verdict(entry: Entry) -> Statement:

@@ -1,10 +1,11 @@
-"""The folder of the recordings: path of a new log, and how much more fits on the disk."""
+"""The folder of the recordings: path of a new log, how much more fits on the disk, and what makes room there."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from recorder.catalogue.trash import trash_contents
 from rig.disk import free_bytes
 from rig.errors import BadInputError, StorageError
 from rig.settings.model import RigSettings
@@ -62,9 +63,15 @@ def bytes_per_s(rig: RigSettings) -> float:
     return rows * columns * rig.trigger.rate_hz
 
 
-def room_for(rig: RigSettings, free_bytes: int) -> Room:
-    """How much can be recorded into `free_bytes`."""
-    seconds = max(0.0, usable_bytes(rig, free_bytes)) // bytes_per_s(rig)
+def room_for(rig: RigSettings, free_bytes: int, trash_bytes: int = 0) -> Room:
+    """How much can be recorded.
+
+    Args:
+        rig: the rig.
+        free_bytes: free on the disk.
+        trash_bytes: what the trash holds, if it makes room when room runs short.
+    """
+    seconds = max(0.0, usable_bytes(rig, free_bytes + trash_bytes)) // bytes_per_s(rig)
     return Room(free_bytes, seconds, int(seconds / rig.recorder.jump_s))
 
 
@@ -72,11 +79,23 @@ def check_room_for(rig: RigSettings, directory: Path, seconds: float) -> None:
     """Check that a recording of `seconds` fits on the disk.
 
     Raises:
-        StorageError: it does not fit.
+        StorageError: it does not fit; the message says what makes room.
     """
-    room = room_for(rig, free_bytes(directory) or 0)
+    free = free_bytes(directory) or 0
+    room = room_for(rig, free)
     if room.seconds < seconds:
+        missing = seconds * bytes_per_s(rig) - usable_bytes(rig, free)
         raise StorageError(
             f"{directory}: there is room for {room.seconds:.0f} s and {seconds:g} s are wanted, beside the reserve of "
-            f"{rig.recorder.reserve_gb:g} GB: delete recordings, or copy them away"
+            f"{rig.recorder.reserve_gb:g} GB: {_what_makes_room(directory, missing)}"
         )
+
+
+def _what_makes_room(directory: Path, missing_bytes: float) -> str:
+    """What to do for so much more room. Deleting alone gives none: what is deleted lies in the trash."""
+    trash = trash_contents(directory).bytes
+    if trash >= missing_bytes:
+        return f"empty the trash, which frees {trash / _GB:.1f} GB"
+    if trash:
+        return f"empty the trash, which frees {trash / _GB:.1f} GB, then delete recordings and empty it again"
+    return "delete recordings and then empty the trash, or move recordings to another disk"

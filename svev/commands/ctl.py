@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from rig.errors import CameraError, SvevError
+from rig.errors import BadInputError, CameraError, SvevError
 from svev import console
 from svev.rest_client import RestClient, read_token
 
@@ -124,13 +124,21 @@ def save(
     seconds: Annotated[
         float | None, typer.Option(min=0, help="the last so many seconds; all that are held if left out")
     ] = None,
+    athlete: Text = None,
+    bib: Text = None,
+    gate: Text = None,
+    wind: Text = None,
+    notes: Text = None,
+    operator: Text = None,
     as_json: Json = False,
 ) -> None:
     """Save what has just happened: record the last seconds, which are held in memory.
 
-    Example: svev ctl save --seconds 5
+    Example: svev ctl save --seconds 5 --bib 17
     """
-    recording = _call(context, "POST", "/api/recordings", _given(preroll_s=seconds, duration_s=0))
+    session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
+    order = session | _given(preroll_s=seconds, duration_s=0)
+    recording = _call(context, "POST", "/api/recordings", order)
     _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), _recording_lines, as_json)
 
 
@@ -186,6 +194,25 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
     _show(_call(context, "POST", f"{_path(recording)}/restore"), _recording_lines, as_json)
 
 
+@app.command()
+def trash(
+    context: typer.Context,
+    empty: Annotated[bool, typer.Option("--empty", help="remove everything in it for good")] = False,
+    remove: Annotated[str, typer.Option("--remove", metavar="ID", help="remove this recording in it for good")] = "",
+    as_json: Json = False,
+) -> None:
+    """Say how much lies in the trash and what its removal frees; or remove it for good.
+
+    Example: svev ctl trash --empty
+    """
+    if empty and remove:
+        raise BadInputError("--empty removes everything, --remove one recording: give one of the two")
+    path = f"/api/trash/{urllib.parse.quote(remove, safe='')}" if remove else "/api/trash"
+    answer = _call(context, "DELETE" if empty or remove else "GET", path)
+    words = "removed for good" if empty or remove else "in the trash"
+    _show(answer, lambda what: [f"{what['recordings']} recordings {words}, {what['bytes'] / 1e9:.2f} GB"], as_json)
+
+
 def _call(context: typer.Context, method: str, path: str, body: dict[str, object] | None = None) -> Any:
     client: RestClient = context.obj
     return client.call(method, path, body)
@@ -231,7 +258,9 @@ def _status_lines(answer: dict[str, Any]) -> list[str]:
     for camera in answer["cameras"]:
         lines.append(f"{camera['name']:10} {_said(camera['statement'])}")
     disk = answer["disk"]
-    lines.append(f"disk       {disk['free_gb']:g} GB free, {disk['jumps_left']} jumps of {disk['jump_s']:g} s left")
+    trash = f" and {disk['trash_gb']:g} GB in the trash" if disk["trash_gb"] else ""
+    left = f"{disk['jumps_left']} jumps of {disk['jump_s']:g} s left"
+    lines.append(f"disk       {disk['free_gb']:g} GB free{trash}, {left}")
     if answer["preroll"]["seconds"]:
         lines.append(f"held       the last {answer['preroll']['seconds']:.1f} s")
     if answer["recording"] is not None:

@@ -16,6 +16,7 @@ from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
+from service.recordings.trash_keeper import TrashKeeper
 from service.service import Service
 from service.status.event_hub import EventHub
 from service.supervision.supervisor import Supervisor
@@ -28,7 +29,6 @@ from webpanel.door.access import Access
 from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
-_TRASH_S: Final = 30 * 86400.0
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
 _ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -74,9 +74,9 @@ def serve(settings: ServiceSettings) -> None:
         hub, catalogue = EventHub(write_line), Catalogue(data)
         options = RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
         supervisor = Supervisor(rig, rig_toml, hub, options)
-        service = Service(supervisor, catalogue, slot, PanelDoctor(rig, data).report)
+        keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
+        service = Service(supervisor, catalogue, keeper, slot, PanelDoctor(rig, data).report)
         server = make_server(create_app(service, settings.access))
-        _purge(catalogue, hub)
         supervisor.on_turn = _Reporter(supervisor, server, notify, url(listener)).report
 
         def end() -> None:
@@ -92,11 +92,6 @@ def serve(settings: ServiceSettings) -> None:
                 supervisor.stop(_STOP_S)
         if supervisor.failure is not None:
             raise supervisor.failure
-
-
-def _purge(catalogue: Catalogue, hub: EventHub) -> None:
-    if gone := catalogue.purge(_TRASH_S):
-        hub.tell(Event.now(Level.INFO, "service", f"the trash is emptied of recordings older than 30 days: {gone}"))
 
 
 class _Reporter:

@@ -78,7 +78,9 @@ def _room_of(status: Status) -> Finding:
     disk = status.disk
     what = f"{disk.free_gb:g} GB free, room for {disk.jumps_left} jumps of {disk.jump_s:g} s"
     if disk.jumps_left < 1:
-        return failure(Topic.DISK, what, "delete recordings, or copy them away")
+        return failure(
+            Topic.DISK, what, "empty the trash; delete recordings and empty it again, or move them to another disk"
+        )
     return passed(Topic.DISK, f"{what}; disarm to have its speed examined")
 
 

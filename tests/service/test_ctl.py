@@ -45,7 +45,8 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         ended = _json(_ctl(url, "stop", "--json", token=TOKEN))
         assert (ended["id"], ended["state"], ended["session"]["bib"]) == (begun["id"], "finished", "17")
         assert _json(_ctl(url, "session", begun["id"], "--bib", "18", "--json", token=TOKEN))["session"]["bib"] == "18"
-        saved = _json(_ctl(url, "save", "--seconds", "1", "--json", token=TOKEN))
+        saved = _json(_ctl(url, "save", "--seconds", "1", "--bib", "19", "--json", token=TOKEN))
+        assert saved["session"]["bib"] == "19"
         assert 0 < saved["counts"]["pulses"] <= 33
         listed = _ctl(url, "list", token=TOKEN).stdout
         assert [line.split()[0] for line in listed.splitlines()] == [saved["id"], begun["id"]]
@@ -53,6 +54,10 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         assert _json(_ctl(url, "delete", begun["id"], "--json", token=TOKEN))["deleted"]
         assert len(_json(_ctl(url, "list", "--json", token=TOKEN))["recordings"]) == 1
         assert not _json(_ctl(url, "restore", begun["id"], "--json", token=TOKEN))["deleted"]
+        assert _ctl(url, "trash", "--remove", saved["id"], token=TOKEN).returncode == 1
+        _ctl(url, "delete", saved["id"], token=TOKEN)
+        assert _ctl(url, "trash", token=TOKEN).stdout.startswith("1 recordings in the trash")
+        assert _json(_ctl(url, "trash", "--empty", "--json", token=TOKEN))["recordings"] == 1
         assert _ctl(url, "stop", token=TOKEN).returncode == 1
         assert _ctl(url, "delete", "nonsense", token=TOKEN).returncode == 2
         assert _ctl(url, "start", "--notes", "x" * 5000, token=TOKEN).returncode == 2

@@ -41,6 +41,16 @@ def test_a_full_disk_ends_the_recording_and_the_service_lives_on(tmp_path: Path,
         assert found["counts"]["complete"] == found["counts"]["pulses"] > 100
         kept.write_bytes(Path(f"/proc/{service.pid}/root{small}/{recording['id']}.mcap").read_bytes())
         service.get("/api/doctor")
+
+        # What is deleted makes room by itself when it is needed, and is counted as room before.
+        assert service.get("/api/status")["disk"]["jumps_left"] == 0
+        assert service.call("DELETE", f"/api/recordings/{recording['id']}")[0] == 200
+        wait_until(
+            lambda: service.get("/api/status")["disk"]["jumps_left"] or not service.get("/api/trash")["recordings"],
+            "the trash counts as room", PATIENCE_S, 0.1,
+        )  # fmt: skip
+        assert service.post("/api/recordings", {"duration_s": 1})["state"] == "recording"
+        assert service.get("/api/trash") == {"recordings": 0, "bytes": 0}
     report = verify(kept)
     assert report.ledger.complete == report.ledger.pulses > 100
     assert not report.damaged

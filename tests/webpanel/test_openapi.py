@@ -22,7 +22,7 @@ CALLS = {
     "POST /api/recordings/{recording_id}/restore", "GET /api/recordings/{recording_id}/file",
     "GET /api/recordings/{recording_id}/pulses", "GET /api/recordings/{recording_id}/pulses/{pulse}.jpg",
     "GET /api/recordings/{recording_id}/thumbnail.jpg", "POST /api/login", "POST /api/logout", "GET /metrics",
-    "GET /healthz",
+    "GET /healthz", "GET /api/trash", "DELETE /api/trash", "DELETE /api/trash/{recording_id}",
 }  # fmt: skip
 
 

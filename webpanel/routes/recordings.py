@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Body, Query, Response
 
-from rig.status import Recording, RecordingOrder, SessionChange
+from rig.status import Recording, RecordingOrder, SessionChange, Trash
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, RecordingId, refusals, strict_router
 from webpanel.routes.events import Changes
@@ -65,6 +65,25 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         recording = service.delete_recording(recording_id)
         changes.recordings_changed()
         return recording
+
+    @router.get("/trash")
+    def get_trash() -> Trash:
+        """How much lies in the trash. What lies there: `GET /recordings?deleted=true`."""
+        return service.trash()
+
+    @router.delete("/trash", responses=CHANGING)
+    def empty_trash() -> Trash:
+        """Empty the trash: what was deleted is removed for good, which frees its room. Answers what was removed."""
+        gone = service.empty_trash()
+        changes.recordings_changed()
+        return gone
+
+    @router.delete("/trash/{recording_id}", responses=CHANGING | refusals(404))
+    def remove_recording(recording_id: RecordingId) -> Trash:
+        """Remove one recording for good; it must lie in the trash."""
+        gone = service.remove_recording(recording_id)
+        changes.recordings_changed()
+        return gone
 
     @router.post("/recordings/{recording_id}/restore", responses=CHANGING | refusals(404))
     def restore_recording(recording_id: RecordingId, _: NoFields = None) -> Recording:

@@ -82,7 +82,7 @@ def test_the_newest_comes_first_and_one_without_pulses_counts_from_its_file(fold
 def test_a_missing_folder_holds_nothing(tmp_path: Path) -> None:
     assert Catalogue(tmp_path / "none").entries() == []
     assert Catalogue(tmp_path / "none").entries(deleted=True) == []
-    assert Catalogue(tmp_path / "none").purge(0) == []
+    assert Catalogue(tmp_path / "none").purge().recordings == 0
 
 
 @pytest.mark.parametrize(
@@ -278,9 +278,9 @@ def test_the_trash_is_emptied_of_what_is_old(folder: Path) -> None:
     catalogue.change_session("jump", {"bib": "3"})
     (folder / "jump.truth.json").write_text("{}")
     catalogue.delete("jump")
-    assert catalogue.purge(3600) == []
+    assert catalogue.purge(older_than_s=3600).recordings == 0
     assert catalogue.entry("jump").deleted
-    assert catalogue.purge(0) == ["jump"]
+    assert catalogue.purge().recordings == 1
     assert list((folder / ".trash").iterdir()) == []
 
 

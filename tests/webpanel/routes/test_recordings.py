@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
+from mcap.writer import Writer
 
 from rig.errors import StorageError, SvevError
 from rig.frame import FrameStatus
@@ -157,6 +158,37 @@ def test_a_recording_is_deleted_and_restored(client: httpx.Client, service: Memo
     assert client.delete("/api/recordings/jump").json() == deleted.json()
     assert not client.post("/api/recordings/jump/restore").json()["deleted"]
     assert [each["id"] for each in client.get("/api/recordings").json()] == ["jump"]
+
+
+def test_the_trash_is_looked_at_and_emptied(client: httpx.Client, service: MemoryService) -> None:
+    for name in ("one", "two", "three"):
+        write_recording(service.catalogue.directory, name)
+    assert client.get("/api/trash").json() == {"recordings": 0, "bytes": 0}
+    assert refused(client.delete("/api/trash/one"), 409).code == "state_forbids"
+    refused(client.delete("/api/trash/nobody"), 404)
+    for name in ("one", "two"):
+        client.delete(f"/api/recordings/{name}")
+    full = client.get("/api/trash").json()
+    assert full["recordings"] == 2
+    one = client.delete("/api/trash/one").raise_for_status().json()
+    assert (one["recordings"], one["bytes"]) == (1, full["bytes"] // 2)
+    assert client.delete("/api/trash").json() == one
+    assert client.get("/api/recordings?deleted=true").json() == []
+    assert [each["id"] for each in client.get("/api/recordings").json()] == ["three"]
+
+
+def test_a_foreign_log_is_moved_and_answered_for(client: httpx.Client, service: MemoryService) -> None:
+    folder = service.catalogue.directory
+    with (folder / "foreign.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        writer.finish()  # type: ignore[no-untyped-call]
+    deleted = client.delete("/api/recordings/foreign")
+    assert (deleted.status_code, deleted.json()["deleted"]) == (200, True)
+    restored = client.post("/api/recordings/foreign/restore")
+    assert (restored.status_code, restored.json()["deleted"]) == (200, False)
+    assert "is no log of svev" in restored.json()["verdict"]["text"]
+    assert (folder / "foreign.mcap").exists()
 
 
 def test_a_bad_file_is_a_bad_row(client: httpx.Client, service: MemoryService) -> None:

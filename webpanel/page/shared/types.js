@@ -34,6 +34,7 @@
  *
  * @typedef {object} DiskStatus
  * @property {number} free_gb
+ * @property {number} trash_gb
  * @property {number} reserve_gb
  * @property {number} seconds_left
  * @property {number} jumps_left

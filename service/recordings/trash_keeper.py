@@ -1,0 +1,107 @@
+"""Removes what is old from the trash, and what has been there for longest when the disk's room runs short."""
+
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from recorder.catalogue.folder import Catalogue
+from recorder.catalogue.trash import TrashContents
+from rig.disk import free_bytes
+from rig.errors import StorageError
+from rig.events import Event, Level
+from rig.settings.model import RigSettings
+from rig.status import DiskStatus, Status
+from service.recordings.storage import bytes_per_s, room_for, usable_bytes
+
+#: What was deleted is kept for so long, unless its room is needed.
+KEPT_DAYS: Final = 30
+_DAY_S: Final = 86400.0
+#: Room is made before less than so much can be recorded, or two jumps.
+_SPARE_S: Final = 120.0
+_SPARE_JUMPS: Final = 2
+#: Between two looks the fastest rigs write some 500 MB, less than the usual reserve.
+_LOOK_S: Final = 5.0
+#: A disk that hangs is not waited for longer.
+_END_S: Final = 2.0
+_GB: Final = 1e9
+
+
+class TrashKeeper:
+    """Looks after the trash of a folder in a thread of its own, because the disk may hang; a context manager.
+
+    Args:
+        rig: says how much room a recording takes.
+        catalogue: of the folder.
+        tell: takes an event whenever something was removed, or could not be; any thread may call it.
+    """
+
+    def __init__(self, rig: RigSettings, catalogue: Catalogue, tell: Callable[[Event], None]) -> None:
+        self._rig, self._catalogue, self._tell = rig, catalogue, tell
+        self._contents = TrashContents(0, 0)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="trash keeper", daemon=True)
+        self._refused = ""
+
+    def __enter__(self) -> "TrashKeeper":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join(_END_S)
+
+    def counted_in(self, status: Status) -> Status:
+        """A status whose room counts what the trash holds: it is made free when it is needed."""
+        trash, disk = self._contents.bytes, status.disk
+        if not trash:
+            return status
+        room = room_for(self._rig, round(disk.free_gb * _GB), trash)
+        counted = DiskStatus(
+            free_gb=disk.free_gb,
+            trash_gb=round(trash / _GB, 2),
+            reserve_gb=disk.reserve_gb,
+            seconds_left=round(room.seconds),
+            jumps_left=room.jumps,
+            jump_s=disk.jump_s,
+        )
+        return status.model_copy(update={"disk": counted})
+
+    def make_room(self, seconds: float) -> None:
+        """Remove from the trash what must go for a recording of so many seconds, what was deleted first at the front.
+
+        Raises:
+            StorageError: the disk refuses.
+        """
+        free = free_bytes(self._catalogue.directory)
+        if free is None:  # the disk is not there
+            return
+        missing = seconds * bytes_per_s(self._rig) - usable_bytes(self._rig, free)
+        if missing > 0:
+            self._say(self._catalogue.make_room(missing), "room was needed")
+
+    def look(self) -> None:
+        """Remove what is too old, make room if it runs short, and measure what is left.
+
+        Raises:
+            StorageError: the disk refuses.
+        """
+        self._say(self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S), f"it was older than {KEPT_DAYS} days")
+        self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._rig.recorder.jump_s))
+        self._contents = self._catalogue.trash()
+
+    def _say(self, gone: TrashContents, why: str) -> None:
+        if gone.recordings:
+            self._contents = self._catalogue.trash()
+            what = f"{gone.recordings} recordings, {gone.bytes / _GB:.1f} GB"
+            self._tell(Event.now(Level.INFO, "service", f"removed from the trash for good: {what}; {why}"))
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            try:
+                self.look()
+                self._refused = ""
+            except StorageError as error:
+                if str(error) != self._refused:
+                    self._refused = str(error)
+                    self._tell(Event.now(Level.ERROR, "service", self._refused))
+            self._over.wait(_LOOK_S)

@@ -1,9 +1,8 @@
 """The seam between panel and service: what the panel may call, and the errors by which the service refuses."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,27 @@ class Preview:
     pixels: NDArray[np.uint8]
     columns: tuple[tuple[int, int], ...]
     statuses: tuple[FrameStatus, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Download:
+    """A recording as a file to take away.
+
+    Attributes:
+        name: of the file; it says who jumped.
+        size: bytes.
+        modified: when the recording was last written, UNIX time, s.
+        tag: another one whenever the file's bytes are others.
+        corrected: the session in it differs from that of the log: it was changed after the recording.
+        open: opens it.
+    """
+
+    name: str
+    size: int
+    modified: float
+    tag: str
+    corrected: bool
+    open: Callable[[], BinaryIO]
 
 
 class RigService(Protocol):
@@ -92,8 +112,20 @@ class RigService(Protocol):
         """One recording, in the trash or not."""
         ...
 
-    def log_file(self, recording_id: str) -> Path:
-        """Path of a recording's log. StateForbidsError: the log is still being written."""
+    def download(self, recording_id: str) -> Download:
+        """A recording as a file, with its session as it was corrected. StateForbidsError: it is still being written."""
+        ...
+
+    def checksum(self, recording_id: str) -> str:
+        """SHA-256 of that file, in hexadecimal; reads all of it, unless it was asked for before."""
+        ...
+
+    def known_checksum(self, download: Download) -> str:
+        """SHA-256 of a file if it was asked for before, otherwise empty."""
+        ...
+
+    def zipped(self, recording_ids: Sequence[str]) -> Iterator[bytes]:
+        """Several recordings as one archive (ZIP), piece by piece. Errors of single recordings come at once."""
         ...
 
     def pulses(self, recording_id: str) -> Pulses:

@@ -1,7 +1,8 @@
 """The REST client of `svev ctl`: JSON in, JSON out, refusals of the service as errors."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from http import HTTPStatus
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -51,28 +52,52 @@ class RestClient:
             SvevError: the service's state forbids it; the message says what to do.
             ProcessDiedError: the service does not answer, or failed.
         """
+        with self.answering(method, path, body) as answer:
+            try:
+                answer.read()
+                return answer.json()
+            except ValueError:
+                text = f"{self._url} answers no JSON: give the address of svev serve with --url"
+                raise ProcessDiedError(text) from None
+
+    @contextmanager
+    def answering(
+        self,
+        method: str,
+        path: str,
+        body: Mapping[str, Any] | None = None,
+        more: Mapping[str, str] | None = None,
+    ) -> "Iterator[httpx.Response]":
+        """A successful answer, whose content is still to be read; arguments and errors as for `call`.
+
+        Args:
+            method: e.g. GET.
+            path: below the service's address.
+            body: sent as JSON.
+            more: further headers.
+        """
         import httpx  # noqa: PLC0415 - takes 70 ms to import, which --help need not wait for
 
-        headers = {"Accept": "application/json"} | ({"Authorization": f"Bearer {self._token}"} if self._token else {})
+        headers = {"Accept": "application/json", **(more or {})}
+        if self._token:
+            headers["Authorization"] = f"Bearer {self._token}"
         try:
             # Neither proxies (trust_env) nor redirects: the service is on this computer or in the network at the hill,
             # and nobody else is to get the token. Certificates are loaded (0.1 s) only where there is one to check.
-            answer = httpx.request(
+            with httpx.stream(
                 method, self._url + path, json=body, headers=headers, timeout=_TIMEOUT_S, trust_env=False,
                 follow_redirects=False, verify=self._url.startswith("https:"),
-            )  # fmt: skip
+            ) as answer:  # fmt: skip
+                if not answer.is_success:
+                    answer.read()
+                    raise _refusal(answer)
+                yield answer
         except httpx.InvalidURL:
             raise _no_address(self._url) from None
         except httpx.HTTPError as error:
             raise ProcessDiedError(
                 f"{self._url} does not answer ({error}): start it with svev serve, or give its address with --url"
             ) from None
-        if not answer.is_success:
-            raise _refusal(answer)
-        try:
-            return answer.json()
-        except ValueError:
-            raise ProcessDiedError(f"{self._url} answers no JSON: give the address of svev serve with --url") from None
 
 
 def read_token(file: Path | None, environment: Mapping[str, str] = os.environ) -> str:

@@ -20,6 +20,7 @@ from webpanel.problems import handle_errors
 from webpanel.routes.common import COMMON
 from webpanel.routes.contents import contents_router
 from webpanel.routes.events import Changes, events_router
+from webpanel.routes.files import files_router
 from webpanel.routes.login import login_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
 from webpanel.routes.preview import preview_router
@@ -62,7 +63,8 @@ def create_app(service: RigService, access: Access) -> FastAPI:
     routers = (
         rig_router(service),
         recordings_router(service, changes),
-        contents_router(service, streams.downloads),
+        contents_router(service),
+        files_router(service, streams.downloads),
         preview_router(service, streams.previews),
         events_router(service, changes, streams.events),
         login_router(door),

@@ -1,8 +1,8 @@
 """Reads the recordings in the service's folder and describes them for the panel, each with its verdict."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ from rig.status import (
     Trash,
 )
 from rig.tag import TripletTag
+from service.recordings.download import download_of, sha256_of, zipped
+from service.seam import Download
 from triggering.ledger import pauses_in_words
 
 _STATES = {
@@ -45,6 +47,7 @@ class Archive(ABC):
 
     def __init__(self, catalogue: Catalogue) -> None:
         self._catalogue = catalogue
+        self._checksums: dict[str, str] = {}
 
     @abstractmethod
     def status(self) -> Status:
@@ -79,8 +82,8 @@ class Archive(ABC):
             raise StateForbidsError(f"recording {recording_id} is not in the trash: delete it first")
         return _as_trash(self._catalogue.remove(recording_id))
 
-    def log_file(self, recording_id: str) -> Path:
-        """Path of the log of a recording that has ended.
+    def download(self, recording_id: str) -> Download:
+        """A recording that has ended, as a file with its corrected session.
 
         Raises:
             StillRecordingError: it has not.
@@ -89,7 +92,23 @@ class Archive(ABC):
         current = self.status().recording
         if current and current.id == recording_id:
             raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
-        return self._catalogue.file(recording_id)
+        return download_of(self._catalogue.entry(recording_id), self._catalogue.file(recording_id))
+
+    def checksum(self, recording_id: str) -> str:
+        """SHA-256 of that file, in hexadecimal."""
+        download = self.download(recording_id)
+        known = self.known_checksum(download)
+        if not known:
+            known = self._checksums[download.tag] = sha256_of(download)
+        return known
+
+    def known_checksum(self, download: Download) -> str:
+        """SHA-256 of a file if it was asked for before, otherwise empty."""
+        return self._checksums.get(download.tag, "")
+
+    def zipped(self, recording_ids: Sequence[str]) -> Iterator[bytes]:
+        """Several recordings as one archive, piece by piece."""
+        return zipped([self.download(recording_id) for recording_id in dict.fromkeys(recording_ids)])
 
     def pulses(self, recording_id: str) -> Pulses:
         """What became of each pulse of a recording."""

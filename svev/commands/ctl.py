@@ -10,6 +10,7 @@ import typer
 
 from rig.errors import BadInputError, CameraError, SvevError
 from svev import console
+from svev.fetch import fetch
 from svev.rest_client import RestClient, read_token
 
 _POLL_S: Final = 0.2
@@ -192,6 +193,30 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
     Example: svev ctl restore 2026-02-14T10-15-30Z
     """
     _show(_call(context, "POST", f"{_path(recording)}/restore"), _recording_lines, as_json)
+
+
+@app.command()
+def download(
+    context: typer.Context,
+    recordings: Annotated[list[str], typer.Argument(help="ids of the recordings, see svev ctl list")],
+    folder: Annotated[Path, typer.Option("-o", "--output", help="folder to put them into")] = Path(),
+    as_json: Json = False,
+) -> None:
+    """Fetch the files of recordings, with their session as it was corrected, and check that they came whole.
+
+    A connection that breaks goes on where it broke.
+
+    Example: svev ctl download 2026-02-14T10-15-30Z -o jumps
+    """
+    client: RestClient = context.obj
+    if not folder.is_dir():
+        raise BadInputError(f"{folder}: no such folder; make it, or choose another one with -o")
+    found = []
+    for recording in recordings:
+        with console.progress(f"fetching {recording}", 100) as advance:
+            path = fetch(client, f"{_path(recording)}/file", folder, lambda have, of: advance(have * 100 // max(1, of)))
+        found.append(str(path))
+    _show({"files": found}, lambda answer: answer["files"], as_json)
 
 
 @app.command()

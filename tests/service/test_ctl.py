@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from recorder.checking.verify import verify
+from recorder.reading.info import info
 from tests.capture.rigs import write_rig
 from tests.service.serving import serving
 from tests.support.loopback import Loopback
@@ -54,6 +56,13 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         assert _json(_ctl(url, "delete", begun["id"], "--json", token=TOKEN))["deleted"]
         assert len(_json(_ctl(url, "list", "--json", token=TOKEN))["recordings"]) == 1
         assert not _json(_ctl(url, "restore", begun["id"], "--json", token=TOKEN))["deleted"]
+        fetched = _json(_ctl(url, "download", begun["id"], saved["id"], "-o", str(tmp_path), "--json", token=TOKEN))
+        files = [tmp_path / f"18_Ola_{begun['id']}.mcap", tmp_path / f"19_{saved['id']}.mcap"]
+        assert fetched == {"files": [str(file) for file in files]}
+        assert info(files[0]).session["bib"] == "18"
+        assert not verify(files[0]).damaged
+        again = _ctl(url, "download", begun["id"], "-o", str(tmp_path), token=TOKEN)
+        assert (again.returncode, "exists already" in again.stderr) == (2, True)
         assert _ctl(url, "trash", "--remove", saved["id"], token=TOKEN).returncode == 1
         _ctl(url, "delete", saved["id"], token=TOKEN)
         assert _ctl(url, "trash", token=TOKEN).stdout.startswith("1 recordings in the trash")

@@ -23,6 +23,7 @@ CALLS = {
     "GET /api/recordings/{recording_id}/pulses", "GET /api/recordings/{recording_id}/pulses/{pulse}.jpg",
     "GET /api/recordings/{recording_id}/thumbnail.jpg", "POST /api/login", "POST /api/logout", "GET /metrics",
     "GET /healthz", "GET /api/trash", "DELETE /api/trash", "DELETE /api/trash/{recording_id}",
+    "GET /api/recordings/{recording_id}/file.sha256", "GET /api/recordings.zip",
 }  # fmt: skip
 
 

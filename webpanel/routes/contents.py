@@ -1,24 +1,18 @@
-"""Routes that read a recording: its file, its pulses, its images."""
+"""Routes that look into a recording: its pulses, its images."""
 
-import pathlib
-import re
 from http import HTTPStatus
-from typing import Annotated, Final
+from typing import Annotated
 
 import anyio
 import numpy as np
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Path, Query, Response
-from fastapi.responses import FileResponse
+from fastapi import APIRouter, Path, Query, Response
 from numpy.typing import NDArray
-from starlette.datastructures import Headers
-from starlette.types import Receive, Scope, Send
 
 from rig.status import Pulses, RecordingState
 from service.seam import RigService
-from webpanel.door.streams import Streams
-from webpanel.problems import ProblemError, problem
-from webpanel.routes.common import RecordingId, Responses, jpeg_answer, refusals, strict_router
+from webpanel.problems import ProblemError
+from webpanel.routes.common import RecordingId, jpeg_answer, refusals, strict_router
 from webpanel.routes.preview import to_jpeg
 
 _THUMBNAIL_WIDTH = 480
@@ -26,32 +20,12 @@ _THUMBNAIL_WIDTH = 480
 _KEPT = {"Cache-Control": "private, max-age=31536000, immutable"}
 #: Threads that read and encode images. They are few, so that looking through a recording never slows down recording.
 _READERS = 2
-_FILE = {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
-_LOG: Responses = {
-    200: {"description": "The whole log.", "content": _FILE},
-    206: {"description": "A part of the log.", "content": _FILE},
-}
-_RANGES: Final = re.compile(r"bytes\s*=\s*(\d{1,18}-\d{0,18}|-\d{1,18})(\s*,\s*(\d{1,18}-\d{0,18}|-\d{1,18}))*\s*")
 
 
-def contents_router(service: RigService, downloads: Streams) -> APIRouter:
+def contents_router(service: RigService) -> APIRouter:
     """The routes that read recordings."""
     router = strict_router("Recordings")
     readers = anyio.CapacityLimiter(_READERS)
-
-    @router.get(
-        "/recordings/{recording_id}/file",
-        response_class=FileResponse,
-        dependencies=[Depends(downloads.place)],
-        responses=_LOG | refusals(404, 409, 416, 503),
-    )
-    def download_recording(recording_id: RecordingId) -> RecordingFile:
-        """The log as a file, whole or by a `Range`; with `ETag` and `If-Range`, so that a download can be resumed."""
-        return RecordingFile(recording_id, service.log_file(recording_id))
-
-    @router.head("/recordings/{recording_id}/file", include_in_schema=False)
-    def head_recording(recording_id: RecordingId) -> RecordingFile:
-        return RecordingFile(recording_id, service.log_file(recording_id))
 
     @router.get("/recordings/{recording_id}/pulses", responses=refusals(404))
     async def list_pulses(recording_id: RecordingId) -> Pulses:
@@ -105,45 +79,3 @@ def _thumbnail(service: RigService, recording_id: str) -> tuple[bytes, bool]:
     """The triplet that shows the recording best, small; whether it will stay this one."""
     final = service.recording(recording_id).state is RecordingState.FINISHED
     return _jpeg(service, recording_id, service.liveliest_pulse(recording_id), None, _THUMBNAIL_WIDTH), final
-
-
-class RecordingFile(FileResponse):
-    """A log to download.
-
-    A `Range` header that cannot be understood is ignored (RFC 9110, 14.2); a range beyond the end is refused with 416.
-    """
-
-    def __init__(self, recording_id: str, path: pathlib.Path) -> None:
-        super().__init__(
-            path, media_type="application/octet-stream", filename=f"{recording_id}.mcap", stat_result=path.stat()
-        )
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-        asked = Headers(scope=scope).get("range")
-        if asked is not None:
-            size = int(self.headers["content-length"])
-            spans = _spans(asked, size)
-            if any(first >= size for first, _ in spans):
-                text = f"the file has {size} bytes: ask for a range within it"
-                headers = {"Content-Range": f"bytes */{size}"}
-                status = HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE
-                await problem(status, "range_not_satisfiable", text, headers)(scope, receive, send)
-                return
-            if not spans or any(first > last for first, last in spans):
-                scope = {**scope, "headers": [pair for pair in scope["headers"] if pair[0] != b"range"]}
-        await super().__call__(scope, receive, send)
-
-
-def _spans(text: str, size: int) -> list[tuple[int, int]]:
-    """First and last byte of each range of a `Range` header; empty if the header is not understood."""
-    if not _RANGES.fullmatch(text):
-        return []
-    spans = []
-    for part in text.partition("=")[2].split(","):
-        first, _, last = part.strip().partition("-")
-        if first:
-            spans.append((int(first), int(last) if last else size - 1))
-        else:
-            spans.append((max(size - int(last), 0) if int(last) else size, size - 1))
-    return spans

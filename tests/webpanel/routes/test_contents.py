@@ -1,6 +1,10 @@
 """The file of a recording, whole and in parts; its pulses and images."""
 
+import base64
 import contextlib
+import hashlib
+import io
+import zipfile
 
 import cv2
 import httpx
@@ -8,6 +12,7 @@ import numpy as np
 import pytest
 
 from recorder.checking.verify import Verdict, verify
+from recorder.reading.info import info
 from rig.frame import FrameStatus
 from tests.recorder.logs import ALL_OK, make_image, make_tag
 from tests.webpanel.memory_service import SHAPE, MemoryService, write_recording
@@ -119,10 +124,75 @@ def test_what_was_downloaded_is_whole(client: httpx.Client, service: MemoryServi
     assert verify(copy).verdict is Verdict.PARTIAL
 
 
+def test_the_file_carries_the_corrected_session(client: httpx.Client, service: MemoryService, log: bytes) -> None:
+    folder = service.catalogue.directory
+    first = client.get(FILE)
+    assert first.headers["x-svev-session"] == "as-recorded"
+    client.patch("/api/recordings/jump", json={"bib": "17", "athlete": "Bjørn  Ødegård/æ", "notes": "x" * 4000})
+    head, answer = client.head(FILE), client.get(FILE)
+    assert (answer.status_code, answer.headers["x-svev-session"]) == (200, "corrected")
+    assert {**head.headers, "date": ""} == {**answer.headers, "date": ""}
+    assert len(answer.content) == int(head.headers["content-length"]) > len(log)
+    assert answer.headers["content-disposition"] == (
+        'attachment; filename="17_Bjorn-Odegard-ae_jump.mcap"; '
+        "filename*=UTF-8''17_Bj%C3%B8rn-%C3%98deg%C3%A5rd-%C3%A6_jump.mcap"
+    )
+    copy = folder.parent / "copy.mcap"
+    copy.write_bytes(answer.content)
+    assert verify(copy).verdict is Verdict.PARTIAL
+    assert info(copy).session["athlete"] == "Bjørn  Ødegård/æ"
+    assert (folder / "jump.mcap").read_bytes() == log
+
+    tag = answer.headers["etag"]
+    assert tag != first.headers["etag"]
+    parts = b"".join(
+        client.get(FILE, headers={"Range": f"bytes={begin}-{begin + 9999}", "If-Range": tag}).content
+        for begin in range(0, len(answer.content), 10_000)
+    )
+    assert parts == answer.content
+    client.patch("/api/recordings/jump", json={"bib": "18"})
+    again = client.get(FILE, headers={"Range": "bytes=10-19", "If-Range": tag})
+    assert again.status_code == 200
+    assert 'filename="18_Bjorn' in again.headers["content-disposition"]
+
+
+def test_the_checksum_is_that_of_the_file_as_it_comes(client: httpx.Client) -> None:
+    for change in ({}, {"bib": "5"}):
+        client.patch("/api/recordings/jump", json=change)
+        assert "repr-digest" not in client.head(FILE).headers
+        said = client.get(f"{FILE}.sha256")
+        assert said.headers["content-type"].startswith("text/plain")
+        content = client.get(FILE)
+        digest = hashlib.sha256(content.content)
+        assert said.text == f"{digest.hexdigest()}  {'5_' if change else ''}jump.mcap\n"
+        assert content.headers["repr-digest"] == f"sha-256=:{base64.b64encode(digest.digest()).decode()}:"
+
+
+def test_several_recordings_come_as_one_archive(client: httpx.Client, service: MemoryService) -> None:
+    write_recording(service.catalogue.directory, "other", session={"bib": "4", "athlete": "Åse Lie"})
+    client.patch("/api/recordings/jump", json={"bib": "17"})
+    answer = client.get("/api/recordings.zip?ids=jump,other,jump")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "application/zip")
+    assert answer.headers["content-disposition"] == 'attachment; filename="svev_2-jumps.zip"'
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.testzip() is None
+        names = ["17_jump.mcap", "4_Åse-Lie_other.mcap"]
+        assert archive.namelist() == [*names, "SHA256SUMS"]
+        assert archive.read(names[0]) == client.get(FILE).content
+        assert archive.read(names[1]) == (service.catalogue.directory / "other.mcap").read_bytes()
+        sums = [f"{hashlib.sha256(archive.read(name)).hexdigest()}  {name}" for name in names]
+        assert archive.read("SHA256SUMS").decode().splitlines() == sums
+    assert client.head("/api/recordings.zip?ids=jump").headers["content-type"] == "application/zip"
+    refused(client.get("/api/recordings.zip?ids=jump,nobody"), 404)
+    for wrong in ("", "?ids=", "?ids=jump,", "?ids=a/b", "?ids=jump&ids=other"):
+        refused(client.get(f"/api/recordings.zip{wrong}"), 422)
+
+
 def test_the_recording_in_progress_is_not_handed_out(client: httpx.Client) -> None:
     client.post("/api/arm")
     recording = client.post("/api/recordings").json()["id"]
-    assert "stop it first" in refused(client.get(f"/api/recordings/{recording}/file"), 409).detail
+    for path in (f"/{recording}/file", f"/{recording}/file.sha256", f".zip?ids={recording}"):
+        assert "stop it first" in refused(client.get(f"/api/recordings{path}"), 409).detail
 
 
 def test_downloads_are_limited(panel: Panel, service: MemoryService) -> None:

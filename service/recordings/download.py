@@ -1,0 +1,118 @@
+"""Recordings as files to take away: with the corrected session, under a name that says who jumped, one or several."""
+
+import hashlib
+import re
+import unicodedata
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from recorder.catalogue.entry import Entry
+from recorder.log.session_changes import session_changes
+from recorder.reading.corrected_log import corrected_log
+from rig.errors import BadInputError
+from service.seam import Download
+
+#: What a part of a file's name may hold on every system; letters are those of any language.
+_NOT_IN_NAMES: Final = re.compile(r"[^\w.]+")
+_PART_MAX: Final = 40
+_PIECE: Final = 1 << 20
+_SUMS: Final = "SHA256SUMS"
+
+
+def download_of(entry: Entry, path: Path) -> Download:
+    """A recording as a file to take away.
+
+    Args:
+        entry: of the recording.
+        path: its log, which nobody writes any more.
+
+    Raises:
+        BadInputError: the log cannot be read.
+    """
+    stat = path.stat()
+    try:
+        changes = session_changes(path)
+    except BadInputError:  # the entry's verdict says so; the recording itself is as good as ever
+        changes = {}
+    log = corrected_log(path, changes)
+    facts = (stat.st_ino, stat.st_mtime_ns, stat.st_size, sorted(changes.items()) if log.corrected else ())
+    tag = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
+    return Download(file_name(entry.id, entry.session), log.size, stat.st_mtime, tag, log.corrected, log.open)
+
+
+def file_name(recording: str, session: Mapping[str, str]) -> str:
+    """The name of a downloaded log: bib, athlete and id, e.g. `17_Ola-Nordmann_2026-11-20T10-15-03Z.mcap`."""
+    parts = [_part(session.get(field, "")) for field in ("bib", "athlete")]
+    return "_".join([*filter(None, parts), recording]) + ".mcap"
+
+
+def sha256_of(download: Download) -> str:
+    """SHA-256 of a file to take away, as it is handed out; reads all of it.
+
+    Raises:
+        BadInputError: the log has become shorter.
+        OSError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    with download.open() as file:
+        while piece := file.read(_PIECE):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+def zipped(downloads: Iterable[Download]) -> Iterator[bytes]:
+    """Several files as one ZIP archive without compression, made while it is sent; with the SHA-256 of each.
+
+    ZIP64, so neither a log nor the archive is too large. The checksums are taken from the bytes as they go by, and
+    stand at the end in a file that `sha256sum -c SHA256SUMS` reads.
+
+    Raises:
+        BadInputError: a log has become shorter.
+        OSError: one cannot be read.
+    """
+    sink, sums = _Sink(), []
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+        for download in downloads:
+            digest = hashlib.sha256()
+            begun = datetime.fromtimestamp(download.modified, UTC).timetuple()[:6]
+            entry = zipfile.ZipInfo(download.name, begun)
+            with archive.open(entry, "w", force_zip64=True) as member, download.open() as file:
+                while piece := file.read(_PIECE):
+                    digest.update(piece)
+                    member.write(piece)
+                    yield sink.taken()
+            sums.append(f"{digest.hexdigest()}  {download.name}\n")
+        archive.writestr(_SUMS, "".join(sums))
+    yield sink.taken()
+
+
+class _Sink:
+    """Takes what an archive writes, until it is sent. It has no place to go back to, so the archive never does."""
+
+    def __init__(self) -> None:
+        self._written = bytearray()
+
+    def write(self, data: bytes, /) -> int:
+        """Take bytes."""
+        self._written += data
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing waits elsewhere."""
+
+    def close(self) -> None:
+        """What was written can still be taken."""
+
+    def taken(self) -> bytes:
+        """What was written since the last call."""
+        data = bytes(self._written)
+        self._written.clear()
+        return data
+
+
+def _part(text: str) -> str:
+    """A session field as a part of a file's name."""
+    return _NOT_IN_NAMES.sub("-", unicodedata.normalize("NFC", text)).replace("_", "-").strip("-.")[:_PART_MAX]

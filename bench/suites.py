@@ -8,6 +8,7 @@ from typing import Any
 from bench.analysis.faults import run_faults
 from bench.analysis.honesty import run_honesty
 from bench.analysis.jumps import run_jumps
+from bench.analysis.repeats import run_repeats
 from bench.photogrammetry.adjustment import run_adjustment
 from bench.photogrammetry.intersection import run_intersection
 from bench.photogrammetry.planning import run_planning
@@ -104,6 +105,16 @@ def _honesty(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _repeats(seconds: float, directory: Path) -> dict[str, Any]:
+    cases = run_repeats(seconds)
+    path = write_results("jump-repeats", cases, directory)
+    table = [
+        f"{case['name']}: a difference found in {case['found']:.1%} of {case['pairs']} pairs, {case['expected']:.1%} expected"
+        for case in cases
+    ]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 def _faults(_seconds: float, directory: Path) -> dict[str, Any]:
     cases = run_faults()
     path = write_results("jump-faults", cases, directory)
@@ -123,4 +134,5 @@ SUITES: dict[str, Suite] = {
     "jumps": _jumps,
     "jump-faults": _faults,
     "jump-honesty": _honesty,
+    "jump-repeats": _repeats,
 }

@@ -26,7 +26,8 @@ def bench(
     drawing, each alone. api: answer times of the service while it records at 30 Hz; the baseline is the idle service.
     intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
     covariance; the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and
-    with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas.
+    with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump
+    measured again and again, and with another leg angle: how often a comparison finds a difference.
 
     Example: svev bench saturated --seconds 10
     """

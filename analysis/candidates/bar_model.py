@@ -11,11 +11,12 @@ brightness are those of a pair of skis: one for all bars.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Final
 
 import cv2
 import numpy as np
-from scipy.special import expit
+from numpy.typing import NDArray
 
 from analysis.candidates.background import Region
 from rig.arrays import Floats, Integers
@@ -25,7 +26,11 @@ OF_BAR: Final = 4  #: unknowns of each bar: rho, theta, t0, t1
 MARGIN: Final = 2.6  #: px beside and beyond a bar that are fitted
 _OPPOSITE = 1  # px around pixels in front that differ from the background in the other direction
 _MODEL = 0.03  # of the contrast: residuals that the model itself leaves
+_FAR = 6.0  # of the normal distribution: 1e-9 from its limit
 _NORMAL = 1.59577, 0.07056  # logit of the normal distribution: error below 2e-4, one exponential for it and its slope
+
+
+GreyValues = NDArray[np.float32]  #: of pixels, and what is computed for each pixel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,11 +70,11 @@ class Pixels:
     """
 
     origin: Floats
-    x: Floats
-    y: Floats
-    grey: Floats
-    behind: Floats
-    sigma: Floats
+    x: GreyValues
+    y: GreyValues
+    grey: GreyValues
+    behind: GreyValues
+    sigma: GreyValues
     brightness: float
 
     def __len__(self) -> int:
@@ -105,7 +110,7 @@ def pixels_around(region: Region, bars: Sequence[Bar], brighter: bool) -> Pixels
     left, top = np.maximum(0, low.astype(int))
     right, bottom = np.minimum((columns, rows), high.astype(int) + 2)
     part = slice(top, bottom), slice(left, right)
-    y, x = np.mgrid[part] - origin[::-1, None, None]
+    y, x = (np.mgrid[part] - origin[::-1, None, None]).astype(np.float32)
     near = np.zeros(x.shape, bool)
     for bar in bars:
         rho, theta, t0, t1 = bar.line(origin)
@@ -115,10 +120,10 @@ def pixels_around(region: Region, bars: Sequence[Bar], brighter: bool) -> Pixels
     opposite = region.front[part] & ((difference < 0) if brighter else (difference > 0))
     square = np.ones((2 * _OPPOSITE + 1, 2 * _OPPOSITE + 1), np.uint8)
     near &= cv2.dilate(opposite.astype(np.uint8), square) == 0
-    grey, behind = region.grey[part][near].astype(float), region.behind[part][near].astype(float)
+    grey, behind = region.grey[part][near], region.behind[part][near]
     inside = grey[region.front[part][near]]
     brightness = float(np.percentile(inside, 75 if brighter else 25)) if len(inside) else 0.0
-    sigma = np.hypot(region.sigma[part][near].astype(float), _MODEL * np.abs(brightness - behind))
+    sigma = np.hypot(region.sigma[part][near], np.float32(_MODEL) * np.abs(np.float32(brightness) - behind))
     return Pixels(origin, x[near], y[near], grey, behind, sigma, brightness)
 
 
@@ -127,60 +132,61 @@ def lines_of(theta: Floats) -> Floats:
     return np.asarray(theta[SHARED:].reshape(-1, OF_BAR))
 
 
-def modelled(pixels: Pixels, theta: Floats) -> tuple[Floats, Floats]:
+def modelled(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues]:
     """Grey values (n,) and their derivatives (unknowns, n).
 
     Args:
         pixels: where.
         theta: B, log h, log s, then rho, theta, t0, t1 of each bar.
     """
-    h, s = float(np.exp(theta[1])), float(np.exp(theta[2]))
-    parts = [_cover(pixels, line.tolist(), h, s) for line in lines_of(theta)]
-    contrast = theta[0] - pixels.behind
-    open_ = np.ones(len(pixels))
-    for part in parts:
-        open_ *= 1 - part[0]
-    design = np.zeros((len(theta), len(pixels)))
-    design[0] = 1 - open_
-    for k, part in enumerate(parts):
-        others = contrast
-        for i, other in enumerate(parts):
-            if i != k:
-                others = others * (1 - other[0])
-        for i in range(OF_BAR):
-            np.multiply(part[1 + i], others, out=design[SHARED + OF_BAR * k + i])
-        design[1] += part[5] * others
-        design[2] += part[6] * others
+    cover, by_line, by_shape = _covers(pixels, theta)
+    contrast = theta[0].astype(pixels.behind.dtype) - pixels.behind
+    open_ = 1 - cover
+    design = np.empty((len(theta), len(pixels)), pixels.behind.dtype)
+    of_bars = design[SHARED:].reshape(by_line.shape)
+    through = np.repeat(contrast[None], len(cover), axis=0)  # what the other bars let through
+    for k, i in permutations(range(len(cover)), 2):
+        through[k] *= open_[i]
+    np.multiply(by_line, through[:, None], out=of_bars)
+    by_shape *= through[:, None]
+    np.sum(by_shape, axis=0, out=design[1:SHARED])
+    np.subtract(1, np.prod(open_, axis=0), out=design[0])
     return pixels.behind + contrast * design[0], design
 
 
-def _cover(pixels: Pixels, line: list[float], h: float, s: float) -> tuple[Floats, ...]:
-    """Cover (n,) of a bar, and its derivatives by rho, theta, t0, t1, log h, log s."""
-    rho, theta, t0, t1 = line
-    cosine, sine = np.cos(theta), np.sin(theta)
+def _covers(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues, GreyValues]:
+    """Covers (bars, n), and their derivatives by rho, theta, t0, t1 (bars, 4, n), and by log h, log s (bars, 2, n)."""
+    lines = lines_of(theta).astype(pixels.x.dtype)
+    h, s = np.exp(theta[1:SHARED]).astype(pixels.x.dtype)
+    rho, angle, t0, t1 = lines.T[..., None]
+    cosine, sine = np.cos(angle), np.sin(angle)
     t, w = pixels.x * cosine + pixels.y * sine, pixels.y * cosine - pixels.x * sine
+    border = np.empty((len(lines), OF_BAR, len(pixels)), t.dtype)  # distance from each, in units of the blur
     u, along = (w - rho) / s, t / s
-    above, below, front, back = u + h / s, u - h / s, along - t0 / s, along - t1 / s
-    (f_above, d_above), (f_below, d_below) = _normal(above), _normal(below)
-    (f_front, d_front), (f_back, d_back) = _normal(front), _normal(back)
-    across, length = f_above - f_below, f_front - f_back
-    by_u, by_t = (d_above - d_below) * (length / s), (d_front - d_back) * (across / s)
-    by_s = -(above * d_above - below * d_below) * length - (front * d_front - back * d_back) * across
-    edge = across / s
-    return (
-        across * length,
-        -by_u,
-        by_t * w - by_u * t,
-        -d_front * edge,
-        d_back * edge,
-        (d_above + d_below) * (h / s) * length,
-        by_s,
-    )
+    np.add(u, h / s, out=border[:, 0])
+    np.subtract(u, h / s, out=border[:, 1])
+    np.subtract(along, t0 / s, out=border[:, 2])
+    np.subtract(along, t1 / s, out=border[:, 3])
+    value, slope = _normal(border)
+    across, length = value[:, 0] - value[:, 1], value[:, 2] - value[:, 3]
+    edge, side = across / s, length / s
+    by_u, by_t = (slope[:, 0] - slope[:, 1]) * side, (slope[:, 2] - slope[:, 3]) * edge
+    by_line, by_shape = np.empty_like(border), np.empty((len(lines), 2, len(pixels)), t.dtype)
+    np.negative(by_u, out=by_line[:, 0])
+    np.subtract(by_t * w, by_u * t, out=by_line[:, 1])
+    np.multiply(slope[:, 2], -edge, out=by_line[:, 2])
+    np.multiply(slope[:, 3], edge, out=by_line[:, 3])
+    np.multiply(slope[:, 0] + slope[:, 1], h * side, out=by_shape[:, 0])
+    border *= slope
+    np.multiply(border[:, 1] - border[:, 0], length, out=by_shape[:, 1])
+    by_shape[:, 1] -= (border[:, 2] - border[:, 3]) * across
+    return across * length, by_line, by_shape
 
 
-def _normal(x: Floats) -> tuple[Floats, Floats]:
+def _normal(x: GreyValues) -> tuple[GreyValues, GreyValues]:
     """The normal distribution function and its derivative, approximately."""
     a, b = _NORMAL
-    square = x * x
-    value = np.asarray(expit(x * (a + b * square)), float)
+    near = np.clip(x, -_FAR, _FAR)
+    square = near * near
+    value = np.asarray(1 / (1 + np.exp(-near * (a + b * square))), x.dtype)
     return value, value * (1 - value) * (a + 3 * b * square)

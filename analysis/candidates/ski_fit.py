@@ -17,6 +17,7 @@ from analysis.candidates.bar_model import (
     OF_BAR,
     SHARED,
     Bar,
+    GreyValues,
     Pixels,
     directions,
     lines_of,
@@ -111,12 +112,12 @@ class _Fit:
         self._pixels, self._bars, self.count = pixels, bars, len(bars)
         width = float(np.median([bar.width for bar in bars]))
         lines = [bar.line(pixels.origin) for bar in bars]
-        self.theta = np.concatenate(([pixels.brightness, np.log(max(width, 0.8) / 2), np.log(_BLUR)], *lines))
-        spread = np.full(len(self.theta), np.inf)
+        start = np.concatenate(([pixels.brightness, np.log(max(width, 0.8) / 2), np.log(_BLUR)], *lines))
+        spread = np.full(len(start), np.inf)
         spread[0] = _BRIGHTNESS_SPREAD * (1 + abs(pixels.brightness - float(np.median(pixels.behind))))
         spread[1:SHARED] = _WIDTH_SPREAD, _BLUR_SPREAD
         lines_of(spread)[:, 2:] = _END_SPREAD
-        self._expected, self._prior = self.theta.copy(), spread**-2.0
+        self._expected, self._prior = start, spread**-2.0
         theta = lines[int(np.argmax([bar.length for bar in bars]))][1]
         along = pixels.x * np.cos(theta) + pixels.y * np.sin(theta)
         self._section = np.floor((along - along.min()) / _SECTION).astype(int)
@@ -124,15 +125,20 @@ class _Fit:
         self._good = np.ones(len(pixels), bool)
         self._robust = True
         self.misfit = self.cost = np.inf
-        self._accept(self._equations(self.theta))
+        self._at = self._modelled(start)
+
+    @property
+    def theta(self) -> Floats:
+        """The unknowns as adjusted."""
+        return self._at.theta
 
     def on(self, pixels: Pixels) -> "_Fit":
         """The same explanation with other pixels, from where this one has come to."""
         if pixels is self._pixels:
             return self
         other = _Fit(pixels, self._bars)
-        other.theta, other._robust = self.theta.copy(), False
-        other._accept(other._equations(other.theta))
+        other._robust = False
+        other._at = other._modelled(self.theta)
         other._choose()
         return other
 
@@ -156,24 +162,21 @@ class _Fit:
     def _adjust(self) -> float:
         """Some steps with the present sections; by how much the axes moved in the last one, px."""
         damping, moved = 1e-3, np.inf
-        self._accept(self._equations(self.theta))
+        now = self._equations(self._at)
         for _ in range(_STEPS):
-            damped = self._normal + damping * np.diag(np.diag(self._normal))
-            trial = self._bounded(np.asarray(np.linalg.solve(damped, self._gradient), float))
-            new = self._equations(trial)
-            if new.cost > self._sum:
+            damped = now.normal + damping * np.diag(np.diag(now.normal))
+            trial = self._bounded(np.asarray(np.linalg.solve(damped, now.gradient), float))
+            there = self._modelled(trial)
+            new = self._equations(there)
+            if new.cost > now.cost:
                 damping *= 10
                 continue
             moved = self._moved(trial - self.theta)
-            self.theta, damping = trial, damping / 10
-            self._accept(new)
+            self._at, now, damping = there, new, damping / 10
             if moved < _SETTLED:
                 break
+        self._normal = now.normal
         return moved
-
-    def _accept(self, new: "_Equations") -> None:
-        self._sum, self._normal, self._gradient = new.cost, new.normal, new.gradient
-        self._residuals, self._design = new.residuals, new.design
 
     def _moved(self, step: Floats) -> float:
         reach = float(np.abs(lines_of(self.theta)[:, 2:]).max())
@@ -192,29 +195,32 @@ class _Fit:
 
     def _choose(self) -> None:
         """Keep the sections that are explained about as well as most."""
-        square = self._residuals**2
+        square = self._at.residuals**2
         mean = np.bincount(self._section, square) / np.maximum(self._in_section, 1)
         there = self._in_section > 0
-        typical = max(1.0, float(np.quantile(mean[there], _TYPICAL)))
+        typical = max(1.0, _quantile(mean[there], _TYPICAL))
         self._good = ~(mean > _POOR * typical)[self._section]
         self.misfit = float(np.sqrt(square[self._good].mean())) if self._good.any() else np.inf
         self.cost = float(np.minimum(square, _CAP).sum())
 
-    def _equations(self, theta: Floats) -> "_Equations":
+    def _modelled(self, theta: Floats) -> "_Modelled":
         value, design = modelled(self._pixels, theta)
         design /= self._pixels.sigma
-        v = (self._pixels.grey - value) / self._pixels.sigma
-        off = self._expected - theta
-        square = v * v
+        return _Modelled(theta, (self._pixels.grey - value) / self._pixels.sigma, design)
+
+    def _equations(self, at: "_Modelled") -> "_Equations":
+        off = self._expected - at.theta
+        square = at.residuals**2
         if self._robust:  # Cauchy's estimator
-            weight = self._good / (1 + square / _ROBUST**2)
-            cost = _ROBUST**2 * float(np.log1p(square / _ROBUST**2) @ self._good)
+            weight = self._good / (1 + square / np.float32(_ROBUST**2))
+            cost = _ROBUST**2 * float(np.log1p(square / np.float32(_ROBUST**2)) @ self._good)
         else:
-            weight = self._good.astype(float)
+            weight = self._good.astype(np.float32)
             cost = float(square @ weight)
-        weighted = design * weight
-        normal = weighted @ design.T + np.diag(self._prior + 1e-9)
-        return _Equations(cost + float(self._prior @ off**2), normal, weighted @ v + self._prior * off, v, design)
+        weighted = at.design * weight
+        normal = (weighted @ at.design.T).astype(float) + np.diag(self._prior + 1e-9)
+        gradient = weighted @ at.residuals + self._prior * off
+        return _Equations(cost + float(self._prior @ off**2), normal, gradient)
 
     def farthest(self, other: "_Fit") -> float:
         """By how much the axes of this explanation lie aside the nearest axis of another one, at their middles, px."""
@@ -256,7 +262,7 @@ class _Fit:
         self, k: int, good: Flags, place: Integers, along: Floats, sections: int
     ) -> tuple[Floats, Floats, Floats]:
         """Where along, how far off the axis, and with which sigma, section by section: all bars' shifts together."""
-        j, v = self._design[SHARED::OF_BAR, good], self._residuals[good]
+        j, v = self._at.design[SHARED::OF_BAR, good], self._at.residuals[good]
         normal = np.empty((sections, self.count, self.count))
         right = np.empty((sections, self.count))
         for a in range(self.count):
@@ -281,12 +287,24 @@ class _Fit:
         return float(np.sqrt(max(0.0, row @ whole @ row - 1 / weight.sum())))
 
 
+def _quantile(values: Floats, share: float) -> float:
+    """What `np.quantile` gives, which takes longer than all the rest for a few values."""
+    return float(np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Modelled:
+    """What the model says with some unknowns: normalized residuals (n,) and derivatives (unknowns, n)."""
+
+    theta: Floats
+    residuals: GreyValues
+    design: GreyValues
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Equations:
-    """Normal equations, and what they are made of: normalized residuals (n,) and derivatives (unknowns, n)."""
+    """Normal equations of an adjustment."""
 
     cost: float
     normal: Floats
     gradient: Floats
-    residuals: Floats
-    design: Floats

@@ -23,7 +23,8 @@ UNKNOWNS: Final = 10
 _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residuals that count half
 _COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
-_HALVES = 4, 6, 10, 16, 24  # px; half sizes of windows
+_FARTHEST = 24.0  # px; no pixel farther away is fitted
+_GROUPS = 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together
 _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends on it
 _STRETCH_SPREAD, _SHAPE, _SHAPE_SPREAD = 0.25, 0.3, 0.5  # weak priors
 _SIZE_SPREAD = 0.4  # of log size
@@ -76,10 +77,11 @@ def fit_soft_discs(
     n = len(xy)
     theta, covariance = np.zeros((n, UNKNOWNS)), np.full((n, UNKNOWNS, UNKNOWNS), np.nan)
     misfit, rms, good = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, bool)
-    half = np.searchsorted(_HALVES, np.minimum(radius + margin, _HALVES[-1]))
-    for size in np.unique(half):
-        mine = np.flatnonzero(half == size)
-        fitted = _Batch(grey, sigma, xy[mine], radius[mine], _HALVES[size], margin, tight).solved()
+    reach = np.minimum(radius + margin, _FARTHEST)
+    group = np.searchsorted(_GROUPS, reach)
+    for each in np.unique(group):
+        mine = np.flatnonzero(group == each)
+        fitted = _Batch(grey, sigma, xy[mine], radius[mine], reach[mine], tight).solved()
         theta[mine], covariance[mine], misfit[mine], rms[mine], good[mine] = fitted
     spread = _second_moment(theta[:, 2], theta[:, 5])
     factor = np.maximum(1.0, misfit) ** _PENALTY
@@ -103,10 +105,25 @@ def _second_moment(log_size: Floats, log_shape: Floats) -> Floats:
 
 
 _Fitted = tuple[Floats, Floats, Floats, Floats, Flags]
+_Pixel = NDArray[np.float32]  # (n, k) a number for each pixel of each spot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """The pixels around spots: places relative to a whole pixel near each, grey values, 1 / noise or 0."""
+
+    x: _Pixel
+    y: _Pixel
+    grey: _Pixel
+    weight: _Pixel
+
+    def only(self, chosen: Integers | Flags) -> "_Windows":
+        """Those of some spots."""
+        return _Windows(self.x[chosen], self.y[chosen], self.grey[chosen], self.weight[chosen])
 
 
 class _Batch:
-    """Spots with windows of one size."""
+    """Spots of similar size. Unknowns and equations are 64 bits wide, pixels 32: they are noisier than that."""
 
     def __init__(
         self,
@@ -114,26 +131,14 @@ class _Batch:
         sigma: NDArray[np.float32],
         xy: Floats,
         radius: Floats,
-        half: int,
-        margin: float,
+        reach: Floats,
         robust: bool,
     ) -> None:
-        rows, columns = grey.shape
-        steps = np.arange(-half, half + 1)
-        centre = np.rint(xy).astype(int)
-        x = centre[:, 0, None, None] + steps[None, None, :]
-        y = centre[:, 1, None, None] + steps[None, :, None]
-        inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-        near = (x - xy[:, 0, None, None]) ** 2 + (y - xy[:, 1, None, None]) ** 2 <= (radius + margin)[
-            :, None, None
-        ] ** 2
-        x, y = np.broadcast_to(x, inside.shape), np.broadcast_to(y, inside.shape)
-        place = np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)
-        n = len(xy)
-        self._x, self._y = x.reshape(n, -1).astype(float), y.reshape(n, -1).astype(float)
-        self._grey = grey[place].reshape(n, -1).astype(float)
-        self._weight = np.where(inside & near, 1 / sigma[place], 0.0).reshape(n, -1).astype(float)
-        self._start, self._radius, self._robust = xy, radius, robust
+        self._centre = np.rint(xy)
+        self._start, self._radius, self._robust = xy - self._centre, radius, robust
+        self._windows = _windows(grey, sigma, self._centre.astype(int), self._start, reach)
+        self._prior = np.zeros(UNKNOWNS)
+        self._prior[2:6] = _SIZE_SPREAD**-2, _STRETCH_SPREAD**-2, _STRETCH_SPREAD**-2, _SHAPE_SPREAD**-2
 
     def solved(self) -> _Fitted:
         """Unknowns, their covariance a priori, misfit, rms, and whether the fit is good (Levenberg-Marquardt)."""
@@ -141,40 +146,35 @@ class _Batch:
         theta = self._started()
         damping, active = np.full(n, 1e-3), np.flatnonzero(self._promising(theta))
         cost, normal, gradient = np.full(n, np.inf), np.tile(np.eye(UNKNOWNS), (n, 1, 1)), np.zeros((n, UNKNOWNS))
+        windows = self._windows.only(active)
         if len(active):
-            cost[active], normal[active], gradient[active] = self._equations(theta[active], active)
+            cost[active], normal[active], gradient[active] = self._equations(theta[active], active, windows)
         for _ in range(_STEPS):
             if not len(active):
                 break
-            damped = normal[active] + damping[active, None, None] * _diagonal(normal[active])
-            step = np.linalg.solve(damped, gradient[active][..., None])[..., 0]
-            step[:, 2:6] = np.clip(step[:, 2:6], -_LARGEST_STEP, _LARGEST_STEP)
-            step[:, :2] = np.clip(step[:, :2], -1.0, 1.0)
+            step = np.linalg.solve(_damped(normal[active], damping[active]), gradient[active][..., None])[..., 0]
+            np.clip(step[:, 2:6], -_LARGEST_STEP, _LARGEST_STEP, out=step[:, 2:6])
+            np.clip(step[:, :2], -1.0, 1.0, out=step[:, :2])
             trial = theta[active] + step
-            trial[:, 5] = np.clip(trial[:, 5], -0.3, 2.5)
-            trial[:, 2] = np.clip(trial[:, 2], -1.5, 4.0)
-            new = self._equations(trial, active)
+            np.clip(trial[:, 5], -0.3, 2.5, out=trial[:, 5])
+            np.clip(trial[:, 2], -1.5, 4.0, out=trial[:, 2])
+            new = self._equations(trial, active, windows)
             better = new[0] <= cost[active]
             won = active[better]
-            theta[won], cost[won], normal[won], gradient[won] = (
-                trial[better],
-                new[0][better],
-                new[1][better],
-                new[2][better],
-            )
+            theta[won], cost[won], normal[won], gradient[won] = trial[better], *(part[better] for part in new)
             damping[active] *= np.where(better, 0.2, 10.0)
             settled = (np.abs(step[:, :2]).max(axis=1) < _ENOUGH) | (damping[active] > 1e6)
-            active = active[~settled]
+            if settled.any():
+                active, windows = active[~settled], windows.only(~settled)
         return self._judged(theta, normal, cost)
 
     def _promising(self, theta: Floats) -> Flags:
         """Whether the spot to start from explains enough; no fit would mend larger residuals."""
-        value, _ = self._model(theta, np.arange(len(theta)))
-        used = self._weight > 0
-        v = (self._grey - value) * used
         if self._robust:
             return np.ones(len(theta), bool)
-        rms = np.sqrt((v**2).sum(axis=1) / np.maximum(1, used.sum(axis=1)))
+        used = self._windows.weight > 0
+        v = (self._windows.grey - _Shape(theta, self._windows).grey) * used
+        rms = np.sqrt(_sums(v, v) / np.maximum(1, used.sum(axis=1)))
         return np.asarray(rms < _POOR_START * np.abs(theta[:, 6]))
 
     def _started(self) -> Floats:
@@ -182,74 +182,41 @@ class _Batch:
         theta[:, :2] = self._start
         theta[:, 2] = np.log(np.sqrt(self._radius**2 / 4 + _BLUR**2))
         theta[:, 5] = _SHAPE
-        design = self._model(theta, np.arange(len(theta)))[1][:, 6:] * self._weight[:, None, :]
-        normal = design @ design.transpose(0, 2, 1) + 1e-9 * np.eye(4)
-        right = design @ (self._grey * self._weight)[..., None]
-        theta[:, 6:] = np.linalg.solve(normal, right)[..., 0]
-        self._prior = np.zeros((UNKNOWNS,))
-        self._prior[2:6] = _SIZE_SPREAD**-2, _STRETCH_SPREAD**-2, _STRETCH_SPREAD**-2, _SHAPE_SPREAD**-2
+        windows = self._windows
+        design = _Shape(theta, windows).linear() * windows.weight[:, None, :]
+        normal = (design @ design.transpose(0, 2, 1)).astype(float) + 1e-9 * np.eye(4)
+        right = design @ (windows.grey * windows.weight)[..., None]
+        theta[:, 6:] = np.linalg.solve(normal, right.astype(float))[..., 0]
         self._expected = np.zeros_like(theta)
         self._expected[:, 2], self._expected[:, 5] = theta[:, 2], _SHAPE
         return theta
 
-    def _equations(self, theta: Floats, chosen: Integers) -> tuple[Floats, Floats, Floats]:
+    def _equations(self, theta: Floats, chosen: Integers, windows: _Windows) -> tuple[Floats, Floats, Floats]:
         """Cost, normal matrix and right-hand side of the chosen spots, priors included."""
-        value, design = self._model(theta, chosen)
-        v = self._grey[chosen] - value
-        weight = self._weight[chosen]
+        shape = _Shape(theta, windows)
+        v = windows.grey - shape.grey
+        weight = windows.weight
         if self._robust:
-            weight = weight * np.sqrt(self._share(v, weight, theta[:, 6]))
+            weight = weight * np.sqrt(_share(v, weight, theta[:, 6]))
         v *= weight
+        design = shape.design()
         design *= weight[:, None, :]
         off = self._expected[chosen] - theta
-        normal = design @ design.transpose(0, 2, 1) + np.diag(self._prior)
+        normal = (design @ design.transpose(0, 2, 1)).astype(float) + np.diag(self._prior)
         gradient = (design @ v[..., None])[..., 0] + self._prior * off
-        return (v**2).sum(axis=1) + (self._prior * off**2).sum(axis=1), normal, gradient
-
-    @staticmethod
-    def _share(v: Floats, weight: Floats, contrast: Floats) -> Floats:
-        """How much residuals (n, k) count (Cauchy): half at some sigmas and a part of the contrast."""
-        half = _HALF_SIGMAS / np.maximum(weight, 1e-9) + _HALF_CONTRAST * np.abs(contrast)[:, None]
-        return np.asarray(1 / (1 + (v / half) ** 2))
-
-    def _model(self, theta: Floats, chosen: Integers) -> tuple[Floats, Floats]:
-        """Grey values (n, k) and their derivatives (n, 10, k)."""
-        x, y, log_w, s, t, log_p, contrast, b, bx, by = theta.T[..., None]
-        dx, dy = self._x[chosen] - x, self._y[chosen] - y
-        p, scale = np.exp(log_p), np.exp(-2 * log_w)
-        # stretched coordinates (I + [[s, t], [t, -s]]) d
-        u, w = (1 + s) * dx + t * dy, t * dx + (1 - s) * dy
-        q = (u * u + w * w) * scale + 1e-12
-        log_q = np.log(q)
-        power = np.exp(p * log_q)
-        value = np.exp(-0.5 * power)
-        by_power = -0.5 * contrast * p * power * value
-        by_q = by_power / q
-        along = 2 * scale * by_q
-        design = np.empty((len(dx), UNKNOWNS, dx.shape[1]))
-        design[:, 0] = -along * (u * (1 + s) + w * t) - bx
-        design[:, 1] = -along * (u * t + w * (1 - s)) - by
-        design[:, 2] = -2 * by_power
-        design[:, 3] = along * (u * dx - w * dy)
-        design[:, 4] = along * (u * dy + w * dx)
-        design[:, 5] = by_power * log_q
-        design[:, 6] = value
-        design[:, 7] = 1.0
-        design[:, 8], design[:, 9] = dx, dy
-        return contrast * value + b + bx * dx + by * dy, design
+        return _sums(v, v) + off**2 @ self._prior, normal, gradient
 
     def _judged(self, theta: Floats, normal: Floats, cost: Floats) -> _Fitted:
-        everything = np.arange(len(theta))
-        value, _ = self._model(theta, everything)
-        used = self._weight > 0
+        windows = self._windows
+        used = windows.weight > 0
         count = used.sum(axis=1)
-        v = (self._grey - value) * used
-        share = self._share(v, self._weight, theta[:, 6]) * used if self._robust else used.astype(float)
-        counted = share.sum(axis=1)
-        square = (share * (v * self._weight) ** 2).sum(axis=1)
-        misfit = np.asarray(np.sqrt(square / np.maximum(1, counted - UNKNOWNS)), float)
-        rms = np.asarray(np.sqrt((share * v**2).sum(axis=1) / np.maximum(1, counted)), float)
-        covariance = np.asarray(np.linalg.inv(normal + 1e-12 * _diagonal(normal)), float)
+        v = (windows.grey - _Shape(theta, windows).grey) * used
+        share = _share(v, windows.weight, theta[:, 6]) * used if self._robust else used.astype(np.float32)
+        counted = share.sum(axis=1, dtype=float)
+        square, normalized = share * v, v * windows.weight**2
+        misfit = np.sqrt(_sums(square, normalized) / np.maximum(1, counted - UNKNOWNS))
+        rms = np.sqrt(_sums(square, v) / np.maximum(1, counted))
+        covariance = np.asarray(np.linalg.inv(_damped(normal, np.full(len(normal), 1e-12))), float)
         away = np.hypot(*(theta[:, :2] - self._start).T)
         spread = np.einsum("nii->ni", covariance)[:, :2]
         good: Flags = (
@@ -259,9 +226,91 @@ class _Batch:
             & (spread > 0).all(axis=1)
         )
         good &= np.isfinite(theta).all(axis=1)
+        theta[:, :2] += self._centre
         return theta, covariance, misfit, rms, good
 
 
-def _diagonal(matrices: Floats) -> Floats:
-    """The diagonals of (n, m, m) as diagonal matrices, never quite zero."""
-    return np.asarray(np.einsum("nii->ni", matrices)[:, :, None] * np.eye(matrices.shape[1]) + 1e-12)
+class _Shape:
+    """What the model says about the pixels of n spots with unknowns (n, 10).
+
+    Attributes:
+        grey: (n, k) grey values.
+    """
+
+    def __init__(self, theta: Floats, windows: _Windows) -> None:
+        x, y, log_w, s, t, log_p, contrast, b, bx, by = theta.T.astype(np.float32)[..., None]
+        self._plus, self._minus, self._turn, self._p = 1 + s, 1 - s, t, np.exp(log_p)
+        self._scale, self._contrast, self._bx, self._by = np.exp(-2 * log_w), contrast, bx, by
+        self._dx, self._dy = windows.x - x, windows.y - y
+        # stretched coordinates (I + [[s, t], [t, -s]]) d
+        self._u, self._w = self._plus * self._dx + t * self._dy, t * self._dx + self._minus * self._dy
+        q = self._u * self._u
+        q += self._w * self._w
+        q *= self._scale
+        q += np.float32(1e-12)
+        self._q, self._log_q = q, np.log(q)
+        self._power = np.exp(self._p * self._log_q)
+        self._value = np.exp(np.float32(-0.5) * self._power)
+        self.grey = contrast * self._value
+        self.grey += b + bx * self._dx
+        self.grey += by * self._dy
+
+    def linear(self) -> _Pixel:
+        """Derivatives (n, 4, k) of the grey values by contrast and plane."""
+        return np.stack((self._value, np.ones_like(self._dx), self._dx, self._dy), axis=1)
+
+    def design(self) -> _Pixel:
+        """Derivatives (n, 10, k) of the grey values."""
+        u, w, dx, dy = self._u, self._w, self._dx, self._dy
+        by_power = self._power * self._value
+        by_power *= np.float32(-0.5) * self._contrast * self._p
+        along = by_power / self._q
+        along *= 2 * self._scale
+        along_u, along_w = along * u, along * w
+        design = np.empty((len(dx), UNKNOWNS, dx.shape[1]), np.float32)
+        design[:, 0] = -self._bx - along_u * self._plus - along_w * self._turn
+        design[:, 1] = -self._by - along_u * self._turn - along_w * self._minus
+        np.multiply(by_power, -2, out=design[:, 2])
+        np.subtract(along_u * dx, along_w * dy, out=design[:, 3])
+        np.add(along_u * dy, along_w * dx, out=design[:, 4])
+        np.multiply(by_power, self._log_q, out=design[:, 5])
+        design[:, 6], design[:, 7] = self._value, 1.0
+        design[:, 8], design[:, 9] = dx, dy
+        return design
+
+
+def _windows(
+    grey: NDArray[np.float32], sigma: NDArray[np.float32], centre: Integers, off: Floats, reach: Floats
+) -> _Windows:
+    """The pixels of spots: those within reach (n,) of the places off (n, 2) from the whole pixels centre (n, 2)."""
+    rows, columns = grey.shape
+    half = int(np.ceil(reach.max() + np.abs(off).max()))
+    y, x = (part.ravel() for part in np.mgrid[-half : half + 1, -half : half + 1])
+    within = x * x + y * y <= (reach.max() + np.hypot(*off.T).max()) ** 2
+    y, x = y[within], x[within]
+    near = (x - off[:, 0, None]) ** 2 + (y - off[:, 1, None]) ** 2 <= reach[:, None] ** 2
+    row, column = centre[:, 1, None] + y, centre[:, 0, None] + x
+    near &= (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    place = np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)
+    relative = np.broadcast_to(np.stack((x, y)).astype(np.float32)[:, None], (2, *near.shape))
+    return _Windows(relative[0], relative[1], grey[place], np.where(near, 1 / sigma[place], np.float32(0)))
+
+
+def _share(v: _Pixel, weight: _Pixel, contrast: Floats) -> _Pixel:
+    """How much residuals (n, k) count (Cauchy): half at some sigmas and a part of the contrast."""
+    half = _HALF_SIGMAS / np.maximum(weight, np.float32(1e-9))
+    half += (_HALF_CONTRAST * np.abs(contrast)[:, None]).astype(np.float32)
+    return np.asarray(1 / (1 + (v / half) ** 2))
+
+
+def _sums(one: _Pixel, other: _Pixel) -> Floats:
+    """Sums (n,) of products over the pixels of each spot."""
+    return np.asarray(np.einsum("nk,nk->n", one, other), float)
+
+
+def _damped(normal: Floats, damping: Floats) -> Floats:
+    """Normal matrices (n, m, m) with their diagonals increased by a share (n,), never quite zero."""
+    damped = normal.copy()
+    diagonal = np.einsum("nii->ni", damped)  # a view
+    diagonal += damping[:, None] * (diagonal + 1e-12)
+    return damped

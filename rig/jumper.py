@@ -1,7 +1,8 @@
-"""The measured jumper at one pulse (`svev.JumperState`), as it travels to the log and to subscribers.
+"""The jumper at one pulse (`svev.JumperState`), as it travels to the log and to subscribers.
 
-The JSON form is that of a pulse in `jumper.json` (`svev-jumper/1`): lengths m, speeds m/s, angles in degrees; what was
-not measured is null.
+The JSON form is that of the smoothed part of a pulse in `jumper.json` (`svev-jumper/1`): lengths m, speeds m/s, angles
+in degrees; what was never measured is null. A live state knows the pulses until its own, and none after it: a part
+that was measured before and not at this pulse has the status `predicted` and a sigma that says so.
 """
 
 from typing import Annotated, Any, Final
@@ -43,6 +44,13 @@ class JumperSki(msgspec.Struct, frozen=True):
     status: Annotated[str, Meta(description="controlled, two rays, predicted or by hand")]
 
 
+class JumperVector(msgspec.Struct, frozen=True):
+    """A vector."""
+
+    value: Triple
+    covariance: Annotated[tuple[Triple, Triple, Triple], Meta(description="row by row")]
+
+
 class JumperState(msgspec.Struct, frozen=True, kw_only=True, rename={"time": "time_ns"}):
     """The jumper at one pulse."""
 
@@ -57,6 +65,8 @@ class JumperState(msgspec.Struct, frozen=True, kw_only=True, rename={"time": "ti
     angles: dict[str, Measured | None]
     height: Measured | None
     speed: Measured | None
+    velocity: Annotated[JumperVector | None, Meta(description="of the middle of the bindings, m/s")] = None
+    angle_of_attack: Annotated[Measured | None, Meta(description="skis against the path, degrees")] = None
 
     def encode(self) -> bytes:
         """The state as JSON in UTF-8."""

@@ -60,6 +60,15 @@ class Region:
         """Bytes of memory."""
         return self.grey.nbytes + self.behind.nbytes + self.sigma.nbytes + self.noise.nbytes + self.front.nbytes
 
+    def around(self, xy: Floats, reach: float) -> "Region":
+        """The part of it within `reach` px of a place (2,) of the image, in columns and rows; perhaps empty."""
+        low = np.maximum(np.floor(xy - reach).astype(int) - (self.x, self.y), 0)
+        high = np.maximum(np.ceil(xy + reach).astype(int) + 1 - (self.x, self.y), low)
+        part = slice(low[1], high[1]), slice(low[0], high[0])
+        x, y = self.x + int(low[0]), self.y + int(low[1])
+        grey, behind, sigma, noise = (layer[part] for layer in (self.grey, self.behind, self.sigma, self.noise))
+        return Region(x, y, grey, behind, sigma, noise, self.front[part])
+
     def holds(self, xy: Floats) -> bool:
         """Whether a place of the image, px (2,), lies in it."""
         rows, columns = self.grey.shape
@@ -98,17 +107,25 @@ class Background:
         """Rows and columns."""
         return self._grey.shape[0], self._grey.shape[1]
 
-    def regions(self, image: NDArray[np.uint8], stamped: tuple[int, int, int] | None = None) -> list[Region]:
+    def regions(
+        self,
+        image: NDArray[np.uint8],
+        stamped: tuple[int, int, int] | None = None,
+        within: tuple[int, int, int, int] | None = None,
+    ) -> list[Region]:
         """Where something is in front, the largest region first.
 
         Args:
             image: (rows, columns) of this camera.
             stamped: row, first column and count of pixels that are no picture.
+            within: column and row of the first and behind the last pixel that is looked at; the whole image if left
+                out.
         """
         moment = self._moment(image)
-        front = np.empty(image.shape, np.uint8)
-        for top in range(0, len(image), self._strip):  # what is computed at a time stays in the processor's cache
-            part = slice(top, top + self._strip), slice(None)
+        front = np.zeros(image.shape, np.uint8)
+        left, first, right, last = within or (0, 0, image.shape[1], len(image))
+        for top in range(first, last, self._strip):  # what is computed at a time stays in the processor's cache
+            part = slice(top, min(last, top + self._strip)), slice(left, right)
             behind, variance = self._expected(part, moment)
             difference = cv2.subtract(image[part].astype(np.float32), behind)
             variance *= np.float32(_FRONT**2)

@@ -6,7 +6,8 @@ predicted place with its covariance, and takes weaker evidence there. Pixels tha
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,8 @@ from msgspec import UNSET
 from numpy.typing import NDArray
 
 from analysis.candidates.background import Background, Region
-from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
-from analysis.candidates.spots import MOST, find_spots, look_for_spots
+from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
+from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
 from analysis.candidates.traces import find_traces, look_for_traces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
@@ -28,6 +29,7 @@ from rig.tag import CameraTag, TripletTag
 
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
 
+_THINNEST = 4  # px; a smaller part of an image holds no spot
 _FITS_OF_OTHERS = 6  # places that are fitted in regions without skis, but for the largest one
 
 
@@ -55,6 +57,46 @@ class Finder:
             BadInputError: an image is not as large as the static image of its camera.
         """
         found: dict[str, ImageCandidates] = {}
+        for camera, background, block in self._blocks(tag, image):
+            regions = background.regions(block, _stamped(camera))
+            self._keep(tag.pulse, camera.name, regions)
+            found[camera.name] = _candidates(regions)
+        return PulseCandidates(tag.pulse, tag.time, found)
+
+    def find_expected(
+        self, tag: TripletTag, image: NDArray[np.uint8], expected: Mapping[str, Expected]
+    ) -> PulseCandidates:
+        """The candidates of a pulse near where a jumper is expected: faster than all of them.
+
+        Args:
+            tag: of the pulse.
+            image: (rows, columns) all cameras side by side.
+            expected: by camera; images of others have no candidates.
+
+        Raises:
+            BadInputError: see `find`.
+        """
+        names: list[str] = []
+        columns = [0]
+        parts: list[Region] = []
+        traces: list[tuple[Trace, ...]] = []
+        for camera, background, block in self._blocks(tag, image):
+            place = expected.get(camera.name)
+            box = None if place is None else _inside(place.box, background.shape)
+            regions = [] if box is None else background.regions(block, _stamped(camera), box)
+            self._keep(tag.pulse, camera.name, regions)
+            if place is not None:
+                parts += [_moved(part, columns[-1]) for part in _around(regions, place)]
+            names.append(camera.name)
+            columns.append(columns[-1] + block.shape[1])
+            traces.append(tuple(trace for region in regions for trace in find_traces(region)))
+        spots = find_expected(parts, columns) if parts else [Spots.none() for _ in names]
+        return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
+
+    def _blocks(
+        self, tag: TripletTag, image: NDArray[np.uint8]
+    ) -> Iterator[tuple[CameraTag, Background, NDArray[np.uint8]]]:
+        """The cameras that delivered, with their static scene and their part of the image."""
         for camera in tag.cameras:
             background = self._backgrounds.get(camera.name)
             if camera.status is not FrameStatus.OK or background is None:
@@ -65,10 +107,7 @@ class Finder:
                     f"{camera.name}: image of {block.shape[1]} x {block.shape[0]} px, but the static image has "
                     f"{background.shape[1]} x {background.shape[0]} px; compute both from the same recording"
                 )
-            regions = background.regions(block, _stamped(camera))
-            self._keep(tag.pulse, camera.name, regions)
-            found[camera.name] = _candidates(regions)
-        return PulseCandidates(tag.pulse, tag.time, found)
+            yield camera, background, block
 
     def look_for_spots(
         self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats, radius: float | None = None
@@ -145,6 +184,24 @@ def _candidates(regions: list[Region]) -> ImageCandidates:
     traces = [find_traces(region) for region in regions]
     most = [MOST if found or i == 0 else _FITS_OF_OTHERS for i, found in enumerate(traces)]
     return ImageCandidates(find_spots(regions, most), tuple(trace for found in traces for trace in found))
+
+
+def _inside(box: Floats, shape: tuple[int, int]) -> tuple[int, int, int, int] | None:
+    """The part of a box (`Expected.box`) that lies in an image of so many rows and columns; None if none does."""
+    left, top = np.maximum(np.floor(box[0]).astype(int), 0).tolist()
+    right, bottom = np.minimum(np.ceil(box[1]).astype(int) + 1, shape[::-1]).tolist()
+    return (left, top, right, bottom) if left < right and top < bottom else None
+
+
+def _around(regions: list[Region], place: Expected) -> list[Region]:
+    """The parts of regions around the expected markers."""
+    pairs = zip(place.markers, place.reach.tolist(), strict=True)
+    parts = [region.around(xy, reach) for xy, reach in pairs for region in regions]
+    return [part for part in parts if min(part.grey.shape) > _THINNEST]
+
+
+def _moved(part: Region, columns: int) -> Region:
+    return replace(part, x=part.x + columns)
 
 
 def _stamped(camera: CameraTag) -> tuple[int, int, int] | None:

@@ -109,6 +109,21 @@ class PulseCandidates:
     images: Mapping[str, ImageCandidates]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Expected:
+    """Where an image is expected to show a jumper.
+
+    Attributes:
+        markers: (n, 2) places of his markers, px.
+        reach: (n,) px by which each may be off, with its own size.
+        box: (2, 2) smallest and largest column and row (in this order) in which he and his skis may be, px.
+    """
+
+    markers: Floats
+    reach: Floats
+    box: Floats
+
+
 class SecondLook(Protocol):
     """Looks for spots at a place where one is expected, on weaker evidence than at first sight."""
 

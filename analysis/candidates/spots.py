@@ -5,6 +5,7 @@ discs. What is no spot goes: too long, too large, not explained by the model, to
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ _ANSWER = 5.0  # times its noise: of the Laplacian
 _NOISE_OF_ANSWER = 0.35  # standard deviation of the normalised Laplacian at scale 1 for noise 1; falls as 1 / scale
 _ROUND = 4.0  # ratio of the curvatures of a blob, at most
 MOST = 40  #: fits of a region
+_OF_PLACE = 3  # fits around one expected place: the marker, and what may be confused with it
 _STRENGTH = 6.0  # contrast over its sigma
 _STRETCH = 0.75  # log of the ratio of the axes: a streak of 26 m/s and 2 ms is no longer
 _MISFIT = 0.25  # residuals over contrast
@@ -46,6 +48,25 @@ def find_spots(regions: Sequence[Region], most: Sequence[int]) -> Spots:
     places = [of[0][:count] for of, count in zip(blobs, most, strict=True)]
     radii = [of[1][:count] for of, count in zip(blobs, most, strict=True)]
     return _fitted(regions, places, radii, _STRENGTH)
+
+
+def find_expected(parts: Sequence[Region], columns: Sequence[int]) -> list[Spots]:
+    """Spots around expected places in several images side by side, all at once: the clearest of each image first.
+
+    Args:
+        parts: of the images around each place; their columns count from the first column of the first image.
+        columns: first column of each image, and behind the last one.
+
+    Returns:
+        By image, in px of the image.
+    """
+    found = find_spots(parts, [_OF_PLACE] * len(parts))
+    image = np.searchsorted(columns, found.xy[:, 0] + 0.5, side="right") - 1
+    spots = []
+    for i in range(len(columns) - 1):
+        own = found.only(image == i)
+        spots.append(replace(own, xy=own.xy - (columns[i], 0.0)))
+    return spots
 
 
 def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float | None = None) -> Spots:

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.export.places import SKI_LENGTH_M
-from analysis.result.model import JumperState
+from analysis.result.model import SmoothedState
 from rig.arrays import Floats
 from rig.clocks import NS_PER_S, UtcNs
 
@@ -31,7 +31,7 @@ _SKIS: Final = (("right", "P3", _RED), ("left", "P4", _GREEN))
 _Colour = tuple[float, float, float]
 
 
-def scene_update(scene: OrientedScene, state: JumperState, time: UtcNs) -> bytes:
+def scene_update(scene: OrientedScene, state: SmoothedState, time: UtcNs) -> bytes:
     """The scene at one pulse, encoded.
 
     Args:

@@ -6,9 +6,9 @@ import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
 from analysis.identification.flights import Flight, find_flights, find_tracks
-from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
+from analysis.identification.markers import BINDINGS, follow_further, follow_markers
 from analysis.identification.ski_traces import StraightTrace, straightened
-from analysis.identification.skis import Skis, follow_skis
+from analysis.identification.skis import follow_skis
 from analysis.identification.space_points import Appearance
 from analysis.identification.synchrony import lateness
 from analysis.identification.views import Views
@@ -23,6 +23,7 @@ from analysis.measurements.model import (
     SkiMeasurement,
 )
 from analysis.scene.camera_system import CameraSystem
+from rig.arrays import Integers
 
 _SEARCH_HZ = 30.0  #: tracks are sought in so many pulses per second: displacements that stand out of the noise
 _BEYOND_S = 0.6  #: that markers are followed before the first and after the last point of a track
@@ -97,27 +98,43 @@ def _measured(
         markers = follow_markers(views, window, flight)
     if look is not None:
         markers = follow_further(views, window, flight, markers, look)
-    traces = [
+    traces = straight_traces(views, window)
+    skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
+    pulses = [
+        named_pulse(views, c, markers.assigned.rays[t], skis.traces[t], traces[t])
+        for t, c in enumerate(window.candidates)
+    ]
+    found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
+    return pulses[found[0] : found[-1] + 1] if found else []
+
+
+def straight_traces(views: Views, window: Window) -> list[list[list[StraightTrace]]]:
+    """The straight traces of each pulse of a window by camera."""
+    return [
         [
             straightened(c.images[name].traces, window.shift[t, k]) if name in c.images else []
             for k, name in enumerate(views.names)
         ]
         for t, c in enumerate(window.candidates)
     ]
-    skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
-    pulses = [_pulse(views, c, markers, skis, traces[t], t) for t, c in enumerate(window.candidates)]
-    found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
-    return pulses[found[0] : found[-1] + 1] if found else []
 
 
-def _pulse(
+def named_pulse(
     views: Views,
     candidates: PulseCandidates,
-    markers: Markers,
-    skis: Skis,
+    rays: Integers,
+    skis: Integers,
     lines: Sequence[Sequence[StraightTrace]],
-    t: int,
 ) -> PulseMeasurements:
+    """What was measured in the images of a pulse, by its candidates with their names.
+
+    Args:
+        views: the cameras.
+        candidates: of the pulse.
+        rays: (4, m) spot of each marker in each image; -1: none.
+        skis: (2, m) straight trace of each ski in each image; -1: none.
+        lines: straight traces by camera.
+    """
     images = {}
     for k, name in enumerate(views.names):
         if name not in candidates.images:
@@ -126,13 +143,13 @@ def _pulse(
         points = {
             label: PointMeasurement(spots.xy[s], spots.covariance[s])
             for i, label in enumerate(POINTS)
-            if (s := int(markers.assigned.rays[t, i, k])) >= 0
+            if (s := int(rays[i, k])) >= 0
         }
         traces = candidates.images[name].traces
         measured = {
             side: _ski([traces[part] for part in lines[k][line].parts])
             for i, side in enumerate(SIDES)
-            if (line := int(skis.traces[t, i, k])) >= 0
+            if (line := int(skis[i, k])) >= 0
         }
         images[name] = ImageMeasurements(points, measured)
     return PulseMeasurements(candidates.pulse, candidates.time, images)

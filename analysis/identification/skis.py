@@ -111,6 +111,32 @@ def follow_skis(
     return Skis(found)
 
 
+def assign_skis(
+    views: Views,
+    traces: Sequence[Sequence[Sequence[StraightTrace]]],
+    delivered: Flags,
+    flight: Flight,
+    bindings: Places,
+    angles: Prediction,
+) -> Integers:
+    """Assign traces to skis whose angles are predicted.
+
+    Args:
+        views: the cameras.
+        traces: of t pulses by camera.
+        delivered: (t, m) whether a camera has an image of a pulse.
+        flight: of the jumper.
+        bindings: their places.
+        angles: (t, 2, 2) slope and heading of the right and the left ski in the frame of the flight, rad.
+
+    Returns:
+        (t, 2, m) index of the straight trace of each side in each image; -1: none, or not to be told.
+    """
+    search = _Search(views, traces, delivered, flight, bindings)
+    anywhere = np.zeros((2, 2)), np.tile(_BINDING_M**2 * np.eye(2), (2, 1, 1))
+    return search.assigned(search.belief(angles, anywhere))
+
+
 class _Search:
     """The assignment of traces in all pulses for given beliefs."""
 

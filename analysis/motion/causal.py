@@ -5,7 +5,7 @@ filter does not know yet how lively the motion is, so two go side by side, calm 
 (interacting multiple models, Blom and Bar-Shalom 1988). The bundle of the whole jump replaces all of it afterwards.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
 from analysis.motion.bundle import Model, begun, near, root_of, settled, without_gross_errors
-from analysis.motion.channels import CHANNELS, MotionFrame
+from analysis.motion.channels import CHANNELS, SLOPE, MotionFrame
 from analysis.motion.observations import GROUPS, Observations, linearised, observations, used_cameras
 from analysis.motion.prior import STATE, prior, start_densities, transitions
 from analysis.motion.quantities import known_groups, smoothed_states
@@ -23,11 +23,15 @@ from analysis.result.model import SmoothedState
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Flags, Floats
 from rig.clocks import NS_PER_S, UtcNs
+from rig.pulse import PulseNumber
 
 _TRIGGER_S: Final = 20e-6  # of cameras that obey one trigger
 _STAY_S: Final = 0.15  #: mean time that a motion stays calm, or lively
 _GATE_P: Final = 1e-5  #: a measurement that is less likely than this is not used
 _STEPS, _REMOVALS = 8, 4
+#: How far a jumper's skis turn at all: standard deviations of slope, its difference, heading and opening (rows), of
+#: value, speed and acceleration (columns), rad, rad/s, rad/s^2. Nothing may be less certain: so much is known unseen.
+_SKI_LIMITS: Final = np.array(((0.45, 2.0, 30.0), (0.3, 1.0, 15.0), (0.25, 1.0, 15.0), (0.5, 2.0, 30.0)))
 _MODELS: Final = ("calm", "lively")
 
 
@@ -66,27 +70,49 @@ class CausalFilter:
     def update(self, pulse: PulseMeasurements) -> SmoothedState | None:
         """The jumper at this pulse; None before enough pulses are measured."""
         if self._frame is None:
-            return self._begin(pulse)
+            self._waiting.append(pulse)
+            states = self.begin(tuple(self._waiting))
+            return states[-1] if states else None
         observed = self._observed((pulse,))
-        seconds = (pulse.time - self._time) / NS_PER_S
-        self._time = pulse.time
-        self._mix(seconds)
-        self._predict(seconds)
-        return self._result(observed, self._measure(self._frame, observed))
+        self._advance(pulse.time)
+        used = self._measure(self._frame, observed)
+        self._known |= known_groups(used)
+        return self._result(observed, used, self._known)
+
+    def predicted(self, time: UtcNs) -> SmoothedState | None:
+        """Where to look for the jumper at a pulse that is measured next; None before enough pulses are measured.
+
+        Args:
+            time: of the pulse.
+
+        Returns:
+            A state with all points and skis, also those that were never measured: their covariance tells.
+        """
+        if self._frame is None:
+            return None
+        self._advance(time)
+        nothing = self._observed((PulseMeasurements(PulseNumber(0), time, {}),))
+        return self._result(nothing, nothing.seen, np.ones(len(GROUPS), bool))
 
     def _observed(self, pulses: tuple[PulseMeasurements, ...]) -> Observations:
         return observations(JumpMeasurements(0, pulses), self._header, self._system)
 
-    def _begin(self, pulse: PulseMeasurements) -> SmoothedState | None:
-        """A small bundle of the first pulses."""
-        self._waiting.append(pulse)
-        observed = self._observed(tuple(self._waiting))
+    def begin(self, pulses: Sequence[PulseMeasurements]) -> list[SmoothedState]:
+        """Begin with a small bundle of the first pulses.
+
+        Args:
+            pulses: the first ones, in order.
+
+        Returns:
+            The states of the last of them, from the first measured one on; none if these are not enough to begin.
+        """
+        observed = self._observed(tuple(pulses))
         measured = np.flatnonzero(observed.seen.any(axis=(1, 2)))
         if not len(measured) or not observed.seen[-1].any():
-            return None
+            return []
         observed = observed.part(slice(int(measured[0]), None))
         if len(observed.times) < 2 or (start := start_values(observed, self._system)) is None:
-            return None
+            return []
         m = len(observed.names)
         model = Model(
             observed,
@@ -103,14 +129,25 @@ class CausalFilter:
         begin = begun(model, states, near(model, states, shared), shared)
         adjusted = without_gross_errors(settled(begin, _STEPS), _REMOVALS)
         rank, solution = self._root.shape[1], adjusted.solution
-        cross = solution.cross[-1][:, :rank]
-        covariance = np.block([[solution.covariance[-1], cross], [cross.T, solution.shared_covariance[:rank, :rank]]])
+        cross = solution.cross[:, :, :rank]
+        of_u = solution.shared_covariance[:rank, :rank]
+        covariance = np.block([[solution.covariance[-1], cross[-1]], [cross[-1].T, of_u]])
         mean = np.concatenate((adjusted.states[-1], adjusted.shared[:rank]))
-        self._beliefs = [_Belief(mean, covariance)] * len(_MODELS)
-        self._frame, self._time = start.frame, pulse.time
+        self._beliefs = [self._bounded(mean, covariance)] * len(_MODELS)
+        self._frame, self._time = start.frame, pulses[-1].time
         self._waiting.clear()
         self._known = known_groups(adjusted.used)
-        return self._result(observed.part(slice(-1, None)), adjusted.used[-1:])
+        return self._states(
+            observed, adjusted.used, self._known, adjusted.states, solution.covariance, cross @ self._back
+        )
+
+    def _advance(self, time: UtcNs) -> None:
+        """Predict the motion at a time, unless that was done."""
+        seconds = (time - self._time) / NS_PER_S
+        if seconds > 0:
+            self._time = time
+            self._mix(seconds)
+            self._predict(seconds)
 
     def _mix(self, seconds: float) -> None:
         """Each model starts from both, by the chance that the motion was the other's and changed."""
@@ -131,8 +168,25 @@ class CausalFilter:
             for channel in range(CHANNELS):
                 at = channel + CHANNELS * np.arange(3)
                 covariance[np.ix_(at, at)] += noise[channel]
-            beliefs.append(_Belief(move @ belief.mean, covariance))
+            beliefs.append(self._bounded(move @ belief.mean, covariance))
         self._beliefs = beliefs
+
+    def _bounded(self, mean: Floats, covariance: Floats) -> _Belief:
+        """A belief in which the skis do what skis do, where it was less certain than that.
+
+        A pseudo-observation of zero brings the variance v of such a part of the state down to its limit l: its own
+        variance is r = v l / (v - l), so that 1 / v + 1 / r = 1 / l.
+        """
+        scale = np.array((1.0, self._unit, self._unit**2 / 2))
+        for degree, limits in enumerate((_SKI_LIMITS * scale).T):
+            for channel, limit in enumerate(limits**2, start=SLOPE):
+                at = degree * CHANNELS + channel
+                excess = covariance[at, at] - limit
+                if excess > 0:
+                    gain = covariance[:, at] * excess / covariance[at, at] ** 2
+                    mean = mean - gain * mean[at]
+                    covariance = covariance - np.outer(gain, covariance[at])
+        return _Belief(mean, covariance)
 
     def _measure(self, frame: MotionFrame, observed: Observations) -> Flags:
         """Use the measurements of a pulse; returns which (1, m, 6)."""
@@ -170,21 +224,34 @@ class CausalFilter:
         distance = np.einsum("ga,gab,gb->g", off, np.linalg.inv(spread), off)
         return np.asarray(distance < chi2.isf(_GATE_P, 2))
 
-    def _result(self, observed: Observations, used: Flags) -> SmoothedState:
+    def _result(self, observed: Observations, used: Flags, known: Flags) -> SmoothedState:
+        """What both models believe at the pulse of `observed`."""
+        belief = _mixed(self._beliefs, self._chances)
+        of_state, by_u = belief.covariance[None, :STATE, :STATE], belief.covariance[None, :STATE, STATE:]
+        return self._states(observed, used, known, belief.mean[None, :STATE], of_state, by_u @ self._back)[0]
+
+    def _states(
+        self,
+        observed: Observations,
+        used: Flags,
+        known: Flags,
+        states: Floats,
+        covariance: Floats,
+        by_calibration: Floats,
+    ) -> list[SmoothedState]:
         if self._frame is None:
             raise AssertionError("the filter has not begun")
-        self._known |= known_groups(used)
-        belief = _mixed(self._beliefs, self._chances)
+        by_hand: Flags = np.asarray((observed.by_hand & used).any(axis=1))
         return smoothed_states(
             self._frame,
             self._unit,
-            belief.mean[None, :STATE],
-            belief.covariance[None, :STATE, :STATE],
-            (belief.covariance[:STATE, STATE:] @ self._back)[None],
+            states,
+            covariance,
+            by_calibration,
             used_cameras(observed, used),
-            [dict(zip(GROUPS, (observed.by_hand & used)[0].any(axis=0), strict=True))],
-            self._known,
-        )[0]
+            [dict(zip(GROUPS, of_pulse.tolist(), strict=True)) for of_pulse in by_hand],
+            known,
+        )
 
 
 def _mixed(beliefs: list[_Belief], weights: Floats) -> _Belief:

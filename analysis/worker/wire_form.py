@@ -1,6 +1,6 @@
-"""Puts a measured state into the form in which it travels to log and subscribers (`rig.jumper`)."""
+"""Puts a state of the jumper into the form in which it travels to log and subscribers (`rig.jumper`)."""
 
-from analysis.result.model import JumperState, Phase, PointState, Quantity, SkiState
+from analysis.result.model import PointState, Quantity, SkiState, SmoothedState
 from rig import jumper
 from rig.arrays import Floats
 from rig.clocks import UtcNs
@@ -8,16 +8,9 @@ from rig.pulse import PulseNumber
 
 
 def wire_form(
-    state: JumperState,
-    *,
-    recording: str,
-    jump: int,
-    pulse: PulseNumber,
-    time: UtcNs,
-    since_takeoff_s: float | None = None,
-    phase: Phase | None = None,
+    state: SmoothedState, *, recording: str, jump: int, pulse: PulseNumber, time: UtcNs
 ) -> jumper.JumperState:
-    """A state with what identifies it.
+    """A state with what identifies it; the take-off is not known yet.
 
     Args:
         state: of the jumper.
@@ -25,27 +18,24 @@ def wire_form(
         jump: number of the jump in it.
         pulse: number of the pulse.
         time: middle of the exposure.
-        since_takeoff_s: None while the take-off is not known.
-        phase: likewise.
     """
     return jumper.JumperState(
         recording=recording,
         jump=jump,
         pulse=pulse,
         time=time,
-        since_takeoff_s=since_takeoff_s,
-        phase=None if phase is None else phase.value,
         points={name: None if point is None else _point(point) for name, point in state.points.items()},
         skis={side: None if ski is None else _ski(ski) for side, ski in state.skis.items()},
         angles={name: _measured(angle) for name, angle in state.angles.items()},
         height=_measured(state.height),
         speed=_measured(state.speed),
+        velocity=jumper.JumperVector(_triple(state.velocity.value), _rows(state.velocity.covariance)),
+        angle_of_attack=_measured(state.angle_of_attack),
     )
 
 
 def _point(point: PointState) -> jumper.JumperPoint:
-    first, second, third = (_triple(row) for row in point.covariance)
-    return jumper.JumperPoint(_triple(point.xyz), (first, second, third), point.cameras, point.status.value)
+    return jumper.JumperPoint(_triple(point.xyz), _rows(point.covariance), point.cameras, point.status.value)
 
 
 def _ski(ski: SkiState) -> jumper.JumperSki:
@@ -55,6 +45,11 @@ def _ski(ski: SkiState) -> jumper.JumperSki:
 
 def _measured(quantity: Quantity | None) -> jumper.Measured | None:
     return None if quantity is None else jumper.Measured(quantity.value, quantity.sigma)
+
+
+def _rows(matrix: Floats) -> tuple[jumper.Triple, jumper.Triple, jumper.Triple]:
+    first, second, third = (_triple(row) for row in matrix)
+    return first, second, third
 
 
 def _triple(values: Floats) -> jumper.Triple:

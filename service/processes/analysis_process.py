@@ -65,7 +65,7 @@ def main() -> None:
         raise SystemExit("analysis: the rig file has no [analysis] table")
     reports = _Reports(child.control)
     if (analysis := _opened(child, rig, rig.analysis, reports)) is not None:
-        with connected(_source(rig.network)) as stream:
+        with analysis, connected(_source(rig.network)) as stream:
             _measure(child, stream, analysis)
 
 

@@ -66,9 +66,9 @@ def worker_command(
         socket.linger = _LINGER_MS
         address = bind(socket, bind_to)
         findings = _Published(socket, out, aside=as_json)
-        analysis = LiveAnalysis(survey, calibration, findings)
-        console.say(f"triplets from {connect}, results at {address}; end with Ctrl-C", aside=True)
-        _work(analysis, source, idle)
+        with LiveAnalysis(survey, calibration, findings) as analysis:
+            console.say(f"triplets from {connect}, results at {address}; end with Ctrl-C", aside=True)
+            _work(analysis, source, idle)
     summary = {"pulses": analysis.pulses, "states": findings.states, "jumps": analysis.jumps}
     if not reliable:  # of a reliable replay, other workers may have the pulses between ours
         summary["missed"] = analysis.missed
@@ -93,7 +93,6 @@ def _work(analysis: LiveAnalysis, source: Source, idle_s: float | None) -> None:
                 else:
                     quiet_s += _POLL_S
                     analysis.idle(quiet_s)
-        analysis.finish()
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

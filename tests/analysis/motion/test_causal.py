@@ -13,6 +13,7 @@ from tests.analysis.simulated import RATE_HZ, drawn, simulated_measurements, tru
 SEED = 5
 FIRST = 5  # pulses until there is a state
 LARGEST = 4.5  # sigmas; 6e-6 of single errors are larger
+HIDDEN = range(8, 28)  # pulses without skis
 AT_CHANGES = 6.0  # where the motion has just changed, the distribution is a mixture with longer tails
 
 
@@ -46,3 +47,30 @@ def test_states_err_as_their_covariance_says_and_gaps_are_predicted() -> None:
         assert k != 25 or helmet.cameras == ("K2", "K3")
         sigmas[k] = float(np.trace(helmet.covariance)) ** 0.5
     assert sigmas[19] < sigmas[20] < sigmas[21] > sigmas[22]
+
+
+def test_skis_that_are_hidden_stay_what_skis_are_and_a_prediction_changes_nothing() -> None:
+    rng, truth = np.random.default_rng(SEED), true_jump(SEED)
+    measured = simulated_measurements(truth, true_cameras(), rng)
+    live, other = (CausalFilter(true_cameras(), measured.cameras, RATE_HZ) for _ in range(2))
+    for given in measured.jumps[0].pulses[: HIDDEN.stop]:
+        images = given.images
+        if given.pulse - measured.jumps[0].pulses[0].pulse in HIDDEN:
+            images = {name: ImageMeasurements(image.points, {}) for name, image in images.items()}
+        pulse = replace(given, images=images)
+        predicted = live.predicted(pulse.time)
+        state, same = live.update(pulse), other.update(pulse)
+    assert state is not None
+    assert same is not None
+    assert predicted is not None
+    assert (state.origin.value == same.origin.value).all()
+    for side, heading in zip(("right", "left"), truth.pose(pulse.pulse).skis, strict=True):
+        ski = state.skis[side]
+        assert ski is not None
+        assert ski.status is Status.PREDICTED
+        angle = np.degrees(np.arctan2(heading[1], heading[0]))
+        assert abs(ski.heading.value - angle) < LARGEST * ski.heading.sigma
+        assert 5.0 < ski.heading.sigma < 30.0
+    hip = predicted.points["P2"]
+    assert hip is not None
+    assert _distance(hip.xyz - truth.pose(pulse.pulse).markers[1], hip.covariance) < AT_CHANGES

@@ -1,0 +1,182 @@
+"""Follows a jumper from pulse to pulse: what the past predicts names the candidates of the next pulse.
+
+The filter over time (`analysis.motion.causal`) predicts markers and skis, the candidates near them are assigned as in a
+whole jump, and what was so measured goes into the filter. A jump that is over is identified once more as a whole: with
+what comes after a pulse, more can be told of it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+import numpy as np
+
+from analysis.candidates.model import Expected, PulseCandidates
+from analysis.identification.assignment import assign
+from analysis.identification.body import REACH_M
+from analysis.identification.flights import Flight
+from analysis.identification.identify import named_pulse, straight_traces
+from analysis.identification.markers import BINDINGS, Markers
+from analysis.identification.prediction import Prediction
+from analysis.identification.skis import assign_skis
+from analysis.identification.space_points import Appearance
+from analysis.identification.views import Views
+from analysis.identification.window import Window
+from analysis.measurements.model import SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
+from analysis.motion.causal import CausalFilter
+from analysis.result.model import SmoothedState, Status
+from analysis.scene.camera_system import CameraSystem
+from rig.clocks import UtcNs
+from rig.pulse import PulseNumber
+
+#: A jumper of whom nothing was measured for so long is not followed any more: his place is too uncertain.
+_LOST_S: Final = 0.25
+#: A marker is looked for within so many standard deviations of its prediction and so many of its radii.
+_SIGMAS, _RADII = 4.0, 8.0
+_FEWEST_CAMERAS: Final = 2  #: that must be able to see any of his markers
+
+_Part = TypeVar("_Part")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """A pulse of a jumper who is followed.
+
+    Attributes:
+        pulse: its number.
+        time: when it fired.
+        state: of the jumper, from all pulses until this one.
+    """
+
+    pulse: PulseNumber
+    time: UtcNs
+    state: SmoothedState
+
+
+class Follower:
+    """Follows one jumper; made by `begun`.
+
+    Attributes:
+        first: the first pulse in which he was seen.
+        last: the last one in which something was measured.
+    """
+
+    def __init__(self, system: CameraSystem, cameras: Mapping[str, MeasuredCamera], rate_hz: float) -> None:
+        self._views = Views(system, {name: camera.exposure_s for name, camera in cameras.items()})
+        self._filter = CausalFilter(system, cameras, rate_hz)
+        self._rate_hz = rate_hz
+        self._appearance: Appearance | None = None
+        self.first = self.last = PulseNumber(0)
+
+    def begin(self, found: JumpMeasurements, candidates: Sequence[PulseCandidates]) -> list[Followed]:
+        """Begin with the pulses in which a jumper was found.
+
+        Args:
+            found: what was identified.
+            candidates: in which it was identified.
+
+        Returns:
+            His states; none if the pulses are not enough to begin.
+        """
+        states = self._filter.begin(found.pulses)
+        self._appearance = _appearance(self._views, found.pulses, candidates)
+        pulses = found.pulses[len(found.pulses) - len(states) :]
+        self.first, self.last = found.pulses[0].pulse, found.pulses[-1].pulse
+        return [Followed(pulse.pulse, pulse.time, state) for pulse, state in zip(pulses, states, strict=True)]
+
+    def expected(self, time: UtcNs) -> dict[str, Expected]:
+        """Where each camera is expected to show him at a pulse; cameras that do not see him are left out."""
+        state = self._predicted(time)
+        xyz = np.array([_known(point).xyz for point in state.points.values()])
+        covariance = np.array([_known(point).covariance for point in state.points.values()])
+        radius = 0.0 if self._appearance is None else self._appearance.radius
+        found = {}
+        for k, name in enumerate(self._views.names):
+            scale = float(self._views.scale[k])
+            sight = self._views.see(k, np.concatenate((xyz, state.origin.value[None])))
+            spread = sight.by_point[:-1] @ covariance @ sight.by_point[:-1].swapaxes(-1, -2) + sight.noise[:-1]
+            sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(spread, nan=1e6))[:, -1])
+            reach = _SIGMAS * sigma + _RADII * radius * scale
+            middle, half = sight.xy[-1], REACH_M * scale
+            if np.isfinite(sight.xy).all():
+                found[name] = Expected(sight.xy[:-1], reach, np.stack((middle - half, middle + half)))
+        return found
+
+    def follow(self, candidates: PulseCandidates) -> Followed:
+        """Measure him at the next pulse."""
+        views = self._views
+        state = self._predicted(candidates.time)
+        flight = _flight(state, candidates.pulse / self._rate_hz)
+        window = Window(views, [candidates], self._rate_hz, flight, self._appearance)
+        points = [_known(point) for point in state.points.values()]
+        places = Prediction(np.array([[p.xyz for p in points]]), np.array([[p.covariance for p in points]]))
+        assigned = assign(views, window, places, flight.axes)
+        lines = straight_traces(views, window)
+        bindings = Markers(assigned, places).places(BINDINGS)
+        skis = assign_skis(views, lines, window.delivered, flight, bindings, _angles(state, flight))
+        measured = named_pulse(views, window.candidates[0], assigned.rays[0], skis[0], lines[0])
+        found = self._filter.update(measured)
+        if found is None:
+            raise AssertionError("the filter has begun")
+        if any(part is not None and part.status is not Status.PREDICTED for part in found.points.values()):
+            self.last = candidates.pulse
+        return Followed(candidates.pulse, candidates.time, found)
+
+    def lost(self, pulse: PulseNumber, time: UtcNs) -> bool:
+        """Whether he is followed no more at a pulse: nothing was measured for too long, or he has left the images."""
+        if pulse - self.last > _LOST_S * self._rate_hz:
+            return True
+        state = self._predicted(time)
+        xyz = np.array([_known(point).xyz for point in state.points.values()])
+        seeing = sum(bool(self._views.see(k, xyz).inside.any()) for k in range(len(self._views)))
+        return seeing < _FEWEST_CAMERAS
+
+    def _predicted(self, time: UtcNs) -> SmoothedState:
+        state = self._filter.predicted(time)
+        if state is None:
+            raise AssertionError("following has begun")
+        return state
+
+
+def _appearance(
+    views: Views, pulses: Sequence[PulseMeasurements], candidates: Sequence[PulseCandidates]
+) -> Appearance | None:
+    """What the markers look like, by the spots that show them; None if they are known by second looks alone."""
+    seen = []
+    of_pulse = {pulse.pulse: pulse for pulse in pulses}
+    for at in candidates:
+        for k, name in enumerate(views.names):
+            if at.pulse not in of_pulse or name not in at.images or name not in of_pulse[at.pulse].images:
+                continue
+            spots = at.images[name].spots
+            for point in of_pulse[at.pulse].images[name].points.values():
+                for i in np.flatnonzero((spots.xy == point.xy).all(axis=1)):
+                    seen.append((float(spots.contrast[i]), float(spots.radius[i] / views.scale[k])))
+    return Appearance.of(*np.array(seen).T) if seen else None
+
+
+def _flight(state: SmoothedState, time_s: float) -> Flight:
+    """The flight as it goes on from a state."""
+    velocity = state.velocity.value
+    forward = np.array((velocity[0], velocity[1], 0.0)) / np.hypot(velocity[0], velocity[1])
+    up = np.array((0.0, 0.0, 1.0))
+    motion = np.stack((state.origin.value, velocity, np.zeros(3)))
+    return Flight(time_s, time_s, time_s, motion, np.stack((forward, np.cross(up, forward), up)), ())
+
+
+def _angles(state: SmoothedState, flight: Flight) -> Prediction:
+    """Slope and heading of both skis in the frame of the flight, rad."""
+    course = np.degrees(np.arctan2(flight.axes[0, 1], flight.axes[0, 0]))
+    values, covariance = np.zeros((1, 2, 2)), np.zeros((1, 2, 2, 2))
+    for i, side in enumerate(SIDES):
+        ski = _known(state.skis[side])
+        values[0, i] = ski.slope.value, (ski.heading.value - course + 180.0) % 360.0 - 180.0
+        sigma = np.array((ski.slope.sigma, ski.heading.sigma))
+        covariance[0, i] = np.outer(sigma, sigma) * np.array(((1.0, ski.correlation), (ski.correlation, 1.0)))
+    return Prediction(np.radians(values), covariance * np.radians(1.0) ** 2)
+
+
+def _known(part: _Part | None) -> _Part:
+    if part is None:
+        raise AssertionError("a predicted state has all parts")
+    return part

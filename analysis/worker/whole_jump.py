@@ -1,0 +1,49 @@
+"""Computes a jump that is over: identified once more as a whole, then raw, smoothed and judged as in `svev analyze`."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from analysis.cameras.oriented_scene import OrientedScene, orientation_result
+from analysis.candidates.model import PulseCandidates, SecondLook
+from analysis.identification.identify import identify
+from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements
+from analysis.procedure.jump import compute_jump
+from analysis.result.model import MeasuredRecording
+from analysis.worker.findings import MeasuredJump, summary_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JumpTask:
+    """A jump to be computed; everything that is needed for it, so that another thread can do it.
+
+    Attributes:
+        recording: id of the recording.
+        number: of the jump in it.
+        rate_hz: pulses per second.
+        cameras: image size and exposure time by name.
+        candidates: of the pulses in which the jumper may be in sight.
+        scene: cameras and balls.
+        look: looks again where a marker is expected.
+    """
+
+    recording: str
+    number: int
+    rate_hz: float
+    cameras: Mapping[str, MeasuredCamera]
+    candidates: tuple[PulseCandidates, ...]
+    scene: OrientedScene
+    look: SecondLook
+
+    def computed(self) -> MeasuredJump | None:
+        """The jump; None if nobody jumps in the candidates."""
+        exposures = {name: camera.exposure_s for name, camera in self.cameras.items()}
+        found = identify(self.candidates, self.scene.system, self.rate_hz, exposures, self.look)
+        if not found:
+            return None
+        longest = max(found, key=lambda jump: len(jump.pulses))
+        jump = JumpMeasurements(self.number, longest.pulses)
+        measurements = Measurements(self.recording, self.rate_hz, self.cameras, (jump,))
+        computed = compute_jump(jump, measurements, self.scene.system)
+        orientation = orientation_result(self.scene)
+        result = MeasuredRecording(self.recording, {}, self.rate_hz, orientation, computed.synchrony, (computed.jump,))
+        return MeasuredJump(result, summary_of(self.recording, self.rate_hz, computed))

@@ -78,8 +78,7 @@ def predict(lens: Lens, pose: SinglePose, xyz: Floats, xyz_covariance: Floats) -
 
 
 def _at(lens: Lens, position: Floats, rotation: Floats, xyz: Floats, xy: Floats) -> tuple[Floats, Floats, Floats]:
-    n = len(xyz)
-    many = Lens(np.tile(lens.interior, (n, 1)), np.tile(lens.balance, n), np.tile(lens.measured, n))
+    one = Lens(lens.interior[None], np.reshape(lens.balance, 1), np.reshape(lens.measured, 1))
     with np.errstate(all="ignore"):
-        found = linearise(many, np.tile(rotation, (n, 1, 1)), np.tile(position, (n, 1)), xyz, xy)
+        found = linearise(one, rotation[None], position[None], xyz, xy)
     return found.v, found.by_pose, found.by_point

@@ -23,15 +23,18 @@ def poses_from_three_points(points: Floats, rays: Floats) -> tuple[Floats, Float
     Returns:
         Projection centres (m, 3), rotations (m, 3, 3) with columns r1, r2, r3, and to which triple each belongs (m,).
     """
-    points, rays = np.broadcast_arrays(points, rays)
     with np.errstate(all="ignore"):
         distances, triple = _distances(points, rays)
-    in_camera = rays[triple] * distances[:, :, None]
-    in_space = points[triple]
-    rotation = _frames(in_space) @ _frames(in_camera).transpose(0, 2, 1)
-    position = in_space[:, 0] - (rotation @ in_camera[:, 0, :, None])[:, :, 0]
+    in_camera = _of(rays, triple) * distances[:, :, None]
+    rotation = _of(_frames(points), triple) @ _frames(in_camera).transpose(0, 2, 1)
+    position = _of(points[:, 0], triple) - (rotation @ in_camera[:, 0, :, None])[:, :, 0]
     sound = np.isfinite(position).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2))
     return position[sound], rotation[sound], triple[sound]
+
+
+def _of(values: Floats, triple: Integers) -> Floats:
+    """The values (n, ...) of these triples; or (1, ...), those of all."""
+    return values if len(values) == 1 else values[triple]
 
 
 def _distances(points: Floats, rays: Floats) -> tuple[Floats, Integers]:
@@ -40,7 +43,7 @@ def _distances(points: Floats, rays: Floats) -> tuple[Floats, Integers]:
     cos_a, cos_b, cos_c = (np.einsum("ni,ni->n", rays[:, i], rays[:, j]) for i, j in ((1, 2), (0, 2), (0, 1)))
     p, q, s, t = (a - c) / b, (a + c) / b, c / b, a / b
     coefficients = np.stack(
-        (
+        np.broadcast_arrays(
             (p - 1) ** 2 - 4 * s * cos_a**2,
             4 * (p * (1 - p) * cos_b - (1 - q) * cos_a * cos_c + 2 * s * cos_a**2 * cos_b),
             2 * (p**2 - 1 + 2 * (p * cos_b) ** 2 + 2 * (1 - s) * cos_a**2 - 4 * q * cos_a * cos_b * cos_c)

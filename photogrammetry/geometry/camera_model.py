@@ -18,6 +18,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from photogrammetry.geometry.rotation import skew
 from rig.arrays import Flags, Numbers
 
 #: Order of the interior orientation's parameters (Luhmann et al. 2006).
@@ -129,9 +130,9 @@ def linearise(lens: Lens, rotation: Numbers, position: Numbers, xyz: Numbers, xy
     """Residuals and analytic derivatives of the collinearity equations.
 
     Args:
-        lens: n interior orientations.
-        rotation: (n, 3, 3).
-        position: (n, 3).
+        lens: n interior orientations; or one, of shape (1, ...), the same for all.
+        rotation: (n, 3, 3) or (1, 3, 3).
+        position: (n, 3) or (1, 3).
         xyz: (n, 3), object points.
         xy: (n, 2), measured metric image coordinates.
 
@@ -162,7 +163,7 @@ def linearise(lens: Lens, rotation: Numbers, position: Numbers, xyz: Numbers, xy
     by_pose = np.empty((*v.shape, 6), dtype=v.dtype)
     by_pose[..., :3] = -by_point
     # dk/dd = [k]x for R' = R exp([d]x)
-    by_pose[..., 3:] = np.cross(by_k, k[..., None, :])
+    by_pose[..., 3:] = by_k @ skew(k)
     return Linearised(v, by_interior, by_pose, by_point)
 
 

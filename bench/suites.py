@@ -109,7 +109,7 @@ def _repeats(seconds: float, directory: Path) -> dict[str, Any]:
     cases = run_repeats(seconds)
     path = write_results("jump-repeats", cases, directory)
     table = [
-        f"{case['name']}: a difference found in {case['found']:.1%} of {case['pairs']} pairs, {case['expected']:.1%} expected"
+        f"{case['name']}: different in {case['found']:.1%} of {case['pairs']} pairs, expected {case['expected']:.1%}"
         for case in cases
     ]
     return {"cases": cases, "file": str(path), "table": table}

@@ -1,4 +1,4 @@
-"""Whether comparing jumps finds what it says it would find: one jump rendered again and again, and with another leg angle."""
+"""Whether comparing jumps finds what it says: one jump rendered again and again, and with another leg angle."""
 
 import tempfile
 import time

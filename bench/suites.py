@@ -9,6 +9,7 @@ from bench.analysis.faults import run_faults
 from bench.analysis.honesty import run_honesty
 from bench.analysis.jumps import run_jumps
 from bench.analysis.repeats import run_repeats
+from bench.analysis.smoothing import run_smoothing
 from bench.photogrammetry.adjustment import run_adjustment
 from bench.photogrammetry.intersection import run_intersection
 from bench.photogrammetry.planning import run_planning
@@ -23,6 +24,7 @@ from bench.service.catalogue import run_catalogue
 from recorder.publishing.subscriber import free_address
 
 Suite = Callable[[float, Path], dict[str, Any]]
+DrawnSuite = Callable[[int, Path], dict[str, Any]]
 
 
 def _capture(name: str, seconds: float, directory: Path) -> dict[str, Any]:
@@ -122,6 +124,20 @@ def _faults(_seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _smoothing(draws: int, directory: Path) -> dict[str, Any]:
+    cases = run_smoothing(draws)
+    path = write_results("smoothing", cases, directory)
+    table = []
+    for case in cases:
+        table.append(f"{case['name']}, {case['draws']} draws: mean square, within 2 sigma, sigma over scatter")
+        table += [
+            f"  {quantity:24}{of['mean_square']:8.2f}{of['within_2_sigma']:8.1%}{of['sigma_over_scatter']:8.2f}"
+            for quantity, of in case["honesty"].items()
+        ]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
+#: Suites that go on for some seconds.
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
     "firewire": _firewire,
@@ -136,3 +152,5 @@ SUITES: dict[str, Suite] = {
     "jump-honesty": _honesty,
     "jump-repeats": _repeats,
 }
+#: Suites that draw jumps and the errors of their measurements.
+DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing}

@@ -5,14 +5,17 @@ from typing import Annotated
 
 import typer
 
-from bench.suites import SUITES
+from bench.suites import DRAWN, SUITES
 from rig.errors import BadInputError
 from svev import console
 
+_NAMES = (*SUITES, *DRAWN)
+
 
 def bench(
-    suites: Annotated[list[str] | None, typer.Argument(help=f"which of {', '.join(SUITES)}; all if left out")] = None,
+    suites: Annotated[list[str] | None, typer.Argument(help=f"which of {', '.join(_NAMES)}; all if left out")] = None,
     seconds: Annotated[float, typer.Option(min=1, max=600, help="length of each run, seconds")] = 20.0,
+    draws: Annotated[int, typer.Option(min=1, max=10_000, help="number of jumps that smoothing draws")] = 18,
     out: Annotated[Path, typer.Option(help="folder for the results, and for logs that are removed again")] = Path(
         "bench/results"
     ),
@@ -27,17 +30,18 @@ def bench(
     intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
     covariance; the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and
     with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump
-    measured again and again, and with another leg angle: how often a comparison finds a difference.
+    measured again and again, and with another leg angle: how often a comparison finds a difference. smoothing: whether the sigmas of
+    smoothed jumps hold, with all measurements and with a marker or a ski missing for a while; about two seconds a draw.
 
     Example: svev bench saturated --seconds 10
     """
-    if unknown := [name for name in suites or () if name not in SUITES]:
-        raise BadInputError(f"no benchmark is called {unknown[0]}: choose from {', '.join(SUITES)}")
+    if unknown := [name for name in suites or () if name not in _NAMES]:
+        raise BadInputError(f"no benchmark is called {unknown[0]}: choose from {', '.join(_NAMES)}")
     out.mkdir(parents=True, exist_ok=True)
     results = {}
-    for name in suites or SUITES:
+    for name in suites or _NAMES:
         console.say(f"{name} ...", aside=True)
-        results[name] = SUITES[name](seconds, out)
+        results[name] = DRAWN[name](draws, out) if name in DRAWN else SUITES[name](seconds, out)
     if as_json:
         console.print_json(results)
     else:

@@ -55,12 +55,19 @@ class Solution:
     coupling: Floats
     response: Floats
 
-    def covariance_of(self, by_states: Floats) -> Floats:
-        """Covariance (f, f) of f linear functions of the states of any pulses, given by derivatives (n, s, f)."""
-        solved = _back(self.inverse, self.coupling, _forward(self.inverse, self.coupling, by_states))
-        own = np.einsum("nsf,nsg->fg", by_states, solved)
-        by_shared = np.einsum("nsf,nsb->fb", by_states, self.response)
-        return np.asarray(own + by_shared @ self.shared_covariance @ by_shared.T)
+    def covariance_of(self, by_states: Floats, by_shared: Floats | None = None) -> Floats:
+        """Covariance (f, f) of f linear functions.
+
+        Args:
+            by_states: (n, s, f) their derivatives by the states of all pulses.
+            by_shared: (b, f) by the shared unknowns; none if left out.
+        """
+        f = by_states.shape[-1]
+        reduced = _forward(self.inverse, self.coupling, by_states).reshape(-1, f)
+        by_all = -self.response.reshape(-1, self.response.shape[-1]).T @ by_states.reshape(-1, f)
+        if by_shared is not None:
+            by_all += by_shared
+        return np.asarray(reduced.T @ reduced + by_all.T @ self.shared_covariance @ by_all)
 
 
 def solve(normals: Normals) -> Solution:

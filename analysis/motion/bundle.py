@@ -19,15 +19,11 @@ from analysis.motion.prior import STATE, Prior, transitions
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Flags, Floats
 
-#: Probability that a jump without gross errors loses any measurement.
-FALSE_REMOVAL_P: Final = 0.05
 _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
 _COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is given by definition
 _SETTLED: Final = 0.01  # of a sigma: greatest step of O that ends the iteration
 _FAR: Final = 10.0  # times the median distance from approximate states
-_MEDIAN: Final = float(chi2.median(2))
-_SIGNIFICANT: Final = 3.1  # sigmas; right ones are held for too small with a probability of 0.001
-_FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
+MEDIAN: Final = float(chi2.median(2))  #: of the weighted square sum of a group
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +112,7 @@ def near(model: Model, states: Floats, shared: Floats) -> Flags:
     v = linearised(model.observed, _cameras(model, shared), model.frame, channels).v
     seen, square = model.observed.seen, (v**2).sum(axis=-1)
     usual = np.array([np.median(square[:, :, g][seen[:, :, g]]) if seen[:, :, g].any() else 0.0 for g in range(6)])
-    return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, _MEDIAN)))
+    return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, MEDIAN)))
 
 
 def settled(adjusted: Adjusted, most: int) -> Adjusted:
@@ -133,89 +129,9 @@ def with_prior(adjusted: Adjusted, prior: Prior) -> Adjusted:
     return _stepped(replace(adjusted.model, prior=prior), adjusted.used, adjusted.states, adjusted.shared)
 
 
-def fitting_sigmas(adjusted: Adjusted, most: int) -> tuple[Adjusted, Floats]:
-    """Enlarge the sigmas of all points, or of all skis, if most of them agree worse than their sigmas allow.
-
-    The median of the tests decides, so that gross errors do not count. Returns the factors (6,) of the groups too.
-    """
-    factors = np.ones(6)
-    for _ in range(most):
-        tests, step = statistics(adjusted).test, np.ones(6)
-        for kind in (slice(0, 4), slice(4, 6)):
-            own = tests[:, :, kind][adjusted.used[:, :, kind]]
-            ratio = float(np.median(own)) / _MEDIAN if len(own) else 1.0
-            # The median of n exponential numbers scatters by 1 / (sqrt(n) ln 2) of itself.
-            if ratio > 1 + _SIGNIFICANT / (np.sqrt(max(len(own), 1)) * np.log(2.0)):
-                step[kind] = np.sqrt(ratio)
-        if (step == 1.0).all():
-            break
-        factors *= step
-        model = replace(adjusted.model, observed=adjusted.model.observed.scaled(step))
-        adjusted = settled(replace(adjusted, model=model), 2)
-    return adjusted, factors
-
-
-def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
-    """Leave out measurements that contradict all others, the worst around first; take back those that no longer do.
-
-    Where two of a point's rays had to go and a single one is left, nothing tells that it is the right one: it goes too.
-    """
-    seen = adjusted.model.observed.seen
-    limit = float(chi2.isf(FALSE_REMOVAL_P / max(int(seen.sum()), 1), 2))
-    doubtful = np.zeros((len(seen), 1, 6), bool)
-    for _ in range(most):
-        tests = statistics(adjusted).test
-        worst = np.where(adjusted.used, tests, 0.0).max(axis=(1, 2))
-        around = np.lib.stride_tricks.sliding_window_view(np.pad(worst, 1), 3).max(axis=1)
-        leave = adjusted.used & (tests > limit) & (tests >= around[:, None, None])
-        kept = adjusted.used & ~leave
-        used = kept | (seen & ~adjusted.used & (tests < limit))
-        doubtful |= (used.sum(axis=1, keepdims=True) == 1) & ((seen & ~used).sum(axis=1, keepdims=True) >= 2)
-        used &= ~doubtful
-        if (used == adjusted.used).all():
-            return adjusted
-        adjusted = settled(replace(adjusted, used=used), 2)
-    return adjusted
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Statistics:
-    """Of each group (n, m, 6).
-
-    Attributes:
-        square: weighted square sum of its residuals.
-        redundancy: its share in the degrees of freedom, 0..2; 0 where it was not used.
-        test: chi-squared of two degrees of freedom: how far the measurement is from what all others say of it.
-    """
-
-    square: Floats
-    redundancy: Floats
-    test: Floats
-
-
-def statistics(adjusted: Adjusted) -> Statistics:
-    """Residuals, redundancies and tests of all groups."""
-    solution, instants = adjusted.solution, adjusted.instants
-    rows, border = adjusted.equations.by_channels, _border_rows(adjusted)
-    n, m = adjusted.used.shape[:2]
-    spread = np.empty((n, m, 6, 2, 2))
-    for i in range(m):
-        own = np.einsum(
-            "d,ndcef,e->ncf", instants[i], solution.covariance.reshape(n, 3, CHANNELS, 3, CHANNELS), instants[i]
-        )
-        cross = np.einsum("d,ndcb->ncb", instants[i], solution.cross.reshape(n, 3, CHANNELS, -1))
-        flat, shared = rows[:, i].reshape(n, 12, CHANNELS), border[:, i].reshape(n, 12, -1)
-        half = (flat @ cross @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
-        whole = (flat @ own @ flat.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
-        whole += half + half.transpose(0, 3, 4, 1, 2)
-        whole += (shared @ solution.shared_covariance @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
-        spread[:, i] = np.einsum("ngagb->ngab", whole)
-    v, unit = adjusted.equations.v, np.eye(2)
-    used = adjusted.used[..., None, None]
-    free = np.where(used, unit * (1 + _FLOOR) - spread, unit + spread)
-    test = np.einsum("...a,...ab,...b->...", v, np.linalg.inv(free), v)
-    redundancy = np.where(adjusted.used, 2.0 - np.trace(spread, axis1=-2, axis2=-1), 0.0)
-    return Statistics((v**2).sum(axis=-1), redundancy, test)
+def rows_by_shared(adjusted: Adjusted) -> Floats:
+    """Derivatives (n, m, 6, 2, r + m) of the observations by the shared unknowns."""
+    return _rows_by_shared(adjusted.model, adjusted.equations, adjusted.states, adjusted.instants)
 
 
 def _cameras(model: Model, shared: Floats) -> CameraSystem:
@@ -225,11 +141,6 @@ def _cameras(model: Model, shared: Floats) -> CameraSystem:
 def _instants(model: Model, shared: Floats) -> Floats:
     late = shared[model.root.shape[1] :] + model.observed.delay / model.prior.unit
     return np.asarray(transitions(late)[:, 0])
-
-
-def _border_rows(adjusted: Adjusted) -> Floats:
-    """(n, m, 6, 2, r + m) derivatives of the observations by the shared unknowns."""
-    return _rows_by_shared(adjusted.model, adjusted.equations, adjusted.states, adjusted.instants)
 
 
 def _rows_by_shared(model: Model, equations: Equations, states: Floats, instants: Floats) -> Floats:

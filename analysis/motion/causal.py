@@ -13,8 +13,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
-from analysis.motion.bundle import Model, begun, near, root_of, settled, without_gross_errors
+from analysis.motion.bundle import Model, begun, near, root_of, settled
 from analysis.motion.channels import CHANNELS, SLOPE, MotionFrame
+from analysis.motion.gross_errors import without_gross_errors
 from analysis.motion.observations import GROUPS, Observations, linearised, observations, used_cameras
 from analysis.motion.prior import STATE, prior, start_densities, transitions
 from analysis.motion.quantities import known_groups, smoothed_states

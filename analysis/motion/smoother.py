@@ -12,14 +12,12 @@ from analysis.motion.bundle import (
     Adjusted,
     Model,
     begun,
-    fitting_sigmas,
     near,
     root_of,
     settled,
-    statistics,
     with_prior,
-    without_gross_errors,
 )
+from analysis.motion.gross_errors import fitting_sigmas, statistics, without_gross_errors
 from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
 from analysis.motion.prior import prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states

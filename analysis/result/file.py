@@ -43,8 +43,17 @@ def write(result: MeasuredRecording, path: Path) -> None:
     Raises:
         OSError: the disk refuses.
     """
+    write_json(to_json(result), path)
+
+
+def write_json(content: Mapping[str, Any], path: Path) -> None:
+    """Write what `to_json` has made, perhaps with more members, in the same way as `write`.
+
+    Raises:
+        OSError: the disk refuses.
+    """
     half_done = path.with_name(f".{path.name}.new")
-    half_done.write_text(json.dumps(to_json(result), allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+    half_done.write_text(json.dumps(content, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
     half_done.replace(path)
 
 

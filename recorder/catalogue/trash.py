@@ -8,6 +8,7 @@ from stat import S_ISDIR
 from typing import Final
 
 from recorder.log.session_changes import session_path
+from recorder.log.jumper_path import jumper_path
 from recorder.log.truth_path import truth_path
 
 SUFFIX: Final = ".mcap"
@@ -95,7 +96,7 @@ def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[Tr
 
 def beside(log: Path) -> tuple[Path, ...]:
     """The files that belong to a log, whether they are there or not."""
-    return session_path(log), truth_path(log)
+    return session_path(log), truth_path(log), jumper_path(log)
 
 
 def _trashed(path: Path) -> TrashedLog | None:

@@ -180,9 +180,11 @@ class AnalysisConfig(Message):
 
     Attributes:
         rig: the rig; its `analysis` says where survey or calibration are.
+        directory: where the logs are.
     """
 
     rig: RigSettings
+    directory: Path
 
 
 class JumpMeasured(Message):

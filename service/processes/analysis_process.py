@@ -6,6 +6,8 @@ It is nice to the others: recorder and grabbers come first, and what it misses c
 import os
 import re
 import time
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 from analysis.worker.findings import Findings, MeasuredJump
@@ -13,7 +15,7 @@ from analysis.worker.live import LiveAnalysis
 from analysis.worker.stream import Source, Stream, connected
 from recorder.publishing.keys import load_keys
 from rig.clocks import UtcNs
-from rig.errors import SvevError
+from rig.errors import StorageError, SvevError
 from rig.events import Event, Level
 from rig.jumper import JumperState
 from rig.pulse import PulseNumber
@@ -22,6 +24,7 @@ from rig.topics import JUMPER, JUMPER_SCENE
 from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
 from rig.transport.messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Quit, TellResult
+from service.processes import live_jumps
 
 #: It holds nothing that could be lost.
 _GRACE_S: Final = 2.0
@@ -32,8 +35,8 @@ _WAKE_S: Final = 0.2
 class _Reports(Findings):
     """Sends what the analysis finds to the service."""
 
-    def __init__(self, control: ControlChannel[AnalysisReport]) -> None:
-        self._control = control
+    def __init__(self, control: ControlChannel[AnalysisReport], folders: Sequence[Path]) -> None:
+        self._control, self._folders = control, folders
 
     def state(self, state: JumperState) -> None:
         """A measured pulse."""
@@ -48,7 +51,11 @@ class _Reports(Findings):
         self._control.send(TellResult(recording=recording, topic=JUMPER_SCENE.name, pulse=pulse, time=time, data=scene))
 
     def jump(self, jump: MeasuredJump) -> None:
-        """A whole jump."""
+        """A whole jump: also kept beside its log, which may be closed already."""
+        try:
+            live_jumps.keep(jump, self._folders)
+        except StorageError as error:
+            self.message(Level.ERROR, str(error))
         self._control.send(JumpMeasured(jump=jump.summary))
 
     def message(self, level: Level, text: str) -> None:
@@ -63,7 +70,8 @@ def main() -> None:
     rig = child.config.rig
     if rig.analysis is None:
         raise SystemExit("analysis: the rig file has no [analysis] table")
-    reports = _Reports(child.control)
+    folders = [child.config.directory, *filter(None, (rig.recorder.fallback_directory,))]
+    reports = _Reports(child.control, folders)
     if (analysis := _opened(child, rig, rig.analysis, reports)) is not None:
         with analysis, connected(_source(rig.network)) as stream:
             _measure(child, stream, analysis)

@@ -252,7 +252,7 @@ class RigProcesses:
             self._start_grabber(self._names.index(name))
 
     def _start_analysis(self) -> None:
-        config = AnalysisConfig(rig=self._rig)
+        config = AnalysisConfig(rig=self._rig, directory=self._options.directory)
         self._processes.start(
             ProcessSpec(ANALYSIS, "service.processes.analysis_process", config, reports=AnalysisReport)
         )

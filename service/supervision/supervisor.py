@@ -19,6 +19,7 @@ from rig.settings.model import RigSettings
 from rig.status import LastJump, State, Status
 from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderOptions, RecorderReport
 from service.processes.rig_processes import RECORDER, CameraPresence
+from service.recordings import live_results
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
@@ -106,7 +107,7 @@ class Supervisor:
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
         self.health: Health | None = None
-        self._last_jump: LastJump | None = None
+        self._last_jump = live_results.latest(recorder.directory) if rig.analysis else None
         self._status = self._picture()
         self._thread = threading.Thread(target=self._run, name="supervisor")
 

@@ -12,6 +12,7 @@ from recorder.reading.info import LogInfo, info
 from recorder.recovering.recover import RecoverReport, recover
 from rig.clocks import NS_PER_S
 from rig.errors import LogDamagedError, LogTruncatedError
+from service.recordings import live_results
 from svev import console
 
 _LINES_MAX = 60
@@ -24,18 +25,19 @@ AlsoJson = Annotated[bool, typer.Option("--json", help="end with one JSON object
 def info_command(log: LogPath, as_json: AsJson = False) -> None:
     """Say what a log holds: pulses, causes of missing frames, rate, spread of the triggers, session, rig.
 
-    Reads tags only and so takes a moment even for a long log; `svev verify` checks every byte.
+    Tells of the jumps too that were measured while it was recorded. Reads tags only and so takes a moment even for a
+    long log; `svev verify` checks every byte.
 
     Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed or is damaged. What can be
     read is printed in any case.
 
     Example: svev info recordings/jump.mcap
     """
-    found = info(log)
+    found, jumps = info(log), live_results.summaries(log)
     if as_json:
-        console.print_json(found.to_json())
+        console.print_json(found.to_json() | {"jumps": [jump.model_dump(mode="json") for jump in jumps]})
     else:
-        for name, text in _lines(found):
+        for name, text in (*_lines(found), *((f"jump {jump.jump}", jump.verdict) for jump in jumps)):
             console.say(f"{name:<10} {text}")
     if found.truncated:
         raise truncated(log)

@@ -6,10 +6,13 @@ import signal
 from pathlib import Path
 from typing import Any
 
+from analysis.result import file as result_file
 from recorder.checking.verify import verify
+from recorder.log.jumper_path import jumper_path
 from recorder.reading.log_reader import LogReader
 from rig.jumper import JumperState
 from rig.topics import JUMPER, JUMPER_SCENE
+from service.recordings import live_results
 from simrig.world.survey import survey
 from tests.analysis.simulated import training
 from tests.capture.rigs import write_rig
@@ -42,6 +45,7 @@ def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopb
     assert rows["analysis"]["restarts"] == 1
     assert ended["state"] == "finished"
     _figures_are_true(jump, recording)
+    _result_is_beside_the_log(service.data / f"{recording}.mcap", jump)
     _results_are_in_the_log(service.data / f"{recording}.mcap", jump)
 
 
@@ -63,6 +67,13 @@ def _figures_are_true(jump: dict[str, Any], recording: str) -> None:
     assert abs(jump["takeoff_speed"]["value"] - 26.1) < 1.0
     for name in ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body"):
         assert 0 < jump[name]["sigma"] < 1.0, name
+
+
+def _result_is_beside_the_log(log: Path, jump: dict[str, Any]) -> None:
+    measured = result_file.read(jumper_path(log))
+    assert measured.recording == jump["recording"]
+    assert jump in [known.model_dump(mode="json") for known in live_results.summaries(log)]
+    assert len(measured.jumps) == len(live_results.summaries(log))
 
 
 def _results_are_in_the_log(log: Path, jump: dict[str, Any]) -> None:

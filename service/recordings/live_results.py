@@ -1,0 +1,35 @@
+"""The main figures of the jumps that were measured live, from the file beside their log, `LOG.jumper.json`.
+
+`service.processes.live_jumps` writes that file. Nothing is read here but its member `summaries`.
+"""
+
+import json
+from contextlib import suppress
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from recorder.log.jumper_path import jumper_path
+from rig.status import LastJump
+
+
+def summaries(log: Path) -> list[LastJump]:
+    """The main figures of the jumps of a log that were measured live; none if their file is missing or damaged."""
+    return _read(jumper_path(log))
+
+
+def latest(folder: Path) -> LastJump | None:
+    """The jump in a folder that was measured last; None if there is none."""
+    found: list[tuple[int, Path]] = []
+    for path in folder.glob(jumper_path(Path("*.mcap")).name):
+        with suppress(OSError):  # deleted meanwhile
+            found.append((path.stat().st_mtime_ns, path))
+    known = (_read(path) for _, path in sorted(found, reverse=True))
+    return next((jumps[-1] for jumps in known if jumps), None)
+
+
+def _read(path: Path) -> list[LastJump]:
+    try:
+        return [LastJump.model_validate(each) for each in json.loads(path.read_bytes())["summaries"]]
+    except (OSError, ValueError, ValidationError, KeyError, TypeError):
+        return []

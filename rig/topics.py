@@ -30,9 +30,10 @@ EVENTS: Final = Topic("/events", "foxglove.Log", "protobuf", "event")
 HEALTH: Final = Topic("/health", "svev.Health", "json", "health")
 JUMPER: Final = Topic("/jumper", "svev.JumperState", "json", "jumper")
 JUMPER_SCENE: Final = Topic("/jumper/scene", "foxglove.SceneUpdate", "protobuf", None)
+JUMPER_CAMERAS: Final = Topic("/jumper/cameras", "foxglove.FrameTransforms", "protobuf", None)
 #: Messages of the recorder that belong to no pulse, and results of the analysis.
 NOTES: Final = (EVENTS.name, HEALTH.name)
-RESULTS: Final = (JUMPER.name, JUMPER_SCENE.name)
+RESULTS: Final = (JUMPER.name, JUMPER_SCENE.name, JUMPER_CAMERAS.name)
 
 PROFILE: Final = "svev"
 SESSION_METADATA: Final = "svev.session"

@@ -1,20 +1,27 @@
 """The measured jumper as a scene in 3D for Foxglove: cameras, balls, stick model, ellipsoids (`foxglove.SceneUpdate`).
 
-All in the frame "hill", the object system of the survey, m. Each entity replaces the one of the same id.
+All in the frame "hill", the object system of the survey, m. Each entity replaces the one of the same id. Where the
+cameras are in it `camera_frames` says (`foxglove.FrameTransforms`): the frame of a camera has its name, like that of
+its image on `/camera/NAME` and of its calibration. As in both of these x is to the right, y down and z forward, so that
+Foxglove draws the image into the scene.
 """
 
 from typing import Final
 
 import numpy as np
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from scipy.spatial.transform import Rotation
 
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.export.places import SKI_LENGTH_M
 from analysis.result.model import SmoothedState
+from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
 from rig.clocks import NS_PER_S, UtcNs
 
@@ -27,6 +34,9 @@ _CAMERA_M = 2.0
 _WHITE, _RED, _GREEN, _BLUE = (1.0, 1.0, 1.0), (0.9, 0.2, 0.2), (0.2, 0.8, 0.3), (0.3, 0.6, 1.0)
 _BODY: Final = (("P1", "P2"), ("P2", "P3"), ("P2", "P4"))
 _SKIS: Final = (("right", "P3", _RED), ("left", "P4", _GREEN))
+
+#: Signs that turn the axes of our cameras (y up, z backward) into those of an image (y down, z forward).
+_OPTICAL: Final = np.array((1.0, -1.0, -1.0))
 
 _Colour = tuple[float, float, float]
 
@@ -62,6 +72,29 @@ def scene_update(scene: OrientedScene, state: SmoothedState, time: UtcNs) -> byt
     return bytes(update.SerializeToString())
 
 
+def camera_frames(system: CameraSystem, time: UtcNs) -> bytes:
+    """Where the frames of the cameras are in the frame of the scene, encoded.
+
+    Args:
+        system: the cameras.
+        time: from which on they stand so.
+    """
+    frames = FrameTransforms()
+    for placed in system.cameras.values():
+        frame = frames.transforms.add()
+        frame.parent_frame_id, frame.child_frame_id = FRAME, placed.name
+        frame.timestamp.seconds, frame.timestamp.nanos = divmod(int(time), NS_PER_S)
+        _set(frame.translation, placed.position)
+        _set(frame.rotation, Rotation.from_matrix(placed.rotation * _OPTICAL).as_quat())
+    return bytes(frames.SerializeToString())
+
+
+def _set(message: Vector3 | Quaternion, values: Floats) -> None:
+    """Set x, y, z and, of a quaternion, w."""
+    for name, value in zip("xyzw", values.tolist(), strict=False):
+        setattr(message, name, value)
+
+
 def _entity(update: SceneUpdate, name: str, time: UtcNs) -> SceneEntity:
     entity: SceneEntity = update.entities.add()
     entity.id, entity.frame_id = name, FRAME
@@ -88,9 +121,8 @@ def _ellipsoid(entity: SceneEntity, centre: Floats, axes: Floats, size: Floats, 
 
 
 def _set_pose(pose: Pose, centre: Floats, axes: Floats) -> None:
-    pose.position.x, pose.position.y, pose.position.z = (float(value) for value in centre)
-    turn = pose.orientation
-    turn.x, turn.y, turn.z, turn.w = (float(value) for value in Rotation.from_matrix(axes).as_quat())
+    _set(pose.position, centre)
+    _set(pose.orientation, Rotation.from_matrix(axes).as_quat())
 
 
 def _set_colour(primitive: object, colour: _Colour) -> None:

@@ -37,6 +37,9 @@ class Findings(Protocol):
     def scene(self, recording: str, pulse: PulseNumber, time: UtcNs, scene: bytes) -> None:
         """The scene in 3D at a pulse, an encoded `foxglove.SceneUpdate`."""
 
+    def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
+        """Where the cameras stand in the scene from a pulse on, an encoded `foxglove.FrameTransforms`."""
+
     def jump(self, jump: MeasuredJump) -> None:
         """A whole jump."""
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.source import orient_from, read_source
 from analysis.candidates.finder import Finder
-from analysis.export.scene_update import scene_update
+from analysis.export.scene_update import camera_frames, scene_update
 from analysis.identification.identify import identify
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.following import Followed, Follower
@@ -197,6 +197,9 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         middle_s = sum(camera.exposure_s for camera in measured.values()) / 2 / max(1, len(measured))
         time = UtcNs(followed.time + round(middle_s * NS_PER_S))
         state = wire_form(followed.state, recording=recording.id, jump=recording.jumps, pulse=followed.pulse, time=time)
+        if recording.placed != recording.jumps:
+            recording.placed = recording.jumps
+            self._findings.cameras(recording.id, followed.pulse, time, camera_frames(self._scene.system, time))
         self._findings.state(state)
         scene = scene_update(self._scene, followed.state, time)
         self._findings.scene(recording.id, followed.pulse, time, scene)

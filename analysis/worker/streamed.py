@@ -42,6 +42,7 @@ class Streamed:
         done: last pulse of the last jump that was computed.
         sought: pulse at which a jumper was sought last.
         jumps: number of jumps so far, that of the jumper who is in sight among them.
+        placed: the last of them for which it was told where the cameras stand.
     """
 
     def __init__(self, first: TripletTag) -> None:
@@ -52,7 +53,7 @@ class Streamed:
         self.follower: Follower | None = None
         self.seen: tuple[PulseNumber, PulseNumber] | None = None
         self.told, self.done = PulseNumber(0), PulseNumber(0)
-        self.jumps = 0
+        self.jumps = self.placed = 0
         self.sought = PulseNumber(0)
         self._ready_at = first.time + round(_SPREAD_S * NS_PER_S)
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -15,6 +16,7 @@ from recorder.log.mcap_layout import (
     EVENTS_CHANNEL,
     FIRST_CALIBRATION_CHANNEL,
     HEALTH_CHANNEL,
+    JUMPER_CAMERAS_CHANNEL,
     JUMPER_CHANNEL,
     JUMPER_SCENE_CHANNEL,
     TAG_CHANNEL,
@@ -24,7 +26,7 @@ from recorder.log.mcap_layout import (
 from rig.health import HEALTH_SCHEMA
 from rig.jumper import JUMPER_SCHEMA
 from rig.tag import TAG_SCHEMA
-from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, JUMPER_SCENE, TAG, TRIPLET, Topic
+from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, JUMPER_CAMERAS, JUMPER_SCENE, TAG, TRIPLET, Topic
 
 CALIBRATION_TOPIC = "/calibration/"
 
@@ -45,6 +47,7 @@ def schemas_and_channels(
         _json(4, HEALTH, HEALTH_SCHEMA),
         _json(6, JUMPER, JUMPER_SCHEMA),
         _protobuf(7, SceneUpdate),
+        _protobuf(8, FrameTransforms),
     ]
     shown = [
         (image.channel, TRIPLET.name if image.channel == TRIPLET_CHANNEL else CAMERA_TOPIC + image.frame)
@@ -59,6 +62,7 @@ def schemas_and_channels(
             (HEALTH_CHANNEL, HEALTH, 4),
             (JUMPER_CHANNEL, JUMPER, 6),
             (JUMPER_SCENE_CHANNEL, JUMPER_SCENE, 7),
+            (JUMPER_CAMERAS_CHANNEL, JUMPER_CAMERAS, 8),
         )
     ]
     cameras = list(calibrated)

@@ -20,7 +20,7 @@ from rig.events import Event, Level
 from rig.jumper import JumperState
 from rig.pulse import PulseNumber
 from rig.settings.model import AnalysisSettings, NetworkSettings, RigSettings
-from rig.topics import JUMPER, JUMPER_SCENE
+from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
 from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
 from rig.transport.messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Quit, TellResult
@@ -49,6 +49,11 @@ class _Reports(Findings):
     def scene(self, recording: str, pulse: PulseNumber, time: UtcNs, scene: bytes) -> None:
         """The scene in 3D at a pulse."""
         self._control.send(TellResult(recording=recording, topic=JUMPER_SCENE.name, pulse=pulse, time=time, data=scene))
+
+    def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
+        """Where the cameras stand from a pulse on."""
+        name = JUMPER_CAMERAS.name
+        self._control.send(TellResult(recording=recording, topic=name, pulse=pulse, time=time, data=frames))
 
     def jump(self, jump: MeasuredJump) -> None:
         """A whole jump: also kept beside its log, which may be closed already."""

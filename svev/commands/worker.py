@@ -117,6 +117,9 @@ class _Published:
     def scene(self, recording: str, pulse: PulseNumber, time: UtcNs, scene: bytes) -> None:
         """The scene is for logs only."""
 
+    def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
+        """So is where the cameras stand in it."""
+
     def jump(self, jump: MeasuredJump) -> None:
         """Publish a whole jump, and write it."""
         self._socket.send_multipart([_JUMP_TOPIC, json.dumps(result_file.to_json(jump.result)).encode()], zmq.DONTWAIT)

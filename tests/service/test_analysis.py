@@ -11,7 +11,7 @@ from recorder.checking.verify import verify
 from recorder.log.jumper_path import jumper_path
 from recorder.reading.log_reader import LogReader
 from rig.jumper import JumperState
-from rig.topics import JUMPER, JUMPER_SCENE
+from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
 from service.recordings import live_results
 from simrig.world.survey import survey
 from tests.analysis.simulated import training
@@ -81,7 +81,10 @@ def _results_are_in_the_log(log: Path, jump: dict[str, Any]) -> None:
     with LogReader(log) as reader:
         states = [(m.sequence, JumperState.decode(bytes(m.data or b""))) for m in reader.messages(JUMPER.name)]
         scenes = [(m.sequence, bytes(m.data or b"")) for m in reader.messages(JUMPER_SCENE.name)]
+        places = [m.sequence for m in reader.messages(JUMPER_CAMERAS.name)]
     assert len(states) > 20
+    assert set(places) < {pulse for pulse, _ in states}
+    assert len(places) == len({state.jump for _, state in states})
     assert [pulse for pulse, _ in scenes] == [pulse for pulse, _ in states] == [state.pulse for _, state in states]
     assert {state.recording for _, state in states} == {jump["recording"]}
     assert sum(point is not None for _, state in states for point in state.points.values()) > 2 * len(states)

@@ -46,8 +46,7 @@ class Steadiness:
     moved: tuple[CameraMove, ...]
     messages: tuple[str, ...]
     _scene: OrientedScene
-    _source: FrameSource
-    _trackers: Mapping[str, BallTracker]
+    _tracks: "_Tracks"
     _static: CameraSystem
 
     def during(self, pulses: Collection[int]) -> Standing:
@@ -56,7 +55,7 @@ class Steadiness:
         Args:
             pulses: of the jump.
         """
-        tracks = _followed(self._trackers, self._source, pulses)
+        tracks = self._tracks.during(pulses)
         changes: dict[str, PoseChange] = {}
         shakes: dict[str, dict[PulseNumber, FrameShake]] = {}
         for name, turns in tracks.items():
@@ -78,8 +77,8 @@ class Steadiness:
         """The change of the pose from the static image to the mean of some frames."""
         if len(turns) < _FEWEST_FRAMES:
             return None
-        off, variance = _mean_off(self._trackers[name], list(turns.values()))
-        return pose_change(self._static[name], self._trackers[name].displaced(off, variance))
+        tracker = self._tracks.trackers[name]
+        return pose_change(self._static[name], tracker.displaced(*_mean_off(tracker, list(turns.values()))))
 
 
 def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
@@ -96,7 +95,8 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
         places = {ball: scene.balls[ball].images[name] for ball in balls}
         trackers[name] = BallTracker(static[name], scene.static[name], balls, places)
     blocks = _sampled(source.pulses)
-    tracks = _followed(trackers, source, {pulse for block in blocks for pulse in block})
+    followed = _Tracks(trackers, source)
+    tracks = followed.during({pulse for block in blocks for pulse in block})
     moved: list[CameraMove] = []
     messages = []
     for name, turns in tracks.items():
@@ -108,7 +108,7 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
                 f"camera {name}: its balls were found in {len(turns)} of {frames} frames that were looked at, so "
                 "whether it stood still is not known for all of the recording"
             )
-    return Steadiness(tuple(moved), tuple(messages), scene, source, trackers, static)
+    return Steadiness(tuple(moved), tuple(messages), scene, followed, static)
 
 
 def _sampled(pulses: Sequence[PulseNumber]) -> list[list[PulseNumber]]:
@@ -125,15 +125,24 @@ def _sampled(pulses: Sequence[PulseNumber]) -> list[list[PulseNumber]]:
     return [list(pulses[start : start + size]) for start in starts]
 
 
-def _followed(trackers: Mapping[str, BallTracker], source: FrameSource, pulses: Collection[int]) -> dict[str, _Turns]:
-    """By camera, how it stood in some pulses."""
-    tracks: dict[str, dict[PulseNumber, FrameTurn]] = {name: {} for name in trackers}
-    for pulse, frames in source.frames(pulses):
-        for name, tracker in trackers.items():
-            turn = tracker.measure(frames[name]) if name in frames else None
-            if turn is not None:
-                tracks[name][pulse] = turn
-    return dict(tracks)
+class _Tracks:
+    """How the cameras stood in single pulses; each is measured once.
+
+    Attributes:
+        trackers: by camera.
+    """
+
+    def __init__(self, trackers: Mapping[str, BallTracker], source: FrameSource) -> None:
+        self.trackers, self._source = trackers, source
+        self._known: dict[PulseNumber, dict[str, FrameTurn]] = {}
+
+    def during(self, pulses: Collection[int]) -> dict[str, _Turns]:
+        """By camera, how it stood in some pulses, in order; without those in which it could not be measured."""
+        for pulse, frames in self._source.frames({pulse for pulse in pulses if pulse not in self._known}):
+            turns = {name: tracker.measure(frames[name]) for name, tracker in self.trackers.items() if name in frames}
+            self._known[pulse] = {name: turn for name, turn in turns.items() if turn is not None}
+        seen = [(pulse, self._known[pulse]) for pulse in sorted(self._known) if pulse in pulses]
+        return {name: {pulse: turns[name] for pulse, turns in seen if name in turns} for name in self.trackers}
 
 
 def _during_recording(

@@ -1,7 +1,8 @@
 """Finds the jumps in the candidates of a recording whose cameras may have moved.
 
 At first the gates are as wide as the cameras moved. For each jump that is found so, the cameras are taken as they stood
-in it, frame by frame, and it is identified once more with gates as narrow as the measurements allow.
+in it, frame by frame, and unless they stood still it is identified once more with gates as narrow as the measurements
+allow.
 """
 
 from collections.abc import Sequence
@@ -11,11 +12,13 @@ import numpy as np
 
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.pose_change import changed
+from analysis.cameras.standing import Standing
 from analysis.cameras.steadiness import Steadiness
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook
 from analysis.identification.identify import identify
 from analysis.measurements.model import JumpMeasurements
 from analysis.procedure.log_facts import LogFacts
+from analysis.scene.camera_system import CameraSystem
 
 #: Pulses around a jump in which it is looked for again, s.
 _AROUND_S = 0.5
@@ -45,11 +48,14 @@ def find_jumps(
     }
     loose = [_loosened(seen, moves_px) for seen in candidates]
     found: list[JumpMeasurements] = []
-    for jump in identify(loose, system, facts.rate_hz, exposures):
+    for jump in identify(loose, system, facts.rate_hz, exposures, None if moves_px else look):
         around = round(_AROUND_S * facts.rate_hz)
         first, last = jump.pulses[0].pulse - around, jump.pulses[-1].pulse + around
         window = [seen for seen in candidates if first <= seen.pulse <= last]
         standing = steadiness.during([seen.pulse for seen in window])
+        if not moves_px and _stood_still(standing, system):
+            found.append(JumpMeasurements(len(found) + 1, jump.pulses))
+            continue
         steady = [standing.candidates(seen) for seen in window]
         again = identify(steady, standing.system, facts.rate_hz, exposures, standing.look(look))
         best = max(again, key=lambda one: len(one.pulses), default=None)
@@ -57,6 +63,11 @@ def find_jumps(
             pulses = tuple(standing.in_frames(pulse) for pulse in best.pulses)
             found.append(JumpMeasurements(len(found) + 1, pulses))
     return found
+
+
+def _stood_still(standing: Standing, system: CameraSystem) -> bool:
+    """Whether the cameras stood in a jump as they did before: whatever changes a pose makes it more uncertain."""
+    return not standing.shake and np.array_equal(standing.system.covariance, system.covariance)
 
 
 def _loosened(seen: PulseCandidates, moves_px: dict[str, float]) -> PulseCandidates:

@@ -110,8 +110,9 @@ def pixels_around(region: Region, bars: Sequence[Bar], brighter: bool) -> Pixels
     left, top = np.maximum(0, low.astype(int))
     right, bottom = np.minimum((columns, rows), high.astype(int) + 2)
     part = slice(top, bottom), slice(left, right)
-    y, x = (np.mgrid[part] - origin[::-1, None, None]).astype(np.float32)
-    near = np.zeros(x.shape, bool)
+    x = (np.arange(left, right) - origin[0]).astype(np.float32)
+    y = (np.arange(top, bottom) - origin[1]).astype(np.float32)[:, None]
+    near = np.zeros((len(y), len(x)), bool)
     for bar in bars:
         rho, theta, t0, t1 = bar.line(origin)
         t, u = x * np.cos(theta) + y * np.sin(theta), y * np.cos(theta) - x * np.sin(theta) - rho
@@ -124,7 +125,8 @@ def pixels_around(region: Region, bars: Sequence[Bar], brighter: bool) -> Pixels
     inside = grey[region.front[part][near]]
     brightness = float(np.percentile(inside, 75 if brighter else 25)) if len(inside) else 0.0
     sigma = np.hypot(region.sigma[part][near], np.float32(_MODEL) * np.abs(np.float32(brightness) - behind))
-    return Pixels(origin, x[near], y[near], grey, behind, sigma, brightness)
+    row, column = np.nonzero(near)
+    return Pixels(origin, x[column], y[row, 0], grey, behind, sigma, brightness)
 
 
 def lines_of(theta: Floats) -> Floats:

@@ -118,6 +118,10 @@ class _Fit:
         spread[1:SHARED] = _WIDTH_SPREAD, _BLUR_SPREAD
         lines_of(spread)[:, 2:] = _END_SPREAD
         self._expected, self._prior = start, spread**-2.0
+        self._of_prior = np.diag(self._prior + 1e-9)
+        self._largest = np.full(len(start), np.inf)
+        self._largest[1:SHARED] = _LARGEST_STEPS[0]
+        lines_of(self._largest)[:, :2] = _LARGEST_STEPS[1:]
         theta = lines[int(np.argmax([bar.length for bar in bars]))][1]
         along = pixels.x * np.cos(theta) + pixels.y * np.sin(theta)
         self._section = np.floor((along - along.min()) / _SECTION).astype(int)
@@ -164,7 +168,8 @@ class _Fit:
         damping, moved = 1e-3, np.inf
         now = self._equations(self._at)
         for _ in range(_STEPS):
-            damped = now.normal + damping * np.diag(np.diag(now.normal))
+            damped = now.normal.copy()
+            damped.flat[:: len(damped) + 1] *= 1 + damping
             trial = self._bounded(np.asarray(np.linalg.solve(damped, now.gradient), float))
             there = self._modelled(trial)
             new = self._equations(there)
@@ -184,13 +189,8 @@ class _Fit:
         return float((np.abs(lines[:, 0]) + reach * np.abs(lines[:, 1])).max())
 
     def _bounded(self, step: Floats) -> Floats:
-        step = step.copy()
-        logs, rho, turn = _LARGEST_STEPS
-        step[1:SHARED] = np.clip(step[1:SHARED], -logs, logs)
-        lines = lines_of(step)
-        lines[:, 0], lines[:, 1] = np.clip(lines[:, 0], -rho, rho), np.clip(lines[:, 1], -turn, turn)
-        new = self.theta + step
-        new[2] = np.clip(new[2], *_BLURS)
+        new = self.theta + np.minimum(np.maximum(step, -self._largest), self._largest)
+        new[2] = min(max(new[2], _BLURS[0]), _BLURS[1])
         return np.asarray(new)
 
     def _choose(self) -> None:
@@ -218,7 +218,7 @@ class _Fit:
             weight = self._good.astype(np.float32)
             cost = float(square @ weight)
         weighted = at.design * weight
-        normal = (weighted @ at.design.T).astype(float) + np.diag(self._prior + 1e-9)
+        normal = (weighted @ at.design.T).astype(float) + self._of_prior
         gradient = weighted @ at.residuals + self._prior * off
         return _Equations(cost + float(self._prior @ off**2), normal, gradient)
 

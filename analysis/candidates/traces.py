@@ -269,9 +269,9 @@ def _best_line(middles: _Middles, rows: int) -> tuple[float, float, Flags] | Non
     slopes = np.linspace(-_STEEPEST, _STEEPEST, max(3, int(_STEEPEST * extent)))  # a px off at the ends, at most
     bins = rows + 2 * int(_STEEPEST * extent) + 4
     low = int(_STEEPEST * extent) + 1
-    cell = np.floor(y[None, :] - slopes[:, None] * (x - start) + low).astype(int)
-    votes = np.bincount((np.arange(len(slopes))[:, None] * bins + cell).ravel(), minlength=len(slopes) * bins)
-    votes = votes.reshape(len(slopes), bins)
+    cell = (y + low) - slopes[:, None] * (x - start)  # never negative: cut off is rounded down
+    cell += bins * np.arange(len(slopes))[:, None]
+    votes = np.bincount(cell.astype(int).ravel(), minlength=len(slopes) * bins).reshape(len(slopes), bins)
     pairs = votes[:, :-1] + votes[:, 1:]
     k, b = np.unravel_index(int(pairs.argmax()), pairs.shape)
     if pairs[k, b] < _SHORTEST:
@@ -307,7 +307,7 @@ def _line(on: _Middles, offset: float, slope: float) -> _Line | None:
     first, last = float(on.column[0]), float(on.column[-1])
     width = float(np.median(on.width)) / np.hypot(1, slope)
     length = (last - first + 1) * np.hypot(1, slope)
-    filled = len(np.unique(on.column)) / (last - first + 1)
+    filled = (1 + np.count_nonzero(np.diff(on.column))) / (last - first + 1)
     if length < _SLENDER * width or filled < _FILLED:
         return None
     ends = np.array([(c, offset + slope * c) for c in (first, last)])

@@ -257,7 +257,10 @@ def test_a_log_that_vanishes_is_noticed_and_the_recording_goes_on(
     assert ("was moved away" if what == "moved" else "was deleted") in err
     assert result["logs"] == [str(log), str(log.with_name(f"{log.stem}-part2.mcap"))]
     report = verify(Path(result["log"]))
-    assert report.verdict == "clean"
+    # A busy machine may lose frames, and their tags say so; the fault cost nothing but what went with the first file.
+    assert not report.damaged, report.findings
+    assert not report.ledger.missing
+    assert not report.ledger.pauses()
     assert result["pulses"] == report.ledger.pulses > 30
     assert info(Path(result["log"])).session["continues"] == log.stem
     faults = {"file": "the log is deleted", "folder": "its folder is deleted", "moved": "the log is moved away"}

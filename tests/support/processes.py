@@ -35,8 +35,12 @@ class Process:
 
 def own_processes(token: str) -> frozenset[Process]:
     """All processes below this one and all that carry `token` in their environment."""
-    everyone = {process.pid: process for entry in Path("/proc").glob("[0-9]*") if (process := _read(entry))}
     here = os.getpid()
+    us = _read(here)
+    assert us is not None
+    pids = (int(name) for name in os.listdir("/proc") if name.isdecimal())  # noqa: PTH208 - numbers, looked at often
+    # Older processes were there before us, and so are not ours; they need not be looked at closer.
+    everyone = {pid: process for pid in pids if (process := _read(pid, since=us.started))}
     return frozenset(
         process
         for process in everyone.values()
@@ -48,7 +52,7 @@ def own_processes(token: str) -> frozenset[Process]:
 
 def end(process: Process) -> None:
     """Kill a process that a test left, so that it does not disturb the next one."""
-    now = _read(Path(f"/proc/{process.pid}"))
+    now = _read(process.pid)
     if now is None or now.started != process.started:
         return
     with suppress(ProcessLookupError):
@@ -57,16 +61,18 @@ def end(process: Process) -> None:
         os.waitpid(process.pid, 0)
 
 
-def _read(entry: Path) -> Process | None:
-    """The process of one folder of /proc, None if it has just gone."""
+def _read(pid: int, since: int = 0) -> Process | None:
+    """The process of this number; None if it has just gone, or was started before `since` (clock ticks)."""
     try:
-        stat = (entry / "stat").read_text()
-        command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+        stat = Path(f"/proc/{pid}/stat").read_text()
+        # The name stands in parentheses and may hold anything, a closing parenthesis included.
+        name, fields = stat[stat.index("(") + 1 : stat.rindex(")")], stat[stat.rindex(")") + 2 :].split()
+        if int(fields[19]) < since:
+            return None
+        command = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
     except OSError:
         return None
-    # The name stands in parentheses and may hold anything, a closing parenthesis included.
-    name, fields = stat[stat.index("(") + 1 : stat.rindex(")")], stat[stat.rindex(")") + 2 :].split()
-    return Process(int(entry.name), int(fields[1]), int(fields[19]), fields[0], command or f"[{name}]")
+    return Process(pid, int(fields[1]), int(fields[19]), fields[0], command or f"[{name}]")
 
 
 def _descends(process: Process, ancestor: int, everyone: dict[int, Process]) -> bool:

@@ -34,13 +34,14 @@ test: setup $(NPM) ## all tests
 	  echo "what failed is tried once more, one test at a time, on the now quiet machine"; \
 	  $(BIN)/pytest --last-failed --last-failed-no-failures none $(ARGS); }
 
-check: style test ## what CI does before it tries the wheel: format, lint, types, layers, tests
+check: style test ## what CI does, except that it tries the wheel as well: format, lint, types, layers, tests
 
+# `nice`, since with -j2 it runs beside the tests, whose simulated cameras keep time.
 style: setup
 	@$(BIN)/ruff format --check --quiet . || { echo "format: run .venv/bin/ruff format ." >&2; exit 1; }
 	@$(BIN)/ruff check --quiet .
-	@$(BIN)/mypy
-	@$(BIN)/lint-imports
+	@nice $(BIN)/mypy
+	@nice $(BIN)/lint-imports
 
 wheel: setup ## build a wheel and try it in an empty environment outside the checkout
 	@.ci/try-wheel

@@ -32,8 +32,8 @@ def test_the_demo_records_publishes_verifies_and_shows(tmp_path: Path, bus: str)
 
 
 def test_the_demo_measures_the_jumper_and_shows_the_truth_beside(tmp_path: Path) -> None:
-    """Nine seconds hold a whole jump, whenever they begin: one comes every four seconds and is in sight for 1.3 s."""
-    command = [sys.executable, "-m", "svev", "demo", "--seconds", "9", "--out", str(tmp_path), "--json"]
+    """Six seconds hold a whole jump, whenever they begin: one comes every four seconds and is in sight for 1.3 s."""
+    command = [sys.executable, "-m", "svev", "demo", "--seconds", "6", "--out", str(tmp_path), "--json"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=170, check=False)
     assert done.returncode == 0, done.stderr
     analysis = json.loads(done.stdout)["analysis"]

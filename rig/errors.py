@@ -69,9 +69,25 @@ class UnknownRecordingError(SvevError):
     """The recording does not exist, or has no such pulse."""
 
 
+class UnknownLineError(SvevError):
+    """The start list has no such line."""
+
+
 class StateForbidsError(SvevError):
     """The service refuses the call in its present state; the message says what to do instead."""
 
 
 class StillRecordingError(StateForbidsError):
     """The caller asked for the log of a recording in progress."""
+
+
+class ChangedMeanwhileError(StateForbidsError):
+    """The caller saw another state, or another next jumper, than there is by now. Nothing was done."""
+
+
+class TooSoonError(StateForbidsError):
+    """The state has only just changed, so that the call may be the second half of a double tap. Nothing was done."""
+
+
+class ConfirmFirstError(StateForbidsError):
+    """The recording has only just begun, so that stopping it has to be confirmed. It goes on."""

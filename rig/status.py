@@ -10,7 +10,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
 
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
@@ -20,6 +20,17 @@ class Model(BaseModel):
     """Base of all models: unknown fields are errors, instances are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _no_other_type(value: object) -> object:
+    if isinstance(value, bool | str):
+        raise ValueError("Input should be a valid integer")  # noqa: TRY004 - pydantic makes an answer of a ValueError
+    return value
+
+
+#: Makes an integer what JSON schema understands by it: 3.0 is one, true and "3" are none. Stands behind limits.
+WHOLE: Final = BeforeValidator(_no_other_type)
+WholeNumber = Annotated[int, WHOLE]
 
 
 class State(StrEnum):
@@ -180,6 +191,23 @@ class SessionChange(Model):
     operator: Line | None = Field(None, examples=["Kari"])
 
 
+class NextJumper(Model):
+    """Whom the next recording is of. There is one, which everybody sees and may edit."""
+
+    number: int = Field(0, description="counts up whenever somebody else is next; edits say whom they are about by it")
+    version: int = Field(0, description="counts up with every change of the next jumper or of the start list")
+    line: int | None = Field(None, description="id of his line in the start list; null: he stands in none")
+    following: int | None = Field(None, description="line that follows, if he stands in none and was put before it")
+    session: SessionFields = SessionFields()
+    more: dict[str, str] = Field({}, description="what the start list has of him beside the session fields, by column")
+
+
+_SEEN: Final = (
+    "`guard.number` of the status that the operator saw when he pressed the button: the call is refused if the state "
+    "has changed since, or only just before. Programs that know what they want leave it out."
+)
+
+
 class RecordingOrder(SessionFields):
     """Start of a recording.
 
@@ -191,7 +219,25 @@ class RecordingOrder(SessionFields):
         None, ge=0, le=600, allow_inf_nan=False, description="left out: all that is held", examples=[5.0]
     )
     duration_s: float | None = Field(
-        None, ge=0, le=86400, allow_inf_nan=False, description="left out: until stopped", examples=[10.0]
+        None,
+        ge=0,
+        le=86400,
+        allow_inf_nan=False,
+        description="left out: until stopped, at most `recorder.longest_s` of the rig file",
+        examples=[10.0],
+    )
+    seen: WholeNumber | None = Field(None, description=_SEEN, examples=[None])
+
+
+class StopOrder(Model):
+    """How a recording is to be stopped."""
+
+    seen: WholeNumber | None = Field(None, description=_SEEN, examples=[None])
+    confirm: StrictBool = Field(
+        False,
+        description="stop also in the first seconds, which a call with `seen` is refused otherwise; the seconds before "
+        "the stop stay in memory for the next recording, and its jumper stays the next one",
+        examples=[False],
     )
 
 
@@ -275,12 +321,22 @@ class Event(Model):
     message: str
 
 
+class TapGuard(Model):
+    """What keeps a second tap from undoing the first: see `seen` of the commands."""
+
+    number: int = Field(description="of the present state; counts up with every change of state")
+    hold_s: float = Field(description="so long from now calls with `seen` are refused, because the state is new")
+    confirm_s: float = Field(description="so long from now the recording is stopped with `confirm` only")
+
+
 class Status(Model):
     """Everything about the running service at one moment."""
 
     state: State
     since: datetime = Field(description="when this state began, UTC")
     statement: Statement = Field(description="the state in plain words, and what to do next")
+    notice: Statement | None = Field(None, description="what befell the last recording, until the next one")
+    guard: TapGuard
     rig: str
     version: str
     cameras: tuple[CameraStatus, ...]
@@ -290,6 +346,7 @@ class Status(Model):
     recording: Recording | None = Field(description="the recording in progress")
     last_recording: str | None = Field(description="id of the recording that ended last")
     last_jump: LastJump | None = Field(None, description="the jump that the analysis measured last")
+    next_jumper: NextJumper = Field(NextJumper(), description="whom the next recording is of")
     processes: tuple[ProcessStatus, ...]
 
 

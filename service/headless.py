@@ -30,7 +30,7 @@ from rig.transport import wire
 from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
-from service.recordings.control import Outcome
+from service.recordings.in_progress import Outcome
 from service.recordings.storage import check_room_for
 from service.status.event_hub import EventHub
 from service.supervision.commands import at_once

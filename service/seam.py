@@ -10,7 +10,19 @@ from prometheus_client.metrics_core import Metric
 
 from rig.frame import FrameStatus
 from rig.pulse import RigPulse
-from rig.status import DoctorReport, Event, Pulses, Recording, RecordingOrder, RigView, SessionChange, Status, Trash
+from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
+from rig.status import (
+    DoctorReport,
+    Event,
+    Pulses,
+    Recording,
+    RecordingOrder,
+    RigView,
+    SessionChange,
+    Status,
+    StopOrder,
+    Trash,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +63,61 @@ class Download:
     open: Callable[[], BinaryIO]
 
 
+class Jumpers(Protocol):
+    """The start list and the next jumper, one for all. Any thread may call any method; each gives the list then.
+
+    Raises (each where it applies):
+        UnknownLineError: the start list has no such line.
+        ChangedMeanwhileError: the call is about another state of the list than the present one.
+        StateForbidsError: the list as it is forbids the call.
+        BadInputError: a table cannot be read; the message names line and column.
+    """
+
+    def view(self) -> StartList:
+        """The list as it is now."""
+        ...
+
+    def change_next(self, change: JumperChange) -> StartList:
+        """Change session fields of the next jumper."""
+        ...
+
+    def skip(self, turn: Turn) -> StartList:
+        """Pass over the next jumper; if another one is next by now, nothing changes."""
+        ...
+
+    def choose(self, line: int) -> StartList:
+        """Make the jumper of a line the next one."""
+        ...
+
+    def add(self, new: NewLine) -> StartList:
+        """Add a line at the end."""
+        ...
+
+    def change_line(self, line: int, change: LineChange) -> StartList:
+        """Change a line, or move it."""
+        ...
+
+    def remove(self, line: int) -> StartList:
+        """Remove a line."""
+        ...
+
+    def import_table(self, content: bytes) -> StartList:
+        """Replace the list by a table of comma-separated values; an empty one clears it."""
+        ...
+
+    def change_rules(self, rules: Rules) -> StartList:
+        """Change what happens from one jumper to the next."""
+        ...
+
+    def begin_round(self) -> StartList:
+        """Have everybody wait again, from the top of the list."""
+        ...
+
+    def undo(self, order: UndoOrder) -> StartList:
+        """Take the last change back."""
+        ...
+
+
 class RigService(Protocol):
     """The running service. Any thread may call any method; none waits without a deadline.
 
@@ -73,11 +140,16 @@ class RigService(Protocol):
         ...
 
     def start_recording(self, order: RecordingOrder) -> Recording:
-        """Start a recording; returns when its log is open. Only while armed."""
+        """Start a recording of the next jumper; returns when its log is open. Only while armed."""
         ...
 
-    def stop_recording(self, recording_id: str) -> Recording:
+    def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:
         """Stop a recording; returns when its log is closed. A finished recording is returned unchanged."""
+        ...
+
+    @property
+    def jumpers(self) -> Jumpers:
+        """The start list and the next jumper."""
         ...
 
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:

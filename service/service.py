@@ -13,10 +13,11 @@ from prometheus_client.metrics_core import Metric
 from recorder.catalogue.folder import Catalogue
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.pulse import RigPulse
-from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, State, Status
+from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, State, Status, StopOrder
 from rig.transport.preview import PreviewSlot
+from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
-from service.recordings.control import Outcome
+from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
 from service.seam import Preview
 from service.status.measurements import measurements
@@ -37,6 +38,7 @@ class Service(Archive):
 
     Args:
         supervisor: owns the rig.
+        jumpers: the start list and the next jumper.
         catalogue: of the folder of the recordings.
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
@@ -46,18 +48,26 @@ class Service(Archive):
     def __init__(
         self,
         supervisor: Supervisor,
+        jumpers: JumperBook,
         catalogue: Catalogue,
         keeper: TrashKeeper,
         slot: PreviewSlot,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
         super().__init__(catalogue)
-        self._supervisor, self._keeper, self._slot, self._examine = supervisor, keeper, slot, examine
+        self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
+        self._slot, self._examine = slot, examine
         self._closing = threading.Event()
 
     def status(self) -> Status:
         """The present status; the room on the disk counts what the trash holds."""
-        return self._keeper.counted_in(self._supervisor.status)
+        status = self._supervisor.status.model_copy(update={"next_jumper": self._jumpers.view().next})
+        return self._keeper.counted_in(status)
+
+    @property
+    def jumpers(self) -> JumperBook:
+        """The start list and the next jumper."""
+        return self._jumpers
 
     def arm(self) -> Status:
         """Begin to arm."""
@@ -78,12 +88,12 @@ class Service(Archive):
 
         return supervisor.commands.ask(start, _OPEN_S)
 
-    def stop_recording(self, recording_id: str) -> Recording:
+    def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:
         """Stop, and return when the log is closed."""
         supervisor = self._supervisor
 
         def stop(ended: "Future[Outcome]") -> None:
-            supervisor.recordings.stop(recording_id, ended)
+            supervisor.recordings.stop(recording_id, ended, order=order)
 
         with suppress(UnknownRecordingError):  # not in progress: it is over, or the catalogue does not know it either
             supervisor.commands.ask(stop, _CLOSE_S)

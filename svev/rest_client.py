@@ -38,13 +38,13 @@ class RestClient:
             raise BadInputError(f"the token is not one line of letters, digits and signs: look at {TOKEN_VARIABLE}")
         self._url, self._token = url.rstrip("/"), token
 
-    def call(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> Any:
+    def call(self, method: str, path: str, body: Mapping[str, Any] | bytes | None = None) -> Any:
         """Call the API.
 
         Args:
             method: e.g. GET.
             path: below the service's address, e.g. `/api/status`.
-            body: sent as JSON; None: the request has no body.
+            body: sent as JSON, bytes as a table (CSV); None: the request has no body.
 
         Raises:
             BadInputError: the service refuses what was sent, or the token.
@@ -65,7 +65,7 @@ class RestClient:
         self,
         method: str,
         path: str,
-        body: Mapping[str, Any] | None = None,
+        body: Mapping[str, Any] | bytes | None = None,
         more: Mapping[str, str] | None = None,
     ) -> "Iterator[httpx.Response]":
         """A successful answer, whose content is still to be read; arguments and errors as for `call`.
@@ -81,12 +81,15 @@ class RestClient:
         headers = {"Accept": "application/json", **(more or {})}
         if self._token:
             headers["Authorization"] = f"Bearer {self._token}"
+        table = body if isinstance(body, bytes) else None
+        if table is not None:
+            headers["Content-Type"] = "text/csv"
         try:
             # Neither proxies (trust_env) nor redirects: the service is on this computer or in the network at the hill,
             # and nobody else is to get the token. Certificates are loaded (0.1 s) only where there is one to check.
             with httpx.stream(
-                method, self._url + path, json=body, headers=headers, timeout=_TIMEOUT_S, trust_env=False,
-                follow_redirects=False, verify=self._url.startswith("https:"),
+                method, self._url + path, json=body if table is None else None, content=table, headers=headers,
+                timeout=_TIMEOUT_S, trust_env=False, follow_redirects=False, verify=self._url.startswith("https:"),
             ) as answer:  # fmt: skip
                 if not answer.is_success:
                     answer.read()

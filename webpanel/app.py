@@ -26,6 +26,7 @@ from webpanel.routes.observing import CountRequests, Metrics, observing_router
 from webpanel.routes.preview import preview_router
 from webpanel.routes.recordings import recordings_router
 from webpanel.routes.rig import rig_router
+from webpanel.routes.start_list import start_list_router
 
 #: The media types of the page's files; the computer's own table may lack some or have others.
 _TYPES: Final = {
@@ -63,6 +64,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
     routers = (
         rig_router(service),
         recordings_router(service, changes),
+        start_list_router(service),
         contents_router(service),
         files_router(service, streams.downloads),
         preview_router(service, streams.previews),

@@ -12,7 +12,14 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from rig.errors import BadInputError, StateForbidsError, StorageError, SvevError, UnknownRecordingError
+from rig.errors import (
+    BadInputError,
+    StateForbidsError,
+    StorageError,
+    SvevError,
+    UnknownLineError,
+    UnknownRecordingError,
+)
 from rig.status import Model
 
 _PAGE_POLICY: Final = (
@@ -35,6 +42,7 @@ MEDIA_TYPE = "application/problem+json"
 #: The status of an error of ours: that of the first class in the table that it belongs to.
 _STATUSES: tuple[tuple[type[SvevError], HTTPStatus], ...] = (
     (UnknownRecordingError, HTTPStatus.NOT_FOUND),
+    (UnknownLineError, HTTPStatus.NOT_FOUND),
     (StateForbidsError, HTTPStatus.CONFLICT),
     (BadInputError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (StorageError, HTTPStatus.INSUFFICIENT_STORAGE),

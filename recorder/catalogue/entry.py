@@ -48,6 +48,7 @@ class Entry:
         shape: rows and columns of the triplets, None if there is no pulse.
         session: the session's fields, with later changes applied.
         disk: frames that were lost because of the disk, in one line; empty if none.
+        forgotten_s: after so many seconds it ended by itself, because nobody had stopped it; 0: otherwise.
         trouble: what could not be read, and what to do, in one line; empty if all could be read.
     """
 
@@ -69,6 +70,7 @@ class Entry:
     shape: tuple[int, int] | None = None
     session: Mapping[str, str] = field(default_factory=dict)
     disk: str = ""
+    forgotten_s: float = 0.0
     trouble: str = ""
 
     @property
@@ -110,7 +112,7 @@ def read_entry(path: Path) -> Entry:
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session,
-        disk=found.trouble,
+        disk=found.trouble, forgotten_s=found.forgotten_s,
     )  # fmt: skip
 
 

@@ -104,5 +104,5 @@ def _read_own(path: Path) -> bytes:
 
 
 #: Counts up when entries of the same log become different ones.
-_FORMAT: Final = 1
+_FORMAT: Final = 2
 _DECODER: Final = wire.decoder(dict[str, KeptEntry])

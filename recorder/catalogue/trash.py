@@ -7,8 +7,8 @@ from pathlib import Path
 from stat import S_ISDIR
 from typing import Final
 
-from recorder.log.session_changes import session_path
 from recorder.log.jumper_path import jumper_path
+from recorder.log.session_changes import session_path
 from recorder.log.truth_path import truth_path
 
 SUFFIX: Final = ".mcap"

@@ -141,7 +141,7 @@ class RecorderLoop:
                 except SvevError as error:
                     self._tell(RecorderFailed.of(error))
             case StopRecording():
-                self._recordings.stop(at_once=command.at_once)
+                self._recordings.stop(at_once=command.at_once, keep=command.keep)
             case GrabberDied():
                 self._assembler.disconnected(command.camera, command.reason, host_now())
             case TellEvent():

@@ -13,7 +13,7 @@ import msgspec
 
 from recorder.live.assembler import Assembler
 from recorder.live.preroll import Held
-from recorder.log.extent import extent
+from recorder.log.extent import FORGOTTEN, extent
 from recorder.log.tag_room import check_tag_fits
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
@@ -62,6 +62,7 @@ class Recording:
         failure: why the log ended before its time, None if it did not.
         trouble: what went wrong with the disk without ending the log, empty if nothing.
         continues: id of the recording that this one continues, empty if none.
+        mishap: whether it was stopped as soon as it had begun: its pulses belong to the next recording too.
     """
 
     def __init__(self, order: StartRecording, assembler: Assembler, after: "Recording | None" = None) -> None:
@@ -75,7 +76,8 @@ class Recording:
         self.ledger = Ledger()
         self._handed = 0
         self._in_flight: deque[_InFlight] = deque()
-        self._ended = False
+        self._kept: deque[Held] = deque()
+        self._ended = self._stopped = self.mishap = False
         if after is None:
             self.commanded = host_now()
             back = order.preroll_s
@@ -154,7 +156,7 @@ class Recording:
 
     def stop(self) -> None:
         """End with the last pulse that has fired until now."""
-        self._end = host_now()
+        self._end, self._stopped = host_now(), True
 
     def end_now(self) -> None:
         """End with the last pulse that was handed to the log."""
@@ -196,13 +198,36 @@ class Recording:
             self._assembler.buffers.hold(slot)
         self._writer.write_pulse(tag, slot, self._anchor.utc(held.ready), encoded)
 
-    def confirm(self) -> None:
-        """Account for the pulses that are in the file by now, and release their triplet buffers."""
+    def confirm(self, now: HostNs) -> None:
+        """Account for the pulses that are in the file by now, and release their triplet buffers.
+
+        In the first seconds (`StartRecording.keep_s`) they are kept instead, in case that the recording is a mishap.
+        """
+        keeping = self.mishap or now < self.commanded + round(self._order.keep_s * NS_PER_S)
         while self.log is not None and self._in_flight and self.ledger.pulses < self.log.pulses:
             done = self._in_flight.popleft()
             self.ledger.add(done.tag)
-            if done.held.triplet.slot is not None:
-                self._assembler.buffers.release(done.held.triplet.slot)
+            self._kept.append(done.held)
+        if not keeping:
+            self.forget()
+
+    def forget(self, least_free: int | None = None) -> None:
+        """Release the triplet buffers of pulses that were kept, the oldest first.
+
+        Args:
+            least_free: only until so many buffers are free; None: all of them.
+        """
+        buffers = self._assembler.buffers
+        while self._kept and (least_free is None or buffers.free_count < least_free):
+            slot = self._kept.popleft().triplet.slot
+            if slot is not None:
+                buffers.release(slot)
+
+    def take_kept(self) -> list[Held]:
+        """Remove and return the pulses that were kept, oldest first; their slots are the caller's."""
+        kept = list(self._kept)
+        self._kept.clear()
+        return kept
 
     @property
     def all_written(self) -> bool:
@@ -289,6 +314,8 @@ class Recording:
             self.end_account()
         if self._account_until is not None:
             fields = extent(self.utc(self._account_from), self.utc(self._account_until))
+            if self._order.nobody_stops and not (self._stopped or self.failure is not None):
+                fields |= {FORGOTTEN: f"{self._order.seconds or 0:.3f}"}
             self._writer.set_metadata(RECORDING_METADATA, fields)
         if self.trouble:
             self._writer.set_metadata(TROUBLE_METADATA, {"disk": self.trouble})

@@ -139,15 +139,17 @@ class Recordings:
         self._earlier.clear()
         self._begin(Recording(order, self._assembler))
 
-    def stop(self, *, at_once: bool = False) -> None:
+    def stop(self, *, at_once: bool = False, keep: bool = False) -> None:
         """End the recording, if there is one, with the pulses that have fired until now.
 
         Args:
             at_once: do not wait for the disk.
+            keep: the recording was a mishap: what is still held of its pulses belongs to the next one too.
         """
         if self._recording is None:
             return
         self._recording.stop()
+        self._recording.mishap = keep and not self._earlier
         if at_once:
             text = "it was stopped without waiting for the disk; what the disk had taken stays readable"
             self._give_up(self._recording, StorageError(f"{self._recording.path}: {text}"), may_continue=False)
@@ -163,8 +165,9 @@ class Recordings:
         """Do what can be done without waiting, for some milliseconds at most."""
         recording = self._recording
         for each in (*self._earlier, *([] if recording is None else [recording])):
-            each.confirm()
+            each.confirm(now)
         if recording is not None:
+            recording.forget(least_free=self._buffers.count - self._preroll.triplets)
             writing = self._phase in {_Phase.RUNNING, _Phase.FLUSHING}
             if writing and recording.log is not None and recording.log.error is not None:
                 self._fail(recording, recording.log.error)
@@ -291,11 +294,15 @@ class Recordings:
     def _finish(self, recording: Recording) -> None:
         """Report the end of the recording."""
         self._recording = None
-        recording.confirm()
+        recording.confirm(host_now())
         for each in (recording, *self._earlier):
             each.release()
         if recording.failure is None:
             recording.failure = recording.unclosed()
+        if recording.mishap and recording.failure is None:
+            self._preroll.put_back(recording.take_kept())
+        for each in (recording, *self._earlier):
+            each.forget()
         parts = [each.part() for each in self._earlier]
         gone = next((each.failure for each in self._earlier if isinstance(each.failure, FileVanishedError)), None)
         failure = recording.failure or gone
@@ -355,6 +362,8 @@ class Recordings:
             patience_ns: how long to wait until the log is closed.
         """
         recording.failure = error if isinstance(error, StorageError) else None
+        recording.mishap = False
+        recording.forget()
         self._publisher.event(Event.now(Level.FATAL, "recorder", str(error)))
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
         if not whole:

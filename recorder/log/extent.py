@@ -1,10 +1,15 @@
 """The metadata record of when a recording began and ended: a log may have no pulses for a while before its end."""
 
+import re
 from collections.abc import Mapping
+from typing import Final
 
 from rig.clocks import NS_PER_S, UtcNs
 from rig.topics import RECORDING_METADATA, RIG_METADATA
 from triggering.ledger import Ledger
+
+#: Field of the record: after so many seconds the recording ended by itself, because nobody had stopped it.
+FORGOTTEN: Final = "forgotten_s"
 
 
 def extent(begin: UtcNs, end: UtcNs) -> dict[str, str]:
@@ -26,6 +31,16 @@ def apply_extent(metadata: Mapping[str, Mapping[str, str]], ledger: Ledger) -> N
     """
     fields = metadata.get(RECORDING_METADATA, {})
     ledger.lasted(_time(fields, "begin_ns"), _time(fields, "end_ns"), _period_ns(metadata.get(RIG_METADATA, {})))
+
+
+def forgotten_s(metadata: Mapping[str, Mapping[str, str]]) -> float:
+    """After how many seconds a recording that nobody stopped ended by itself; 0: it ended as was wanted.
+
+    Args:
+        metadata: fields of the metadata records by name.
+    """
+    text = metadata.get(RECORDING_METADATA, {}).get(FORGOTTEN, "")
+    return float(text) if re.fullmatch(r"\d{1,5}(\.\d{1,3})?", text, re.ASCII) else 0.0
 
 
 def _time(fields: Mapping[str, str], name: str) -> UtcNs | None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from recorder.log.extent import apply_extent
+from recorder.log.extent import apply_extent, forgotten_s
 from recorder.log.session_changes import session_changes
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
@@ -33,6 +33,7 @@ class LogInfo:
         rig: fields of the last rig record.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         trouble: what went wrong with the disk while the log was written, in one line; empty if nothing.
+        forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
         messages: number of messages per topic.
         library: the program that wrote the log.
     """
@@ -49,6 +50,7 @@ class LogInfo:
     rig: dict[str, str]
     known_lost: tuple[tuple[int, int], ...]
     trouble: str
+    forgotten_s: float
     messages: dict[str, int]
     library: str
 
@@ -133,7 +135,8 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
         return LogInfo(
             path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader),
-            "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), messages, reader.library,
+            "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata), messages,
+            reader.library,
         )  # fmt: skip
 
 

@@ -121,6 +121,13 @@ class RecorderSettings(StrictModel):
     )
     preroll_limit_mb: float = Field(1024.0, ge=0, description="memory for that at most, 10^6 bytes")
     jump_s: float = Field(10.0, gt=0, le=3600, description="length of a jump, for how many more fit on the disk")
+    longest_s: float = Field(
+        120.0,
+        gt=0,
+        le=86400,
+        description="svev serve: a recording that was started without a length and that nobody stops ends after so "
+        "many seconds",
+    )
     reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
     per_camera_topics: bool = Field(
         False,

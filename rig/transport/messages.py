@@ -109,7 +109,9 @@ class StartRecording(Message):
         session: fields of the session (athlete, bib, gate, wind, notes, operator, session).
         pulses: stop after so many, counted from the command; None: until told.
         seconds: stop so long after the command even if fewer pulses came; None: until told.
+        nobody_stops: `seconds` are over only if nobody stops the recording; its log says so then.
         preroll_s: begin so long before the command, as far as pulses are held; None: with the oldest that is held.
+        keep_s: so long after the command its pulses are held in memory too, for a stop that keeps them.
         rig_toml: the rig file as it was read, attached to the log.
         calibration: calibration of the cameras; None: not known.
     """
@@ -118,7 +120,9 @@ class StartRecording(Message):
     session: Mapping[str, str]
     pulses: int | None = None
     seconds: float | None = None
+    nobody_stops: bool = False
     preroll_s: float | None = 0.0
+    keep_s: float = 0.0
     rig_toml: str = ""
     calibration: Calibration | None = None
 
@@ -133,9 +137,11 @@ class StopRecording(Message):
 
     Attributes:
         at_once: do not wait for the disk: give up what it has not taken.
+        keep: the recording was a mishap: its last seconds belong to the next one too, if they are still held.
     """
 
     at_once: bool = False
+    keep: bool = False
 
 
 class GrabberDied(Message):

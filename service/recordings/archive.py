@@ -155,6 +155,7 @@ def verdict(entry: Entry) -> Statement:
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
         "failures": _failures(entry), "pauses": len(entry.pauses),
         "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1), "disk": entry.disk,
+        "longest_s": entry.forgotten_s,
     }  # fmt: skip
     return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
 
@@ -170,7 +171,11 @@ def _judge(entry: Entry) -> tuple[Level, str, str, str]:
         return Level.WARNING, "unfinished", text, advice
     if not entry.pulses:
         return Level.WARNING, "empty", "No pulse came", "Look at the trigger"
-    return _judge_account(entry)
+    level, code, text, advice = _judge_account(entry)
+    if entry.forgotten_s:
+        text = f"Ended by itself after {entry.forgotten_s:g} s, because nobody had stopped it. {text}"
+        return Level.WARNING, "forgotten", text, advice
+    return level, code, text, advice
 
 
 def _judge_account(entry: Entry) -> tuple[Level, str, str, str]:

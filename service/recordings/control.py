@@ -4,14 +4,11 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
 import msgspec
 
-from rig import status
-from rig.clocks import NS_PER_S
 from rig.errors import (
     BadInputError,
     ProcessDiedError,
@@ -22,7 +19,7 @@ from rig.errors import (
 )
 from rig.events import Event, Level
 from rig.settings.model import RigSettings
-from rig.status import Counts, Recording, RecordingOrder, RecordingState, SessionChange, SessionFields, State, Statement
+from rig.status import Recording, RecordingOrder, SessionChange, SessionFields, State, Statement, StopOrder
 from rig.transport.messages import (
     Calibration,
     RecorderFailed,
@@ -35,120 +32,15 @@ from rig.transport.messages import (
     StartRecording,
     StopRecording,
 )
+from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RigProcesses
+from service.recordings.in_progress import Outcome, RecordingInProgress
 from service.recordings.storage import check_room_for, new_log_path
 from service.recordings.truth import TruthWriter
-from service.status.statements import FORBIDDEN, recording_continued, recording_ended
+from service.status.statements import FORBIDDEN, recording_continued, recording_ended, recording_forgotten
 from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
-
-#: How a recording ended: the recorder's report, or the error that ended it.
-Outcome = RecordingFinished | SvevError
-
-
-class RecordingInProgress:
-    """A recording from the order to the recorder's last report of it.
-
-    Args:
-        path: the log.
-        session: the session fields.
-        opened: is answered when the log is open.
-
-    Attributes:
-        ids: ids of its logs; there are several if logs failed.
-        path: the log, the last one if there are several.
-        session: the session fields, later changes included.
-        stopping: whether the recorder was told to stop.
-        waiting: are answered when the recording is over.
-    """
-
-    def __init__(self, path: Path, session: SessionFields, opened: "Future[Recording]") -> None:
-        self.ids, self.path, self.session = [path.stem], path, session
-        self.waiting: list[Future[Outcome]] = []
-        self.stopping = False
-        self._opened: Future[Recording] | None = opened
-        self._ordered = datetime.now(UTC)
-        self._started: datetime | None = None
-        self._counts, self._pauses = Counts(), 0
-        self._bytes = 0
-
-    @property
-    def id(self) -> str:
-        """Id of the log that is being written."""
-        return self.ids[-1]
-
-    @property
-    def opening(self) -> bool:
-        """Whether the recorder has not reported yet that the log is open."""
-        return self._opened is not None
-
-    def open(self, report: RecordingStarted) -> Callable[[], None]:
-        """Note that the recorder has opened the log.
-
-        Returns:
-            A function that answers the thread that waits for it.
-        """
-        self._note_first(report)
-        opened, self._opened = self._opened, None
-        return lambda: opened.set_result(self.view()) if opened is not None else None
-
-    def refuse(self, error: Exception) -> None:
-        """Answer the thread that waits for the log to be opened with an error."""
-        if self._opened is not None:
-            self._opened.set_exception(error)
-
-    def continue_in(self, path: Path) -> None:
-        """Note that the log failed and the recording goes on in another one."""
-        self.ids.append(path.stem)
-        self.path = path
-
-    def progress(self, report: RecordingProgress) -> None:
-        """Note the account so far."""
-        self._note_first(report)
-        self._counts, self._pauses = report.counts, len(report.pauses)
-
-    def grown(self, size: int) -> None:
-        """Note the size of the log, bytes."""
-        self._bytes = size
-
-    def change_session(self, change: SessionChange) -> None:
-        """Change session fields."""
-        self.session = self.session.model_copy(update=change.model_dump(exclude_none=True))
-
-    def _note_first(self, report: RecordingStarted | RecordingProgress) -> None:
-        if self._started is None and report.first_pulse is not None:
-            self._started = datetime.fromtimestamp(report.first_pulse / NS_PER_S, UTC)
-
-    def end(self, outcome: Outcome) -> None:
-        """Answer the threads that wait for the end."""
-        for future in self.waiting:
-            future.set_result(outcome)
-
-    def view(self) -> Recording:
-        """The recording for the status and the list of recordings."""
-        started = self._started or self._ordered
-        counts = self._counts
-        text = f"recording, {counts.pulses} pulses so far"
-        if counts.partial:
-            text += f", {counts.partial} of them incomplete"
-        if self._pauses:
-            text += ", with a pause" if self._pauses == 1 else f", with {self._pauses} pauses"
-        verdict = Statement(
-            level=status.Level.WARNING if counts.partial or self._pauses else status.Level.GOOD,
-            code="recording_paused" if self._pauses else "recording_running",
-            text=text,
-            values={"pulses": counts.pulses, "partial": counts.partial, "pauses": self._pauses},
-        )
-        return Recording(
-            id=self.id,
-            state=RecordingState.RECORDING,
-            started=started,
-            duration_s=round((datetime.now(UTC) - started).total_seconds(), 1),
-            bytes=self._bytes,
-            counts=counts,
-            session=self.session,
-            verdict=verdict,
-        )
+from service.supervision.tap_guard import CONFIRM_S, check_seen, check_stop
 
 
 class RecordingControl:
@@ -157,6 +49,7 @@ class RecordingControl:
     Args:
         machine: the state machine; this object moves it between armed and recording.
         session: the rig, its processes, and whom to tell events.
+        jumpers: says whom the next recording is of.
         rig_toml: the rig file's text, attached to every log.
         calibration: calibration of the cameras, written into every log; None: not known.
         truths: writes the truth beside the logs of simulated cameras.
@@ -172,11 +65,12 @@ class RecordingControl:
         self,
         machine: StateMachine,
         session: RigSession,
+        jumpers: JumperBook,
         rig_toml: str,
         calibration: Calibration | None,
         truths: TruthWriter,
     ) -> None:
-        self._machine, self._session, self._truths = machine, session, truths
+        self._machine, self._session, self._truths, self._jumpers = machine, session, truths, jumpers
         self._rig, self._data = session.rig, session.recorder.directory
         self._rig_toml, self._calibration = rig_toml, calibration
         self.current: RecordingInProgress | None = None
@@ -192,21 +86,25 @@ class RecordingControl:
             answer()
 
     def start(self, order: RecordingOrder, opened: "Future[Recording]") -> None:
-        """Have the recorder open a log.
+        """Have the recorder open a log for the jumper whom the order names, or for the next one.
 
         Raises:
-            StateForbidsError: not armed, or a recording is being opened.
+            StateForbidsError: not armed, or a recording is being opened, or the order may be a second tap.
             StorageError: no room, or the folder cannot be written.
         """
+        check_seen(self._machine.phase, order.seen, opening=self.current is not None)
         self._armed_processes()
         length_s = self._rig.recorder.jump_s if order.duration_s is None else order.duration_s
         check_room_for(self._rig, self._data, length_s)
-        session = SessionFields(**order.model_dump(include=set(SessionFields.model_fields)))
+        path, longest_s = self._new_path(), self._rig.recorder.longest_s
+        session, more = self._jumpers.take(path.stem, order)
         start = StartRecording(
-            path=self._new_path(),
-            session={name: text for name, text in session.model_dump().items() if text},
-            seconds=order.duration_s,
+            path=path,
+            session={name: text for name, text in (more | session.model_dump()).items() if text},
+            seconds=longest_s if order.duration_s is None else order.duration_s,
+            nobody_stops=order.duration_s is None,
             preroll_s=self._reach_s(order),
+            keep_s=CONFIRM_S,
         )
         self.begin(start, session, opened)
 
@@ -229,7 +127,8 @@ class RecordingControl:
             StateForbidsError: not armed, or a recording is being opened.
         """
         processes = self._armed_processes()
-        self.current, self.notice = RecordingInProgress(start.path, session, opened), None
+        longest_s = start.seconds if start.nobody_stops else None
+        self.current, self.notice = RecordingInProgress(start.path, session, opened, longest_s), None
         if ended is not None:
             self.current.waiting.append(ended)
         processes.tell(msgspec.structs.replace(start, rig_toml=self._rig_toml, calibration=self._calibration))
@@ -254,26 +153,38 @@ class RecordingControl:
         return armed_s if order.preroll_s is None else min(order.preroll_s, armed_s)
 
     def stop(
-        self, recording: str | None = None, ended: "Future[Outcome] | None" = None, *, at_once: bool = False
+        self,
+        recording: str | None = None,
+        ended: "Future[Outcome] | None" = None,
+        *,
+        order: StopOrder | None = None,
+        at_once: bool = False,
     ) -> None:
         """Have the recorder close the log.
 
         Args:
             recording: id of the recording; None: the one in progress.
             ended: is answered when the recording is over.
+            order: who wants it, and how surely; None: the service itself.
             at_once: do not wait for the disk.
 
         Raises:
             UnknownRecordingError: this recording is not in progress.
+            StateForbidsError: the order may be a second tap.
         """
         current = self.current
         if current is None or recording not in {None, *current.ids}:
             raise UnknownRecordingError(f"recording {recording} is not in progress: see the list of recordings")
+        if order is not None and not current.stopping:
+            check_stop(self._machine.phase, order)
         if ended is not None:
             current.waiting.append(ended)
         if self._session.processes is not None and (at_once or not current.stopping):
             current.stopping = True
-            self._session.processes.tell(StopRecording(at_once=at_once))
+            mishap = order is not None and order.confirm and self._machine.phase.age_s < CONFIRM_S
+            if mishap:
+                self._jumpers.give_back(current.ids[0])
+            self._session.processes.tell(StopRecording(at_once=at_once, keep=mishap))
 
     def change_session(self, recording: str, change: SessionChange) -> Recording | None:
         """Change session fields of the recording in progress.
@@ -318,6 +229,9 @@ class RecordingControl:
         if report.failure is not None:
             self.notice = recording_ended(current.id, report.failure.error())
             self._say(Level.ERROR, self.notice.text)
+        elif current.longest_s is not None and not current.stopping:
+            self.notice = recording_forgotten(current.id, current.longest_s)
+            self._say(Level.WARNING, self.notice.text)
         self._over(report, State.ARMED)
 
     def fail(self, error: SvevError, then: State) -> None:
@@ -326,6 +240,7 @@ class RecordingControl:
         if current is None:
             return
         if current.opening:
+            self._jumpers.give_back(current.id)
             current.refuse(error)
             self.current = None
             return

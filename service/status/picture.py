@@ -11,6 +11,7 @@ from rig.status import (
     CameraStatus,
     DiskStatus,
     LastJump,
+    Level,
     PrerollStatus,
     ProcessStatus,
     PulseStatus,
@@ -23,6 +24,7 @@ from service.processes.rig_processes import CameraPresence
 from service.recordings.storage import Room
 from service.status.statements import about_camera, about_state, camera_state, process_restarted
 from service.supervision.state_machine import Phase
+from service.supervision.tap_guard import tap_guard
 from service.supervision.watching import PulseRate
 
 #: What the status of a camera takes from its health record.
@@ -38,7 +40,8 @@ class Facts:
 
     Attributes:
         phase: the state and its beginning.
-        notice: what is to be said instead of the usual words for this state.
+        fault: the fault in words; None in any other state.
+        notice: what befell the last recording.
         heard: what was last heard of each camera; None while nothing runs.
         health: the recorder's last health record, None if there is none.
         warm: whether whole triplets have come.
@@ -50,6 +53,7 @@ class Facts:
     """
 
     phase: Phase
+    fault: Statement | None
     notice: Statement | None
     heard: Sequence[CameraPresence] | None
     health: Health | None
@@ -71,9 +75,13 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
     state, pulses = facts.phase.state, facts.pulses
     arriving = facts.heard is not None and (pulses.arriving or (facts.warm and not facts.health))
     rate = pulses.rate_hz if arriving else None
-    usual = about_state(state, rig.cameras, states, arriving, rate) if state is not State.FAULT else None
-    statement = facts.notice or usual
-    if statement is None:
+    if state is not State.FAULT:
+        statement = about_state(state, rig.cameras, states, arriving, rate)
+        if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
+            statement = facts.notice
+    elif facts.fault is not None:
+        statement = facts.fault
+    else:
         raise RuntimeError("a fault without words")
     room, reserve = facts.room, rig.recorder.reserve_gb
     pairing = None if facts.health is None else facts.health.pairing
@@ -81,6 +89,8 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         state=state,
         since=facts.phase.since,
         statement=statement,
+        notice=facts.notice,
+        guard=tap_guard(facts.phase),
         rig=rig.name,
         version=_VERSION,
         cameras=cameras,

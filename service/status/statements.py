@@ -109,6 +109,14 @@ def _working(
         values["rate_hz"] = round(rate_hz, 2)
     if not missing:
         return Statement(level=Level.GOOD, code=code, text=text, values=values)
+    if len(missing) == len(cameras):
+        return Statement(
+            level=Level.ERROR,
+            code=f"{code}_none",
+            text=f"{text}, but none of the {len(cameras)} cameras delivers",
+            advice="see the cameras for what to do; a recording would be empty",
+            values=values,
+        )
     return Statement(
         level=Level.WARNING,
         code=f"{code}_partly",
@@ -152,6 +160,17 @@ def recording_ended(recording: str, error: SvevError) -> Statement:
         text=f"recording {recording} ended early: {error}",
         advice="what was recorded until then is kept; see the recording's verdict",
         values={"recording": recording, "reason": str(error)},
+    )
+
+
+def recording_forgotten(recording: str, longest_s: float) -> Statement:
+    """A recording ended by itself after the longest time, because nobody stopped it."""
+    return Statement(
+        level=Level.WARNING,
+        code="recording_forgotten",
+        text=f"recording {recording} ended by itself after {longest_s:g} s: nobody had stopped it",
+        advice="what was recorded is kept; recorder.longest_s of the rig file says how long",
+        values={"recording": recording, "longest_s": longest_s},
     )
 
 

@@ -13,6 +13,7 @@ Only the supervisor's thread moves the machine; any thread reads its phase.
 """
 
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -35,10 +36,29 @@ FOLLOWS: Final[Mapping[State, frozenset[State]]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A state and the time when it began, UTC."""
+    """A state.
+
+    Attributes:
+        state: the state.
+        since: when it began, UTC.
+        number: counts up with every change of state; higher than any number of an earlier run of the service.
+        began: when it began, on the monotonic clock, s.
+    """
 
     state: State
     since: datetime
+    number: int
+    began: float
+
+    @classmethod
+    def now(cls, state: State, number: int) -> "Phase":
+        """A state that begins now."""
+        return cls(state, datetime.now(UTC), number, time.monotonic())
+
+    @property
+    def age_s(self) -> float:
+        """How long the state has lasted, s."""
+        return time.monotonic() - self.began
 
 
 class StateMachine:
@@ -50,7 +70,7 @@ class StateMachine:
 
     def __init__(self, on_move: Callable[[State, State], None]) -> None:
         self._lock = threading.Lock()
-        self._phase = Phase(State.IDLE, datetime.now(UTC))
+        self._phase = Phase.now(State.IDLE, int(time.time()))
         self._on_move = on_move
 
     @property
@@ -74,5 +94,5 @@ class StateMachine:
             before = self._phase.state
             if to not in FOLLOWS[before]:
                 raise ValueError(f"{to} cannot follow {before}")
-            self._phase = Phase(to, datetime.now(UTC))
+            self._phase = Phase.now(to, self._phase.number + 1)
         self._on_move(before, to)

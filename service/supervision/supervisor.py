@@ -18,6 +18,7 @@ from rig.health import Health
 from rig.settings.model import RigSettings
 from rig.status import LastJump, State, Status
 from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderOptions, RecorderReport
+from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RECORDER, CameraPresence
 from service.recordings import live_results
 from service.recordings.control import RecordingControl, read_calibration
@@ -62,6 +63,7 @@ class Supervisor:
         rig_toml: the rig file's text.
         hub: the live log; gets every event.
         recorder: what the recorder does beside recording.
+        jumpers: says whom the next recording is of; None: nobody in particular.
         hill: starts the simulated cameras; None: as the rig file says.
         enduring: whether to try again when setting up failed or the recorder died; otherwise the thread ends then.
 
@@ -86,6 +88,7 @@ class Supervisor:
         hub: EventHub,
         recorder: RecorderOptions,
         *,
+        jumpers: JumperBook | None = None,
         hill: StartHill | None = None,
         enduring: bool = True,
     ) -> None:
@@ -99,7 +102,9 @@ class Supervisor:
         self._machine = StateMachine(self._moved)
         self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder, hill=hill)
         self.truths = TruthWriter(hub.tell)
-        self.recordings = RecordingControl(self._machine, self._session, rig_toml, calibration, self.truths)
+        self.recordings = RecordingControl(
+            self._machine, self._session, jumpers or JumperBook(), rig_toml, calibration, self.truths
+        )
         self._fault = Fault()
         self._wanted = False
         self._settling, self._watch = Settling(), RecorderWatch()
@@ -324,7 +329,8 @@ class Supervisor:
         free = self.health.disk.free_bytes if self.health else free_bytes(self._recorder.directory)
         facts = Facts(
             phase=phase,
-            notice=fault or (self.recordings.notice if phase.state in {State.ARMED, State.RECORDING} else None),
+            fault=fault,
+            notice=self.recordings.notice if phase.state in {State.ARMED, State.RECORDING} else None,
             heard=None if processes is None else tuple(processes.cameras),
             health=self.health,
             warm=processes is not None and processes.warm,

@@ -10,6 +10,7 @@ import typer
 
 from rig.errors import BadInputError, CameraError, SvevError
 from svev import console
+from svev.answers import jumper_lines, recording_lines, recordings_lines, start_list_lines, status_lines
 from svev.fetch import fetch
 from svev.rest_client import RestClient, read_token
 
@@ -23,6 +24,14 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+
+start_list_app = typer.Typer(
+    help="The start list: show, load, undo.",
+    epilog="Exit codes: as of svev ctl. Example: svev ctl startlist load list.csv",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+app.add_typer(start_list_app, name="startlist")
 
 Id = Annotated[str, typer.Argument(help="id of the recording, see svev ctl list")]
 Wait = Annotated[
@@ -50,7 +59,7 @@ def status(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl status
     """
-    _show(_call(context, "GET", "/api/status"), _status_lines, as_json)
+    _show(_call(context, "GET", "/api/status"), status_lines, as_json)
 
 
 @app.command()
@@ -60,7 +69,7 @@ def arm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -> N
     Example: svev ctl arm
     """
     answer = _call(context, "POST", "/api/arm")
-    _show(_awaited(context, answer, "arming", wait_s), _status_lines, as_json)
+    _show(_awaited(context, answer, "arming", wait_s), status_lines, as_json)
 
 
 @app.command()
@@ -70,7 +79,7 @@ def disarm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -
     Example: svev ctl disarm
     """
     answer = _call(context, "POST", "/api/disarm")
-    _show(_awaited(context, answer, "disarming", wait_s), _status_lines, as_json)
+    _show(_awaited(context, answer, "disarming", wait_s), status_lines, as_json)
 
 
 @app.command()
@@ -96,7 +105,7 @@ def start(
     """
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=preroll, duration_s=seconds)
-    _show(_call(context, "POST", "/api/recordings", order), _recording_lines, as_json)
+    _show(_call(context, "POST", "/api/recordings", order), recording_lines, as_json)
 
 
 @app.command()
@@ -116,7 +125,7 @@ def stop(
         if current is None:
             raise SvevError("no recording is in progress: see svev ctl list")
         recording = current["id"]
-    _show(_call(context, "POST", f"{_path(recording)}/stop"), _recording_lines, as_json)
+    _show(_call(context, "POST", f"{_path(recording)}/stop"), recording_lines, as_json)
 
 
 @app.command()
@@ -140,7 +149,7 @@ def save(
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=seconds, duration_s=0)
     recording = _call(context, "POST", "/api/recordings", order)
-    _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), _recording_lines, as_json)
+    _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), recording_lines, as_json)
 
 
 @app.command("list")
@@ -154,7 +163,7 @@ def list_(
     Example: svev ctl list
     """
     found = _call(context, "GET", f"/api/recordings?deleted={str(deleted).lower()}")
-    _show({"recordings": found}, _recordings_lines, as_json)
+    _show({"recordings": found}, recordings_lines, as_json)
 
 
 @app.command()
@@ -174,7 +183,71 @@ def session(
     Example: svev ctl session 2026-02-14T10-15-30Z --bib 18
     """
     change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
-    _show(_call(context, "PATCH", _path(recording), change), _recording_lines, as_json)
+    _show(_call(context, "PATCH", _path(recording), change), recording_lines, as_json)
+
+
+@app.command("next")
+def next_(
+    context: typer.Context,
+    athlete: Text = None,
+    bib: Text = None,
+    gate: Text = None,
+    wind: Text = None,
+    notes: Text = None,
+    operator: Text = None,
+    as_json: Json = False,
+) -> None:
+    """Show whom the next recording is of, or change it; a bib of the start list makes its jumper the next one.
+
+    Example: svev ctl next --bib 18
+    """
+    change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
+    method, body = ("PATCH", change) if change else ("GET", None)
+    _show(_call(context, method, "/api/next-jumper", body), jumper_lines, as_json)
+
+
+@app.command()
+def skip(context: typer.Context, as_json: Json = False) -> None:
+    """Pass over the next jumper.
+
+    Example: svev ctl skip
+    """
+    _show(_call(context, "POST", "/api/next-jumper/skip"), start_list_lines, as_json)
+
+
+@start_list_app.command("show")
+def show_start_list(context: typer.Context, as_json: Json = False) -> None:
+    """Show the start list: who has jumped, who is next, who waits.
+
+    Example: svev ctl startlist show
+    """
+    _show(_call(context, "GET", "/api/start-list"), start_list_lines, as_json)
+
+
+@start_list_app.command("load")
+def load_start_list(
+    context: typer.Context,
+    table: Annotated[Path, typer.Argument(help="table (CSV) whose first line names the columns: bib, athlete, …")],
+    as_json: Json = False,
+) -> None:
+    """Replace the start list by a table with the columns bib, athlete, gate, club and own ones.
+
+    Example: svev ctl startlist load list.csv
+    """
+    try:
+        content = table.read_bytes()
+    except OSError as error:
+        raise BadInputError(f"{table}: cannot be read ({error.strerror}); correct the path") from None
+    _show(_call(context, "PUT", "/api/start-list", content), start_list_lines, as_json)
+
+
+@start_list_app.command("undo")
+def undo(context: typer.Context, as_json: Json = False) -> None:
+    """Take the last change of the start list back.
+
+    Example: svev ctl startlist undo
+    """
+    _show(_call(context, "POST", "/api/start-list/undo"), start_list_lines, as_json)
 
 
 @app.command()
@@ -183,7 +256,7 @@ def delete(context: typer.Context, recording: Id, as_json: Json = False) -> None
 
     Example: svev ctl delete 2026-02-14T10-15-30Z
     """
-    _show(_call(context, "DELETE", _path(recording)), _recording_lines, as_json)
+    _show(_call(context, "DELETE", _path(recording)), recording_lines, as_json)
 
 
 @app.command()
@@ -192,7 +265,7 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
 
     Example: svev ctl restore 2026-02-14T10-15-30Z
     """
-    _show(_call(context, "POST", f"{_path(recording)}/restore"), _recording_lines, as_json)
+    _show(_call(context, "POST", f"{_path(recording)}/restore"), recording_lines, as_json)
 
 
 @app.command()
@@ -238,7 +311,7 @@ def trash(
     _show(answer, lambda what: [f"{what['recordings']} recordings {words}, {what['bytes'] / 1e9:.2f} GB"], as_json)
 
 
-def _call(context: typer.Context, method: str, path: str, body: dict[str, object] | None = None) -> Any:
+def _call(context: typer.Context, method: str, path: str, body: dict[str, object] | bytes | None = None) -> Any:
     client: RestClient = context.obj
     return client.call(method, path, body)
 
@@ -275,41 +348,3 @@ def _given(**fields: object) -> dict[str, object]:
 
 def _path(recording: str) -> str:
     return f"/api/recordings/{urllib.parse.quote(recording, safe='')}"
-
-
-def _status_lines(answer: dict[str, Any]) -> list[str]:
-    """The status, for people: state, cameras, disk, seconds held, recording in progress."""
-    lines = [f"{answer['state']:10} {_said(answer['statement'])}"]
-    for camera in answer["cameras"]:
-        lines.append(f"{camera['name']:10} {_said(camera['statement'])}")
-    disk = answer["disk"]
-    trash = f" and {disk['trash_gb']:g} GB in the trash" if disk["trash_gb"] else ""
-    left = f"{disk['jumps_left']} jumps of {disk['jump_s']:g} s left"
-    lines.append(f"disk       {disk['free_gb']:g} GB free{trash}, {left}")
-    if answer["preroll"]["seconds"]:
-        lines.append(f"held       the last {answer['preroll']['seconds']:.1f} s")
-    if answer["recording"] is not None:
-        lines.append(f"recording  {_recording_line(answer['recording'])}")
-    return lines
-
-
-def _recording_lines(answer: dict[str, Any]) -> list[str]:
-    """One recording, for people."""
-    return [_recording_line(answer)]
-
-
-def _recording_line(answer: dict[str, Any]) -> str:
-    """One recording, for people."""
-    session = answer["session"]
-    who = " ".join(text for text in (session["bib"], session["athlete"]) if text)
-    size = f"{answer['duration_s']:.1f} s, {answer['bytes'] / 1e6:.1f} MB"
-    return f"{answer['id']}  {size:22} {_said(answer['verdict'])}" + (f"  [{who}]" if who else "")
-
-
-def _recordings_lines(answer: dict[str, Any]) -> list[str]:
-    """Recordings, for people, one a line."""
-    return [_recording_line(each) for each in answer["recordings"]] or ["no recordings"]
-
-
-def _said(statement: dict[str, Any]) -> str:
-    return f"{statement['text']} -> {statement['advice']}" if statement["advice"] else str(statement["text"])

@@ -14,6 +14,8 @@ from rig.events import Event, Level
 from rig.settings.file import load_rig
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
+from service.jumpers.book import JumperBook
+from service.jumpers.keeper import Keeper
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.trash_keeper import TrashKeeper
@@ -73,9 +75,10 @@ def serve(settings: ServiceSettings) -> None:
         slot = stack.enter_context(closing(PreviewSlot.create(rig.triplet_shape, len(rig.cameras))))
         hub, catalogue = EventHub(write_line), Catalogue(data)
         options = RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
-        supervisor = Supervisor(rig, rig_toml, hub, options)
+        jumpers = JumperBook(Keeper(data, hub.tell), hub.wake)
+        supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)
         keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
-        service = Service(supervisor, catalogue, keeper, slot, PanelDoctor(rig, data).report)
+        service = Service(supervisor, jumpers, catalogue, keeper, slot, PanelDoctor(rig, data).report)
         server = make_server(create_app(service, settings.access))
         supervisor.on_turn = _Reporter(supervisor, server, notify, url(listener)).report
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from rig import status as models
+from rig import start_list, status
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"
@@ -72,7 +72,8 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
         stated |= set(re.findall(r'\bcode="(\w+)"', text))
         stated |= set(re.findall(r'\bcode=.* else "(\w+)"', text))
         stated |= set(re.findall(r'_working\("(\w+)"', text))
-        stated |= {f"{code}_partly" for code in re.findall(r'_working\("(\w+)"', text)}
+        stated |= {f"{code}_{few}" for code in re.findall(r'_working\("(\w+)"', text) for few in ("partly", "none")}
+        stated |= set(re.findall(r'_statement\(\s*"(\w+)"', text))
         stated |= set(
             re.findall(r'(?:ProblemError\(|_unauthorized\(|_refuse\(|problem\()\s*(?:[\w.]+, )?"(\w+)"', text)
         )
@@ -97,7 +98,7 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    model: type[BaseModel] = getattr(models, name)
+    model: type[BaseModel] = getattr(start_list if hasattr(start_list, name) else status, name)
     assert _types()[name] == list(model.model_fields)
 
 
@@ -139,5 +140,5 @@ def test_icons_that_are_shown_exist() -> None:
     drawn = set(re.findall(r'<symbol id="([\w-]+)"', (PAGE / "icons.svg").read_text()))
     shown = set(re.findall(r"icons\.svg#([\w-]+)", (PAGE / "index.html").read_text()))
     shown |= set(re.findall(r'\bicon(?:\(|: )"([\w-]+)"', _sources()))
-    shown |= {state.value for state in models.State} - {"disarming"} | {level.value for level in models.Level}
+    shown |= {state.value for state in status.State} - {"disarming"} | {level.value for level in status.Level}
     assert shown <= drawn

@@ -63,6 +63,11 @@ class Serving:
         assert status in {200, 201}, answer
         return answer
 
+    def call_table(self, content: bytes) -> Any:
+        """Load a start list."""
+        headers = {"Content-Type": "text/csv"}
+        return self._client.put("/api/start-list", content=content, headers=headers).raise_for_status().json()
+
     @contextmanager
     def watching(self, path: str) -> Iterator[None]:
         """Within, an endless answer is being read, or rather not: it has begun, and nobody takes it."""

@@ -47,12 +47,19 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         ended = _json(_ctl(url, "stop", "--json", token=TOKEN))
         assert (ended["id"], ended["state"], ended["session"]["bib"]) == (begun["id"], "finished", "17")
         assert _json(_ctl(url, "session", begun["id"], "--bib", "18", "--json", token=TOKEN))["session"]["bib"] == "18"
-        saved = _json(_ctl(url, "save", "--seconds", "1", "--bib", "19", "--json", token=TOKEN))
-        assert saved["session"]["bib"] == "19"
+        (tmp_path / "list.csv").write_bytes("bib;navn;klubb\n17;Åse;Lyn\n19;Eva;\n".encode("latin-1"))
+        loaded = _ctl(url, "startlist", "load", str(tmp_path / "list.csv"), token=TOKEN).stdout
+        assert loaded.splitlines()[1:] == ["next       17  Åse, Lyn", "waiting    19  Eva"]
+        assert _ctl(url, "skip", token=TOKEN).stdout.splitlines()[1].startswith("skipped ")
+        assert _ctl(url, "next", "--gate", "11", token=TOKEN).stdout == "athlete Eva  bib 19  gate 11\n"
+        assert _json(_ctl(url, "save", "--bib", "20", "--json", token=TOKEN))["session"]["athlete"] == ""
+        saved = _json(_ctl(url, "save", "--seconds", "1", "--json", token=TOKEN))
         assert 0 < saved["counts"]["pulses"] <= 33
+        assert (saved["session"]["athlete"], saved["session"]["gate"]) == ("Eva", "11")
         listed = _ctl(url, "list", token=TOKEN).stdout
         assert [line.split()[0] for line in listed.splitlines()] == [saved["id"], begun["id"]]
         assert "[18 Ola]" in listed
+        assert "[19 Eva]" in listed
         assert _json(_ctl(url, "delete", begun["id"], "--json", token=TOKEN))["deleted"]
         assert len(_json(_ctl(url, "list", "--json", token=TOKEN))["recordings"]) == 1
         assert not _json(_ctl(url, "restore", begun["id"], "--json", token=TOKEN))["deleted"]

@@ -125,15 +125,15 @@ def test_a_killed_recorder_ends_the_recording_and_the_rig_is_armed_again(
         os.kill(service.pids()["recorder"], signal.SIGKILL)
         service.await_state("fault", "arming")
         status = service.await_state("armed")
-        assert status["statement"]["code"] == "recording_ended"
-        assert recording["id"] in status["statement"]["text"]
+        assert status["notice"]["code"] == "recording_ended"
+        assert recording["id"] in status["notice"]["text"]
         found = service.get(f"/api/recordings/{recording['id']}")
         assert found["state"] == "unfinished"
         assert found["counts"]["pulses"] > 0
         again = service.post("/api/recordings", {"duration_s": 0.5})
         assert service.await_state("armed")["statement"]["code"] in {"state_armed", "state_armed_partly"}
         assert service.get(f"/api/recordings/{again['id']}")["state"] == "finished"
-    said, lost = status["statement"]["text"], "those from then on; the next recording is whole"
+    said, lost = status["notice"]["text"], "those from then on; the next recording is whole"
     fault_table.tell("Processes", "kill -9 of the recorder of the service", lost=lost, said=said)
 
 

@@ -34,13 +34,16 @@ from rig.status import (  # fmt: skip
     RecordingState,
     RigView,
     SessionChange,
-    SessionFields,
     State,
     Statement,
     Status,
+    StopOrder,
 )
+from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
 from service.seam import Preview
+from service.supervision.state_machine import Phase
+from service.supervision.tap_guard import check_seen, check_stop, tap_guard
 from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
 
 SHAPE = (120, 480)
@@ -69,9 +72,10 @@ class MemoryService(Archive):
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None
         self.preview_calls = 0
-        self._since = datetime.now(UTC)
+        self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
         self._lock = threading.RLock()
+        self.jumpers = JumperBook(changed=self._wake)
         self._events: list[Event] = []
         self._numbers = 0
         self._listeners: set[Callable[[], None]] = set()
@@ -91,7 +95,9 @@ class MemoryService(Archive):
             held_s = min(5.0, time.monotonic() - self._armed_at) if armed else 0.0
             return Status(
                 state=self.state,
-                since=self._since,
+                since=self._phase.since,
+                guard=tap_guard(self._phase),
+                next_jumper=self.jumpers.view().next,
                 statement=Statement(code=f"state_{self.state.value}", text=f"The rig is {self.state.value}"),
                 rig="memory",
                 version="0",
@@ -122,14 +128,16 @@ class MemoryService(Archive):
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         with self._lock:
+            check_seen(self._phase, order.seen)
             if self.state is State.RECORDING:
                 raise StateForbidsError("a recording is under way: stop it first")
             if self.state is not State.ARMED:
                 raise StateForbidsError(f"the rig is {self.state.value}: arm it first")
             now = datetime.now(UTC)
-            session = SessionFields(**order.model_dump(include=set(SessionFields.model_fields)))
+            name = f"{now:%Y%m%d-%H%M%S-%f}"
+            session, _ = self.jumpers.take(name, order)
             self._recording = Recording(
-                id=f"{now:%Y%m%d-%H%M%S-%f}", state=RecordingState.RECORDING, started=now, duration_s=0.0, bytes=0,
+                id=name, state=RecordingState.RECORDING, started=now, duration_s=0.0, bytes=0,
                 counts=Counts(), session=session,
                 verdict=Statement(level=Level.INFO, code="verdict_recording", text="Recording"),
             )  # fmt: skip
@@ -137,11 +145,12 @@ class MemoryService(Archive):
             self._become(State.RECORDING)
         return started if order.duration_s is None else self.stop_recording(started.id)
 
-    def stop_recording(self, recording_id: str) -> Recording:
+    def stop_recording(self, recording_id: str, order: StopOrder | None = None) -> Recording:
         with self._lock:
             current = self._recording
             if current is None or current.id != recording_id:
                 return as_recording(self.catalogue.entry(recording_id))
+            check_stop(self._phase, order or StopOrder())
             self._recording, self._last = None, recording_id
             write_recording(self.catalogue.directory, recording_id, session=current.session.model_dump())
             self._become(State.ARMED)
@@ -212,12 +221,15 @@ class MemoryService(Archive):
             self._numbers += 1
             event = Event(number=self._numbers, time=datetime.now(UTC), level="info", name="service", message=message)
             self._events = [*self._events[-KEPT_EVENTS + 1 :], event]
+        self._wake()
+
+    def _wake(self) -> None:
         for wake in list(self._listeners):
             wake()
 
     def _become(self, state: State) -> None:
         self.state = state
-        self._since = datetime.now(UTC)
+        self._phase = Phase.now(state, self._phase.number + 1)
         self.say(f"now {state.value}")
 
     def _pulse(self) -> RigPulse:

@@ -24,6 +24,10 @@ CALLS = {
     "GET /api/recordings/{recording_id}/thumbnail.jpg", "POST /api/login", "POST /api/logout", "GET /metrics",
     "GET /healthz", "GET /api/trash", "DELETE /api/trash", "DELETE /api/trash/{recording_id}",
     "GET /api/recordings/{recording_id}/file.sha256", "GET /api/recordings.zip",
+    "GET /api/next-jumper", "PATCH /api/next-jumper", "POST /api/next-jumper/skip",
+    "GET /api/start-list", "PUT /api/start-list", "PATCH /api/start-list", "POST /api/start-list/undo",
+    "POST /api/start-list/round", "POST /api/start-list/lines", "PATCH /api/start-list/lines/{line}",
+    "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 
 
@@ -64,7 +68,7 @@ def test_every_refusal_is_declared_as_a_problem(schema: dict[str, Any]) -> None:
         assert {"400", "401", "403", "422", "429", "500"} <= statuses, name
         if not name.startswith("GET") and "login" not in name and "logout" not in name:
             assert {"409", "413", "415"} <= statuses, name
-        if "{recording_id}" in name:
+        if "{recording_id}" in name or "{line}" in name:
             assert "404" in statuses, name
         for status, response in operation["responses"].items():
             if status >= "400":
@@ -83,7 +87,17 @@ def test_every_reference_leads_somewhere(schema: dict[str, Any]) -> None:
 
 def test_bodies_have_examples(schema: dict[str, Any]) -> None:
     schemas = schema["components"]["schemas"]
-    for name in ("RecordingOrder", "SessionFields", "SessionChange", "Login"):
+    for name in (
+        "RecordingOrder",
+        "StopOrder",
+        "SessionFields",
+        "SessionChange",
+        "JumperChange",
+        "NewLine",
+        "LineChange",
+        "Rules",
+        "Login",
+    ):
         assert all(field.get("examples") for field in schemas[name]["properties"].values()), name
         assert schemas[name]["additionalProperties"] is False
     content = schema["paths"]["/api/recordings"]["post"]["requestBody"]["content"]["application/json"]

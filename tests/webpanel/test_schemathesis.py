@@ -17,6 +17,8 @@ from tests.webpanel.serving import Panel
 K2_LOST = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
 #: These answers have no end; they are tested on their own.
 ENDLESS = ("/api/events", "/api/preview.mjpg")
+#: No schema says which tables are right.
+TABLE = "import_start_list"
 
 
 def schemathesis(url: str, folder: Path, *options: str) -> str:
@@ -24,7 +26,8 @@ def schemathesis(url: str, folder: Path, *options: str) -> str:
     excluded = [f"--exclude-path={path}" for path in ENDLESS]
     command = [
         str(Path(sys.executable).with_name("st")), "run", f"{url}/openapi.json",
-        "--seed=1", "--request-timeout=20", "--continue-on-failure", "--generation-database=none", *excluded, *options,
+        "--seed=1", "--request-timeout=20", "--continue-on-failure", "--generation-database=none", *excluded,
+        f"--exclude-operation-id={TABLE}", *options,
     ]  # fmt: skip
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=170, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr
@@ -39,7 +42,7 @@ def test_the_api_is_as_it_is_described(
         write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
     service.arm()
     said = schemathesis(panel.url, tmp_path, "--phases=coverage,fuzzing", "--max-examples=8")
-    assert "26 selected / 28 total" in said
+    assert "37 selected / 40 total" in said
     assert service.healthy()
 
 

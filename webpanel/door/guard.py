@@ -21,6 +21,8 @@ _READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Paths that need the token. The page's files do not: the page has to ask for the token.
 _PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
 _OPEN: Final = frozenset({"/api/login", "/api/logout"})
+#: Paths where a body may be something else than JSON; their routes look which call takes what.
+_OTHER_BODIES: Final = {"/api/start-list": "text/csv"}
 
 
 class Guard:
@@ -63,7 +65,7 @@ class Guard:
             _check_origin(headers)
         if path.startswith(_PROTECTED) and path not in _OPEN:
             self._door.admit(request)
-        _check_body(headers, reading=reading)
+        _check_body(headers, _OTHER_BODIES.get(path), reading=reading)
 
 
 def check_host(request: HTTPConnection, access: Access) -> None:
@@ -104,13 +106,13 @@ def _authority(origin: str) -> str:
     return parts.netloc.lower() if parts.scheme in {"http", "https"} else ""
 
 
-def _check_body(headers: Headers, *, reading: bool) -> None:
+def _check_body(headers: Headers, other: str | None, *, reading: bool) -> None:
     length = headers.get("content-length", "0")
     if length.isdecimal() and int(length[:20]) > BODY_MAX:
         raise ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "request_entity_too_large", _TOO_LARGE)
     has_body = length != "0" or "transfer-encoding" in headers
     media_type = headers.get("content-type", "").partition(";")[0].strip().lower()
-    if has_body and not reading and media_type != "application/json":
+    if has_body and not reading and media_type not in {"application/json", other}:
         text = "the body must be JSON: send Content-Type: application/json"
         raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
 

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Body, Query, Response
 
-from rig.status import Recording, RecordingOrder, SessionChange, Trash
+from rig.status import Recording, RecordingOrder, SessionChange, StopOrder, Trash
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, RecordingId, refusals, strict_router
 from webpanel.routes.events import Changes
@@ -28,6 +28,9 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
     def start_recording(response: Response, order: Annotated[RecordingOrder, _ORDER] = _ALL_HELD) -> Recording:
         """Start a recording. The rig must be armed and not be recording already.
 
+        It is of the next jumper, unless `bib` or `athlete` says of whom: then nothing else is filled in, and the next
+        jumper stays the next one.
+
         If `preroll_s` is left out, the recording begins with all seconds that are held in memory; if `duration_s` is
         left out, it lasts until it is stopped. `{"duration_s": 0}` saves what has just happened, and ends by itself.
         """
@@ -36,9 +39,12 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         return recording
 
     @router.post("/recordings/{recording_id}/stop", responses=CHANGING | refusals(404))
-    def stop_recording(recording_id: RecordingId, _: NoFields = None) -> Recording:
-        """Stop a recording; answers when its file is closed. A recording that has ended is not changed."""
-        return service.stop_recording(recording_id)
+    def stop_recording(recording_id: RecordingId, order: StopOrder | None = None) -> Recording:
+        """Stop a recording; answers when its file is closed. A recording that has ended is not changed.
+
+        A page sends `seen`, so that a second tap on its button does not end a recording that has only just begun.
+        """
+        return service.stop_recording(recording_id, order or StopOrder())
 
     @router.get("/recordings")
     def list_recordings(

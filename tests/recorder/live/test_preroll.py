@@ -79,11 +79,25 @@ class Recorder:
         self.cameras.expose(pulse, *cameras)
         self.cameras.expose(pulse, *(set(range(3)) - set(cameras)), lose=True)
 
-    def start(self, preroll_s: float | None, *, pulses: int | None = None, seconds: float | None = None) -> Path:
+    def start(
+        self,
+        preroll_s: float | None,
+        *,
+        pulses: int | None = None,
+        seconds: float | None = None,
+        keep_s: float = 0.0,
+    ) -> Path:
         """Start a recording into a log of its own."""
         path = self.path / f"{next(self.logs)}.mcap"
         self.recordings.start(
-            StartRecording(path=path, session={"session": "s"}, pulses=pulses, seconds=seconds, preroll_s=preroll_s)
+            StartRecording(
+                path=path,
+                session={"session": "s"},
+                pulses=pulses,
+                seconds=seconds,
+                preroll_s=preroll_s,
+                keep_s=keep_s,
+            )
         )
         before, now = len(self.reports), HostNs(self.clock.time)  # no time passes while the log is opened
 
@@ -291,6 +305,36 @@ def test_a_failing_disk_leaves_the_rest_of_the_past_for_another_try(tmp_path: Pa
         path = recorder.start(None, seconds=0)
         recorder.finish()
     assert _pulses(path) == list(range(failed.counts.pulses + 1, 81))
+
+
+@pytest.mark.parametrize(("limit", "first"), [(100, 14), (8, 51)])
+def test_a_mishap_leaves_its_pulses_to_the_next_recording(
+    tmp_path: Path, publisher: Publisher, limit: int, first: int
+) -> None:
+    """As many as memory for the past has room for; those that come meanwhile never wait for them."""
+    with _recorder(tmp_path, publisher, seconds=1.5, limit=limit) as recorder:
+        _expose(recorder, 1, 40)
+        mishap = recorder.start(None, keep_s=3.0)
+        for pulse in range(41, 51):
+            _expose(recorder, pulse, pulse)
+            wait_until(recorder.has_room, "the disk takes something", timeout_s=30, poll_s=0.001)
+        recorder.recordings.stop(keep=True)
+        recorder.finish()
+        _expose(recorder, 51, 54)
+        whole = recorder.start(None, keep_s=0.1)
+        _expose(recorder, 55, 64)
+
+        def all_free() -> bool:
+            recorder.recordings.work(HostNs(recorder.clock.time))
+            return recorder.buffers.free_count == recorder.buffers.count
+
+        wait_until(all_free, "after the first seconds nothing is kept", timeout_s=30, poll_s=0.001)
+        recorder.recordings.stop(keep=True)
+        recorder.finish()
+    found, again = _pulses(mishap), _pulses(whole)
+    assert (found[-1], again[-1]) == (50, 64)
+    assert again == list(range(again[0], 65)), "every pulse once, without a seam"
+    assert again[0] <= first
 
 
 def test_only_pulses_of_the_present_count_as_latency(tmp_path: Path, publisher: Publisher) -> None:

@@ -1,5 +1,5 @@
 /**
- * The shapes of the answers of the REST API, as in rig/status.py (a test compares the two).
+ * The shapes of the answers of the REST API, as in rig/status.py and rig/start_list.py (a test compares them).
  *
  * @typedef {"idle"|"arming"|"armed"|"recording"|"disarming"|"fault"} State
  * @typedef {"good"|"info"|"warning"|"error"} Level
@@ -117,10 +117,46 @@
  * @property {MeasuredValue|null} angle_of_attack
  * @property {MeasuredValue|null} ski_to_body
  *
+ * @typedef {object} TapGuard
+ * @property {number} number
+ * @property {number} hold_s
+ * @property {number} confirm_s
+ *
+ * @typedef {object} NextJumper
+ * @property {number} number
+ * @property {number} version
+ * @property {number|null} line
+ * @property {number|null} following
+ * @property {SessionFields} session
+ * @property {Record<string, string>} more
+ *
+ * @typedef {object} StartLine
+ * @property {string} bib
+ * @property {string} athlete
+ * @property {string} gate
+ * @property {string} club
+ * @property {string} notes
+ * @property {Record<string, string>} more
+ * @property {number} id
+ * @property {"waiting"|"jumped"|"skipped"} mark
+ * @property {string[]} jumps
+ *
+ * @typedef {object} StartList
+ * @property {number} version
+ * @property {number} round
+ * @property {boolean} auto_advance
+ * @property {string[]} carry
+ * @property {string[]} columns
+ * @property {StartLine[]} lines
+ * @property {NextJumper} next
+ * @property {Statement|null} undo
+ *
  * @typedef {object} Status
  * @property {State} state
  * @property {string} since
  * @property {Statement} statement
+ * @property {Statement|null} notice
+ * @property {TapGuard} guard
  * @property {string} rig
  * @property {string} version
  * @property {CameraStatus[]} cameras
@@ -130,6 +166,7 @@
  * @property {Recording|null} recording
  * @property {string|null} last_recording
  * @property {LastJump|null} last_jump
+ * @property {NextJumper} next_jumper
  * @property {ProcessStatus[]} processes
  *
  * @typedef {object} Finding

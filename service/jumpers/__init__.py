@@ -1,0 +1,1 @@
+"""Who jumps: the start list and the next jumper, seen and changed by all, kept over restarts."""

@@ -1,0 +1,100 @@
+"""Keeps the start list in a file of the recordings' folder, so that a service that is started again goes on with it."""
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from rig.events import Event, Level
+from rig.start_list import StartList
+
+NAME: Final = ".svev-start-list.json"
+
+
+class Keeper:
+    """Writes in a thread of its own, which never keeps the process alive: the disk may hang.
+
+    Any thread may call `keep` and `wait`. Of several lists that wait for the disk only the latest is written.
+
+    Args:
+        folder: folder of the recordings.
+        tell: takes an event about a list that could not be read or written; any thread may call it.
+    """
+
+    def __init__(self, folder: Path, tell: Callable[[Event], None]) -> None:
+        self._path, self._tell = folder / NAME, tell
+        self._changed = threading.Condition()
+        self._waiting: StartList | None = None
+        self._busy = self._failed = False
+
+    def load(self) -> StartList:
+        """The list that was kept; an empty one if there is none. A file that cannot be read is put aside."""
+        try:
+            found = StartList.model_validate_json(self._path.read_bytes())
+        except FileNotFoundError:
+            return StartList()
+        except (OSError, ValidationError) as error:
+            return self._put_aside(error)
+        return found.model_copy(update={"undo": None})
+
+    def keep(self, start_list: StartList) -> None:
+        """Begin to write a list."""
+        with self._changed:
+            self._waiting = start_list
+            if not self._busy:
+                self._busy = True
+                threading.Thread(target=self._run, name="start list", daemon=True).start()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until the latest list is written; False if it is not after `timeout_s`."""
+        until = time.monotonic() + timeout_s
+        with self._changed:
+            while self._busy and (left := until - time.monotonic()) > 0:
+                self._changed.wait(left)
+            return not self._busy
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                start_list, self._waiting = self._waiting, None
+                if start_list is None:
+                    self._busy = False
+                    self._changed.notify_all()
+                    return
+            try:
+                self._write(start_list.model_dump_json(indent=1).encode())
+            except OSError as error:
+                self._lament(error)
+            else:
+                self._failed = False
+
+    def _write(self, content: bytes) -> None:
+        new = self._path.with_suffix(".new")
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with new.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(self._path)
+
+    def _lament(self, error: OSError) -> None:
+        """Say once that the list is not kept, until it is again."""
+        if not self._failed:
+            self._failed = True
+            text = f"{self._path}: the start list cannot be kept ({error.strerror}); a restart of the service loses it"
+            self._tell(Event.now(Level.ERROR, "start list", text))
+
+    def _put_aside(self, error: Exception) -> StartList:
+        aside = self._path.with_suffix(".unreadable")
+        why = error.strerror if isinstance(error, OSError) else "it is none of this version of svev"
+        text = f"{self._path}: cannot be read ({why}) and is put aside as {aside.name}; load the start list again"
+        try:
+            self._path.replace(aside)
+        except OSError as refusal:
+            text = f"{self._path}: cannot be read ({why}) nor put aside ({refusal.strerror}); check its permissions"
+        self._tell(Event.now(Level.ERROR, "start list", text))
+        return StartList()

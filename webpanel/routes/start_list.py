@@ -1,0 +1,115 @@
+"""The routes of the next jumper and the start list: one for all devices, and for every recording."""
+
+from http import HTTPStatus
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Path, Request
+from starlette.concurrency import run_in_threadpool
+
+from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
+from rig.status import NextJumper
+from service.seam import Jumpers, RigService
+from webpanel.problems import ProblemError
+from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
+
+LineNumber = Annotated[int, Path(ge=1, le=10**9, description="id of a line of the start list", examples=[3])]
+_CSV: Final = "text/csv"
+_TABLE: Final = {
+    "requestBody": {
+        "required": False,
+        "content": {
+            _CSV: {
+                "schema": {"type": "string"},
+                "example": "bib;athlete;gate;club\n17;Ola Nordmann;12;Lyn\n18;Kari Hansen;12;Koll\n",
+            }
+        },
+    }
+}
+
+
+def start_list_router(service: RigService) -> APIRouter:
+    """The routes of the next jumper and the start list."""
+    router = strict_router("Jumpers")
+    _add_next_jumper(router, service.jumpers)
+    _add_list(router, service.jumpers)
+    _add_lines(router, service.jumpers)
+    return router
+
+
+def _add_next_jumper(router: APIRouter, jumpers: Jumpers) -> None:
+    @router.get("/next-jumper")
+    def get_next_jumper() -> NextJumper:
+        """Whom the next recording is of."""
+        return jumpers.view().next
+
+    @router.patch("/next-jumper", responses=CHANGING)
+    def change_next_jumper(change: JumperChange) -> NextJumper:
+        """Change session fields of the next jumper; a recording in progress is not changed.
+
+        A bib of the start list makes the jumper of that line the next one. Another bib makes it somebody who stands in
+        no line: name and notes are cleared, and the line waits.
+        """
+        return jumpers.change_next(change).next
+
+    @router.post("/next-jumper/skip", responses=CHANGING)
+    def skip_next_jumper(turn: Turn | None = None) -> StartList:
+        """Pass over the next jumper: the following one of the start list is next, or nobody in particular."""
+        return jumpers.skip(turn or Turn())
+
+
+def _add_list(router: APIRouter, jumpers: Jumpers) -> None:
+    @router.get("/start-list")
+    def get_start_list() -> StartList:
+        """The start list, with who is next and what the last change was."""
+        return jumpers.view()
+
+    @router.put("/start-list", responses=CHANGING, openapi_extra=_TABLE)
+    async def import_start_list(request: Request) -> StartList:
+        """Replace the start list by a table (CSV) whose first line names the columns; the first jumper is next.
+
+        Columns are `bib`, `athlete` (or first and last name), `gate`, `club`, `notes` in any order, and own ones, which
+        are written into the logs too. Semicolons, commas or tabs; UTF-8, UTF-16 or Latin-1. What is wrong is refused
+        with the line and the column. `undo` brings the old list back. An empty table clears the list.
+        """
+        content = await request.body()
+        if content and not request.headers.get("content-type", "").startswith(_CSV):
+            text = f"the body must be a table: send Content-Type: {_CSV}"
+            raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
+        return await run_in_threadpool(jumpers.import_table, content)
+
+    @router.patch("/start-list", responses=CHANGING)
+    def change_rules(rules: Rules) -> StartList:
+        """Change what happens from one jumper to the next: whether the list goes on by itself, what is carried over."""
+        return jumpers.change_rules(rules)
+
+    @router.post("/start-list/undo", responses=CHANGING)
+    def undo_change(order: UndoOrder | None = None) -> StartList:
+        """Take the last change of the start list back, step by step; recordings stay as they are."""
+        return jumpers.undo(order or UndoOrder())
+
+    @router.post("/start-list/round", responses=CHANGING)
+    def begin_round(_: NoFields = None) -> StartList:
+        """Begin the next round: everybody waits, and the first of the list is next."""
+        return jumpers.begin_round()
+
+
+def _add_lines(router: APIRouter, jumpers: Jumpers) -> None:
+    @router.post("/start-list/lines", status_code=HTTPStatus.CREATED, responses=CHANGING)
+    def add_line(line: NewLine) -> StartList:
+        """Add a jumper at the end of the start list."""
+        return jumpers.add(line)
+
+    @router.patch("/start-list/lines/{line}", responses=CHANGING | refusals(404))
+    def change_line(line: LineNumber, change: LineChange) -> StartList:
+        """Change a line, or move it to another `place`."""
+        return jumpers.change_line(line, change)
+
+    @router.delete("/start-list/lines/{line}", responses=CHANGING | refusals(404))
+    def remove_line(line: LineNumber) -> StartList:
+        """Remove a line; the jumper's recordings stay."""
+        return jumpers.remove(line)
+
+    @router.post("/start-list/lines/{line}/choose", responses=CHANGING | refusals(404))
+    def choose_line(line: LineNumber, _: NoFields = None) -> StartList:
+        """Make the jumper of this line the next one; after him the list goes on with those who follow him."""
+        return jumpers.choose(line)

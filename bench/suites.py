@@ -86,6 +86,7 @@ def _jumps(seconds: float, directory: Path) -> dict[str, Any]:
     table = []
     for case in cases:
         table.append(f"{case['name']}: {case['value']} {case['unit']}, {case['baseline_is']}: {case['baseline']}")
+        table.append("  " + ", ".join(f"{step} {spent:.2f}" for step, spent in case["stages_cpu_s"].items()))
         table.append(
             f"  {case['found']} of {case['jumps']} jumps found; of points in sight {case['solved']:.1%} solved, "
             f"{case['within_0.02_m'] or 0:.1%} of them within 0.02 m"

@@ -43,11 +43,13 @@ def _case(name: str, seconds: float) -> dict[str, Any]:
     judged, took, baseline = Judged(), 0.0, 0.0
     jumps = found = 0
     said = []
+    stages = Stages()
     end = time.monotonic() + seconds
     with tempfile.TemporaryDirectory(prefix="svev-bench-") as folder:
         while not jumps or time.monotonic() < end:
             log = write_hill_log(Path(folder) / f"{name}-{jumps}", scenario_of(name, 1000 + jumps), PULSES)
-            took += cpu_s(lambda log=log: said.append(measured(log, judged)))  # type: ignore[misc]
+            stages.begin()
+            took += cpu_s(lambda log=log: said.append(measured(log, judged, told=stages.told)))  # type: ignore[misc]
             baseline += cpu_s(lambda log=log: _subtract_background(log.path))  # type: ignore[misc]
             log.path.unlink()
             jumps += 1
@@ -60,13 +62,48 @@ def _case(name: str, seconds: float) -> dict[str, Any]:
         "baseline_is": "reading the log and OpenCV's background subtraction alone",
         "jumps": jumps,
         "found": found,
+        "stages_cpu_s": {step: round(spent / jumps, 2) for step, spent in stages.spent.items()},
         **judged.figures(),
     }
 
 
-def measured(log: HillLog, judged: Judged, seen: SeenLog | None = None) -> int:
-    """Analyze a log, perhaps looked at before, and judge what was measured; returns the number of jumps found."""
-    result = analyze(log.path, read_source(log.survey, None), seen=seen).result
+class Stages:
+    """CPU time of the steps of an analysis.
+
+    Attributes:
+        spent: by step in words, s.
+    """
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = {}
+        self.begin()
+
+    def begin(self) -> None:
+        """The next analysis begins."""
+        self._last = time.process_time()
+
+    def told(self, step: str, _share: float) -> None:
+        """What was done since the last call belongs to this step."""
+        now = time.process_time()
+        self.spent[step] = self.spent.get(step, 0.0) + now - self._last
+        self._last = now
+
+
+def measured(
+    log: HillLog, judged: Judged, seen: SeenLog | None = None, told: Callable[[str, float], None] | None = None
+) -> int:
+    """Analyze a log and judge what was measured.
+
+    Args:
+        log: the log.
+        judged: takes what was measured.
+        seen: what was found in its images before.
+        told: the progress of the analysis.
+
+    Returns:
+        The number of jumps found.
+    """
+    result = analyze(log.path, read_source(log.survey, None), seen=seen, progress=told).result
     for jump in result.jumps:
         judged.jump(jump, log.truth)
     return len(result.jumps)

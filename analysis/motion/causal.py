@@ -252,6 +252,7 @@ class CausalFilter:
             used_cameras(observed, used),
             [dict(zip(GROUPS, of_pulse.tolist(), strict=True)) for of_pulse in by_hand],
             known,
+            vague=np.inf,  # the filter itself bounds what it does not know, and whoever follows needs all parts
         )
 
 

@@ -19,9 +19,9 @@ _POINT_ROWS, _SKI_ROWS, _ORIGIN_ROWS = slice(0, 12), slice(12, 16), slice(16, 19
 _QUANTITY_ROWS = slice(19, 30)
 _DEGREES = np.ones(30)
 _DEGREES[[12, 13, 14, 15, *range(19, 25)]] = np.degrees(1.0)
-#: rad. Angles follow from a state by derivatives, which hold no longer where twice the sigma is two thirds of a
-#: radian: there an angle and its sine differ by a tenth. An angle that is less certain is as good as unknown.
-_VAGUE: Final = 1 / 3
+#: rad. Angles follow from a state by derivatives, which hold no longer where twice the sigma is a radian: there
+#: an angle and its sine differ by a sixth. An angle that is less certain is as good as unknown.
+_VAGUE: Final = 1 / 2
 #: What each quantity needs, of GROUPS.
 _NEEDS: Final[Mapping[str, tuple[str, ...]]] = {
     "alpha": ("P2", "P3", "P4", "right", "left"),
@@ -44,6 +44,7 @@ def smoothed_states(
     cameras: Sequence[Mapping[str, tuple[str, ...]]],
     by_hand: Sequence[Mapping[str, bool]],
     known: Flags,
+    vague: float = _VAGUE,
 ) -> list[SmoothedState]:
     """What follows from n states.
 
@@ -56,9 +57,7 @@ def smoothed_states(
         cameras: of each pulse, by group those whose measurement was used.
         by_hand: of each pulse, by group whether a person measured any of them.
         known: (6,) which groups were ever intersected; of the others nothing is stated.
-
-    Returns:
-        The states. Skis and angles that are as good as unknown, where nothing was seen for long, are left out.
+        vague: rad; skis and angles that are less certain, where nothing was seen for long, are left out.
     """
     pick = np.r_[0:CHANNELS, CHANNELS : CHANNELS + 3]
     scale = np.concatenate((np.ones(CHANNELS), np.full(3, 1 / unit)))
@@ -71,7 +70,7 @@ def smoothed_states(
     out = by @ spread @ by.transpose(0, 2, 1)
     gradient = (by @ given)[:, _QUANTITY_ROWS]
     return [
-        _state(values[k], out[k], gradient[k], cameras[k], by_hand[k], dict(zip(GROUPS, known, strict=True)))
+        _state(values[k], out[k], gradient[k], cameras[k], by_hand[k], dict(zip(GROUPS, known, strict=True)), vague)
         for k in range(len(states))
     ]
 
@@ -116,9 +115,10 @@ def _state(
     cameras: Mapping[str, tuple[str, ...]],
     by_hand: Mapping[str, bool],
     known: Mapping[str, bool],
+    vague: float,
 ) -> SmoothedState:
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    vague = sigma > np.where(_DEGREES == 1.0, np.inf, np.degrees(_VAGUE))
+    unknown = sigma > np.where(_DEGREES == 1.0, np.inf, np.degrees(vague))
 
     def quantity(row: int) -> Quantity:
         return Quantity(float(values[row]), float(sigma[row]))
@@ -140,14 +140,14 @@ def _state(
     skis: dict[str, SkiState | None] = {}
     for i, side in enumerate(SIDES):
         up, aside = 12 + 2 * i, 13 + 2 * i
-        known = {**known, side: known[side] and not (vague[up] or vague[aside])}
+        known = {**known, side: known[side] and not (unknown[up] or unknown[aside])}
         direction = _direction(values[up], values[aside])
         correlation = float(covariance[up, aside] / (sigma[up] * sigma[aside]))
         ski = SkiState(direction, quantity(up), quantity(aside), correlation, cameras[side], status(side))
         skis[side] = ski if known[side] else None
     first = _QUANTITY_ROWS.start
     missing = [
-        bool(vague[first + i]) or not all(known[group] for group in _NEEDS.get(name, ()))
+        bool(unknown[first + i]) or not all(known[group] for group in _NEEDS.get(name, ()))
         for i, name in enumerate(QUANTITIES)
     ]
     gradient = np.where(np.array(missing)[:, None], np.nan, gradient)

@@ -17,6 +17,8 @@ from rig.arrays import Flags, Floats, Integers
 #: What the two bindings may be at a pulse: index of the point that was taken as the P3 and P4; -1: none.
 #: Both as they are, both exchanged, and what else there is.
 _CHOICES = np.array([(0, 1), (1, 0), (0, -1), (1, -1), (-1, 0), (-1, 1), (-1, -1)])
+#: What they are if their names are right, by whether there is a point of each.
+_AS_THEY_ARE = {(True, True): 0, (True, False): 2, (False, True): 5, (False, False): 6}
 _BEAM = 12  #: hypotheses that go on to the next pulse
 _FALSE = 0.05  #: share of the points taken as a binding that are none
 _WITHIN_M = 1.0  #: edge of the space in which such points were looked for
@@ -57,20 +59,26 @@ def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floa
         (t, 2) which of the two points is the one and which the other binding; -1: none, or not to be told.
     """
     there: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
+    points = there, np.nan_to_num(xyz), np.nan_to_num(covariance), strange
+    ahead = _followed(time_s, *points, bindings)
+    back = _followed(time_s[::-1], *(of_pulses[::-1] for of_pulses in points), bindings)
+    chosen = np.concatenate((ahead.chosen, back.chosen[:, ::-1]))
+    return _told(_CHOICES[chosen], np.concatenate((ahead.cost, back.cost)))
+
+
+def _followed(
+    time_s: Floats, there: Flags, xyz: Floats, covariance: Floats, strange: Floats, bindings: PathFilter
+) -> _Hypotheses:
+    """The best hypotheses about all pulses, and that all names are right as they are, from one end to the other."""
     mean, sigma = bindings.begin
-    h = _Hypotheses(
-        np.zeros(1),
-        np.zeros((1, 0), int),
-        mean[None],
-        np.diag(sigma**2)[None],
-        np.zeros((1, len(bindings.mixing[0])), bool),
-    )
+    none = np.zeros((1, len(bindings.mixing[0])), bool)
+    h = _Hypotheses(np.zeros(1), np.zeros((1, 0), int), mean[None], np.diag(sigma**2)[None], none)
     for t in range(len(time_s)):
         if t:
             state, variance = bindings.moved(h.state, h.variance, float(time_s[t] - time_s[t - 1]), h.begun)
             h = replace(h, state=state, variance=variance)
-        h = _continued(h, there[t], np.nan_to_num(xyz[t]), np.nan_to_num(covariance[t]), strange[t], bindings)
-    return _told(_CHOICES[h.chosen], h.cost)
+        h = _continued(h, there[t], xyz[t], covariance[t], strange[t], bindings)
+    return h
 
 
 def _told(names: Integers, cost: Floats) -> Integers:
@@ -83,13 +91,18 @@ def _told(names: Integers, cost: Floats) -> Integers:
 def _continued(
     h: _Hypotheses, there: Flags, xyz: Floats, covariance: Floats, strange: Floats, bindings: PathFilter
 ) -> _Hypotheses:
-    """The best hypotheses after one more pulse: there (2,), xyz (2, 3), covariance (2, 3, 3) of its points."""
+    """The best hypotheses after one more pulse: there (2,), xyz (2, 3), covariance (2, 3, 3) of its points.
+
+    The first one is that all names are right.
+    """
     options = [c for c, pair in enumerate(_CHOICES.tolist()) if all(there[p] for p in pair if p >= 0)]
     costs = np.stack([_cost(h, _CHOICES[c], there, xyz, covariance, bindings) for c in options])
     for place, option in enumerate(options):
         costs[place] += strange[option] if option < len(strange) else 0.0
+    as_they_are = options.index(_AS_THEY_ARE[bool(there[0]), bool(there[1])]) * len(h.cost)
     order = np.argsort(costs, axis=None)
-    order = order[costs.ravel()[order] < costs.min() + 2 * DECISIVE][:_BEAM]
+    order = order[(costs.ravel()[order] < costs.min() + 2 * DECISIVE) & (order != as_they_are)]
+    order = np.append(as_they_are, order[:_BEAM])
     which, came = np.unravel_index(order, costs.shape)
     state, variance, begun = h.state[came], h.variance[came], h.begun[came]
     for place, option in enumerate(options):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy.stats import chi2
 
 from analysis.candidates.model import PulseCandidates, Spots
 from analysis.identification.views import Views, gate
@@ -16,6 +17,7 @@ from rig.arrays import Floats, Integers
 
 _LIGHT = 0.25  #: standard deviation of a marker's contrast, share of it: light, background and direction change it
 _SIZE = 0.35  #: standard deviation of the logarithm of a spot's radius
+_DOUBTFUL = 0.95  #: share of true points that fit better than one that may have a wrong ray
 _ODDEST = 30.0  #: the greatest chi-square: five standard deviations may have a reason that nobody thought of
 
 
@@ -141,6 +143,7 @@ def find_space_points(views: Views, pulses: Sequence[Sequence[Rays]]) -> list[Sp
     allowed = np.array([np.inf, np.inf, *(gate(2 * count - 3) for count in range(2, m + 1))])
     rays = np.where((fits <= allowed[(full >= 0).sum(axis=1)])[:, None], full, pairs)
     both = np.unique(np.column_stack((of_pulse, rays)), axis=0)
+    both = np.unique(np.concatenate((both, _without_one(views, pulses, both))), axis=0)
     of_pulse, rays = both[:, 0], both[:, 1:]
     solved = _solve(views, pulses, of_pulse, rays)
     points = []
@@ -148,6 +151,29 @@ def find_space_points(views: Views, pulses: Sequence[Sequence[Rays]]) -> list[Sp
         own = np.flatnonzero((of_pulse == pulse) & np.isfinite(solved.misfit))
         points.append(SpacePoints(solved.xyz[own], solved.covariance[own], rays[own], solved.misfit[own]))
     return points
+
+
+def _without_one(views: Views, pulses: Sequence[Sequence[Rays]], points: Integers) -> Integers:
+    """Points (n, 1 + m), pulse and rays, of three rays or more, without a ray that may be wrong.
+
+    The marker may be hidden in one of the images, and what hides it may show a spot near its place. So rays are left
+    out whose spot another point of as many rays has too, and of points that fit badly each one in turn.
+    """
+    count = (points[:, 1:] >= 0).sum(axis=1)
+    several = points[count > 2]
+    if not len(several):
+        return np.asarray(several)
+    left_out = []
+    misfit = _solve(views, pulses, several[:, 0], several[:, 1:]).misfit
+    doubtful = misfit > chi2.ppf(_DOUBTFUL, 2 * count[count > 2] - 3)
+    for k in range(points.shape[1] - 1):
+        spot = several[:, [0, k + 1]]
+        _, of_spot, uses = np.unique(spot, axis=0, return_inverse=True, return_counts=True)
+        dropped = (spot[:, 1] >= 0) & (doubtful | (uses[of_spot.ravel()] > 1))
+        less = several[dropped]
+        less[:, k + 1] = -1
+        left_out.append(less)
+    return np.asarray(np.concatenate(left_out))
 
 
 def _epipolar_pairs(views: Views, pulses: Sequence[Sequence[Rays]]) -> tuple[Integers, Integers]:

@@ -59,9 +59,9 @@ def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floa
         (t, 2) which of the two points is the one and which the other binding; -1: none, or not to be told.
     """
     there: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
-    points = there, np.nan_to_num(xyz), np.nan_to_num(covariance), strange
-    ahead = _followed(time_s, *points, bindings)
-    back = _followed(time_s[::-1], *(of_pulses[::-1] for of_pulses in points), bindings)
+    xyz, covariance = np.nan_to_num(xyz), np.nan_to_num(covariance)
+    ahead = _followed(time_s, there, xyz, covariance, strange, bindings)
+    back = _followed(time_s[::-1], there[::-1], xyz[::-1], covariance[::-1], strange[::-1], bindings)
     chosen = np.concatenate((ahead.chosen, back.chosen[:, ::-1]))
     return _told(_CHOICES[chosen], np.concatenate((ahead.cost, back.cost)))
 

@@ -5,11 +5,12 @@ for a projective map of the image that does not depend on the distance. Measurem
 one pose of the jump, and everything after them need not know of the shake.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.candidates.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
 from analysis.measurements.model import ImageMeasurements, PointMeasurement, PulseMeasurements, SkiMeasurement
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
@@ -67,20 +68,9 @@ class Standing:
         """A second look that takes and gives places as the cameras of `system` would show them.
 
         Args:
-            look: takes and gives places in the frames (`Finder.look_for_spots`).
+            look: takes and gives places in the frames.
         """
-
-        def steady(pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
-            shake = self.shake.get(camera, {}).get(pulse)
-            if shake is None:
-                return look(pulse, camera, xy, covariance)
-            placed = self.system[camera]
-            place, _ = steadied(placed, shake.reversed(), xy[None])
-            spots = look(pulse, camera, place[0], covariance)
-            places, added = steadied(placed, shake, spots.xy)
-            return replace(spots, xy=places, covariance=spots.covariance + added)
-
-        return steady
+        return _SteadyLook(self, look)
 
     def _measurements(self, seen: PulseMeasurements, *, back: bool) -> PulseMeasurements:
         images = {}
@@ -100,6 +90,41 @@ class Standing:
         xy, added = steadied(placed, shake, image.spots.xy)
         spots: Spots = replace(image.spots, xy=xy, covariance=image.spots.covariance + added)
         return ImageCandidates(spots, tuple(_trace(placed, shake, trace) for trace in image.traces))
+
+
+class _SteadyLook:
+    """A second look at frames that shake."""
+
+    def __init__(self, standing: Standing, look: SecondLook) -> None:
+        self._standing, self._look = standing, look
+
+    def look_for_spots(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+        """See `SecondLook`."""
+        return self._steadied(
+            [pulse], camera, xy[None], lambda places: self._look.look_for_spots(pulse, camera, places[0], covariance)
+        )
+
+    def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
+        """See `SecondLook`."""
+        return self._steadied(pulses, camera, xy, lambda places: self._look.fit_discs(pulses, camera, places, shape))
+
+    def _steadied(
+        self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, look: Callable[[Floats], Spots]
+    ) -> Spots:
+        """What `look` finds at places in the frames; all spots belong to one pulse, or each to its own."""
+        shakes, placed, places = self._standing.shake.get(camera, {}), self._standing.system[camera], xy.copy()
+        if not any(pulse in shakes for pulse in pulses):
+            return look(xy)
+        for i, pulse in enumerate(pulses):
+            if pulse in shakes:
+                places[i] = steadied(placed, shakes[pulse].reversed(), xy[i : i + 1])[0][0]
+        spots = look(places)
+        found, covariance = spots.xy.copy(), spots.covariance.copy()
+        for pulse in set(pulses) & set(shakes):
+            own = np.array([p == pulse for p in pulses]) if len(pulses) > 1 else np.ones(len(spots), bool)
+            found[own], added = steadied(placed, shakes[pulse], spots.xy[own])
+            covariance[own] += added
+        return replace(spots, xy=found, covariance=covariance)
 
 
 def steadied(placed: PlacedCamera, shake: FrameShake, xy: Floats) -> tuple[Floats, Floats]:

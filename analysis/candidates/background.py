@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.scene.static_image import GreyImage, StaticImage
-from rig.arrays import Floats
+from rig.arrays import Floats, Integers
 
 _SAMPLES = 8_000  # pixels of the grid
 _ROUNDS, _CLIP = 4, 3.0  # of the robust adjustment; sigmas
@@ -73,6 +73,14 @@ class Region:
         """Whether a place of the image, px (2,), lies in it."""
         rows, columns = self.grey.shape
         return bool(self.x <= xy[0] <= self.x + columns - 1 and self.y <= xy[1] <= self.y + rows - 1)
+
+    def copy_into(self, grey: Floats, noise: Floats, first: Integers) -> None:
+        """Copy what lies in a window whose first pixel is `first` (2,), x and y in the image."""
+        rows, columns = self.grey.shape
+        x, y = int(first[0]) - self.x, int(first[1]) - self.y
+        own = slice(max(0, y), min(rows, y + len(grey))), slice(max(0, x), min(columns, x + grey.shape[1]))
+        there = slice(own[0].start - y, own[0].stop - y), slice(own[1].start - x, own[1].stop - x)
+        grey[there], noise[there] = self.grey[own], self.noise[own]
 
 
 class Background:

@@ -6,7 +6,7 @@ predicted place with its covariance, and takes weaker evidence there. Pixels tha
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from msgspec import UNSET
 from numpy.typing import NDArray
 
 from analysis.candidates.background import Background, Region
+from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs, half_size
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
 from analysis.candidates.traces import find_traces, look_for_traces
@@ -128,6 +129,39 @@ class Finder:
             if region.holds(xy):
                 return look_for_spots(region, xy, covariance, radius)
         return Spots.none()
+
+    def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
+        """Discs of known size near some places, each in an image of its own or with others in one.
+
+        Args:
+            pulses: (n) of the images, searched before, not longer ago than the memory reaches.
+            camera: its name.
+            xy: (n, 2) px.
+            shape: of the n discs.
+
+        Returns:
+            n spots; NaN where there is no such disc, or nothing was in front of the static scene.
+        """
+        half = half_size(shape)
+        first = np.rint(xy).astype(int) - half
+        side = 2 * half + 1
+        grey, noise = np.zeros((len(xy), side, side)), np.full((len(xy), side, side), np.inf)
+        for i, pulse in enumerate(pulses):
+            for region in self._regions.get((pulse, camera), ()):
+                if region.holds(xy[i]):
+                    region.copy_into(grey[i], noise[i], first[i])
+                    break
+        there = np.isfinite(noise).any(axis=(1, 2))
+        discs = fit_known_discs(
+            Windows((xy - first)[there], grey[there], noise[there]), shape.of(np.flatnonzero(there))
+        )
+        spots = Spots(
+            np.full((len(xy), 2), np.nan), np.full((len(xy), 2, 2), np.nan), shape.radius, *np.zeros((2, len(xy)))
+        )
+        spots.xy[there], spots.covariance[there] = discs.xy + first[there], discs.covariance
+        spots.contrast[there] = discs.contrast
+        spots.strength[there] = np.abs(discs.contrast) / discs.sigma_contrast
+        return spots
 
     def look_for_traces(
         self, pulse: PulseNumber, camera: str, axes: Floats, width: float, reach: float

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from analysis.candidates.known_discs import DiscShape
 from rig.arrays import Flags, Floats, Integers
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
@@ -125,8 +126,12 @@ class Expected:
 
 
 class SecondLook(Protocol):
-    """Looks for spots at a place where one is expected, on weaker evidence than at first sight."""
+    """Looks again at places of images where markers are expected (`finder.Finder`)."""
 
-    def __call__(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
-        """Spots near the predicted place xy (2,) with covariance (2, 2), px, the nearest first."""
+    def look_for_spots(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+        """Spots near the predicted place xy (2,) with covariance (2, 2), px, on weaker evidence; the nearest first."""
+        ...
+
+    def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
+        """A disc of known size near each of the places xy (n, 2), px; NaN where there is none."""
         ...

@@ -7,6 +7,7 @@ import numpy as np
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
 from analysis.identification.flights import Flight, find_flights, find_tracks
 from analysis.identification.markers import BINDINGS, follow_further, follow_markers
+from analysis.identification.refinement import refined
 from analysis.identification.ski_traces import StraightTrace, straightened
 from analysis.identification.skis import follow_skis
 from analysis.identification.space_points import Appearance
@@ -45,7 +46,7 @@ def identify(
         system: the oriented cameras.
         rate_hz: pulses per second.
         exposures_s: exposure time of each camera; all alike if left out.
-        look: looks again where a marker is expected and no spot was found (`Finder.look_for_spots`).
+        look: looks again where a marker is expected (`Finder`); it finds more of them, and centres of covered ones.
 
     Returns:
         The jumps in order, each from the first to the last pulse in which the jumper was found. None: nobody jumped.
@@ -98,6 +99,7 @@ def _measured(
         markers = follow_markers(views, window, flight)
     if look is not None:
         markers = follow_further(views, window, flight, markers, look)
+        markers = refined(views, window, flight, markers, appearance, look)
     traces = straight_traces(views, window)
     skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
     pulses = [

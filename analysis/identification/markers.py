@@ -78,6 +78,11 @@ def follow_further(views: Views, window: Window, flight: Flight, markers: Marker
     """Look again where a marker is expected and no spot was found; what is found is added to the window."""
     if not window.add(_looked(views, window, markers, look)):
         return markers
+    return settled_again(views, window, flight, markers)
+
+
+def settled_again(views: Views, window: Window, flight: Flight, markers: Markers) -> Markers:
+    """The markers of a window whose spots have changed, from those before."""
     return _settled(views, window, flight, markers.assigned.xyz, markers.assigned.covariance)
 
 
@@ -158,7 +163,7 @@ def _looked(views: Views, window: Window, markers: Markers, look: SecondLook) ->
         for t, i in np.argwhere(wanted & sight.inside.reshape(-1, n)).tolist():
             at = t * n + i
             place = sight.xy[at] - window.shift[t, k]
-            spots = look(window.candidates[t].pulse, camera, place, spread[at] + sight.noise[at])
+            spots = look.look_for_spots(window.candidates[t].pulse, camera, place, spread[at] + sight.noise[at])
             found.setdefault((t, k), []).append(spots)
     return found
 

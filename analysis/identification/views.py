@@ -57,6 +57,7 @@ class Views:
         names: of the cameras.
         placed: the cameras.
         ideal: the cameras without distortion, for `PlacedCamera.reduced` coordinates.
+        exposure_s: (m,) exposure times.
         late_s: (m,) how much later than the mean of all cameras each one shows the scene.
         centre: (3,) the point that all cameras look at.
         noise: (m,) px^2, variance of an image coordinate there, as in `Sight.noise`.
@@ -68,8 +69,8 @@ class Views:
         self.names = system.names
         self.placed: Sequence[PlacedCamera] = [system[name] for name in self.names]
         self.ideal: Sequence[IdealCamera] = [placed.ideal() for placed in self.placed]
-        middles = np.array([(exposures_s or {}).get(name, 0.0) / 2 for name in self.names])
-        self.late_s = middles - middles.mean()
+        self.exposure_s = np.array([(exposures_s or {}).get(name, 0.0) for name in self.names])
+        self.late_s = (self.exposure_s - self.exposure_s.mean()) / 2
         self.centre = _looked_at(self.ideal)
         sights = [self.see(k, self.centre[None]) for k in range(len(self.names))]
         self.noise = np.array([np.trace(sight.noise[0]) / 2 for sight in sights])

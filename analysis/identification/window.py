@@ -94,15 +94,24 @@ class Window:
             image = self.candidates[t].images[self._views.names[k]]
             more = _new(image.spots, spots)
             if len(more) > len(image.spots):
-                images = {**self.candidates[t].images, self._views.names[k]: ImageCandidates(more, image.traces)}
-                self.candidates[t] = replace(self.candidates[t], images=images)
+                self.put(t, k, more)
                 changed.add(t)
-        order = sorted(changed)
+        self.renew(sorted(changed))
+        return bool(changed)
+
+    def put(self, t: int, k: int, spots: Spots) -> None:
+        """Replace the spots of an image; `renew` makes rays and points of them."""
+        name = self._views.names[k]
+        image = self.candidates[t].images[name]
+        images = {**self.candidates[t].images, name: ImageCandidates(spots, image.traces)}
+        self.candidates[t] = replace(self.candidates[t], images=images)
+
+    def renew(self, order: Sequence[int]) -> None:
+        """Make rays and points in space of the spots of some pulses."""
         for t in order:
             self.rays[t] = self._rays(t)
         for t, points in zip(order, find_space_points(self._views, [self.rays[t] for t in order]), strict=True):
             self.points[t] = points
-        return bool(changed)
 
 
 def _new(known: Spots, found: Sequence[Spots]) -> Spots:

@@ -118,7 +118,7 @@ def analyze(
     if images:
         seen = seen or look(log, {name: scene.static[name] for name in scene.system.names}, tell)
         tell("naming points and skis", 0.0)
-        jumps = find_jumps(seen.candidates, facts, scene, steadiness, seen.finder.look_for_spots)
+        jumps = find_jumps(seen.candidates, facts, scene, steadiness, seen.finder)
         tell("naming points and skis", 1.0)
     measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, tuple(jumps))
     if by_hand is not None:

@@ -176,7 +176,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recent = recording.between(max(newest.pulse - _SOUGHT_S * rate, recording.told + 1), newest.pulse)
         cameras = recording.cameras(self._exposures)
         exposures = {name: camera.exposure_s for name, camera in cameras.items()}
-        found = identify(recent, self._scene.system, rate, exposures, finder.look_for_spots)
+        found = identify(recent, self._scene.system, rate, exposures, finder)
         if not found or len(found[-1].pulses) < _BEGIN:
             return
         follower = Follower(self._scene.system, cameras, rate)
@@ -219,7 +219,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.cameras(self._exposures),
             tuple(recording.between(max(seen[0] - around, recording.done + 1), seen[1] + around)),
             scene,
-            finder.look_for_spots,
+            finder,
         )
         recording.done = seen[1]
         self._computing.append(self._thread.submit(task.computed))

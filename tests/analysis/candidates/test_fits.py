@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from analysis.candidates.background import Background, Region
 from analysis.candidates.bar_model import Bar, pixels_around
 from analysis.candidates.bar_model import modelled as model_of_bars
+from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs
 from analysis.candidates.ski_fit import fit_bars
 from analysis.candidates.soft_discs import fit_soft_discs
 from analysis.scene.static_image import StaticImage
@@ -38,6 +40,48 @@ def test_centres_of_streaks_have_sigmas_that_hold() -> None:
     # 120 squares scatter by 2 / sqrt(120) = 0.18 about 1
     assert 0.55 < squares.mean() < 1.45
     assert abs(float(np.median(fitted.radius)) - 1.6) < 0.3
+
+
+@pytest.mark.parametrize("cover", [90.0, 215.0, 20.0], ids=["a little darker", "brighter", "much darker"])
+def test_centres_of_partly_covered_discs_have_sigmas_that_hold(cover: float) -> None:
+    """A straight border covers up to nine tenths of the diameter, from eight sides."""
+    rng = np.random.default_rng(11)
+    radius, side, count = 3.0, 29, 96
+    depths = np.tile(np.linspace(0.0, 0.9, 12), 8)  # shares of the diameter
+    angles = np.repeat(np.arange(8) * np.pi / 4 + 0.2, 12)
+    centres = (side - 1) / 2 + rng.uniform(-0.5, 0.5, (count, 2))
+    images = np.stack(
+        [
+            _covered_disc(side, centre, radius, angle, (1 - 2 * depth) * radius, cover)
+            for centre, angle, depth in zip(centres, angles, depths, strict=True)
+        ]
+    )
+    images += NOISE * rng.standard_normal(images.shape)
+    # What a fit without knowledge of the size finds is the middle of the visible part.
+    starts = centres - 0.9 * (depths * radius)[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+    shape = DiscShape(np.full(count, radius), 0.04, np.zeros((count, 2)), 130.0, 32.0)
+    found = fit_known_discs(Windows(starts, images, np.full(images.shape, NOISE)), shape)
+    clear = depths < 0.4
+    assert np.isfinite(found.xy[clear]).all()
+    off = found.xy - centres
+    there = np.asarray(np.isfinite(off).all(axis=1))
+    assert there[depths > 0.7].mean() < 0.2, "of a sliver nothing is told"
+    squares = np.einsum("ni,nij,nj->n", off[there], np.linalg.inv(found.covariance[there]), off[there]) / 2
+    assert squares.mean() < 1.5
+    assert (squares > 9).mean() <= 0.05
+    assert np.sqrt((off[clear] ** 2).mean()) < 0.1, "px: starts are off by up to 0.9"
+
+
+def _covered_disc(
+    side: int, centre: Floats, radius: float, angle: float, border: float, cover: float
+) -> NDArray[np.float64]:
+    """A bright disc on a darker ground; beyond a line at `border` px from its centre there is something else."""
+    steps = (np.arange(side * _PARTS) + 0.5) / _PARTS - 0.5
+    x, y = np.meshgrid(steps - centre[0], steps - centre[1])
+    image = np.where(np.hypot(x, y) < radius, 190.0, 60.0)
+    if border < radius:
+        image = np.where(x * np.cos(angle) + y * np.sin(angle) > border, cover, image)
+    return np.asarray(gaussian_filter(image.reshape(side, _PARTS, side, _PARTS).mean(axis=(1, 3)), 0.55))
 
 
 def test_derivatives_of_bars() -> None:

@@ -5,10 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from analysis.candidates.known_discs import DiscShape
 from analysis.candidates.model import Spots
 from analysis.identification.identify import identify
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements
 from rig.arrays import Floats
+from rig.pulse import PulseNumber
 from tests.analysis.identification.cluttered import Disturbed, Scene, scene
 from tests.analysis.simulated import RATE_HZ, SIGMA_PX, SKI_SIGMA_PX, true_cameras, true_jump
 
@@ -107,23 +109,34 @@ def test_a_marker_that_is_not_worn_is_not_found(missing: str) -> None:
     assert _share(jumps, made) > 0.95
 
 
-def test_a_second_look_adds_what_was_missed() -> None:
-    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(7), PULSES, Disturbed(5, 1, lost=0.3))
+class _SecondLook:
+    """Finds every marker that lies within 4 sigma of the expected place, and no disc in any image."""
 
-    def look(pulse: int, camera: str, xy: Floats, covariance: Floats) -> Spots:
-        """Finds every marker that lies within 4 sigma of the expected place."""
+    def look_for_spots(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+        """See `SecondLook`."""
+        placed = true_cameras()[camera]
         places = [
-            system[camera].project(marker)
-            for marker in truth.pose(pulse).markers
-            if (off := system[camera].project(marker) - xy) @ np.linalg.solve(covariance, off) < 16
+            placed.project(marker)
+            for marker in true_jump(7).pose(pulse).markers
+            if (off := placed.project(marker) - xy) @ np.linalg.solve(covariance, off) < 16
         ]
         n = len(places)
         sigma = np.tile(SIGMA_PX**2 * np.eye(2), (n, 1, 1))
         return Spots(np.reshape(places, (n, 2)), sigma, np.full(n, 1.6), np.full(n, 80.0), np.full(n, 4.0))
 
+    def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
+        """See `SecondLook`."""
+        assert camera in true_cameras().cameras
+        n = len(pulses)
+        return Spots(np.full_like(xy, np.nan), np.tile(np.eye(2), (n, 1, 1)), shape.radius, np.zeros(n), np.zeros(n))
+
+
+def test_a_second_look_adds_what_was_missed() -> None:
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(7), PULSES, Disturbed(5, 1, lost=0.3))
+
     system, truth = true_cameras(), true_jump(7)
     before = identify(made.candidates, system, RATE_HZ)
-    after = identify(made.candidates, system, RATE_HZ, None, look)
+    after = identify(made.candidates, system, RATE_HZ, None, _SecondLook())
     assert _share(after, made) > 1.25 * _share(before, made)
     for pulse in after[0].pulses:
         for camera, image in pulse.images.items():

@@ -1,0 +1,168 @@
+"""Measures the spots of named markers again as what they are: discs of one size, smeared by the flight, partly covered.
+
+Before there are names, a spot is anything symmetric, and what is left of a half covered marker is a spot whose centre
+lies on the visible side. The markers of a jumper are alike, and most of them are in full view: these tell the size.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.candidates.known_discs import BLUR_PX, DiscShape
+from analysis.candidates.model import SecondLook, Spots
+from analysis.identification.assignment import well_known
+from analysis.identification.flights import Flight
+from analysis.identification.markers import Markers, settled_again
+from analysis.identification.space_points import Appearance
+from analysis.identification.views import Sight, Views
+from analysis.identification.window import Window
+from analysis.measurements.model import POINTS
+from rig.arrays import Floats, Integers
+
+_SPREAD = 0.04  #: standard deviation of the logarithm of a marker's radius: they are made alike, cloth bends them
+_FEW = 6  #: spots of a camera that tell the size in its images; below, those of all cameras do
+_SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
+_NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
+_SURE = 1.5  #: radii; where a prediction is less certain, a disc beside it would be another one's
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Places:
+    """n places in the images of one camera.
+
+    Attributes:
+        step: (n,) index of the pulse.
+        spot: (n,) index of the spot there; -1: a predicted place without a spot.
+        xy: (n, 2) px in the image.
+        radius: (n,) px, expected.
+        streak: (n, 2) px.
+    """
+
+    step: Sequence[int]
+    spot: Sequence[int]
+    xy: Floats
+    radius: Floats
+    streak: Floats
+
+
+def refined(
+    views: Views, window: Window, flight: Flight, markers: Markers, appearance: Appearance, look: SecondLook
+) -> Markers:
+    """Fit discs of the markers' size to their spots, and where markers are expected; then name them again.
+
+    The spots of the window are replaced: covered ones move to where their whole disc is.
+    """
+    sights = [views.see(k, markers.predicted.xyz.reshape(-1, 3)) for k in range(len(views))]
+    changed: set[int] = set()
+    for k, radius in enumerate(_radii(views, window, flight, markers, sights)):
+        places = _places(views, window, flight, markers, k, sights[k], radius)
+        if not len(places.xy):
+            continue
+        shape = DiscShape(places.radius, _SPREAD, places.streak, appearance.contrast, appearance.sigma)
+        pulses = [window.candidates[t].pulse for t in places.step]
+        discs = look.fit_discs(pulses, views.names[k], places.xy, shape)
+        for t in sorted(set(places.step)):
+            own = np.flatnonzero(np.array(places.step) == t)
+            window.put(t, k, _replaced(window.candidates[t].images[views.names[k]].spots, places, discs, own))
+            changed.add(t)
+    window.renew(sorted(changed))
+    return settled_again(views, window, flight, markers)
+
+
+def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sights: Sequence[Sight]) -> list[float]:
+    """Radius of the markers, m, as each camera shows it: the median of the spots that have a name."""
+    found: list[Floats] = []
+    for k, (name, sight) in enumerate(zip(views.names, sights, strict=True)):
+        steps, which = np.nonzero(markers.assigned.rays[..., k] >= 0)
+        spots = markers.assigned.rays[steps, which, k]
+        radius = np.array(
+            [
+                window.candidates[t].images[name].spots.radius[s]
+                for t, s in zip(steps.tolist(), spots.tolist(), strict=True)
+            ]
+        )
+        at = steps * len(POINTS) + which
+        streak = _streaks(views, window, flight, k, sight, at)
+        # A streak makes the spot longer, and with it the radius of the disc of the same area.
+        more = (streak**2).sum(axis=1) / 12
+        size = (np.sqrt(more**2 + 4 * (radius**2 / 4 + BLUR_PX**2) ** 2) - more) / 2
+        found.append(2 * np.sqrt(np.maximum(size - BLUR_PX**2, _SMALLEST_PX**2 / 4)) / _scale(sight)[at])
+    everywhere = float(np.median(np.concatenate(found))) if any(len(of) for of in found) else np.nan
+    return [float(np.median(of)) if len(of) >= _FEW else everywhere for of in found]
+
+
+def _scale(sight: Sight) -> Floats:
+    """(n,) px per m."""
+    return np.asarray(np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2)))
+
+
+def _streaks(views: Views, window: Window, flight: Flight, k: int, sight: Sight, at: Integers) -> Floats:
+    """(n, 2) px that the images of markers move during the exposure; at (n,): pulse and marker as one index."""
+    velocity = flight.velocity(window.time_s)[at // len(POINTS)]
+    return np.asarray(np.einsum("nij,nj->ni", np.nan_to_num(sight.by_point[at]), velocity) * views.exposure_s[k])
+
+
+def _places(
+    views: Views, window: Window, flight: Flight, markers: Markers, k: int, sight: Sight, radius: float
+) -> _Places:
+    """Spots that have a name or lie where a marker is expected, and expected places without any."""
+    n = len(POINTS)
+    known = well_known(markers.predicted.covariance) & window.delivered[:, k, None]
+    spread = sight.by_point @ markers.predicted.covariance.reshape(-1, 3, 3) @ sight.by_point.swapaxes(-1, -2)
+    px = radius * _scale(sight)
+    sure = np.sqrt(np.trace(spread, axis1=1, axis2=2) / 2) < _SURE * px
+    found: list[tuple[int, int, int, Floats]] = []
+    for t, i in np.argwhere(known & sight.inside.reshape(-1, n)).tolist():
+        at = t * n + i
+        spots = window.candidates[t].images[views.names[k]].spots
+        place, named = sight.xy[at] - window.shift[t, k], int(markers.assigned.rays[t, i, k])
+        if named < 0 and not sure[at]:
+            continue
+        near = [named] if named >= 0 else np.flatnonzero(np.linalg.norm(spots.xy - place, axis=1) < _NEAR * px[at])
+        found += [(t, int(s), at, spots.xy[s]) for s in near]
+        if not len(near):
+            found.append((t, -1, at, place))
+    where = np.array([at for _, _, at, _ in found], int)
+    return _Places(
+        [t for t, _, _, _ in found],
+        [s for _, s, _, _ in found],
+        np.array([xy for _, _, _, xy in found]).reshape(-1, 2),
+        np.maximum(px[where], _SMALLEST_PX),
+        _streaks(views, window, flight, k, sight, where),
+    )
+
+
+def _replaced(spots: Spots, places: _Places, discs: Spots, own: Integers) -> Spots:
+    """The spots of an image with those discs instead that were found; a spot that is no disc is less certain."""
+    spots = spots.only(np.arange(len(spots)))
+    new: list[int] = []
+    moved = np.nan_to_num(np.linalg.norm(discs.xy[own] - places.xy[own], axis=1), nan=np.inf)
+    for i in own[np.argsort(moved)].tolist():
+        s, radius = places.spot[i], float(places.radius[i])
+        if not np.isfinite(discs.xy[i]).all():
+            if s >= 0:
+                spots.covariance[s] += _away(float(spots.radius[s]), radius) ** 2 * np.eye(2)
+            continue
+        others = np.delete(spots.xy, s, axis=0) if s >= 0 else spots.xy
+        if len(others) and np.linalg.norm(others - discs.xy[i], axis=1).min() < radius / 2:
+            continue
+        if s < 0:
+            new.append(i)
+            continue
+        for mine, fitted in zip(
+            (spots.xy, spots.covariance, spots.radius, spots.contrast, spots.strength),
+            (discs.xy, discs.covariance, discs.radius, discs.contrast, discs.strength),
+            strict=True,
+        ):
+            mine[s] = fitted[i]
+    return Spots.joined([spots, discs.only(np.array(new, int))]) if new else spots
+
+
+def _away(shown: float, radius: float) -> float:
+    """How far the centre of a disc may be from that of a spot which shows a part of it, or more than it, px.
+
+    A spot of the same area as what a chord leaves of the disc is so much narrower; in a larger spot the disc may lie
+    at any border.
+    """
+    return max(radius - shown**2 / radius, shown - radius, 0.0)

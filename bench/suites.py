@@ -8,6 +8,7 @@ from typing import Any
 from bench.analysis.faults import run_faults
 from bench.analysis.honesty import run_honesty
 from bench.analysis.jumps import run_jumps
+from bench.analysis.live import run_live
 from bench.analysis.repeats import run_repeats
 from bench.analysis.smoothing import run_smoothing
 from bench.photogrammetry.adjustment import run_adjustment
@@ -150,6 +151,7 @@ SUITES: dict[str, Suite] = {
     "planning": partial(_timed, "planning", run_planning),
     "jumps": _jumps,
     "jump-faults": _faults,
+    "live": lambda seconds, directory: _timed("live", lambda _: run_live(), seconds, directory),
     "jump-honesty": _honesty,
     "jump-repeats": _repeats,
 }

@@ -54,7 +54,7 @@ class Followed:
 
 
 class Follower:
-    """Follows one jumper; made by `begun`.
+    """Follows one jumper.
 
     Attributes:
         first: the first pulse in which he was seen.
@@ -66,6 +66,7 @@ class Follower:
         self._filter = CausalFilter(system, cameras, rate_hz)
         self._rate_hz = rate_hz
         self._appearance: Appearance | None = None
+        self._next: tuple[UtcNs, SmoothedState | None] = UtcNs(0), None
         self.first = self.last = PulseNumber(0)
 
     def begin(self, found: JumpMeasurements, candidates: Sequence[PulseCandidates]) -> list[Followed]:
@@ -132,7 +133,10 @@ class Follower:
         return seeing < _FEWEST_CAMERAS
 
     def _predicted(self, time: UtcNs) -> SmoothedState:
-        state = self._filter.predicted(time)
+        known, state = self._next
+        if state is None or known != time:
+            state = self._filter.predicted(time)
+            self._next = time, state
         if state is None:
             raise AssertionError("following has begun")
         return state

@@ -30,9 +30,9 @@ def bench(
     intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
     covariance; the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and
     with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump
-    measured again and again, and with another leg angle: how often a comparison finds a difference. smoothing: whether
-    the sigmas of smoothed jumps hold, with all measurements and with a marker or a ski missing for a while; about two
-    seconds a draw.
+    measured again and again, and with another leg angle: how often a comparison finds a difference. live: how soon a
+    worker tells the state of each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all
+    measurements and with a marker or a ski missing for a while; about two seconds a draw.
 
     Example: svev bench saturated --seconds 10
     """

@@ -88,12 +88,7 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
         scene: its cameras and balls.
         source: its frames.
     """
-    static = changed(scene.system, scene.changes)
-    trackers = {}
-    for name in static.names:
-        balls = {ball: known.xyz for ball, known in scene.balls.items() if name in known.images}
-        places = {ball: scene.balls[ball].images[name] for ball in balls}
-        trackers[name] = BallTracker(static[name], scene.static[name], balls, places)
+    static, trackers = changed(scene.system, scene.changes), trackers_of(scene)
     blocks = _sampled(source.pulses)
     followed = _Tracks(trackers, source)
     tracks = followed.during({pulse for block in blocks for pulse in block})
@@ -101,7 +96,7 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
     messages = []
     for name, turns in tracks.items():
         moved += _since_calibration(name, scene.changes.get(name), turns, len(blocks), len(tracks))
-        moved += _during_recording(static, trackers[name], name, turns, blocks, len(tracks))
+        moved += moves_during(static, trackers[name], name, turns, blocks, len(tracks))
         frames = sum(len(block) for block in blocks)
         if len(turns) < frames / 2:
             messages.append(
@@ -109,6 +104,26 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
                 "whether it stood still is not known for all of the recording"
             )
     return Steadiness(tuple(moved), tuple(messages), scene, followed, static)
+
+
+def trackers_of(scene: OrientedScene) -> dict[str, BallTracker]:
+    """Trackers of the balls by camera, from its static image on."""
+    static = changed(scene.system, scene.changes)
+    trackers = {}
+    for name in static.names:
+        balls = {ball: known.xyz for ball, known in scene.balls.items() if name in known.images}
+        places = {ball: scene.balls[ball].images[name] for ball in balls}
+        trackers[name] = BallTracker(static[name], scene.static[name], balls, places)
+    return trackers
+
+
+def standing_in(scene: OrientedScene) -> tuple[OrientedScene, list[CameraMove]]:
+    """A scene whose poses are those of its static images, and what has moved since its calibration."""
+    changes = {name: change for name, change in scene.changes.items() if change.p() < _CORRECTED_RISK}
+    moved = [
+        move for name, change in changes.items() for move in _since_calibration(name, change, {}, 0, len(scene.changes))
+    ]
+    return replace(scene, system=changed(scene.system, changes), changes={}), moved
 
 
 def _sampled(pulses: Sequence[PulseNumber]) -> list[list[PulseNumber]]:
@@ -145,7 +160,7 @@ class _Tracks:
         return {name: {pulse: turns[name] for pulse, turns in seen if name in turns} for name in self.trackers}
 
 
-def _during_recording(
+def moves_during(
     static: CameraSystem,
     tracker: BallTracker,
     name: str,
@@ -153,7 +168,16 @@ def _during_recording(
     pulses: Sequence[Sequence[PulseNumber]],
     cameras: int,
 ) -> list[CameraMove]:
-    """The moves of a camera between the blocks."""
+    """The moves of a camera between blocks of frames, in order.
+
+    Args:
+        static: the cameras as they stand in the static images.
+        tracker: of the balls of the camera.
+        name: of the camera.
+        turns: how it stood in single frames.
+        pulses: of the blocks.
+        cameras: number of cameras that are tested; all share the risk of a false alarm.
+    """
     seen = [[turns[pulse] for pulse in block if pulse in turns] for block in pulses]
     blocks = [
         Block(

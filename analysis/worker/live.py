@@ -18,8 +18,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.cameras.live_watch import LiveWatch
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.source import orient_from, read_source
+from analysis.cameras.steadiness import standing_in
 from analysis.candidates.finder import Finder
 from analysis.export.scene_update import camera_frames, scene_update
 from analysis.identification.identify import identify
@@ -33,12 +35,14 @@ from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
+from rig.frame import FrameStatus
 from rig.tag import TripletTag
 
 #: A jumper is sought so often, in the candidates of so long a time, and followed once so many pulses show him.
 _SEEK_S: Final = 0.1
 _SOUGHT_S: Final = 0.5
 _BEGIN: Final = 4
+_WATCH_S: Final = 1.0  #: from one look at the balls to the next
 _FEWEST_CAMERAS: Final = 2  # that show something
 #: A jump is over after so long a time without its jumper; what may belong to it is searched as far before and after.
 _OVER_S: Final = 0.7
@@ -76,6 +80,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         self._exposures = dict(exposures_s or {})
         self._scene: OrientedScene | None = None
         self._finder: Finder | None = None
+        self._watch: LiveWatch | None = None
         self._recording: Streamed | None = None
         self._said: tuple[str, ...] = ()
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="whole jump")
@@ -137,18 +142,20 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         """Orient the cameras from the triplets that wait, then measure in these."""
         try:
             static = recording.static_images()
-            self._scene, _ = orient_from(static, self._source)
+            scene, _ = orient_from(static, self._source)
         except (BadInputError, NotSolvableError, NotConvergedError) as error:
             recording.try_again()
             self._findings.message(Level.ERROR, f"the cameras are not oriented, it is tried again: {error}")
             return
-        self._finder = Finder({name: static[name] for name in self._scene.system.names})
-        if self._scene.messages != self._said:
-            self._said = self._scene.messages
-            for message in self._said:
+        self._scene, moved = standing_in(scene)
+        self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
+        said = (*scene.messages, *(move.message for move in moved))
+        if said != self._said:
+            self._said = said
+            for message in said:
                 self._findings.message(Level.INFO, message)
-        while recording.waiting:
-            self._measure(recording, self._finder, *recording.waiting.popleft())
+        while recording.waiting and (finder := self._finder) is not None:
+            self._measure(recording, finder, *recording.waiting.popleft())
 
     def _measure(self, recording: Streamed, finder: Finder, tag: TripletTag, image: NDArray[np.uint8]) -> None:
         """Follow the jumper, or look whether one comes."""
@@ -156,6 +163,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         if follower is None:
             recording.keep(finder.find(tag, image))
             self._seek(recording, finder)
+            self._look_at_balls(recording, tag, image)
         elif follower.lost(tag.pulse, tag.time):
             recording.follower = None
             recording.keep(finder.find(tag, image))
@@ -165,6 +173,21 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.saw(follower)
         if recording.follower is None and recording.unseen_s() > _OVER_S:
             self._end_jump(recording)
+
+    def _look_at_balls(self, recording: Streamed, tag: TripletTag, image: NDArray[np.uint8]) -> None:
+        """Between two jumps, watch the balls in some frames a second; orient the cameras anew if one has moved."""
+        due = tag.pulse - recording.watched >= _WATCH_S * recording.rate_hz
+        if self._watch is None or recording.seen is not None or not due:
+            return
+        frames = {c.name: image[:, slice(*c.columns)] for c in tag.cameras if c.status is FrameStatus.OK}
+        if not self._watch.look(tag.pulse, frames):
+            return
+        recording.watched = tag.pulse
+        if moves := self._watch.moves():
+            for move in moves:
+                self._findings.message(Level.WARNING, f"{move.message}; the cameras are oriented anew")
+            recording.wait_anew()
+            self._finder = self._watch = None
 
     def _seek(self, recording: Streamed, finder: Finder) -> None:
         """Begin to follow a jumper if one is in sight."""

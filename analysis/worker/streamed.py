@@ -41,6 +41,7 @@ class Streamed:
         told: last pulse whose state was told.
         done: last pulse of the last jump that was computed.
         sought: pulse at which a jumper was sought last.
+        watched: pulse at which the last look at the balls ended.
         jumps: number of jumps so far, that of the jumper who is in sight among them.
         placed: the last of them for which it was told where the cameras stand.
     """
@@ -54,7 +55,7 @@ class Streamed:
         self.seen: tuple[PulseNumber, PulseNumber] | None = None
         self.told, self.done = PulseNumber(0), PulseNumber(0)
         self.jumps = self.placed = 0
-        self.sought = PulseNumber(0)
+        self.sought = self.watched = PulseNumber(0)
         self._ready_at = first.time + round(_SPREAD_S * NS_PER_S)
 
     @property
@@ -94,8 +95,15 @@ class Streamed:
 
     def try_again(self) -> None:
         """Wait for other triplets."""
+        self._wait_for(_AGAIN_S)
+
+    def wait_anew(self) -> None:
+        """Wait for triplets for new static images."""
+        self._wait_for(_SPREAD_S)
+
+    def _wait_for(self, seconds: float) -> None:
         if self.last is not None:
-            self._ready_at = self.last.time + round(_AGAIN_S * NS_PER_S)
+            self._ready_at = self.last.time + round(seconds * NS_PER_S)
 
     def static_images(self) -> dict[str, StaticImage]:
         """The static image of each camera, from frames spread over those that wait.

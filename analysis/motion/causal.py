@@ -87,7 +87,7 @@ class CausalFilter:
             time: of the pulse.
 
         Returns:
-            A state with all points and skis, also those that were never measured: their covariance tells.
+            A state with all points, also those that were never measured: their covariance tells.
         """
         if self._frame is None:
             return None

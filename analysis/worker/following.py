@@ -33,6 +33,7 @@ from rig.pulse import PulseNumber
 _LOST_S: Final = 0.25
 #: A marker is looked for within so many standard deviations of its prediction and so many of its radii.
 _SIGMAS, _RADII = 4.0, 8.0
+_ANYHOW_DEG: Final = np.array((25.0, 15.0))  #: slope and heading of skis against the flight, standard deviations
 _FEWEST_CAMERAS: Final = 2  #: that must be able to see any of his markers
 
 _Part = TypeVar("_Part")
@@ -169,11 +170,12 @@ def _flight(state: SmoothedState, time_s: float) -> Flight:
 
 
 def _angles(state: SmoothedState, flight: Flight) -> Prediction:
-    """Slope and heading of both skis in the frame of the flight, rad."""
+    """Slope and heading of both skis in the frame of the flight, rad; along the flight if they are unknown."""
     course = np.degrees(np.arctan2(flight.axes[0, 1], flight.axes[0, 0]))
-    values, covariance = np.zeros((1, 2, 2)), np.zeros((1, 2, 2, 2))
+    values, covariance = np.zeros((1, 2, 2)), np.tile(np.diag(_ANYHOW_DEG**2), (1, 2, 1, 1))
     for i, side in enumerate(SIDES):
-        ski = _known(state.skis[side])
+        if (ski := state.skis[side]) is None:
+            continue
         values[0, i] = ski.slope.value, (ski.heading.value - course + 180.0) % 360.0 - 180.0
         sigma = np.array((ski.slope.sigma, ski.heading.sigma))
         covariance[0, i] = np.outer(sigma, sigma) * np.array(((1.0, ski.correlation), (ski.correlation, 1.0)))
@@ -182,5 +184,5 @@ def _angles(state: SmoothedState, flight: Flight) -> Prediction:
 
 def _known(part: _Part | None) -> _Part:
     if part is None:
-        raise AssertionError("a predicted state has all parts")
+        raise AssertionError("a predicted state has all points")
     return part

@@ -151,7 +151,7 @@ def test_a_worker_measures_a_replayed_log(jump: HillLog, tmp_path: Path, loopbac
     assert [state["pulse"] for state in states] == sorted({state["pulse"] for state in states})
     assert len(states) == summary["states"] > 30
     assert jumps[0]["jumps"][0]["pulses"]
-    assert sum(None not in state["angles"].values() for state in states) > 0.8 * len(states)
+    assert sum(None not in state["angles"].values() for state in states) > 0.7 * len(states)
     for state in states:
         _is_true(state, jump.truth[state["pulse"]])
 

@@ -1,14 +1,20 @@
 """Watches whether the disk keeps up with a recording: is it behind, does it hang, how many frames does that cost."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 from recorder.writing.log_writer import LogWriter
 from rig.clocks import NS_PER_S, HostNs
+from rig.errors import StorageError
 from rig.events import Event, Level
 
 #: A disk that has finished nothing for so long hangs: much longer than any disk's housekeeping takes.
-HANGS_S: Final = 2.0
+_HANGS_S: Final = 2.0
+#: A log whose disk has taken nothing for so long is given up, s.
+_HUNG_S: Final = 30.0
+#: The same if there is another disk: before the frames no longer fit into memory.
+_HUNG_WITH_OTHER_DISK_S: Final = 2 * _HANGS_S
 #: Frames may wait for the disk for so long before people are told.
 _BEHIND_NS: Final = NS_PER_S
 _MB: Final = 1e6
@@ -76,15 +82,15 @@ class DiskWatch:
         return f"{self._cause()}: {lost} frames were lost; {_REMEDY}" if lost else ""
 
     def _look_for_hanging(self, stalled_s: float) -> Iterator[Event]:
-        if stalled_s >= HANGS_S:
+        if stalled_s >= _HANGS_S:
             self._hung_s = max(self._hung_s, stalled_s)
             if not self._hanging:
                 yield Event.now(
-                    Level.ERROR, "disk", f"the disk hangs: it has taken nothing for {HANGS_S:g} s; look at `dmesg`"
+                    Level.ERROR, "disk", f"the disk hangs: it has taken nothing for {_HANGS_S:g} s; look at `dmesg`"
                 )
         elif self._hanging:
             yield Event.now(Level.WARNING, "disk", f"the disk takes data again, after {self._hung_s:.0f} s")
-        self._hanging = stalled_s >= HANGS_S
+        self._hanging = stalled_s >= _HANGS_S
 
     def _cause(self) -> str:
         return f"the disk hung for {self._hung_s:.0f} s" if self._hung_s else f"disk too slow: it took {self._rates()}"
@@ -95,3 +101,26 @@ class DiskWatch:
 
 
 _REMEDY: Final = "record to a faster disk, and let nothing else use it"
+
+
+def hung(path: Path, log: LogWriter, *, other_disk: bool) -> StorageError | None:
+    """Why a log is given up whose disk has taken nothing for long; None if it has.
+
+    Args:
+        path: the log's.
+        log: the log.
+        other_disk: whether the recording can go on there.
+    """
+    stalled = log.stalled_s()
+    if stalled <= (_HUNG_WITH_OTHER_DISK_S if other_disk else _HUNG_S):
+        return None
+    text = f"the disk has taken nothing for {stalled:.0f} s; look at `dmesg`, record to another disk"
+    return StorageError(f"{path}: {text}")
+
+
+def too_full(log: LogWriter, reserve_gb: float) -> str | None:
+    """Why a recording ends while there is still room to close its log; None if there is more."""
+    free = log.free_bytes
+    if free is None or free >= reserve_gb * 1e9:
+        return None
+    return f"only {free / 1e9:.1f} GB are free and {reserve_gb:g} GB are kept in reserve: recording stopped; make room"

@@ -13,6 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from recorder.checking.verify import verify
+from recorder.live import parts as parts_module
+from recorder.live import pulse_writer as pulse_writer_module
 from recorder.live import recording as recording_module
 from recorder.live import recordings as recordings_module
 from recorder.live.assembler import Assembler
@@ -142,7 +144,7 @@ def publisher() -> Iterator[Publisher]:
 def _recorder(path: Path, publisher: Publisher, seconds: float, limit: int) -> Iterator[Recorder]:
     clock = Clock()
     with camera_rings(RIG, slots=64) as rings, pytest.MonkeyPatch.context() as patch:
-        for module in (recording_module, recordings_module):
+        for module in (parts_module, pulse_writer_module, recording_module, recordings_module):
             patch.setattr(module, "host_now", clock.now)
         cameras, buffers = RingCameras(rings), TripletBuffers(RIG.triplet_shape, 12 + limit)
         assembler, latency = Assembler(RIG, rings, buffers), LatencyHistogram()

@@ -3,7 +3,7 @@
 A binding that is seen alone looks like the other one, and a wrong pair beside it misleads the prediction of both. So
 the points that were taken as bindings get their names once more as one path: hypotheses about all pulses compete, each
 with its own filter, and pay for what does not move as bindings do. What nearly as good hypotheses name otherwise is
-left out: it cannot be told.
+left out: it cannot be told. The hip goes with them: it is between the bindings, whichever of them is seen.
 """
 
 from dataclasses import dataclass, replace
@@ -19,6 +19,7 @@ from rig.arrays import Flags, Floats, Integers
 _CHOICES = np.array([(0, 1), (1, 0), (0, -1), (1, -1), (-1, 0), (-1, 1), (-1, -1)])
 #: What they are if their names are right, by whether there is a point of each.
 _AS_THEY_ARE = {(True, True): 0, (True, False): 2, (False, True): 5, (False, False): 6}
+_HIP = 2  #: its place among the points
 _BEAM = 12  #: hypotheses that go on to the next pulse
 _FALSE = 0.05  #: share of the points taken as a binding that are none
 _WITHIN_M = 1.0  #: edge of the space in which such points were looked for
@@ -50,10 +51,10 @@ def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floa
 
     Args:
         time_s: (t,) of the pulses.
-        xyz: (t, 2, 3) points that were taken as the one and the other binding; NaN where there is none.
-        covariance: (t, 2, 3, 3) of them.
+        xyz: (t, 3, 3) points that were taken as the one and the other binding, and the hip; NaN where there is none.
+        covariance: (t, 3, 3, 3) of them.
         strange: (t, 2) cost of both being a pair as they are, and exchanged.
-        bindings: how both move.
+        bindings: how both and the hip move.
 
     Returns:
         (t, 2) which of the two points is the one and which the other binding; -1: none, or not to be told.
@@ -91,7 +92,7 @@ def _told(names: Integers, cost: Floats) -> Integers:
 def _continued(
     h: _Hypotheses, there: Flags, xyz: Floats, covariance: Floats, strange: Floats, bindings: PathFilter
 ) -> _Hypotheses:
-    """The best hypotheses after one more pulse: there (2,), xyz (2, 3), covariance (2, 3, 3) of its points.
+    """The best hypotheses after one more pulse: there (3,), xyz (3, 3), covariance (3, 3, 3) of its points.
 
     The first one is that all names are right.
     """
@@ -107,9 +108,8 @@ def _continued(
     state, variance, begun = h.state[came], h.variance[came], h.begun[came]
     for place, option in enumerate(options):
         chosen = which == place
-        seen = _CHOICES[option] >= 0
+        seen, points = _used(_CHOICES[option], there)
         if chosen.any() and seen.any():
-            points = _CHOICES[option][seen]
             new = _updated(state[chosen], variance[chosen], seen, xyz[points], covariance[points], bindings)
             state[chosen], variance[chosen] = new
             begun[chosen] |= (bindings.mixing[seen] != 0).any(axis=0)
@@ -121,13 +121,19 @@ def _cost(
     h: _Hypotheses, choice: Integers, there: Flags, xyz: Floats, covariance: Floats, bindings: PathFilter
 ) -> Floats:
     """Costs (h,) of the hypotheses if they go on with a choice."""
-    seen = choice >= 0
+    seen, points = _used(choice, there)
     cost = h.cost + _BY_CHANCE * float(there.sum() - seen.sum())
     if not seen.any():
         return np.asarray(cost)
-    off, total, _ = _innovation(h.state, h.variance, seen, xyz[choice[seen]], covariance[choice[seen]], bindings)
+    off, total, _ = _innovation(h.state, h.variance, seen, xyz[points], covariance[points], bindings)
     squares = np.einsum("hi,hi->h", off, np.linalg.solve(total, off[..., None])[..., 0])
     return np.asarray(cost + squares + np.linalg.slogdet(2 * np.pi * total)[1])
+
+
+def _used(choice: Integers, there: Flags) -> tuple[Flags, Integers]:
+    """Which things (3,) a choice sees, the hip where it is, and the points that show them."""
+    of_things = np.append(choice, _HIP if there[_HIP] else -1)
+    return np.asarray(of_things >= 0), of_things[of_things >= 0]
 
 
 def _updated(
@@ -142,7 +148,7 @@ def _updated(
 def _innovation(
     state: Floats, variance: Floats, seen: Flags, xyz: Floats, covariance: Floats, bindings: PathFilter
 ) -> tuple[Floats, Floats, Floats]:
-    """How far points (n, 3) are from where states (h, s) expect the bindings that are seen (2,), with covariances."""
+    """How far points (n, 3) are from where states (h, s) expect the things that are seen (3,), with covariances."""
     by_state = bindings.all_of[np.repeat(seen, 3)]
     total = by_state @ variance @ by_state.T
     for i, own in enumerate(covariance):

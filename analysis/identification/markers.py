@@ -30,8 +30,13 @@ _ANYWHERE_M = 100.0
 _VELOCITY_M_S, _ACCELERATION_M_S2 = 6.0, 15.0  #: of a part of the body against the flight, standard deviations
 _LIMBS_M_S2 = 25.0  #: change of the acceleration of helmet and hip within 0.1 s
 _FEET_M_S2 = 15.0  #: of the bindings: they follow the table and then the flight
-_HALF_GAP_M = 0.24  #: from the midpoint to a binding
-_GAP_SIGMA = (0.1, 1.0, 5.0)  #: of it, m, m/s, m/s^2
+_HALF_GAP_M = 0.22  #: from the midpoint to a binding: 0.16 m in the tracks of the table, up to 0.3 m in flight
+_GAP_SIGMA = (0.07, 1.0, 5.0)  #: of it, m, m/s, m/s^2
+_HIP = 1  #: index of P2 in `POINTS`
+_HIP_M = 0.05  #: of a point that was taken as the hip, standard deviation beside its own
+#: From the midpoint of the bindings to the hip, standard deviations: m, m/s, m/s^2 and its change within 0.1 s. Along and
+#: up it moves as legs stretch; aside the body hardly leans.
+_HIP_FREE, _HIP_ASIDE = (1.0, 4.0, 25.0, 25.0), (0.08, 0.4, 2.0, 3.0)
 _GAP_M_S2 = 4.0  #: change of its acceleration within 0.1 s
 _LEAST_PAIRS = 3
 _MOST_TURNS = 12
@@ -105,14 +110,33 @@ def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covarian
 
 def _names(window: Window, flight: Flight, assigned: Assigned) -> Integers:
     """Names (t, 2) of the bindings as one path; as they are where there are hardly any pairs that tell the sides."""
-    xyz, covariance = assigned.xyz[:, BINDINGS], assigned.covariance[:, BINDINGS]
-    there: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
+    there: Flags = np.asarray(np.isfinite(assigned.xyz[:, BINDINGS]).all(axis=2))
     if np.count_nonzero(np.all(there, axis=1)) < _LEAST_PAIRS:
         return np.broadcast_to(_AS_THEY_ARE, there.shape)
-    bindings = PathFilter(3, [_parts(flight)[i] for i in BINDINGS], _MIXING[np.ix_(BINDINGS, BINDINGS)])
-    apart = np.nan_to_num(xyz[:, 1] - xyz[:, 0]) @ flight.axes.T
+    things = [*BINDINGS, _HIP]
+    xyz = assigned.xyz[:, things] @ flight.axes.T
+    covariance = flight.axes @ assigned.covariance[:, things] @ flight.axes.T
+    covariance[:, -1] += _HIP_M**2 * np.eye(3)
+    apart = np.nan_to_num(xyz[:, 1] - xyz[:, 0])
     strange = np.stack([implausibility(BINDINGS[0], BINDINGS[1], difference) for difference in (apart, -apart)], axis=1)
-    return name_bindings(window.time_s, xyz, covariance, np.maximum(strange - USUAL, 0.0), bindings)
+    return name_bindings(window.time_s, xyz, covariance, np.maximum(strange - USUAL, 0.0), _legs(flight))
+
+
+def _legs(flight: Flight) -> PathFilter:
+    """How bindings and hip move, in the frame of the flight: midpoint, half way between, and from there to the hip."""
+    path = np.stack((flight.place(flight.middle_s + np.zeros(1))[0], flight.motion[1])) @ flight.axes.T
+    anywhere = (_ANYWHERE_M, _VELOCITY_M_S, _ACCELERATION_M_S2)
+    gap = np.array(((0.0, _HALF_GAP_M, 0.0), (0.0, 0.0, 0.0)))
+    sigma = tuple(np.array((free, aside, free)) for free, aside in zip(_HIP_FREE, _HIP_ASIDE, strict=True))
+    return PathFilter(
+        3,
+        [
+            Part(path, anywhere, _FEET_M_S2),
+            Part(gap, _GAP_SIGMA, _GAP_M_S2),
+            Part(np.zeros((2, 3)), (sigma[0], sigma[1], sigma[2]), sigma[3]),
+        ],
+        np.array([(1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 0.0, 1.0)]),
+    )
 
 
 def _renamed(assigned: Assigned, names: Integers) -> tuple[Floats, Floats]:

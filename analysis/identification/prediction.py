@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from rig.arrays import Flags, Floats
 
@@ -20,13 +21,13 @@ class Part:
 
     Attributes:
         begin: (2, d) value and velocity before anything is measured, in units and units per s.
-        sigma: standard deviations of value, velocity and acceleration then.
-        jerk: by how much the acceleration changes within 0.1 s, standard deviation, units per s^2.
+        sigma: standard deviations of value, velocity and acceleration then, each a number or one (d,) by coordinate.
+        jerk: by how much the acceleration changes within 0.1 s, standard deviation, units per s^2; likewise.
     """
 
     begin: Floats
-    sigma: tuple[float, float, float]
-    jerk: float
+    sigma: tuple[float | Floats, float | Floats, float | Floats]
+    jerk: float | Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,9 +81,9 @@ class PathFilter:
 
     def __init__(self, d: int, parts: Sequence[Part], mixing: Floats) -> None:
         self._d, self.mixing = d, mixing
-        self._jerk = np.array([part.jerk**2 / 0.1 for part in parts])
+        self._jerk = [np.broadcast_to(part.jerk, d) ** 2 / 0.1 for part in parts]
         mean = np.concatenate([np.concatenate((part.begin.ravel(), np.zeros(d))) for part in parts])
-        self.begin = mean, np.concatenate([np.repeat(part.sigma, d) for part in parts])
+        self.begin = mean, np.concatenate([np.broadcast_to(s, d) for part in parts for s in part.sigma])
         self._movements: dict[float, tuple[Floats, Floats]] = {}
         self.all_of = np.kron(mixing, np.kron([[1.0, 0.0, 0.0]], np.eye(d)))
 
@@ -99,7 +100,7 @@ class PathFilter:
                     [size**3 / 6, sign * size**2 / 2, size],
                 ]
             )
-            noise = np.kron(np.diag(self._jerk), np.kron(rows, eye))
+            noise = block_diag(*(np.kron(rows, np.diag(jerk)) for jerk in self._jerk))
             self._movements[dt] = np.asarray(move, float), np.asarray(noise, float)
         return self._movements[dt]
 

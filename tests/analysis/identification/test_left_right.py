@@ -15,15 +15,16 @@ _HIDDEN = slice(5, 14)  # the pulses in which only P3 is in sight
 def _bindings() -> PathFilter:
     path = np.array([[17.0, 0.0, -1.5], [26.0, 0.0, -6.0]])
     gap = np.stack((0.24 * _LEFT, 0.0 * _LEFT))
-    parts = [Part(path, (100.0, 6.0, 15.0), 15.0), Part(gap, (0.1, 1.0, 5.0), 4.0)]
-    return PathFilter(3, parts, np.array([[1.0, -1.0], [1.0, 1.0]]))
+    hip = Part(np.zeros((2, 3)), (np.array((1.0, 0.08, 1.0)), np.array((4.0, 0.4, 4.0)), 5.0), 5.0)
+    parts = [Part(path, (100.0, 6.0, 15.0), 15.0), Part(gap, (0.07, 1.0, 5.0), 4.0), hip]
+    return PathFilter(3, parts, np.array([(1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 0.0, 1.0)]))
 
 
 def _flight(seed: int) -> tuple[Floats, Floats, Floats]:
-    """Times, measured P3 and P4 (t, 2, 3), and the cost of pairs: an exchanged one does not look like a body."""
+    """Times, measured P3, P4 and hip (t, 3, 3), and the cost of pairs: an exchanged one does not look like a body."""
     time_s = np.arange(_PULSES) / 30.0
     middle = np.stack((26.0 * time_s, 0.0 * time_s, -4.9 * time_s**2), axis=1)
-    xyz = np.stack((middle - 0.24 * _LEFT, middle + 0.24 * _LEFT), axis=1)
+    xyz = np.stack((middle - 0.24 * _LEFT, middle + 0.24 * _LEFT, middle + np.array((-0.3, 0.05, 0.6))), axis=1)
     noise = np.random.default_rng(seed).normal(0.0, _SIGMA_M, xyz.shape)
     return time_s, xyz + noise, np.tile((0.0, 60.0), (_PULSES, 1))
 
@@ -46,7 +47,7 @@ def test_a_run_of_lone_bindings_with_the_wrong_name_gets_the_right_one() -> None
         time_s, xyz, strange = _flight(seed)
         xyz[_HIDDEN, 1] = xyz[_HIDDEN, 0]
         xyz[_HIDDEN, 0] = np.nan
-        # a wrong point beside one of them, as far away as a binding is: it pretends to be a pair
+        # A wrong point beside one of them, as far away as a binding is: it pretends to be a pair
         xyz[9, 0] = xyz[9, 1] - (0.05, 0.3, -0.1)
         named = _named(xyz, time_s, strange)
         assert all(pair in ([1, -1], [-1, -1]) for pair in named[_HIDDEN]), "never the wrong name"
@@ -57,7 +58,7 @@ def test_a_run_of_lone_bindings_with_the_wrong_name_gets_the_right_one() -> None
 def test_pairs_that_are_exchanged_in_some_pulses_are_set_right() -> None:
     time_s, xyz, strange = _flight(2)
     for t in (3, 17, 18, 30):
-        xyz[t] = xyz[t, ::-1].copy()
+        xyz[t, :2] = xyz[t, 1::-1].copy()
         strange[t] = strange[t, ::-1].copy()
     assert _named(xyz, time_s, strange) == [[1, 0] if t in (3, 17, 18, 30) else [0, 1] for t in range(_PULSES)]
 

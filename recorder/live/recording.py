@@ -155,8 +155,9 @@ class Recording:
             self._assembler.pairer.hurry(self._end)
 
     def stop(self) -> None:
-        """End with the last pulse that has fired until now."""
-        self._end, self._stopped = host_now(), True
+        """End with the last pulse that has fired until now, or before if that was planned."""
+        now = host_now()
+        self._end, self._stopped = now if self._end is None else min(self._end, now), True
 
     def end_now(self) -> None:
         """End with the last pulse that was handed to the log."""

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, Route, expect
 
 from rig.errors import StateForbidsError
 from rig.frame import FrameStatus
-from rig.status import LastJump, MeasuredValue, Recording, RecordingOrder, State
+from rig.status import LastJump, Level, MeasuredValue, Recording, RecordingOrder, State, Statement, Status
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK
 from tests.support.loopback import Loopback
@@ -73,7 +73,7 @@ def test_an_unready_rig_offers_to_arm_and_nothing_else(panel: Panel, open_page: 
     expect(page.locator("#preview")).to_have_class(re.compile("dark"))
     page.locator("#next-step").click()
     expect(page.locator("#state-word")).to_have_text("Armed")
-    expect(page.locator("#next-step")).to_have_text("Record")
+    expect(page.locator("#next-step")).to_have_text("RecordNo name")
 
 
 @pytest.mark.parametrize(
@@ -174,32 +174,148 @@ def test_the_focus_stays_on_a_recording_when_the_list_is_drawn_anew(
     expect(link).to_be_focused()
 
 
-def test_session_fields_carry_over_and_the_next_jumper_clears_who(
+def test_who_jumps_is_taken_at_the_start_and_conditions_carry_over(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
     service.arm()
     page = open_page(panel.url)
     page.get_by_role("textbox", name="Bib").fill("7")
     page.get_by_role("textbox", name="Wind").fill("1 m/s")
-    page.reload()
-    expect(page.get_by_role("textbox", name="Bib")).to_have_value("7")
     page.locator("#next-step").click()
-    expect(page.locator("#session-title")).to_have_text("This jump")
-    page.get_by_role("textbox", name="Notes").fill("long")
-    page.keyboard.press("Tab")
-    wait_until(
-        lambda: (recording := service.status().recording) is not None and recording.session.notes == "long", "the notes"
-    )
-    page.get_by_role("button", name="Next jumper").click()
-    expect(page.get_by_role("textbox", name="Bib")).to_be_focused()
+    expect(page.locator("#jumping")).to_have_text("Being recorded: 7")
     expect(page.get_by_role("textbox", name="Bib")).to_have_value("")
-    page.keyboard.type("8")
-    page.keyboard.press("Tab")
+    page.get_by_role("textbox", name="Bib").fill("8")
+    page.get_by_role("textbox", name="Notes").fill("long")
+    page.reload()
+    expect(page.get_by_role("textbox", name="Bib")).to_have_value("8")
+    expect(page.locator("#next-step small")).to_have_text("")
     page.locator("#next-step").click()
-    expect(page.locator("#state-word")).to_have_text("Armed")
+    expect(page.locator("#next-step small")).to_have_text("8")
     expect(page.get_by_role("textbox", name="Wind")).to_have_value("1 m/s")
     (saved,) = service.catalogue.entries()
-    assert (saved.session["bib"], saved.session["wind"], saved.session["notes"]) == ("7", "1 m/s", "long")
+    assert (saved.session["bib"], saved.session["wind"], saved.session["notes"]) == ("7", "1 m/s", "")
+    page.get_by_role("button", name="Somebody else").click()
+    expect(page.get_by_role("textbox", name="Bib")).to_be_focused()
+    expect(page.get_by_role("textbox", name="Bib")).to_have_value("")
+
+
+def test_what_is_typed_while_a_jumper_begins_is_never_the_next_ones(
+    panel: Panel, service: MemoryService, client: httpx.Client, open_page: Open
+) -> None:
+    """Two devices: one types about a jumper, the other one records him."""
+    service.arm()
+    service.jumpers.import_table(b"bib;athlete\n1;Anna\n2;Berit\n3;Cecilie\n")
+    page = open_page(panel.url)
+    athlete = page.get_by_role("textbox", name="Athlete", exact=True).first
+    expect(athlete).to_have_value("Anna")
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    page.route("**/api/next-jumper", hold)
+    with page.expect_request("**/api/next-jumper"):
+        athlete.fill("Anna Marie")  # and is being sent
+    made = service.start_recording(RecordingOrder())
+    expect(page.locator("#jumping")).to_have_text("Being recorded: 1 \N{MIDDLE DOT} Anna")
+    held[0].continue_()
+    page.unroute("**/api/next-jumper")
+    snack = page.locator("#snacks")
+    expect(snack).to_contain_text("1 \N{MIDDLE DOT} Anna began to jump while this was written: Anna Marie")
+    expect(page.get_by_role("textbox", name="Bib").first).to_have_value("2")
+    expect(athlete).to_have_value("Berit")
+    snack.get_by_role("button", name="Write it into his jump").click()
+    expect(page.locator("#jumping")).to_contain_text("Anna Marie")
+
+    # While somebody types, the others' edits reach all fields but his, and of one field the last edit counts.
+    athlete.focus()
+    page.keyboard.type("x")
+    client.patch("/api/next-jumper", json={"gate": "9"}).raise_for_status()
+    expect(page.get_by_role("textbox", name="Gate")).to_have_value("9")
+    expect(athlete).to_have_value("Beritx")
+    wait_until(lambda: service.jumpers.view().next.session.athlete == "Beritx", "it is sent while he types", 10)
+    client.patch("/api/next-jumper", json={"athlete": "Berit"}).raise_for_status()
+    page.keyboard.press("Tab")
+    expect(athlete).to_have_value("Berit")
+    current = service.status().recording
+    assert current is not None
+    assert (current.id, current.session.athlete) == (made.id, "Anna Marie")
+
+
+def test_a_start_list_on_two_phones(panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path) -> None:
+    table = tmp_path / "list.csv"
+    table.write_bytes("Startnr;Navn;Klubb\r\n17;Åse Bjørk;Lyn\r\n18;Berit;\r\n19;Cecilie;\r\n".encode("cp1252"))
+    first = open_page(panel.url, width=360, height=780, has_touch=True, is_mobile=True)
+    second = open_page(panel.url, width=360, height=780, locale="nb-NO", has_touch=True, is_mobile=True)
+    first.get_by_role("button", name="Edit").tap()
+    (tmp_path / "wrong.csv").write_text("bib;athlete;recording\n1;A;B\n")
+    first.locator("#list-file").set_input_files(tmp_path / "wrong.csv")
+    expect(first.get_by_role("alert")).to_contain_text('The list was not loaded. column "recording" has a name')
+    first.locator("#list-file").set_input_files(table)
+    following = second.locator("#list-rows [aria-current]")
+    expect(following).to_contain_text("17Åse Bjørk")
+    second.get_by_role("button", name="Hopp over").tap()
+    expect(first.locator("#list-rows [aria-current]")).to_contain_text("18Berit")
+    expect(first.locator("#list-undone")).to_have_text("17 Åse Bjørk was skipped")
+    first.get_by_role("button", name="Undo").tap()
+    expect(following).to_contain_text("17Åse Bjørk")
+    second.locator("#list-rows button", has_text="Cecilie").tap()
+    expect(first.get_by_role("textbox", name="Athlete", exact=True).first).to_have_value("Cecilie")
+    first.get_by_role("button", name="Move Cecilie up").tap()
+    expect(second.locator("#list-rows li")).to_contain_text(["17", "19", "18"])
+    first.locator("#list-bib").fill("20")
+    first.locator("#list-athlete").fill("Eva")
+    first.get_by_role("button", name="Add").tap()
+    expect(second.locator("#list-rows li")).to_have_count(4)
+    first.get_by_role("button", name="Remove Eva").tap()
+    expect(second.locator("#list-rows li")).to_have_count(3)
+    for page in (first, second):
+        assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+        assert page.evaluate("document.documentElement.scrollWidth") == 360
+
+
+def test_a_second_tap_is_said_beside_the_button_and_a_long_press_stops(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page(panel.url)
+    button = page.locator("#next-step")
+    expect(button).to_be_enabled()
+    button.click()
+    expect(button).to_have_text("Stophold to stop")
+    button.click()
+    expect(page.locator("#action-reason")).to_contain_text("has only just begun and goes on. Hold the button")
+    assert service.state is State.RECORDING
+    box = button.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 40, box["y"] + 40)
+    page.mouse.down()
+    expect(page.locator("#state-word")).to_have_text("Armed")
+    page.mouse.up()
+    expect(button).to_be_disabled()
+    assert len(service.catalogue.entries()) == 1
+    expect(page.locator("#snacks [data-level=error]")).to_have_count(0)
+
+
+def test_no_camera_is_not_green_and_old_news_hides_nothing_new(
+    panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = service.status
+    service.arm()
+
+    def with_trouble() -> Status:
+        none = Statement(level=Level.ERROR, code="state_armed_none", text="armed, but none of the 3 cameras delivers")
+        old = Statement(
+            level=Level.ERROR, code="recording_ended", text="recording jump-1 ended early: the disk is full"
+        )
+        return usual().model_copy(update={"statement": none, "notice": old})
+
+    monkeypatch.setattr(service, "status", with_trouble)
+    page = open_page(panel.url)
+    expect(page.locator("#state-text")).to_contain_text("none of the 3 cameras delivers")
+    expect(page.locator("#state-notice")).to_contain_text("jump-1 ended early")
+    colour = "e => getComputedStyle(e).backgroundColor"
+    assert page.locator("#state").evaluate(colour) == "rgb(255, 179, 0)", "the colour of a fault"
 
 
 def test_the_preview_runs_only_while_it_is_looked_at(panel: Panel, service: MemoryService, open_page: Open) -> None:

@@ -18,7 +18,7 @@ MODULES = sorted(PAGE.rglob("*.js"))
 EVERYTHING = sorted(path for path in PAGE.rglob("*") if path.is_file())
 WORDS = re.compile(r'^  "([\w.]+)": "(.*)",$', re.MULTILINE)
 #: Keys that are put together in the code, by their beginnings.
-COMPOSED = ("state.", "actions.wait_", "camera.", "status.", "field.", "doctor.")
+COMPOSED = ("state.", "actions.wait_", "camera.", "status.", "field.", "doctor.", "list.")
 
 
 def _words(language: str) -> dict[str, str]:

@@ -9,6 +9,7 @@ import { startHealth } from "./live/health.js";
 import { startMeasured } from "./live/measured.js";
 import { startPreview } from "./live/preview.js";
 import { startSession } from "./live/session.js";
+import { startStartList } from "./live/startlist.js";
 import { startState } from "./live/state.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
@@ -51,7 +52,7 @@ async function begin() {
 
 startSettings(redraw);
 startLanguage();
-for (const start of [startState, startSession, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
+for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
 for (const start of [doctor.startDoctor, recordings.startRecordings, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
 startLogin(() => location.reload());
 startRouter(entered);

@@ -5,17 +5,27 @@
  */
 
 import { say, t } from "../i18n/i18n.js";
-import { call, recordingPath } from "../shared/api.js";
+import { call, Problem, recordingPath } from "../shared/api.js";
 import { $, icon, make, setIcon, setText } from "../shared/dom.js";
 import { quantity, who } from "../shared/format.js";
 import { go } from "../shared/router.js";
 import { tell, tellProblem } from "../shared/snacks.js";
 import { known, update, watch } from "../shared/store.js";
-import { sessionFields } from "./session.js";
+import { flush } from "./session.js";
+import { onLongPress, seen, startTaps, waits, wantsLongPress } from "./taps.js";
 
 /** Closing a log may wait for a slow disk. */
 const STOP_DEADLINE_MS = 40_000;
 const LEAST_PREROLL_S = 0.2;
+
+/** How long the reason is shown why a tap did nothing. */
+const REASON_MS = 5_000;
+/** Refusals of taps that were hardly meant: said beside the button, and no error. */
+const SECOND_TAPS = ["changed_meanwhile", "too_soon", "confirm_first"];
+
+/** Why the last tap did nothing. */
+let refused = "";
+let refusedTimer = 0;
 
 /** @typedef {{ words: string, icon: string, busy: string, action: () => Promise<void> }} Step */
 
@@ -24,7 +34,7 @@ const NEXT = {
   idle: { words: "actions.arm", icon: "armed", busy: "actions.arming", action: arm },
   fault: { words: "actions.arm_again", icon: "armed", busy: "actions.arming", action: arm },
   armed: { words: "actions.record", icon: "recording", busy: "actions.starting", action: record },
-  recording: { words: "actions.stop", icon: "stop", busy: "actions.stopping", action: stop },
+  recording: { words: "actions.stop", icon: "stop", busy: "actions.stopping", action: () => stop(false) },
   arming: null,
   disarming: null,
   unknown: null,
@@ -34,18 +44,26 @@ export function startActions() {
   $("next-step").addEventListener("click", nextStep);
   $("save-last").addEventListener("click", saveLast);
   $("disarm").addEventListener("click", disarm);
+  onLongPress($("next-step"), () => stopsByLongPress() && possible(), () => void perform("actions.stopping", () => stop(true)));
+  startTaps(draw);
   watch(draw);
+}
+
+function stopsByLongPress() {
+  return known.status?.state === "recording" && wantsLongPress();
 }
 
 /** Take the next step, which the big button names. */
 export function nextStep() {
   const step = NEXT[known.status?.state ?? "unknown"];
-  if (step && possible()) void perform(step.busy, step.action);
+  if (!step || !possible() || waits() && !stopsByLongPress()) return;
+  if (stopsByLongPress()) refuse(t("actions.hold_to_stop"));
+  else void perform(step.busy, step.action);
 }
 
 /** Record the seconds that are held in memory. */
 export function saveLast() {
-  if (known.status?.state === "armed" && possible() && held() >= LEAST_PREROLL_S) void perform("actions.saving", save);
+  if (known.status?.state === "armed" && possible() && !waits() && held() >= LEAST_PREROLL_S) void perform("actions.saving", save);
 }
 
 /** Close the cameras. */
@@ -58,16 +76,22 @@ async function arm() {
 }
 
 async function record() {
-  await call("POST", "recordings", sessionFields());
+  const order = { seen: seen() };
+  await flush();
+  await call("POST", "recordings", order);
 }
 
-async function stop() {
+/** @param {boolean} confirm whether it was a long press */
+async function stop(confirm) {
   const id = known.status?.recording?.id;
-  if (id) announce(await call("POST", recordingPath(id, "/stop"), undefined, STOP_DEADLINE_MS));
+  if (id) announce(await call("POST", recordingPath(id, "/stop"), { seen: seen(), confirm }, STOP_DEADLINE_MS));
 }
 
 async function save() {
-  announce(await call("POST", "recordings", { ...sessionFields(), duration_s: 0 }, STOP_DEADLINE_MS));
+  const order = { seen: seen(), duration_s: 0 };
+  await flush();
+  const { id } = await call("POST", "recordings", order, STOP_DEADLINE_MS);
+  announce(await call("POST", recordingPath(id, "/stop"), undefined, STOP_DEADLINE_MS)); // answers when it is whole
 }
 
 /** @param {import("../shared/types.js").Recording} recording */
@@ -89,10 +113,23 @@ async function perform(words, action) {
     await action();
     update({ status: await call("GET", "status"), heard: Date.now() });
   } catch (error) {
-    tellProblem(error);
+    if (error instanceof Problem && SECOND_TAPS.includes(error.code)) refuse(say({ code: error.code, text: error.message }).text);
+    else tellProblem(error);
   } finally {
     update({ busy: "" });
   }
+}
+
+/**
+ * Say beside the button why a tap did nothing.
+ *
+ * @param {string} words
+ */
+function refuse(words) {
+  refused = words;
+  clearTimeout(refusedTimer);
+  refusedTimer = setTimeout(() => { refused = ""; draw(); }, REASON_MS);
+  draw();
 }
 
 function possible() {
@@ -111,24 +148,39 @@ function draw() {
   const state = known.status?.state ?? "unknown";
   const step = NEXT[state];
   const words = known.busy || step?.words || `actions.wait_${state}`;
-  drawButton($("next-step"), known.busy || !step ? "arming" : step.icon, t(words));
+  drawButton($("next-step"), known.busy || !step ? "arming" : step.icon, t(words), known.busy ? "" : more(state));
   $("next-step").dataset.step = step ? state : "wait";
-  $("next-step").disabled = !step || !possible();
+  const heldUp = Boolean(step) && waits() > 0 && !stopsByLongPress();
+  $("next-step").disabled = !step || !possible() || heldUp;
+  $("next-step").classList.toggle("waits", heldUp);
   $("next-step").setAttribute("aria-busy", String(Boolean(known.busy) || !step));
   $("save-last").hidden = state !== "armed";
   const nothingHeld = held() < LEAST_PREROLL_S;
   drawButton($("save-last"), "save", t("actions.save_last"), quantity(held(), 1, "s"));
-  $("save-last").disabled = !possible() || nothingHeld;
+  $("save-last").disabled = !possible() || nothingHeld || waits() > 0;
   $("disarm").hidden = !mayDisarm();
   $("disarm").disabled = !possible();
   setText($("disarm"), t(state === "arming" ? "actions.cancel" : "actions.disarm"));
-  drawReason(state === "armed" && nothingHeld);
+  drawReason(state === "armed" && nothingHeld && !known.status?.pulses.arriving);
+}
+
+/**
+ * What stands below the word on the big button: whom it records, how it stops, or how long it waits.
+ *
+ * @param {string} state
+ */
+function more(state) {
+  if (stopsByLongPress()) return t("actions.hold");
+  if (waits() > 0) return t("actions.wait", { seconds: Math.ceil(waits()) });
+  if (state !== "armed" || !known.status) return "";
+  return who(known.status.next_jumper.session, t("recordings.nobody"));
 }
 
 /** @param {boolean} nothingHeld */
 function drawReason(nothingHeld) {
   let reason = "";
   if (!known.connected) reason = t("actions.no_connection");
+  else if (refused) reason = refused;
   else if (nothingHeld && !known.busy) reason = t("actions.nothing_held");
   setText($("action-reason"), reason);
   $("action-reason").hidden = !reason;

@@ -19,12 +19,22 @@ function draw() {
   document.title = `${t(`state.${state}`)} – Svev`;
   for (const element of [$("state"), $("pill")]) {
     element.dataset.state = state;
+    element.dataset.level = status?.statement.level ?? "";
     setIcon(element.querySelector("svg"), ICONS[state]);
   }
   setText($("state-word"), t(`state.${state}`));
   setText($("state-text"), inWords());
   $("state-text").dataset.level = status?.statement.level ?? "";
+  drawNotice();
   drawTime();
+}
+
+/** What befell the last recording, where the state has something else to say. */
+function drawNotice() {
+  const { status } = known;
+  const notice = status?.notice && status.notice.code !== status.statement.code ? status.notice : null;
+  $("state-notice").hidden = !notice;
+  setText($("state-notice"), notice ? asSentence(say(notice).text) : "");
 }
 
 function inWords() {

@@ -33,14 +33,14 @@ export function onTokenNeeded(action) {
  *
  * @param {string} method
  * @param {string} path below /api/
- * @param {object} [body] sent as JSON
+ * @param {object} [body] sent as JSON; an ArrayBuffer as a table (CSV)
  * @param {number} [deadlineMs] time after which the call counts as unanswered
  * @returns {Promise<any>} the answer's JSON; null if it has none
  * @throws {Problem}
  */
 export async function call(method, path, body, deadlineMs = DEADLINE_MS) {
   /** @type {RequestInit} */
-  const content = body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
+  const content = body === undefined ? {} : contentOf(body);
   let answer;
   try {
     answer = await fetch(`./api/${path}`, {
@@ -56,6 +56,15 @@ export async function call(method, path, body, deadlineMs = DEADLINE_MS) {
   const problem = await asProblem(answer);
   if (problem.status === 401 && path !== "login") whenTokenIsNeeded();
   throw problem;
+}
+
+/**
+ * @param {object} body
+ * @returns {RequestInit}
+ */
+function contentOf(body) {
+  if (body instanceof ArrayBuffer) return { headers: { "Content-Type": "text/csv" }, body };
+  return { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
 }
 
 /**

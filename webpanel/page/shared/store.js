@@ -1,6 +1,6 @@
 /**
  * What the page knows at present: parts of the page watch it, and draw themselves anew when it changes. And what the
- * browser remembers between visits: look, language, session fields, nothing secret.
+ * browser remembers between visits: look and language, nothing secret.
  *
  * @typedef {import("./types.js").Status} Status
  *

@@ -22,6 +22,7 @@ from bench.recording.parts import run_parts
 from bench.results import write_results
 from bench.service.api import run_api
 from bench.service.catalogue import run_catalogue
+from bench.service.listing import run_listing
 from recorder.publishing.subscriber import free_address
 
 Suite = Callable[[float, Path], dict[str, Any]]
@@ -146,6 +147,7 @@ SUITES: dict[str, Suite] = {
     "parts": _parts,
     "api": _api,
     "catalogue": lambda seconds, directory: _timed("catalogue", lambda _: run_catalogue(directory), seconds, directory),
+    "listing": lambda seconds, directory: _timed("listing", lambda _: run_listing(directory), seconds, directory),
     "adjustment": partial(_timed, "adjustment", run_adjustment),
     "intersection": _intersection,
     "planning": partial(_timed, "planning", run_planning),

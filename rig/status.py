@@ -10,7 +10,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
+from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
 
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
@@ -180,8 +180,12 @@ class SessionFields(Model):
     operator: Line = Field("", examples=["Kari"])
 
 
+LONGEST_TAG: Final = 40
+Tag = Annotated[str, Field(min_length=1, max_length=LONGEST_TAG, pattern=r"^[^\x00-\x1f\x7f,]*$")]
+
+
 class SessionChange(Model):
-    """Session fields to change; a field that is left out stays as it is."""
+    """Session fields to change, and marks for finding the recording again; what is left out stays as it is."""
 
     athlete: Line | None = Field(None, examples=["Ola Nordmann"])
     bib: Line | None = Field(None, examples=["18"])
@@ -189,6 +193,21 @@ class SessionChange(Model):
     wind: Line | None = Field(None, examples=["calm"])
     notes: Text | None = Field(None, examples=["fell after landing"])
     operator: Line | None = Field(None, examples=["Kari"])
+    tags: tuple[Tag, ...] | None = Field(None, max_length=20, examples=[["fall", "new boots"]])
+    favourite: StrictBool | None = Field(None, examples=[True])
+
+    def texts(self) -> dict[str, str]:
+        """The changes as they stand in a log's session, where every value is text."""
+        marks: dict[str, str] = {}
+        if self.tags is not None:
+            marks["tags"] = ",".join(dict.fromkeys(tag.strip() for tag in self.tags))
+        if self.favourite is not None:
+            marks["favourite"] = "yes" if self.favourite else ""
+        return self.model_dump(include=set(SessionFields.model_fields), exclude_none=True) | marks
+
+    def fields(self) -> "SessionChange":
+        """The same change without the marks."""
+        return self.model_copy(update={"tags": None, "favourite": None})
 
 
 class NextJumper(Model):
@@ -262,6 +281,35 @@ class Recording(Model):
     session: SessionFields
     verdict: Statement
     deleted: bool = False
+    favourite: bool = False
+    tags: tuple[str, ...] = ()
+
+
+class Sorting(StrEnum):
+    """The order of a list of recordings."""
+
+    NEWEST = "newest"
+    OLDEST = "oldest"
+    BIB = "bib"  #: numbers by their value, before everything else
+    ATHLETE = "athlete"
+    LONGEST = "longest"
+
+
+class RecordingQuery(Model):
+    """Which recordings to list: those that fit everything that is given."""
+
+    deleted: bool = False
+    search: str = ""
+    athlete: str = ""
+    bib: str = ""
+    since: AwareDatetime | None = None
+    until: AwareDatetime | None = None
+    verdict: Level | None = None
+    tag: str = ""
+    favourite: bool | None = None
+    sort: Sorting = Sorting.NEWEST
+    offset: int = 0
+    limit: int | None = None
 
 
 class Trash(Model):

@@ -17,6 +17,7 @@ from rig.status import (
     Pulses,
     Recording,
     RecordingOrder,
+    RecordingQuery,
     RigView,
     SessionChange,
     Status,
@@ -61,6 +62,19 @@ class Download:
     tag: str
     corrected: bool
     open: Callable[[], BinaryIO]
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRecordings:
+    """What a query finds.
+
+    Attributes:
+        total: how many recordings fit, on all pages.
+        recordings: those of the page that was asked for, in its order.
+    """
+
+    total: int
+    recordings: list[Recording]
 
 
 class Jumpers(Protocol):
@@ -176,8 +190,8 @@ class RigService(Protocol):
         """Remove a recording of the trash for good. StateForbidsError: it does not lie there."""
         ...
 
-    def recordings(self, *, deleted: bool) -> list[Recording]:
-        """All recordings, newest first, with the one in progress; if `deleted`, those in the trash instead."""
+    def recordings(self, query: RecordingQuery) -> FoundRecordings:
+        """The recordings that a query finds, with the one in progress."""
         ...
 
     def recording(self, recording_id: str) -> Recording:

@@ -102,8 +102,8 @@ class Service(Archive):
 
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:
         """Change session fields, also of the recording in progress."""
-        entry = self._catalogue.change_session(recording_id, change.model_dump(exclude_none=True))
-        note = partial(self._supervisor.recordings.change_session, recording_id, change)
+        entry = self._catalogue.change_session(recording_id, change.texts())
+        note = partial(self._supervisor.recordings.change_session, recording_id, change.fields())
         return self._supervisor.commands.ask(at_once(note), _SOON_S) or as_recording(entry)
 
     def delete_recording(self, recording_id: str) -> Recording:

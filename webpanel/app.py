@@ -27,6 +27,7 @@ from webpanel.routes.preview import preview_router
 from webpanel.routes.recordings import recordings_router
 from webpanel.routes.rig import rig_router
 from webpanel.routes.start_list import start_list_router
+from webpanel.routes.trash import trash_router
 
 #: The media types of the page's files; the computer's own table may lack some or have others.
 _TYPES: Final = {
@@ -65,6 +66,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         rig_router(service),
         recordings_router(service, changes),
         start_list_router(service),
+        trash_router(service, changes),
         contents_router(service),
         files_router(service, streams.downloads),
         preview_router(service, streams.previews),

@@ -38,7 +38,7 @@ def run_catalogue(directory: Path) -> list[dict[str, Any]]:
     folder = directory / "catalogue"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        _write_log(folder / "jump-1.mcap")
+        write_jump(folder / "jump-1.mcap", _PULSES, _SHAPE)
         for number in range(2, _LOGS + 1):
             os.link(folder / "jump-1.mcap", folder / f"jump-{number}.mcap")
         reading = _first_list(folder)
@@ -60,18 +60,19 @@ def _first_list(folder: Path) -> float:
     return round(taken * 1e3, 1)
 
 
-def _write_log(path: Path) -> None:
-    buffers = TripletBuffers(_SHAPE, 16)
+def write_jump(path: Path, pulses: int, shape: tuple[int, int]) -> None:
+    """Write a log of three cameras, all pulses complete, with what happens to be in memory for pixels."""
+    buffers = TripletBuffers(shape, 16)
     description = LogDescription({"athlete": "Anna Berg", "bib": "17"}, {"name": "bench"}, b'name = "bench"\n')
     with LogWriter(path, description, buffers) as log:
-        for pulse in range(1, _PULSES + 1):
-            tag = _tag(pulse)
+        for pulse in range(1, pulses + 1):
+            tag = _tag(pulse, shape)
             log.write_pulse(tag, buffers.acquire(timeout_s=10.0), UtcNs(tag.time + 5_000_000))
     buffers.close()
 
 
-def _tag(pulse: int) -> TripletTag:
-    time_ns, width = UtcNs(_START_NS + pulse * _PERIOD_NS), _SHAPE[1] // len(_CAMERAS)
+def _tag(pulse: int, shape: tuple[int, int]) -> TripletTag:
+    time_ns, width = UtcNs(_START_NS + pulse * _PERIOD_NS), shape[1] // len(_CAMERAS)
     device_time = DeviceNs(pulse * _PERIOD_NS)
     cameras = (
         CameraTag(
@@ -79,4 +80,4 @@ def _tag(pulse: int) -> TripletTag:
         )
         for place, name in enumerate(_CAMERAS)
     )
-    return TripletTag(PulseNumber(pulse), time_ns, "bench", "jump-1", _SHAPE, tuple(cameras))
+    return TripletTag(PulseNumber(pulse), time_ns, "bench", "jump-1", shape, tuple(cameras))

@@ -1,11 +1,13 @@
 """What the catalogue knows of one recording, read from its log."""
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from stat import S_ISLNK, S_ISREG
+from typing import Final
 
 from recorder.log.session_changes import session_changes
 from recorder.reading.info import LogInfo, info
@@ -15,6 +17,10 @@ from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.pulse import Pause
 from rig.topics import TAG
+
+SUFFIX: Final = ".mcap"
+#: What the id of a recording looks like: the name of its log without the suffix.
+LOG_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", re.ASCII)
 
 
 class LogState(StrEnum):
@@ -31,7 +37,6 @@ class Entry:
 
     Attributes:
         id: name of the file without `.mcap`.
-        path: the log.
         bytes: size of the file.
         modified: when the file was last written.
         state: state of the log.
@@ -53,7 +58,6 @@ class Entry:
     """
 
     id: str
-    path: Path
     bytes: int
     modified: UtcNs
     state: LogState
@@ -107,7 +111,7 @@ def read_entry(path: Path) -> Entry:
         return _trouble(path, stat, text)
     ledger = found.ledger
     return Entry(
-        path.stem, path, found.bytes, UtcNs(stat.st_mtime_ns), _state(found),
+        path.stem, found.bytes, UtcNs(stat.st_mtime_ns), _state(found),
         started=ledger.first_time, duration_s=ledger.duration_s,
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
@@ -123,7 +127,7 @@ def link_text(path: Path) -> str:
 
 def _trouble(path: Path, stat: os.stat_result, text: str) -> Entry:
     """The entry of a file of which nothing can be read."""
-    return Entry(path.stem, path, stat.st_size, UtcNs(stat.st_mtime_ns), LogState.DAMAGED, trouble=text)
+    return Entry(path.stem, stat.st_size, UtcNs(stat.st_mtime_ns), LogState.DAMAGED, trouble=text)
 
 
 def with_changes(entry: Entry, path: Path, *, deleted: bool) -> Entry:

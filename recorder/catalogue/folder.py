@@ -5,7 +5,6 @@ it, when they are old, or when the disk needs their room.
 """
 
 import os
-import re
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,10 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.catalogue.entry import Entry, link_text, with_changes
+from recorder.catalogue.entry import LOG_ID, SUFFIX, Entry, link_text
 from recorder.catalogue.log_cache import LogCache
 from recorder.catalogue.trash import (
-    SUFFIX,
     TrashContents,
     TrashedLog,
     beside,
@@ -38,7 +36,6 @@ from rig.errors import BadInputError, LogDamagedError, StorageError, UnknownReco
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
-_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", re.ASCII)
 _STEM_MAX: Final = 90
 
 
@@ -66,14 +63,13 @@ class Catalogue:
         """
         folder = self._folder(deleted=deleted)
         try:
-            paths = [path for path in folder.iterdir() if path.suffix == SUFFIX and _ID.fullmatch(path.stem)]
+            found = self._logs.entries(folder)
         except FileNotFoundError:
             return []
         except OSError as error:
             raise StorageError(
                 f"{folder}: cannot be read ({error.strerror}); check the folder's permissions"
             ) from error
-        found = [entry for path in paths if (entry := self._entry(path)) is not None]
         self._logs.save()
         return sorted(found, key=lambda entry: (entry.started or entry.modified, entry.id), reverse=True)
 
@@ -236,7 +232,7 @@ class Catalogue:
 
     def _path(self, recording: str, *, prefer_deleted: bool = False) -> Path:
         """The log of a recording, looked for in the folder first or, if `prefer_deleted`, in the trash first."""
-        if _ID.fullmatch(recording):
+        if LOG_ID.fullmatch(recording):
             for deleted in (prefer_deleted, not prefer_deleted):
                 path = self._folder(deleted=deleted) / f"{recording}{SUFFIX}"
                 if os.path.lexists(path):
@@ -258,10 +254,9 @@ class Catalogue:
     def _entry(self, path: Path) -> Entry | None:
         """The entry of a file, None if the file has just been removed."""
         try:
-            entry = self._logs.entry(path)
+            return self._logs.entry(path)
         except FileNotFoundError:
             return None
-        return with_changes(entry, path, deleted=path.parent == self._trash)
 
     def _free_path(self, log: Path, target: Path) -> Path:
         """A path in `target` with the log's name or, if that is taken, the first number free in folder and trash."""

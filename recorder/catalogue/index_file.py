@@ -6,7 +6,7 @@ writable by nobody else, and its checksum is right. A row is believed if its log
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from stat import S_ISREG
@@ -14,7 +14,7 @@ from typing import Final
 
 from isal.isal_zlib import crc32
 
-from recorder.catalogue.entry import Entry
+from recorder.catalogue.entry import SUFFIX, Entry
 from rig.transport import wire
 
 NAME: Final = ".svev-catalogue"
@@ -38,18 +38,13 @@ class KeptEntry:
     entry: Entry
 
 
-def file_key(path: Path) -> FileKey:
-    """The key of a file, or of the link itself.
-
-    Raises:
-        OSError: the file is not there, or may not be looked at.
-    """
-    stat = path.lstat()
+def file_key(stat: os.stat_result) -> FileKey:
+    """The key of a file of this status, or of a link itself."""
     return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
 
 
-def load_kept(directory: Path) -> dict[Path, KeptEntry]:
-    """The entries that were kept in a directory; none if the file is missing, or not to be believed."""
+def load_kept(directory: Path) -> dict[str, KeptEntry]:
+    """The entries that were kept in a directory, by path below it; none if the file is missing, or not believed."""
     try:
         text = _read_own(directory / NAME)
     except OSError:
@@ -62,18 +57,17 @@ def load_kept(directory: Path) -> dict[Path, KeptEntry]:
     except ValueError:
         return {}
     return {
-        path: replace(each, entry=replace(each.entry, path=path))
-        for name, each in kept.items()
-        if (path := directory / name).stem == each.entry.id and each.entry.bytes == each.key[1]
-    }
+        name: each for name, each in kept.items()
+        if name.rpartition("/")[2] == each.entry.id + SUFFIX and each.entry.bytes == each.key[1]
+    }  # fmt: skip
 
 
-def keep(directory: Path, entries: Mapping[Path, KeptEntry]) -> None:
+def keep(directory: Path, entries: Mapping[str, KeptEntry]) -> None:
     """Replace the kept entries of a directory, by one rename.
 
     A directory that cannot be written keeps none: then the next service reads its logs again, which takes longer.
     """
-    rows = wire.encode({str(path.relative_to(directory)): each for path, each in entries.items()})
+    rows = wire.encode(entries)
     new = directory / f"{NAME}.new"
     try:
         new.unlink(missing_ok=True)

@@ -7,11 +7,11 @@ from pathlib import Path
 from stat import S_ISDIR
 from typing import Final
 
+from recorder.catalogue.entry import SUFFIX
 from recorder.log.jumper_path import jumper_path
 from recorder.log.session_changes import session_path
 from recorder.log.truth_path import truth_path
 
-SUFFIX: Final = ".mcap"
 _NAME: Final = ".trash"
 _BLOCK: Final = 512  # unit of st_blocks, whatever the file system (stat(2))
 

@@ -21,7 +21,12 @@ _BYTES_MAX: Final = 64 << 10
 
 def session_path(log: Path) -> Path:
     """Path of the file with the changes of a log."""
-    return log.with_name(f"{log.stem}.session.json")
+    return log.with_name(session_name(log.stem))
+
+
+def session_name(recording: str) -> str:
+    """Name of the file with the changes of a recording's log."""
+    return f"{recording}.session.json"
 
 
 def session_changes(log: Path) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from datetime import UTC, datetime
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from rig.status import (
     Pulses,
     PulseSummary,
     Recording,
+    RecordingQuery,
     RecordingState,
     SessionFields,
     Statement,
@@ -28,7 +29,8 @@ from rig.status import (
 )
 from rig.tag import TripletTag
 from service.recordings.download import download_of, sha256_of, zipped
-from service.seam import Download
+from service.recordings.listing import find, is_favourite, tags_of, utc
+from service.seam import Download, FoundRecordings
 from triggering.ledger import pauses_in_words
 
 _STATES = {
@@ -36,6 +38,10 @@ _STATES = {
     LogState.UNFINISHED: RecordingState.UNFINISHED,
     LogState.DAMAGED: RecordingState.DAMAGED,
 }
+
+_ALL: Final = RecordingQuery()
+#: What a list repeats of a session field, however long the log has it.
+_LONGEST_SHOWN: Final = 4000
 
 
 class Archive(ABC):
@@ -48,21 +54,31 @@ class Archive(ABC):
     def __init__(self, catalogue: Catalogue) -> None:
         self._catalogue = catalogue
         self._checksums: dict[str, str] = {}
+        self._descriptions: dict[tuple[str, bool], tuple[Entry, Recording]] = {}
 
     @abstractmethod
     def status(self) -> Status:
         """The present status, which has the recording in progress."""
 
-    def recordings(self, *, deleted: bool) -> list[Recording]:
-        """All recordings, newest first; if `deleted`, those in the trash instead."""
+    def recordings(self, query: RecordingQuery = _ALL) -> FoundRecordings:
+        """The recordings that a query finds, the one in progress among them."""
         current = self.status().recording
-        found = [as_recording(entry) for entry in self._catalogue.entries(deleted=deleted)]
-        return [current if current and each.id == current.id else each for each in found]
+        entries = self._catalogue.entries(deleted=query.deleted)
+        found = find(entries, query, lambda entry: self._described(entry).verdict.level)
+        shown = [self._described(entry) for entry in found.entries]
+        return FoundRecordings(found.total, [current if current and each.id == current.id else each for each in shown])
 
     def recording(self, recording_id: str) -> Recording:
         """One recording, in the trash or not."""
         current = self.status().recording
         return current if current and current.id == recording_id else as_recording(self._catalogue.entry(recording_id))
+
+    def _described(self, entry: Entry) -> Recording:
+        """Describe an entry for the panel, unless that was done before: the catalogue gives the same object then."""
+        known = self._descriptions.get((entry.id, entry.deleted))
+        if known is None or known[0] is not entry:
+            known = self._descriptions[entry.id, entry.deleted] = entry, as_recording(entry)
+        return known[1]
 
     def trash(self) -> Trash:
         """How much lies in the trash."""
@@ -127,17 +143,19 @@ def as_recording(entry: Entry) -> Recording:
     """Describe an entry of the catalogue for the panel."""
     causes = Causes(**{status.value: count for status, count in entry.causes.items()})
     counts = Counts(pulses=entry.pulses, complete=entry.complete, partial=entry.partial, causes=causes)
-    known = {name: text for name, text in entry.session.items() if name in SessionFields.model_fields}
+    known = {name: text[:_LONGEST_SHOWN] for name, text in entry.session.items() if name in SessionFields.model_fields}
     return Recording(
         id=entry.id,
         state=_STATES[entry.state],
-        started=None if entry.started is None else datetime.fromtimestamp(entry.started / NS_PER_S, UTC),
+        started=None if entry.started is None else utc(entry.started),
         duration_s=round(entry.duration_s, 6),
         bytes=entry.bytes,
         counts=counts,
         session=SessionFields.model_construct(None, **known),  # unchecked: old logs may hold what is refused today
         verdict=verdict(entry),
         deleted=entry.deleted,
+        favourite=is_favourite(entry),
+        tags=tags_of(entry),
     )
 
 

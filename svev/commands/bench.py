@@ -27,6 +27,7 @@ def bench(
     fakesink and to filesink) with the same cameras. Figures are CPU-seconds per GB of image data, without the work of
     the simulated cameras. firewire: the same on an emulated FireWire bus. parts: pairing, composing, checksum and
     drawing, each alone. api: answer times of the service while it records at 30 Hz; the baseline is the idle service.
+    catalogue, listing: lists of many recordings; the baseline is a service that has just been started.
     intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
     covariance; the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and
     with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump

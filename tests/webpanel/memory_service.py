@@ -12,7 +12,7 @@ from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamil
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
-from rig.clocks import UtcNs
+from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.pulse import RigPulse
@@ -157,13 +157,13 @@ class MemoryService(Archive):
             return as_recording(self.catalogue.entry(recording_id))
 
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:
-        fields = change.model_dump(exclude_none=True)
+        fields = change.fields().model_dump(exclude_none=True)
         with self._lock:
             if self._recording is not None and self._recording.id == recording_id:
                 session = self._recording.session.model_copy(update=fields)
                 self._recording = self._recording.model_copy(update={"session": session})
                 return self._recording
-        return as_recording(self.catalogue.change_session(recording_id, fields))
+        return as_recording(self.catalogue.change_session(recording_id, change.texts()))
 
     def delete_recording(self, recording_id: str) -> Recording:
         if self._recording is not None and self._recording.id == recording_id:
@@ -250,11 +250,12 @@ def write_recording(
     recording_id: str,
     pulses: Sequence[Sequence[FrameStatus]] = (ALL_OK,) * 10,
     session: dict[str, str] | None = None,
+    ago_s: int = 0,
 ) -> Path:
-    """A closed log, whose last pulse is now."""
+    """A closed log, whose last pulse is now, or was so long ago."""
     path = folder / f"{recording_id}.mcap"
     buffers = TripletBuffers(SHAPE, 4)
-    start = time.time_ns() - len(pulses) * PERIOD_NS
+    start = time.time_ns() - len(pulses) * PERIOD_NS - ago_s * NS_PER_S
     with LogWriter(path, LogDescription(session or {}, RIG, RIG_TOML), buffers) as log:
         for pulse, statuses in enumerate(pulses, 1):
             write_pulse(log, buffers, make_tag(pulse, statuses, SHAPE, UtcNs(start + pulse * PERIOD_NS)))

@@ -86,7 +86,8 @@ class StrictRoute(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Put the check in front of the framework's handler."""
         handler = super().get_route_handler()
-        known = {parameter.alias for parameter in self.dependant.query_params}
+        dependants = (self.dependant, *self.dependant.dependencies)
+        known = {parameter.alias for each in dependants for parameter in each.query_params}
 
         async def checked(request: Request) -> Response:
             names = [name for name, _ in request.query_params.multi_items()]

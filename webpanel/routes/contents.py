@@ -16,6 +16,8 @@ from webpanel.routes.common import RecordingId, jpeg_answer, refusals, strict_ro
 from webpanel.routes.preview import to_jpeg
 
 _THUMBNAIL_WIDTH = 480
+#: So many thumbnails are kept in memory, some 10 kB each: every phone and laptop looks at the same ones.
+_THUMBNAILS_MAX = 1000
 #: An image of a closed log never changes.
 _KEPT = {"Cache-Control": "private, max-age=31536000, immutable"}
 #: Threads that read and encode images. They are few, so that looking through a recording never slows down recording.
@@ -26,6 +28,7 @@ def contents_router(service: RigService) -> APIRouter:
     """The routes that read recordings."""
     router = strict_router("Recordings")
     readers = anyio.CapacityLimiter(_READERS)
+    thumbnails: dict[tuple[object, ...], bytes] = {}
 
     @router.get("/recordings/{recording_id}/pulses", responses=refusals(404))
     async def list_pulses(recording_id: RecordingId) -> Pulses:
@@ -54,7 +57,15 @@ def contents_router(service: RigService) -> APIRouter:
     )
     async def get_thumbnail(recording_id: RecordingId) -> Response:
         """A small picture of a recording."""
-        jpeg, final = await run_sync(_thumbnail, service, recording_id, limiter=readers)
+        recording = await run_sync(service.recording, recording_id, limiter=readers)
+        final = recording.state is RecordingState.FINISHED
+        key = recording.id, recording.bytes, recording.started
+        if (jpeg := thumbnails.pop(key, None)) is None:
+            jpeg = await run_sync(_thumbnail, service, recording_id, limiter=readers)
+        if final:
+            thumbnails[key] = jpeg  # the newest stands last
+            if len(thumbnails) > _THUMBNAILS_MAX:
+                del thumbnails[next(iter(thumbnails))]
         return Response(jpeg, media_type="image/jpeg", headers=_KEPT if final else None)
 
     return router
@@ -75,7 +86,6 @@ def _block(pulses: Pulses, image: NDArray[np.uint8], camera: str) -> NDArray[np.
     return np.ascontiguousarray(image[:, first:end])
 
 
-def _thumbnail(service: RigService, recording_id: str) -> tuple[bytes, bool]:
-    """The triplet that shows the recording best, small; whether it will stay this one."""
-    final = service.recording(recording_id).state is RecordingState.FINISHED
-    return _jpeg(service, recording_id, service.liveliest_pulse(recording_id), None, _THUMBNAIL_WIDTH), final
+def _thumbnail(service: RigService, recording_id: str) -> bytes:
+    """The triplet that shows the recording best, small."""
+    return _jpeg(service, recording_id, service.liveliest_pulse(recording_id), None, _THUMBNAIL_WIDTH)

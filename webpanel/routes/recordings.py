@@ -1,13 +1,26 @@
 """The routes of recordings: start and stop, list, change, delete and restore."""
 
+import re
 from http import HTTPStatus
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Body, Query, Response
+from fastapi import APIRouter, Body, Depends, Query, Request, Response
+from isal import igzip as gzip
+from pydantic import AwareDatetime, BeforeValidator, TypeAdapter
 
-from rig.status import Recording, RecordingOrder, SessionChange, StopOrder, Trash
+from rig.status import (
+    LONGEST_LINE,
+    LONGEST_TAG,
+    Level,
+    Recording,
+    RecordingOrder,
+    RecordingQuery,
+    SessionChange,
+    Sorting,
+    StopOrder,
+)
 from service.seam import RigService
-from webpanel.routes.common import CHANGING, NoFields, RecordingId, refusals, strict_router
+from webpanel.routes.common import CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.events import Changes
 
 _ALL_HELD: Final = RecordingOrder()
@@ -17,7 +30,56 @@ _ORDER: Final = Body(
         "what has just happened": {"value": {"bib": "17", "preroll_s": 5, "duration_s": 0}},
     }
 )
+_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[Tt ]")
+_RECORDINGS: Final = TypeAdapter(list[Recording])
+#: A list of recordings repeats itself so much that compressing it thoroughly wins nothing.
+_LIGHTLY: Final = 1
+_LISTED: Final[Responses] = {
+    200: {
+        "headers": {
+            "X-Total-Count": {"description": "how many fit, on all pages", "schema": {"type": "integer"}},
+            "Link": {"description": 'the next page, `rel="next"`, if there is one', "schema": {"type": "string"}},
+        }
+    }
+}
 _LOCATED: Final = {"headers": {"Location": {"description": "address of the recording", "schema": {"type": "string"}}}}
+
+
+def _written_out(text: object) -> object:
+    """Let no bare number pass for a time.
+
+    Raises:
+        ValueError: the text does not begin with a date.
+    """
+    if isinstance(text, str) and not _DATE.match(text):
+        raise ValueError("give date, time and zone, e.g. 2026-11-20T10:00:00Z")
+    return text
+
+
+Moment = Annotated[AwareDatetime, BeforeValidator(_written_out)]
+
+
+def _query(
+    *,
+    deleted: Annotated[bool, Query(description="those in the trash instead")] = False,
+    search: Annotated[
+        str, Query(max_length=LONGEST_LINE, description="words in id, bib, athlete, gate, notes or tags; all of them")
+    ] = "",
+    athlete: Annotated[str, Query(max_length=LONGEST_LINE, description="part of the athlete's name")] = "",
+    bib: Annotated[str, Query(max_length=LONGEST_LINE, description="the bib, exactly")] = "",
+    since: Annotated[Moment | None, Query(description="begun at this time or later, with its zone")] = None,
+    until: Annotated[Moment | None, Query(description="begun before this time, with its zone")] = None,
+    verdict: Annotated[Level | None, Query(description="how grave the verdict is")] = None,
+    tag: Annotated[str, Query(max_length=LONGEST_TAG, description="a tag of the recording")] = "",
+    favourite: Annotated[bool | None, Query(description="true: favourites only; false: all others")] = None,
+    sort: Annotated[Sorting, Query(description="order of the list")] = Sorting.NEWEST,
+    offset: Annotated[int, Query(ge=0, le=2**31, description="leave out so many at the front")] = 0,
+    limit: Annotated[int | None, Query(ge=1, le=1000, description="at most so many; all if left out")] = None,
+) -> RecordingQuery:
+    return RecordingQuery(
+        deleted=deleted, search=search, athlete=athlete, bib=bib, since=since, until=until, verdict=verdict, tag=tag,
+        favourite=favourite, sort=sort, offset=offset, limit=limit,
+    )  # fmt: skip
 
 
 def recordings_router(service: RigService, changes: Changes) -> APIRouter:
@@ -46,12 +108,22 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         """
         return service.stop_recording(recording_id, order or StopOrder())
 
-    @router.get("/recordings")
-    def list_recordings(
-        *, deleted: Annotated[bool, Query(description="those in the trash instead")] = False
-    ) -> list[Recording]:
-        """All recordings, newest first."""
-        return service.recordings(deleted=deleted)
+    @router.get("/recordings", response_model=list[Recording], responses=_LISTED)
+    def list_recordings(request: Request, query: Annotated[RecordingQuery, Depends(_query)]) -> Response:
+        """The recordings that fit everything that is given: all of them, newest first, if nothing is.
+
+        With `limit` the list comes page by page: `X-Total-Count` says how many fit altogether, and `Link` where the
+        next page is.
+        """
+        found = service.recordings(query)
+        headers = {"X-Total-Count": str(found.total), "Vary": "Accept-Encoding"}
+        if query.limit is not None and query.offset + query.limit < found.total:
+            onward = request.url.include_query_params(offset=query.offset + query.limit)
+            headers["Link"] = f'<{onward.path}?{onward.query}>; rel="next"'
+        body = _RECORDINGS.dump_json(found.recordings)
+        if "gzip" in request.headers.get("accept-encoding", ""):
+            body, headers["Content-Encoding"] = gzip.compress(body, _LIGHTLY), "gzip"
+        return Response(body, media_type="application/json", headers=headers)
 
     @router.get("/recordings/{recording_id}", responses=refusals(404))
     def get_recording(recording_id: RecordingId) -> Recording:
@@ -71,25 +143,6 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         recording = service.delete_recording(recording_id)
         changes.recordings_changed()
         return recording
-
-    @router.get("/trash")
-    def get_trash() -> Trash:
-        """How much lies in the trash. What lies there: `GET /recordings?deleted=true`."""
-        return service.trash()
-
-    @router.delete("/trash", responses=CHANGING)
-    def empty_trash() -> Trash:
-        """Empty the trash: what was deleted is removed for good, which frees its room. Answers what was removed."""
-        gone = service.empty_trash()
-        changes.recordings_changed()
-        return gone
-
-    @router.delete("/trash/{recording_id}", responses=CHANGING | refusals(404))
-    def remove_recording(recording_id: RecordingId) -> Trash:
-        """Remove one recording for good; it must lie in the trash."""
-        gone = service.remove_recording(recording_id)
-        changes.recordings_changed()
-        return gone
 
     @router.post("/recordings/{recording_id}/restore", responses=CHANGING | refusals(404))
     def restore_recording(recording_id: RecordingId, _: NoFields = None) -> Recording:

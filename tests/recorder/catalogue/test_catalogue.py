@@ -60,7 +60,7 @@ def test_an_entry_says_what_a_recording_is(folder: Path) -> None:
     assert (entry.id, entry.state, entry.deleted, entry.trouble) == (
         "2026-11-21T10-00-00Z", LogState.CLOSED, False, "",
     )  # fmt: skip
-    assert entry.bytes == entry.path.stat().st_size
+    assert entry.bytes == (folder / f"{entry.id}.mcap").stat().st_size
     assert entry.started == START + PERIOD_NS
     assert entry.duration_s == pytest.approx(3 * PERIOD_NS / 1e9)
     assert (entry.pulses, entry.complete, entry.partial, entry.missing) == (4, 2, 2, 0)

@@ -260,6 +260,25 @@ def test_a_thumbnail(client: httpx.Client, service: MemoryService) -> None:
     assert "no camera delivered" in refused(client.get("/api/recordings/dark/thumbnail.jpg"), 404).detail
 
 
+def test_a_thumbnail_is_made_once(
+    client: httpx.Client, service: MemoryService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[str] = []
+    look = service.liveliest_pulse
+
+    def noted(recording_id: str) -> int:
+        looked.append(recording_id)
+        return look(recording_id)
+
+    monkeypatch.setattr(service, "liveliest_pulse", noted)
+    first = client.get("/api/recordings/jump/thumbnail.jpg")
+    assert client.get("/api/recordings/jump/thumbnail.jpg").content == first.content
+    write_recording(service.catalogue.directory, "new", (ALL_OK,) * 40)
+    (service.catalogue.directory / "new.mcap").replace(service.catalogue.directory / "jump.mcap")
+    assert client.get("/api/recordings/jump/thumbnail.jpg").content != first.content
+    assert looked == ["jump", "jump"]
+
+
 def test_a_broken_log_is_a_problem_not_a_crash(client: httpx.Client, service: MemoryService, log: bytes) -> None:
     (service.catalogue.directory / "torn.mcap").write_bytes(log[: len(log) // 2])
     (service.catalogue.directory / "holed.mcap").write_bytes(log[:5000] + bytes(len(log) - 10_000) + log[-5000:])

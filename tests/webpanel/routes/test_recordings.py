@@ -122,7 +122,16 @@ def test_calls_without_fields_take_none(client: httpx.Client) -> None:
 BAD_QUERIES = [
     "deleted=perhaps",
     "deleted=",
-    "limit=3",
+    "limit=0",
+    "limit=1001",
+    "offset=-1",
+    "sort=fastest",
+    "verdict=excellent",
+    "since=yesterday",
+    "since=2026-11-20T10:00:00",
+    "until=0.5",
+    "favourite=perhaps",
+    "page=3",
     "deleted=1&deleted=0",
     "=",
     "deleted=1&%00=1",
@@ -146,6 +155,67 @@ def test_session_fields_are_changed_later(client: httpx.Client, service: MemoryS
     assert client.get("/api/recordings/jump").json() == changed
     assert log.read_bytes() == before
     refused(client.patch("/api/recordings/jump", json={"id": "other"}), 422)
+
+
+def _ids(client: httpx.Client, query: str) -> list[str]:
+    return [each["id"] for each in client.get(f"/api/recordings?{query}").raise_for_status().json()]
+
+
+@pytest.fixture
+def found(service: MemoryService, client: httpx.Client) -> None:
+    """Five recordings, the last of them the newest."""
+    lost = (FrameStatus.LOST, *ALL_OK[1:])
+    for ago_s, (name, athlete, bib, pulses) in enumerate([
+        ("e", "ole berg", "9", 2), ("d", "Anna Lie", "A1", 2), ("c", "", "", 3), ("b", "Bjørn Ødegård", "9", 5),
+        ("a", "Anna Berg", "10", 2),
+    ]):  # fmt: skip
+        statuses = (lost, *(ALL_OK,) * pulses) if name == "b" else (ALL_OK,) * pulses
+        write_recording(service.catalogue.directory, name, statuses, {"athlete": athlete, "bib": bib}, ago_s)
+    client.patch("/api/recordings/c", json={"tags": ["fall", "new boots"], "favourite": True}).raise_for_status()
+    client.patch("/api/recordings/d", json={"tags": ["Fall"], "notes": "long one"}).raise_for_status()
+
+
+@pytest.mark.usefixtures("found")
+def test_recordings_are_found_and_sorted(client: httpx.Client) -> None:
+    since = client.get("/api/recordings/c").json()["started"]
+    for query, ids in {
+        "": "edcba", "search=berg": "ea", "search=anna%20LIE": "d", "search=ødegård%209": "b", "search=boots": "c",
+        "search=long": "d", "search=nobody": "", "athlete=berg": "ea", "bib=9": "eb", "bib=1": "", "bib=a1": "d",
+        "tag=fall": "dc", "tag=boots": "", "favourite=true": "c", "favourite=false": "edba", "verdict=warning": "b",
+        "verdict=good&athlete=anna": "da", f"since={since}": "edc", f"until={since}": "ba",
+        "sort=oldest": "abcde", "sort=bib": "ebadc", "sort=athlete": "adbec", "sort=longest": "bceda",
+        "deleted=true": "",
+    }.items():  # fmt: skip
+        assert "".join(_ids(client, query)) == ids, query
+
+
+@pytest.mark.usefixtures("found")
+def test_a_list_comes_page_by_page_and_compressed(client: httpx.Client) -> None:
+    whole = client.get("/api/recordings", headers={"Accept-Encoding": "identity"})
+    assert "content-encoding" not in whole.headers
+    assert (whole.headers["x-total-count"], whole.links) == ("5", {})
+    pages, address = [], "/api/recordings?sort=oldest&limit=2"
+    while address:
+        answer = client.get(address)
+        assert answer.headers["content-encoding"] == "gzip"
+        assert answer.headers["x-total-count"] == "5"
+        pages.append([each["id"] for each in answer.json()])
+        address = answer.links.get("next", {}).get("url", "")
+    assert pages == [["a", "b"], ["c", "d"], ["e"]]
+    assert client.get("/api/recordings?limit=5").links == {}
+    assert client.get("/api/recordings?offset=9").json() == []
+    assert client.get("/api/recordings?offset=2").json() == whole.json()[2:]
+
+
+def test_marks_are_kept_beside_the_log(client: httpx.Client, service: MemoryService) -> None:
+    write_recording(service.catalogue.directory, "jump")
+    marked = client.patch("/api/recordings/jump", json={"tags": ["fall", "fall", "K2"], "favourite": True}).json()
+    assert (marked["tags"], marked["favourite"]) == (["fall", "K2"], True)
+    assert marked["session"].keys() == SESSION.keys()
+    plain = client.patch("/api/recordings/jump", json={"tags": [], "favourite": False}).json()
+    assert (plain["tags"], plain["favourite"]) == ([], False)
+    for wrong in (["a,b"], [""], ["x" * 41], ["x"] * 21, "fall"):
+        refused(client.patch("/api/recordings/jump", json={"tags": wrong}), 422)
 
 
 def test_a_recording_is_deleted_and_restored(client: httpx.Client, service: MemoryService) -> None:

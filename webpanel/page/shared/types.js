@@ -81,6 +81,8 @@
  * @property {SessionFields} session
  * @property {Statement} verdict
  * @property {boolean} deleted
+ * @property {boolean} favourite
+ * @property {string[]} tags
  *
  * @typedef {object} PulseSummary
  * @property {number} pulse

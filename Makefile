@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench test check style wheel install uninstall lock clean setup system
+.PHONY: help demo run bench test check style wheel bundle install rollback uninstall lock clean setup system
 
 ARGS ?=
 PREFIX ?= /usr/local
@@ -46,10 +46,16 @@ style: setup
 wheel: setup ## build a wheel and try it in an empty environment outside the checkout
 	@.ci/try-wheel
 
-install: setup ## the program and its systemd service, into PREFIX (as root: /usr/local)
+bundle: setup ## an archive in dist/, from which a computer without network, compiler or checkout installs Svev
+	@systemd/archive dist
+
+install: setup ## the program and its systemd service, into PREFIX (as root: /usr/local), beside the version that runs
 	@systemd/install "$(PREFIX)"
 
-uninstall: ## remove both from PREFIX; keep configuration and recordings
+rollback: ## go back to the version before
+	@systemd/rollback "$(PREFIX)"
+
+uninstall: ## remove all versions from PREFIX; keep configuration and recordings
 	@systemd/uninstall "$(PREFIX)"
 
 lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
@@ -65,8 +71,9 @@ clean: ## remove everything that make made; keep recordings
 # Set-up. Each step makes a stamp file when it is done, so that an interrupted step is repeated.
 setup: $(SVEV)
 
+# Who only installs needs neither compiler nor browser.
 system:
-	@.ci/system-packages
+	@.ci/system-packages $(if $(filter-out bundle install,$(or $(MAKECMDGOALS),test)),develop,run)
 
 $(VENV): | system
 	@echo "setting up .venv from the distribution's Python"

@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -148,6 +148,7 @@ def serving(
     *more: str,
     environment: Mapping[str, str] | None = None,
     prefix: tuple[str, ...] = (),
+    command: Sequence[str] = _COMMAND,
     data: Path | None = None,
     token: str = "",
     ends_with: int = 0,
@@ -159,7 +160,7 @@ def serving(
     arguments = ["--rig", str(rig), "--host", loopback.host, "--port", str(port), "--data", str(data), *more]
     with log.open("w") as file:
         process = subprocess.Popen(
-            [*prefix, *_COMMAND, *arguments],
+            [*prefix, *command, *arguments],
             stdout=file,
             stderr=file,
             text=True,

@@ -1,7 +1,6 @@
 """The service under the real systemd: start, sandbox, watchdog, stop. Skipped where systemd cannot be booted."""
 
 import json
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,22 +8,19 @@ import pytest
 
 from tests.support.waiting import wait_until
 from tests.systemd.booted import CHECKOUT, Booted, booted
+from tests.systemd.prefixes import units_into
 
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> Path:
     """What `make install PREFIX=/opt/prefix` makes, but the program is that of the checkout; the rig is simulated."""
     prefix = tmp_path / "prefix"
-    subprocess.run([CHECKOUT / "systemd" / "install-units", prefix], check=True, timeout=30)
+    units_into(prefix, '#!/bin/sh\nexport PYTHONPATH=/opt/svev\nexec /opt/svev/.venv/bin/python -m svev "$@"\n')
     for path in prefix.rglob("*"):
         if path.is_file():
             path.write_text(path.read_text().replace(str(prefix), "/opt/prefix"))
     rig = (CHECKOUT / "config" / "rigs" / "sim.toml").read_text()
     (prefix / "etc/svev/rig.toml").write_text(rig.replace('"../', '"/opt/svev/config/'))
-    program = prefix / "bin" / "svev"
-    program.parent.mkdir()
-    program.write_text('#!/bin/sh\nexport PYTHONPATH=/opt/svev\nexec /opt/svev/.venv/bin/python -m svev "$@"\n')
-    program.chmod(0o755)
     return prefix
 
 

@@ -162,6 +162,12 @@ class NetworkSettings(StrictModel):
     resend: bool = Field(True, description="ask the camera again for lost packets")
 
 
+class ServiceSettings(StrictModel):
+    """What the service does by itself."""
+
+    arm_at_start: bool = Field(False, description="arm when the service starts, also after a power cut")
+
+
 class AnalysisSettings(StrictModel):
     """The analysis that measures the jumper while recordings run; it needs either the survey or the poses."""
 
@@ -193,6 +199,7 @@ class RigSettings(StrictModel):
     trigger: TriggerSettings = TriggerSettings()
     recorder: RecorderSettings = RecorderSettings()
     network: NetworkSettings = NetworkSettings()
+    service: ServiceSettings = ServiceSettings()
     analysis: AnalysisSettings | None = None
     simulation: SimulationSettings | None = None
     calibration: Path | None = Field(

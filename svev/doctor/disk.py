@@ -82,6 +82,32 @@ def look_at_room(rig: RigSettings, directory: Path, free: int) -> Finding:
     return passed(Topic.DISK, what) if minutes >= _ENOUGH_MIN else warning(Topic.DISK, what, remedy)
 
 
+def look_at_fallback(rig: RigSettings, directory: Path) -> Iterator[Finding]:
+    """Can the folder be written in which a recording goes on when its disk fails, and is it on another disk?"""
+    fallback = rig.recorder.fallback_directory
+    if fallback is None:
+        return
+    place = existing_part(fallback)
+    try:
+        with _unnamed_file(place) as fd:
+            free = free_bytes(fd) or 0
+    except OSError as error:
+        yield failure(
+            Topic.DISK,
+            f"{fallback} (recorder.fallback_directory) cannot be written: {error.strerror}",
+            "correct its permissions; under systemd allow it: sudo systemctl edit svev, [Service] ReadWritePaths=",
+        )
+        return
+    if place.stat().st_dev == existing_part(directory).stat().st_dev:
+        yield warning(
+            Topic.DISK,
+            f"{fallback} (recorder.fallback_directory) is on the same disk as {directory}",
+            "choose a folder on another disk, and check that this one is mounted",
+        )
+    else:
+        yield passed(Topic.DISK, f"{free / _GB:.1f} GB free in {fallback}, if the first disk fails")
+
+
 def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Finding]:
     """Judge the results of a trial by what this rig needs."""
     if not trial.same:

@@ -12,6 +12,7 @@ from recorder.catalogue.folder import Catalogue
 from recorder.publishing.keys import check_publication
 from rig.events import Event, Level
 from rig.settings.file import load_rig
+from rig.settings.model import RigSettings
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
 from service.jumpers.book import JumperBook
@@ -89,12 +90,28 @@ def serve(settings: ServiceSettings) -> None:
         with _signals(server, supervisor, notify):
             supervisor.start()
             try:
+                _tell_of_another_folder(settings, rig, hub)
+                if rig.service.arm_at_start:
+                    service.arm()
                 server.run(sockets=[listener])
             finally:
                 service.close()
                 supervisor.stop(_STOP_S)
         if supervisor.failure is not None:
             raise supervisor.failure
+
+
+def _tell_of_another_folder(settings: ServiceSettings, rig: RigSettings, hub: EventHub) -> None:
+    """Warn if the command line overrides a folder that the rig file names."""
+    named = rig.recorder.directory
+    given = settings.data
+    if given is None or "directory" not in rig.recorder.model_fields_set or given.resolve() == named.resolve():
+        return
+    text = (
+        f"recordings go to {given} as --data says, not to {named} as {settings.rig} says: remove --data, or "
+        "recorder.directory"
+    )
+    hub.tell(Event.now(Level.WARNING, "service", text))
 
 
 class _Reporter:

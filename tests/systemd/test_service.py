@@ -76,3 +76,33 @@ def test_a_wrong_rig_file_is_not_tried_again(prefix: Path) -> None:
         assert system.show("ExecMainStatus") == "2"
         assert system.show("NRestarts") == "0"
         assert "rig.toml" in system.log()
+
+
+def _second_disk(system: Booted) -> tuple[str, str]:
+    """What the service's doctor says of the second disk, level and words."""
+    ask = "import httpx; print(httpx.get('http://127.0.0.1:8000/api/doctor', timeout=60).text)"
+    report = json.loads(system.run("/opt/svev/.venv/bin/python", "-c", ask))
+    (finding,) = (each for each in report["findings"] if "fallback_directory" in each["what"])
+    return finding["level"], finding["what"]
+
+
+def test_a_second_disk_can_be_written_when_the_unit_is_told(prefix: Path) -> None:
+    rig = prefix / "etc/svev/rig.toml"
+    fallback = '[recorder]\nfallback_directory = "/opt/second"\n[service]\narm_at_start = true\n'
+    rig.write_text(f"{rig.read_text()}\n{fallback}")
+    with booted(prefix) as system:
+        wait_until(lambda: system.show("ActiveState") == "active", "the service is ready", 30)
+        _await_state(system, "armed")
+        system.run("install", "-d", "-o", "svev", "/opt/second")
+        level, what = _second_disk(system)
+        assert (level, "Read-only file system" in what) == ("FAIL", True)
+
+        drop_in = "printf '[Service]\\nReadWritePaths=/opt/second\\n' >/run/systemd/system/svev.service.d/disk.conf"
+        system.run("sh", "-c", drop_in)
+        system.systemctl("daemon-reload")
+        system.systemctl("restart", "svev.service")
+
+        _await_state(system, "armed")
+        # Both are in memory here, which is one disk.
+        level, what = _second_disk(system)
+        assert (level, "on the same disk" in what) == ("WARN", True)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rig.settings.model import RigSettings
 from svev.doctor import disk
 from svev.doctor.finding import Level
 from tests.support.rigs import SIM
@@ -100,3 +101,22 @@ def test_a_trial_is_judged_by_what_the_rig_needs(trial: disk.Trial, level: Level
 
 def test_a_good_disk_passes() -> None:
     assert [finding.level for finding in disk.judge_trial(SIM, Path("disk"), GOOD)] == [Level.PASS]
+
+
+def _with_fallback(folder: Path) -> RigSettings:
+    return SIM.model_copy(update={"recorder": SIM.recorder.model_copy(update={"fallback_directory": folder})})
+
+
+@pytest.mark.parametrize(
+    ("folder", "level", "word"),
+    [
+        (Path("/dev/shm/season"), Level.PASS, "if the first disk fails"),  # noqa: S108 - a file system of its own
+        (Path("second"), Level.WARN, "on the same disk"),
+        (Path("/proc/self/task"), Level.FAIL, "cannot be written"),
+    ],
+)
+def test_the_second_disk_is_examined(folder: Path, level: Level, word: str, tmp_path: Path) -> None:
+    (finding,) = disk.look_at_fallback(_with_fallback(tmp_path / folder), tmp_path)
+    assert (finding.level, word in finding.what) == (level, True), finding
+    assert list(tmp_path.iterdir()) == []
+    assert list(disk.look_at_fallback(SIM, tmp_path)) == []

@@ -34,8 +34,8 @@ _HALF_GAP_M = 0.22  #: from the midpoint to a binding: 0.16 m in the tracks of t
 _GAP_SIGMA = (0.07, 1.0, 5.0)  #: of it, m, m/s, m/s^2
 _HIP = 1  #: index of P2 in `POINTS`
 _HIP_M = 0.05  #: of a point that was taken as the hip, standard deviation beside its own
-#: From the midpoint of the bindings to the hip, standard deviations: m, m/s, m/s^2 and its change within 0.1 s. Along and
-#: up it moves as legs stretch; aside the body hardly leans.
+#: From the midpoint of the bindings to the hip, standard deviations: m, m/s, m/s^2 and its change within 0.1 s. Along
+#: and up it moves as legs stretch; aside the body hardly leans.
 _HIP_FREE, _HIP_ASIDE = (1.0, 4.0, 25.0, 25.0), (0.08, 0.4, 2.0, 3.0)
 _GAP_M_S2 = 4.0  #: change of its acceleration within 0.1 s
 _LEAST_PAIRS = 3

@@ -31,6 +31,17 @@ class LogState(StrEnum):
     DAMAGED = "damaged"  #: part of it cannot be read, or pulses have no tag
 
 
+class Trouble(StrEnum):
+    """What is the matter with a file of which nothing can be read, or not all."""
+
+    NONE = ""
+    HEADLESS = "headless"  #: no log of svev, or its beginning is damaged
+    LINK = "link"  #: a link, which is not followed
+    NO_FILE = "no_file"  #: a folder or a device
+    SESSION = "session"  #: the log is as good as it is; the changes of its session cannot be read
+    UNREADABLE = "unreadable"  #: anything else
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
     """A recording.
@@ -55,6 +66,7 @@ class Entry:
         disk: frames that were lost because of the disk, in one line; empty if none.
         forgotten_s: after so many seconds it ended by itself, because nobody had stopped it; 0: otherwise.
         trouble: what could not be read, and what to do, in one line; empty if all could be read.
+        kind: of the trouble.
     """
 
     id: str
@@ -76,6 +88,7 @@ class Entry:
     disk: str = ""
     forgotten_s: float = 0.0
     trouble: str = ""
+    kind: Trouble = Trouble.NONE
 
     @property
     def partial(self) -> int:
@@ -92,23 +105,19 @@ def read_entry(path: Path) -> Entry:
         FileNotFoundError: the file is no longer there.
     """
     stat = path.lstat()
-    if not S_ISREG(stat.st_mode):
-        folder = f"{path}: is a folder or a device, no log; move it out of the folder"
-        return _trouble(path, stat, link_text(path) if S_ISLNK(stat.st_mode) else folder)
+    if S_ISLNK(stat.st_mode):
+        return _trouble(path, stat, link_text(path), Trouble.LINK)
     try:
+        if not S_ISREG(stat.st_mode):
+            text = f"{path}: is a folder or a device, no log; move it out of the folder"
+            return _trouble(path, stat, text, Trouble.NO_FILE)
         found = info(path, original=True)
     except ForeignFileError:
         text = f"{path}: is no log of svev, or its beginning is damaged; try svev recover, or move it out of the folder"
-        return _trouble(path, stat, text)
-    except BadInputError as error:
-        path.lstat()  # it may have been removed meanwhile
-        return _trouble(path, stat, str(error))
-    except OSError as error:
-        path.lstat()
-        return _trouble(path, stat, f"{path}: cannot be looked at ({error.strerror}); check its permissions")
+        return _trouble(path, stat, text, Trouble.HEADLESS)
     except Exception as error:  # noqa: BLE001 - whatever is odd about one file, the others are listed
-        text = f"{path}: cannot be read ({type(error).__name__}); see what is wrong with svev verify"
-        return _trouble(path, stat, text)
+        path.lstat()  # it may have been removed meanwhile
+        return _trouble(path, stat, _in_words(path, error))
     ledger = found.ledger
     return Entry(
         path.stem, found.bytes, UtcNs(stat.st_mtime_ns), _state(found),
@@ -125,18 +134,27 @@ def link_text(path: Path) -> str:
     return f"{path}: is a link, and links are not followed; put the log itself here, or remove the link"
 
 
-def _trouble(path: Path, stat: os.stat_result, text: str) -> Entry:
+def _in_words(path: Path, error: Exception) -> str:
+    if isinstance(error, BadInputError):
+        return str(error)
+    if isinstance(error, OSError):
+        return f"{path}: cannot be looked at ({error.strerror}); check its permissions"
+    return f"{path}: cannot be read ({type(error).__name__}); see what is wrong with svev verify"
+
+
+def _trouble(path: Path, stat: os.stat_result, text: str, kind: Trouble = Trouble.UNREADABLE) -> Entry:
     """The entry of a file of which nothing can be read."""
-    return Entry(path.stem, stat.st_size, UtcNs(stat.st_mtime_ns), LogState.DAMAGED, trouble=text)
+    return Entry(path.stem, stat.st_size, UtcNs(stat.st_mtime_ns), LogState.DAMAGED, trouble=text, kind=kind)
 
 
 def with_changes(entry: Entry, path: Path, *, deleted: bool) -> Entry:
     """The entry with the present changes of its session."""
     try:
-        session, trouble = {**entry.session, **session_changes(path)}, entry.trouble
+        return replace(entry, session={**entry.session, **session_changes(path)}, deleted=deleted)
     except BadInputError as error:
-        session, trouble = dict(entry.session), str(error)
-    return replace(entry, session=session, trouble=trouble, deleted=deleted)
+        if entry.trouble:  # the log's own is the graver one
+            return replace(entry, deleted=deleted)
+        return replace(entry, trouble=str(error), kind=Trouble.SESSION, deleted=deleted)
 
 
 def _state(found: LogInfo) -> LogState:

@@ -98,5 +98,5 @@ def _read_own(path: Path) -> bytes:
 
 
 #: Counts up when entries of the same log become different ones.
-_FORMAT: Final = 2
+_FORMAT: Final = 3
 _DECODER: Final = wire.decoder(dict[str, KeptEntry])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.images.activity import liveliest_pulse
-from recorder.catalogue.entry import Entry, LogState
+from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from rig.clocks import NS_PER_S
@@ -39,6 +39,15 @@ _STATES = {
     LogState.DAMAGED: RecordingState.DAMAGED,
 }
 
+#: How the trouble with a file is said; its text ends in what to do.
+_TROUBLES: Final = {
+    Trouble.HEADLESS: (Level.ERROR, "headless", ""),
+    Trouble.LINK: (Level.ERROR, "link", ""),
+    Trouble.NO_FILE: (Level.ERROR, "no_file", ""),
+    Trouble.SESSION: (Level.ERROR, "session", ""),
+    Trouble.UNREADABLE: (Level.ERROR, "trouble", ""),
+    Trouble.NONE: (Level.ERROR, "trouble", ""),
+}
 _ALL: Final = RecordingQuery()
 #: What a list repeats of a session field, however long the log has it.
 _LONGEST_SHOWN: Final = 4000
@@ -180,10 +189,12 @@ def verdict(entry: Entry) -> Statement:
 
 def _judge(entry: Entry) -> tuple[Level, str, str, str]:
     if entry.trouble:
-        return Level.ERROR, "trouble", entry.trouble, ""
+        level, code, advice = _TROUBLES[entry.kind]
+        return level, code, entry.trouble, advice
     if entry.state is LogState.DAMAGED:
         text = f"Parts cannot be read or are not there; {entry.pulses} pulses are readable"
-        return Level.ERROR, "damaged", text, "Run svev verify on it"
+        advice = "svev recover makes a proper log of what can be read; svev verify says what is damaged"
+        return Level.ERROR, "damaged", text, advice
     if entry.state is LogState.UNFINISHED:
         text, advice = f"Never closed; its {entry.pulses} pulses are readable", "svev recover makes a proper log of it"
         return Level.WARNING, "unfinished", text, advice

@@ -11,6 +11,7 @@ import { startPreview } from "./live/preview.js";
 import { startSession } from "./live/session.js";
 import { startStartList } from "./live/startlist.js";
 import { startState } from "./live/state.js";
+import { startLast } from "./recordings/last.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
 import * as scrubber from "./recordings/scrubber.js";
@@ -53,7 +54,7 @@ async function begin() {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, recordings.startRecordings, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
+for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
 startLogin(() => location.reload());
 startRouter(entered);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));

@@ -41,7 +41,11 @@ export const statements = {
   verdict_empty: ["Det kom ingen puls", "Se på triggeren"],
   verdict_forgotten: ["Tok slutt av seg selv etter {longest_s} s, fordi ingen hadde stoppet det; {partial} av {pulses} pulser mangler et bilde"],
   verdict_unfinished: ["Ble aldri avsluttet; {pulses} pulser kan leses", "svev recover lager en ordentlig logg av den"],
-  verdict_damaged: ["Deler kan ikke leses eller mangler; {pulses} pulser kan leses", "Kjør svev verify på den"],
+  verdict_damaged: ["Deler kan ikke leses eller mangler; {pulses} pulser kan leses", "svev recover lager en ordentlig logg av det som kan leses; svev verify sier hva som er skadet"],
+  verdict_headless: ["Begynnelsen er skadet, eller det er ingen logg fra svev", "svev recover redder det som kan leses; ellers flytt filen ut av mappen"],
+  verdict_link: ["Dette er en lenke, og lenker følges ikke", "Legg selve loggen i mappen, eller fjern lenken"],
+  verdict_no_file: ["Dette er ingen fil", "Flytt det ut av mappen"],
+  verdict_session: ["Rettelsene ved siden av opptaket kan ikke leses", "Rett eller fjern filen som ender på .session.json"],
   verdict_trouble: ["Opptaket kan ikke leses", "Kjør svev verify på det"],
 
   state_forbids: ["det går ikke slik riggen står nå: se øverst hva den gjør, og hva som er neste steg"],

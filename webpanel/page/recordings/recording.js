@@ -1,7 +1,7 @@
 /** The view of one recording: its triplets (scrubber.js), session fields, facts, download, delete. */
 
 import { say, t } from "../i18n/i18n.js";
-import { call, partOf, recordingPath } from "../shared/api.js";
+import { call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { hear } from "../shared/connection.js";
 import { $, fillList, icon, make, makeMark, setText } from "../shared/dom.js";
 import { makeFields, writeFields } from "../shared/fields.js";
@@ -19,25 +19,37 @@ let recording = null;
 let scrubbing = false;
 
 export function startRecording() {
-  makeFields($("recording-session"), "recording", changed);
+  makeFields($("recording-session"), "recording", (name, value) => void change({ [name]: value }));
+  $("recording-tags").addEventListener("change", () => void change({ tags: $("recording-tags").value.split(",").map((/** @type {string} */ tag) => tag.trim()).filter(Boolean) }));
+  $("recording-favourite").addEventListener("click", () => { if (recording) void change({ favourite: !recording.favourite }); });
   hear({ recordings: reload });
   watchCatalogue(reload);
 }
 
 /**
- * Show a recording.
+ * Show a recording. Until it is there, nothing is shown: least of all the one before.
  *
  * @param {string} id
  */
 export async function enterRecording(id) {
+  clearSnacks();
+  clear(id, "");
+  await attempt(() => load(id));
+}
+
+/**
+ * @param {string} id
+ * @param {string} why nothing is shown
+ */
+function clear(id, why) {
   recording = null;
   scrubbing = false;
   clearScrubber();
-  clearSnacks();
   setText($("recording-title"), id);
-  $("recording-verdict").replaceChildren();
-  $("recording-buttons").replaceChildren();
-  await attempt(() => load(id));
+  for (const part of ["recording-verdict", "recording-buttons"]) $(part).replaceChildren();
+  for (const part of ["player", "recording-columns", "recording-favourite", "recording-recover"]) $(part).hidden = true;
+  setText($("recording-empty"), why);
+  $("recording-empty").hidden = !why;
 }
 
 /** Put the recording shown into the trash. */
@@ -58,15 +70,23 @@ async function reload() {
  * @param {string} id
  */
 async function load(id) {
-  const loaded = await call("GET", recordingPath(id));
+  /** @type {Recording} */
+  let loaded;
+  try {
+    loaded = await call("GET", recordingPath(id));
+  } catch (error) {
+    if (place().id === id && error instanceof Problem && [404, 422].includes(error.status)) return clear(id, t("recording.unknown"));
+    throw error;
+  }
   if (place().id !== id) return; // another view is shown by now
   if (loaded.state === "recording" && recording && !isRunning()) return; // an answer that was overtaken
   recording = loaded;
   draw();
-  if (isRunning() || scrubbing) return;
+  if (isRunning() || scrubbing || !recording.counts.pulses) return;
   scrubbing = true;
   try {
-    scrub(await call("GET", recordingPath(id, "/pulses")));
+    const pulses = await call("GET", recordingPath(id, "/pulses"));
+    if (recording?.id === id && place().id === id) scrub(pulses);
   } catch (error) {
     scrubbing = false;
     throw error;
@@ -84,12 +104,22 @@ export function draw() {
   const { id, session, verdict } = recording;
   setText($("recording-title"), who(session, t("recordings.nobody")));
   const { text, advice } = isRunning() ? { text: t("recording.running"), advice: "" } : say(verdict);
-  $("player").hidden = isRunning();
+  const empty = !isRunning() && !recording.counts.pulses;
+  $("player").hidden = isRunning() || empty;
+  $("recording-columns").hidden = false;
+  $("recording-empty").hidden = !empty;
+  setText($("recording-empty"), empty ? t("recording.no_pulses") : "");
+  const toRecover = ["verdict_unfinished", "verdict_damaged", "verdict_headless"].includes(verdict.code);
+  $("recording-recover").hidden = !toRecover;
+  setText($("recording-recover"), toRecover ? t("recording.recover", { command: `svev recover ${id}.mcap -o ${id}-whole.mcap` }) : "");
+  $("recording-favourite").hidden = false;
+  $("recording-favourite").setAttribute("aria-pressed", String(recording.favourite));
+  if ($("recording-tags") !== document.activeElement) $("recording-tags").value = recording.tags.join(", ");
   $("recording-verdict").replaceChildren(makeMark(verdict.level, verdict.level, [text, advice].filter(Boolean).join(" – ")));
   writeFields($("recording-session"), session);
   drawFacts(recording);
   $("recording-buttons").replaceChildren(...isRunning() ? [] : [
-    make("a", { class: "button primary", href: partOf(id, "file"), download: `${id}.mcap` }, icon("download"), make("span", {}, t("recording.download"))),
+    make("a", { class: "button primary", href: partOf(id, "file"), download: "" }, icon("download"), make("span", {}, t("recording.download"))),
     recording.deleted ? makeButton("restore", t("trash.restore"), restoreShown) : makeButton("trash", t("recording.delete"), deleteShown),
   ]);
 }
@@ -120,15 +150,14 @@ async function restoreShown() {
   if (recording) await restore(recording);
 }
 
-/**
- * @param {string} name
- * @param {string} value
- */
-async function changed(name, value) {
+/** @param {object} what session fields, tags, or whether it is a favourite */
+async function change(what) {
   if (!recording) return;
   const { id } = recording;
   await attempt(async () => {
-    recording = await call("PATCH", recordingPath(id), { [name]: value });
+    const changed = await call("PATCH", recordingPath(id), what);
+    if (recording?.id !== id) return;
+    recording = changed;
     draw();
     tell("good", t("recording.changed"));
   });

@@ -1,73 +1,132 @@
-/** The list of recordings, newest first by day, and the trash; in the live view, the recording that ended last. */
+/** The list of recordings, page by page, and the trash. Each keeps its place while something else is looked at. */
 
-import { say, t } from "../i18n/i18n.js";
-import { call, partOf, recordingPath } from "../shared/api.js";
+import { t } from "../i18n/i18n.js";
+import { call, callForPage } from "../shared/api.js";
 import { hear } from "../shared/connection.js";
-import { $, icon, make, makeMark, setText } from "../shared/dom.js";
-import { clock, day, size, timeOfDay, who } from "../shared/format.js";
+import { $, icon, make, setText } from "../shared/dom.js";
+import { day, size, who } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt } from "../shared/snacks.js";
-import { known, watch } from "../shared/store.js";
-import { restore, watchCatalogue } from "./catalogue.js";
+import { emptyTrash, removeForGood, restore, watchCatalogue } from "./catalogue.js";
+import { drawFilters, filtered, filterQuery, sortedByTime, startFilters } from "./filters.js";
+import { makeLink } from "./row.js";
+import { drawSelection, endSelection, makeBox, startSelection } from "./selection.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
+/** @typedef {{ recordings: Recording[]|null, total: number, scrolled: number }} List `recordings`: null before they came */
 
-/** @type {Recording[]|null} */
-let recordings = null;
-let last = "";
+const PAGE = 50;
+/** The service gives no more at once. */
+const MOST = 1000;
+
+/** @type {Record<string, List>} */
+const lists = { jumps: { recordings: null, total: 0, scrolled: 0 }, trash: { recordings: null, total: 0, scrolled: 0 } };
+/** Counts what was asked for: an answer that was overtaken is dropped. */
+let asked = 0;
+let loadingMore = false;
 
 export function startRecordings() {
-  $("recordings-search").addEventListener("input", draw);
+  startFilters(() => { list().scrolled = 0; void load(PAGE); });
+  startSelection(() => list().recordings ?? [], draw);
   hear({ recordings: reload });
   watchCatalogue(reload);
-  watch(drawLast);
+  $("recordings-more").addEventListener("click", () => void loadMore());
+  $("trash-empty").addEventListener("click", () => void emptyTrash());
+  new IntersectionObserver((seen) => { if (seen.some(({ isIntersecting }) => isIntersecting)) void loadMore(); }, { rootMargin: "600px" }).observe($("recordings-more"));
+  addEventListener("scroll", () => { if (place().view === "recordings") list().scrolled = scrollY; }, { passive: true });
 }
 
-/** Load the list anew, if it is shown. */
+/** Load the list anew, if it is shown, as far as it was shown. */
 export async function reload() {
-  const { view, trash } = place();
-  void loadLast(true);
-  if (view !== "recordings") return;
-  recordings = await attempt(() => call("GET", trash ? "recordings?deleted=true" : "recordings")) ?? recordings;
-  draw();
+  if (place().view !== "recordings") return;
+  await load(Math.min(MOST, Math.max(PAGE, list().recordings?.length ?? 0)));
 }
 
-/** Enter the view. What it showed before may be the other list, so it is emptied first. */
+/** Enter the view: the list stands where it was left, and is brought up to date. */
 export function enterRecordings() {
-  recordings = null;
+  endSelection();
   draw();
+  scrollTo(0, list().scrolled);
   void reload();
 }
 
 /** Draw the list. */
 export function draw() {
   const { trash } = place();
-  const sought = $("recordings-search").value.trim().toLowerCase();
-  const found = (recordings ?? []).filter((recording) => !sought || searchable(recording).includes(sought));
+  const { recordings, total } = list();
+  const found = recordings ?? [];
+  drawFilters();
+  drawSelection();
   setText($("recordings-title"), t(trash ? "trash.title" : "nav.recordings"));
+  setText($("recordings-count"), recordings && filtered() ? t("recordings.found", { total }) : "");
   $("recordings-other").href = trash ? "#/recordings" : "#/trash";
   $("recordings-other").replaceChildren(icon(trash ? "recordings" : "trash"), make("span", {}, t(trash ? "nav.recordings" : "trash.title")));
+  $("trash-about").hidden = !trash || !found.length;
   $("recordings-empty").hidden = recordings === null || found.length > 0;
-  setText($("recordings-empty"), t(sought ? "recordings.none_found" : trash ? "trash.empty" : "recordings.empty"));
+  setText($("recordings-empty"), t(filtered() ? "recordings.none_found" : trash ? "trash.empty" : "recordings.empty"));
+  $("recordings-more").hidden = found.length >= total;
   const focused = document.activeElement?.getAttribute("href");
-  $("recordings-list").replaceChildren(...byDay(found).flatMap(([date, those]) => [
-    make("h2", { class: "day" }, date, make("span", {}, String(those.length))),
+  $("recordings-list").replaceChildren(...byDay(found).flatMap(([date, those], index, days) => [
+    date ? make("h2", { class: "day" }, date, make("span", {}, index < days.length - 1 || found.length >= total ? String(those.length) : "")) : "",
     make("ul", { class: "rows" }, ...those.map(makeRow)),
   ]));
   // The link that had the focus was replaced by a new one: who works by keys goes on there.
-  if (focused) [...$("recordings-list").querySelectorAll("a")].find((link) => link.getAttribute("href") === focused)?.focus();
+  if (focused) [...$("recordings-list").querySelectorAll("a")].find((link) => link.getAttribute("href") === focused)?.focus({ preventScroll: true });
 }
 
-/** @param {Recording} recording */
-function searchable({ id, session }) {
-  return `${id} ${session.bib} ${session.athlete} ${session.notes}`.toLowerCase();
+function list() {
+  return lists[place().trash ? "trash" : "jumps"];
+}
+
+/** @param {number} limit @param {number} [offset] */
+function query(limit, offset = 0) {
+  const wanted = filterQuery();
+  wanted.set("limit", String(limit));
+  if (offset) wanted.set("offset", String(offset));
+  if (place().trash) wanted.set("deleted", "true");
+  return `recordings?${wanted}`;
+}
+
+/** @param {number} limit */
+async function load(limit) {
+  const shown = list();
+  const mine = asked += 1;
+  const page = await attempt(() => callForPage(query(limit)));
+  if (!page || mine !== asked) return;
+  Object.assign(shown, { recordings: page.items, total: page.total });
+  if (shown !== list()) return;
+  draw();
+  if (place().trash) await drawTrash();
+}
+
+async function loadMore() {
+  const shown = list();
+  const there = shown.recordings;
+  if (loadingMore || !there || there.length >= shown.total || place().view !== "recordings") return;
+  loadingMore = true;
+  const mine = asked += 1;
+  const page = await attempt(() => callForPage(query(PAGE, there.length)));
+  loadingMore = false;
+  if (!page || mine !== asked) return;
+  const known = new Set(there.map(({ id }) => id)); // one may have been recorded meanwhile, which moves all others
+  shown.recordings = [...there, ...page.items.filter(({ id }) => !known.has(id))];
+  shown.total = page.items.length ? page.total : shown.recordings.length;
+  if (shown === list()) draw();
+}
+
+/** Say how much room the trash takes. */
+async function drawTrash() {
+  /** @type {import("../shared/types.js").Trash|null} */
+  const trash = await attempt(() => call("GET", "trash"));
+  if (trash) setText($("trash-words"), t("trash.about", { count: trash.recordings, size: size(trash.bytes) }));
 }
 
 /**
  * @param {Recording[]} those
- * @returns {[string, Recording[]][]}
+ * @returns {[string, Recording[]][]} days, or one part without a heading where the order is another one
  */
 function byDay(those) {
+  if (!sortedByTime()) return [["", those]];
   /** @type {Map<string, Recording[]>} */
   const days = new Map();
   for (const recording of those) {
@@ -79,49 +138,11 @@ function byDay(those) {
 
 /** @param {Recording} recording */
 function makeRow(recording) {
-  const { trash } = place();
-  const row = make("li", { class: "row" }, makeLink(recording));
-  if (trash) {
-    row.append(make("button", { type: "button", onclick: () => void restore(recording) }, icon("restore"), make("span", {}, t("trash.restore"))));
-  }
+  const row = make("li", { class: "row" }, makeBox(recording, who(recording.session, recording.id)), makeLink(recording));
+  if (!place().trash) return row;
+  row.classList.add("deleted");
+  row.append(
+    make("button", { type: "button", onclick: () => void restore(recording) }, icon("restore"), make("span", {}, t("trash.restore"))),
+    make("button", { type: "button", onclick: () => void removeForGood([recording]) }, icon("close"), make("span", {}, t("trash.remove"))));
   return row;
-}
-
-/**
- * A summary of a recording that links to its view.
- *
- * @param {Recording} recording
- */
-function makeLink(recording) {
-  const { id, session, started, duration_s, bytes, verdict, state } = recording;
-  const thumbnail = make("img", { class: "thumbnail", src: partOf(id, "thumbnail.jpg"), alt: "", loading: "lazy", width: 160, height: 90 });
-  thumbnail.addEventListener("error", () => thumbnail.classList.add("none"));
-  const facts = [started ? timeOfDay(started) : id, clock(duration_s), size(bytes)].join("  ·  ");
-  return make("a", { class: "summary", href: `#/recordings/${encodeURIComponent(id)}` },
-    thumbnail,
-    make("span", { class: "summary-words" },
-      make("strong", {}, who(session, t("recordings.nobody"))), make("span", { class: "summary-facts" }, facts),
-      state === "recording" ? makeMark("recording", "error", t("state.recording")) : makeMark(verdict.level, verdict.level, say(verdict).text)));
-}
-
-function drawLast() {
-  void loadLast(false);
-}
-
-/**
- * Show the recording that ended last in the live view.
- *
- * @param {boolean} again also if it is shown already: somebody may have changed it
- */
-async function loadLast(again) {
-  const id = known.status?.last_recording ?? "";
-  if (!known.connected || (id === last && !again)) return;
-  last = id;
-  try {
-    const recording = id ? await call("GET", recordingPath(id)) : null;
-    $("last").hidden = !recording || recording.deleted;
-    if (recording) $("last-recording").replaceChildren(makeLink(recording));
-  } catch {
-    $("last").hidden = true; // it was deleted for good meanwhile, or the connection is lost, which the banner says
-  }
 }

@@ -42,6 +42,8 @@ export function clearScrubber() {
   recording = null;
   loading = false;
   viewer.image.removeAttribute("src");
+  viewer.image.alt = "";
+  for (const words of ["frame-where", "frame-fate"]) setText($(words), "");
   $("frame-strip").hidden = true;
 }
 

@@ -39,6 +39,29 @@ export function onTokenNeeded(action) {
  * @throws {Problem}
  */
 export async function call(method, path, body, deadlineMs = DEADLINE_MS) {
+  return (await ask(method, path, body, deadlineMs)).content;
+}
+
+/**
+ * Ask for one page of a list.
+ *
+ * @param {string} path below /api/
+ * @returns {Promise<{ items: any[], total: number }>} `total`: how many there are on all pages
+ * @throws {Problem}
+ */
+export async function callForPage(path) {
+  const { answer, content } = await ask("GET", path, undefined, DEADLINE_MS);
+  return { items: content, total: Number(answer.headers.get("X-Total-Count") ?? content.length) };
+}
+
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {object|undefined} body
+ * @param {number} deadlineMs
+ * @returns {Promise<{ answer: Response, content: any }>}
+ */
+async function ask(method, path, body, deadlineMs) {
   /** @type {RequestInit} */
   const content = body === undefined ? {} : contentOf(body);
   let answer;
@@ -46,7 +69,7 @@ export async function call(method, path, body, deadlineMs = DEADLINE_MS) {
     answer = await fetch(`./api/${path}`, {
       method, ...content, cache: "no-store", signal: AbortSignal.timeout(deadlineMs),
     });
-    if (answer.ok) return answer.status === 204 ? null : await answer.json();
+    if (answer.ok) return { answer, content: answer.status === 204 ? null : await answer.json() };
   } catch (error) {
     const late = error instanceof DOMException && error.name === "TimeoutError";
     throw late

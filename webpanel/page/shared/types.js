@@ -84,6 +84,10 @@
  * @property {boolean} favourite
  * @property {string[]} tags
  *
+ * @typedef {object} Trash
+ * @property {number} recordings
+ * @property {number} bytes
+ *
  * @typedef {object} PulseSummary
  * @property {number} pulse
  * @property {number} time_s

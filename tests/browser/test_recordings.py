@@ -1,0 +1,155 @@
+"""The list of recordings and the trash in a browser: long lists, filters, several at once, what cannot be shown."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from recorder.reading.corrected_log import corrected_log
+from rig.frame import FrameStatus
+from tests.browser.conftest import Open
+from tests.recorder.logs import ALL_OK
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import Panel
+
+LOST = (FrameStatus.LOST, *ALL_OK[1:])
+
+
+@pytest.fixture
+def many(service: MemoryService, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """120 recordings of bibs 1 to 120."""
+    first = write_recording(tmp_path_factory.mktemp("first"), "first", (ALL_OK,) * 2)
+    for number in range(1, 121):
+        with corrected_log(first, {"athlete": f"Athlete {number}", "bib": str(number)}).open() as log:
+            (service.catalogue.directory / f"jump-{number:03}.mcap").write_bytes(log.read())
+
+
+@pytest.fixture
+def few(service: MemoryService) -> None:
+    """A complete recording, one that lacks a frame, one without any pulse."""
+    folder = service.catalogue.directory
+    write_recording(folder, "whole", (ALL_OK,) * 3, {"athlete": "Anna Berg", "bib": "17"}, ago_s=20)
+    write_recording(folder, "partial", (LOST, ALL_OK), {"athlete": "Ola Lie", "bib": "4"}, ago_s=10)
+    write_recording(folder, "empty", (), {"bib": "9"})
+
+
+@pytest.mark.usefixtures("many")
+def test_a_long_list_comes_as_it_is_scrolled_and_keeps_its_place(panel: Panel, open_page: Open) -> None:
+    page = open_page("about:blank", width=360, height=780, locale="nb-NO", has_touch=True, is_mobile=True)
+    thumbnails: list[str] = []
+    page.on("request", lambda request: thumbnails.append(request.url) if "thumbnail" in request.url else None)
+    page.goto(f"{panel.url}/#/recordings")
+    rows = page.locator("#recordings-list li")
+    expect(rows).to_have_count(50)
+    assert len(thumbnails) < 50
+    rows.nth(49).scroll_into_view_if_needed()
+    expect(rows).to_have_count(100)
+    link = page.locator('a[href="#/recordings/jump-041"]')
+    link.scroll_into_view_if_needed()
+    before = page.evaluate("scrollY")
+    assert before > 5000
+    link.click()
+    expect(page.locator("#frame-strip li")).to_have_count(1)
+    page.go_back()
+    expect(rows).to_have_count(100)
+    expect(link).to_be_in_viewport()
+    assert abs(page.evaluate("scrollY") - before) < 400
+
+    page.get_by_role("searchbox").fill("athlete 77")
+    expect(rows).to_have_count(1)
+    expect(page.locator("#recordings-count")).to_have_text("1 funnet")
+    page.get_by_role("searchbox").fill("")
+    page.get_by_role("button", name="Filter").click()
+    page.get_by_label("Rekkef\u00f8lge").select_option("bib")
+    expect(page.locator("#recordings-list strong").first).to_have_text("1 \u00b7 Athlete 1")
+    expect(page.locator("#recordings-list .day")).to_have_count(0)
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+
+
+@pytest.mark.usefixtures("few")
+def test_several_are_downloaded_deleted_and_removed_for_good(
+    panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path
+) -> None:
+    page = open_page(f"{panel.url}/#/recordings")
+    expect(page.locator("#recordings-list li")).to_have_count(3)
+    page.get_by_role("button", name="Select").click()
+    expect(page.locator("#select-delete")).to_be_disabled()
+    page.get_by_role("checkbox", name="Select 17").check()
+    page.get_by_role("checkbox", name="Select 4").check()
+    expect(page.locator("#select-count")).to_contain_text("2 selected")
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="Download").click()
+    assert coming.value.suggested_filename == "svev_2-jumps.zip"
+    coming.value.save_as(tmp_path / "jumps.zip")
+    with zipfile.ZipFile(tmp_path / "jumps.zip") as archive:
+        assert set(archive.namelist()) == {"17_Anna-Berg_whole.mcap", "4_Ola-Lie_partial.mcap", "SHA256SUMS"}
+
+    page.get_by_role("button", name="Delete", exact=True).click()
+    expect(page.locator("#recordings-list li")).to_have_count(1)
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator("#recordings-list li")).to_have_count(3)
+    page.get_by_role("button", name="Select").click()
+    page.get_by_role("button", name="All shown").click()
+    page.get_by_role("button", name="Delete", exact=True).click()
+    page.get_by_role("link", name="Trash").click()
+    expect(page.locator("#trash-words")).to_contain_text("3 jumps take")
+    page.locator("li", has_text="Anna Berg").get_by_role("button", name="Restore").click()
+    expect(page.locator("#trash-words")).to_contain_text("2 jumps take")
+    for answer, left in (("Cancel", 2), ("Remove for good", 0)):
+        page.get_by_role("button", name="Empty the trash").click()
+        page.get_by_role("dialog").get_by_role("button", name=answer).click()
+        expect(page.locator("#recordings-list li")).to_have_count(left)
+    expect(page.locator("#recordings-empty")).to_have_text("The trash is empty.")
+    assert service.trash().recordings == 0
+    assert [entry.id for entry in service.catalogue.entries()] == ["whole"]
+
+
+@pytest.mark.usefixtures("few")
+def test_what_cannot_be_shown_never_shows_the_jump_before(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    data = (service.catalogue.directory / "whole.mcap").read_bytes()
+    (service.catalogue.directory / "headless.mcap").write_bytes(bytes(4096) + data[4096:])
+    page = open_page(f"{panel.url}/#/recordings/whole")
+    for name, words in (
+        ("nobody", "There is no such jump"), ("empty", "There is nothing to look at"), ("..", "There is no such jump"),
+        ("headless", "There is nothing to look at"),
+    ):  # fmt: skip
+        page.goto(f"{panel.url}/#/recordings/whole")
+        expect(page.locator("#frame-where")).to_have_text(re.compile("^1 / 3"))
+        page.goto(f"{panel.url}/#/recordings/{name}")
+        expect(page.locator("#recording-empty")).to_contain_text(words)
+        expect(page.locator("#player")).to_be_hidden()
+        assert "Anna Berg" not in page.locator("#recording").inner_text()
+    expect(page.locator("#recording-recover")).to_contain_text("svev recover headless.mcap -o headless-whole.mcap")
+    page.goto(f"{panel.url}/#/recordings/nobody")
+    expect(page.locator("#recording-columns")).to_be_hidden()
+
+
+@pytest.mark.usefixtures("few")
+def test_marks_and_filters(panel: Panel, open_page: Open) -> None:
+    page = open_page(f"{panel.url}/#/recordings/whole")
+    page.get_by_role("button", name="Favourite").click()
+    expect(page.get_by_role("button", name="Favourite")).to_have_attribute("aria-pressed", "true")
+    page.get_by_label("Tags").fill("fall,  new boots ,")
+    page.keyboard.press("Tab")
+    expect(page.get_by_label("Tags")).to_have_value("fall, new boots")
+    page.goto(f"{panel.url}/#/recordings")
+    expect(page.locator("#recordings-list .tags")).to_have_text("fallnew boots")
+    page.get_by_role("button", name="Filter").click()
+    for name, value in (("favourite", None), ("tag", "Fall"), ("verdict", "good")):
+        field = page.locator(f"#filter-{name}")
+        if value is None:
+            field.check()
+        elif name == "tag":
+            field.fill(value)
+        else:
+            field.select_option(value)
+        expect(page.locator("#recordings-list li")).to_have_count(1)
+        page.get_by_role("button", name="Clear all").click()
+        expect(page.locator("#recordings-list li")).to_have_count(3)
+    page.get_by_label("From day").fill("2099-01-01")
+    expect(page.locator("#recordings-empty")).to_have_text("No jump fits this search and these filters.")
+    expect(page.locator("#filters-toggle")).to_have_text("Filter (1)")

@@ -5,13 +5,13 @@ measured it gives a point that ties their images where the jumper is measured.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from analysis.cameras.oriented_scene import OrientedScene, scene_of_survey
-from analysis.cameras.standing import FrameShake, steadied
-from analysis.measurements.model import JumpMeasurements, MeasuredCamera, PulseMeasurements
+from analysis.cameras.standing import FrameShake, SteadiedJump, steadied
+from analysis.measurements.model import MeasuredCamera, PulseMeasurements
 from analysis.scene.camera_system import CameraSystem
 from analysis.scene.orientation import scene_of
 from photogrammetry.geometry.rotation import vector_from_rotation
@@ -25,21 +25,8 @@ HELMET = "P1"
 _MOVING = "H*"  # names of the helmet's places
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HelmetFlight:
-    """A measured jump.
-
-    Attributes:
-        measurements: in the frames of `system`.
-        system: the cameras as they stood during the jump.
-    """
-
-    measurements: JumpMeasurements
-    system: CameraSystem
-
-
 def with_helmet(
-    scene: OrientedScene, flights: Sequence[HelmetFlight], cameras: Mapping[str, MeasuredCamera], rate_hz: float
+    scene: OrientedScene, flights: Sequence[SteadiedJump], cameras: Mapping[str, MeasuredCamera], rate_hz: float
 ) -> tuple[OrientedScene, Orientation]:
     """The scene, oriented by the balls and the helmet, and the adjustment.
 
@@ -74,7 +61,7 @@ def with_helmet(
 
 
 def _places(
-    system: CameraSystem, flight: HelmetFlight, middle: Mapping[str, float]
+    system: CameraSystem, flight: SteadiedJump, middle: Mapping[str, float]
 ) -> dict[int, dict[str, tuple[Floats, Floats]]]:
     """By pulse and camera, where the helmet would be in the static image (px), and sigmas; in two cameras at least."""
     mean = float(np.mean([middle.get(name, 0.0) for name in system.names]))

@@ -12,7 +12,13 @@ import numpy as np
 
 from analysis.candidates.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
-from analysis.measurements.model import ImageMeasurements, PointMeasurement, PulseMeasurements, SkiMeasurement
+from analysis.measurements.model import (
+    ImageMeasurements,
+    JumpMeasurements,
+    PointMeasurement,
+    PulseMeasurements,
+    SkiMeasurement,
+)
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import distort
 from photogrammetry.geometry.rotation import rotation_from_vector
@@ -40,6 +46,19 @@ class FrameShake:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SteadiedJump:
+    """A jump as it would have been measured in frames that do not shake.
+
+    Attributes:
+        measurements: in the frames of `system`.
+        system: the cameras as they stood during the jump.
+    """
+
+    measurements: JumpMeasurements
+    system: CameraSystem
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Standing:
     """The cameras during a jump.
 
@@ -59,6 +78,10 @@ class Standing:
     def measurements(self, seen: PulseMeasurements) -> PulseMeasurements:
         """Measurements in the frames as the cameras of `system` would have made them."""
         return self._measurements(seen, back=False)
+
+    def steadied(self, jump: JumpMeasurements) -> SteadiedJump:
+        """A jump that was measured in the frames as they are, where the cameras of `system` would show it."""
+        return SteadiedJump(replace(jump, pulses=tuple(self.measurements(pulse) for pulse in jump.pulses)), self.system)
 
     def in_frames(self, steadied: PulseMeasurements) -> PulseMeasurements:
         """The inverse of `measurements`: where the frames themselves show what was measured. Covariances stay."""

@@ -18,7 +18,7 @@ from analysis.candidates.background import Background, Region
 from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs, half_size
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
-from analysis.candidates.traces import find_traces, look_for_traces
+from analysis.candidates.traces import find_traces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets, triplets
@@ -162,23 +162,6 @@ class Finder:
         spots.contrast[there] = discs.contrast
         spots.strength[there] = np.abs(discs.contrast) / discs.sigma_contrast
         return spots
-
-    def look_for_traces(
-        self, pulse: PulseNumber, camera: str, axes: Floats, width: float, reach: float
-    ) -> tuple[Trace, ...]:
-        """Traces of skis along predicted axes; none where nothing was in front of the static scene.
-
-        Args:
-            pulse: one that was searched before, not longer ago than the memory reaches.
-            camera: its name.
-            axes: (n, 2, 2) predicted ends of one ski or both, px; both if they are near each other.
-            width: expected, px.
-            reach: px by which an axis may be off.
-        """
-        for region in self._regions.get((pulse, camera), ()):
-            if region.holds(axes.mean(axis=(0, 1))):
-                return look_for_traces(region, axes, width, reach)
-        return ()
 
     def _keep(self, pulse: PulseNumber, camera: str, regions: list[Region]) -> None:
         self._kept -= sum(region.nbytes for region in self._regions.pop((pulse, camera), ()))

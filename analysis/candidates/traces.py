@@ -33,7 +33,7 @@ _TOGETHER = 3  # lines that are fitted together, the longest ones
 _MOST = 4  # lines of each sign and direction
 _MISFIT = 4.0  # residuals over noise
 _WORST_SIGMA = 0.5  # px; of a point
-_FEWEST_POINTS, _FEWEST_EXPECTED = 3, 5  # on an axis; on one that is only expected
+_FEWEST_POINTS = 3  # on an axis
 _PARALLEL = 0.9  # cosine; lines that cross at more than that hardly disturb each other
 _COVERING = 0.97  # cosine of the angle between skis that may nearly cover each other
 _NARROWER = 0.75  # a ski's width over that of two which cover each other, to start from
@@ -96,36 +96,6 @@ def find_traces(region: Region) -> tuple[Trace, ...]:
         fitted = fit_bars(region, _explanations(start), group[0].sign > 0, _POINTS)
         traces += [trace for bar in fitted if (trace := _trace_of(bar, region)) is not None]
     return tuple(sorted(traces, key=lambda trace: -float(np.hypot(*(trace.ends[1] - trace.ends[0])))))
-
-
-def look_for_traces(region: Region, axes: Floats, width: float, reach: float) -> tuple[Trace, ...]:
-    """Traces along predicted axes, where no row of cross sections told of them; none if nothing is there.
-
-    Args:
-        region: part of an image.
-        axes: (n, 2, 2) predicted ends of one ski or both, px of the image.
-        width: expected, px.
-        reach: px by which an axis may be off.
-    """
-    low, high = np.zeros(2), np.array(region.grey.shape[::-1], float) - 1
-    bars = [Bar(np.clip(ends - (region.x, region.y), low, high), width) for ends in axes]
-    bars = [bar for bar in bars if bar.length >= _SHORTEST]
-    if not bars:
-        return ()
-    starts = [bars, *([bar] for bar in bars)] if len(bars) > 1 else [bars]
-    fitted = [bar for brighter in (True, False) for bar in fit_bars(region, starts, brighter, _POINTS)]
-    traces = [trace for bar in fitted if (trace := _trace_of(bar, region)) is not None]
-    return tuple(
-        trace
-        for trace in traces
-        if len(trace.xy) >= _FEWEST_EXPECTED and min(_off(trace, ends) for ends in axes) < reach
-    )
-
-
-def _off(trace: Trace, ends: Floats) -> float:
-    """How far the points of a trace lie off an axis at most, px."""
-    along = (ends[1] - ends[0]) / float(np.hypot(*(ends[1] - ends[0])))
-    return float(np.abs((trace.xy - ends[0]) @ np.array((-along[1], along[0]))).max())
 
 
 def _explanations(bars: list[Bar]) -> list[list[Bar]]:

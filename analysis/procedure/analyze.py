@@ -1,13 +1,14 @@
 """The whole analysis of a recording: from its log and the survey of the balls to the measured jumps."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.cameras.frames import LogFrames
-from analysis.cameras.helmet import HelmetFlight, with_helmet
+from analysis.cameras.helmet import with_helmet
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.cameras.source import Source, orient_from
+from analysis.cameras.standing import SteadiedJump
 from analysis.cameras.steadiness import Steadiness, watch
 from analysis.candidates.finder import Finder, find_candidates
 from analysis.candidates.model import PulseCandidates
@@ -149,12 +150,8 @@ def analyze(
     return Analysis(result, measurements, scene, orientation, perpendicular)
 
 
-def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> HelmetFlight:
-    """A jump as it would have been measured in frames that do not shake, and the cameras as they stood in it."""
-    standing = steadiness.during([pulse.pulse for pulse in jump.pulses])
-    return HelmetFlight(
-        replace(jump, pulses=tuple(standing.measurements(pulse) for pulse in jump.pulses)), standing.system
-    )
+def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> SteadiedJump:
+    return steadiness.during([pulse.pulse for pulse in jump.pulses]).steadied(jump)
 
 
 def _synchrony(jumps: list[ComputedJump]) -> dict[str, CameraOffset]:

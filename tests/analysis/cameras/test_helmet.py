@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from analysis.cameras.helmet import HelmetFlight, with_helmet
+from analysis.cameras.helmet import with_helmet
 from analysis.cameras.oriented_scene import OrientedScene, scene_of_survey
 from analysis.cameras.pose_change import PoseChange
+from analysis.cameras.standing import SteadiedJump
 from analysis.measurements.model import MeasuredCamera
 from analysis.scene.orientation import scene_of
 from analysis.scene.static_image import StaticImage
@@ -54,7 +55,7 @@ def test_the_helmet_ties_the_images() -> None:
         cameras = {name: MeasuredCamera(SIZE, 0.004 * (name == "K3")) for name in scene.system.names}
         rng = np.random.default_rng(seed)
         measured = simulated_measurements(true_jump(seed), true_cameras(), rng, late_s={"K3": 0.002})
-        better, orientation = with_helmet(scene, [HelmetFlight(measured.jumps[0], scene.system)], cameras, RATE_HZ)
+        better, orientation = with_helmet(scene, [SteadiedJump(measured.jumps[0], scene.system)], cameras, RATE_HZ)
         places = sum(point.name.startswith("H") for point in better.network.points)
         assert places > 20
         assert orientation.notes[0] == f"alternative 2: {places} moving points tie the images beside the static ones"

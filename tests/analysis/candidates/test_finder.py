@@ -5,7 +5,7 @@ import pytest
 
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
-from tests.analysis.candidates.judge import Hill, judged, scenario, to_line
+from tests.analysis.candidates.judge import Hill, judged, scenario
 
 PULSES = (29, 36, 43, 50)  # table, edge, early flight, V
 
@@ -61,21 +61,6 @@ def test_a_predicted_place_finds_the_marker_again(hill: Hill) -> None:
             assert np.hypot(*(spots.xy - place).T).min() < 0.15
     nowhere = hill.finder.look_for_spots(PulseNumber(pulse), "K1", np.array((600.0, 20.0)), np.eye(2))
     assert len(nowhere) == 0
-
-
-def test_predicted_axes_find_the_skis_again(hill: Hill) -> None:
-    pulse = 43
-    hill.find(pulse)
-    state = hill.truth([pulse])[0]
-    for i, camera in enumerate(hill.scenario.cameras):
-        lines = hill.ski_lines(i, state)
-        axes = np.array([line[[0, -1]] for line in lines.values()]) + np.array(((0.0, 0.8), (0.0, -0.6)))
-        traces = hill.finder.look_for_traces(PulseNumber(pulse), camera.name, axes, 2.7, 2.0)
-        assert traces, camera.name
-        for trace in traces:
-            assert min(np.abs(to_line(line, trace.xy)[0]).max() for line in lines.values()) < 0.5
-        beside = axes + np.array((0.0, -25.0))
-        assert hill.finder.look_for_traces(PulseNumber(pulse), camera.name, beside, 2.7, 2.0) == ()
 
 
 def test_a_hard_day_hides_few_markers() -> None:

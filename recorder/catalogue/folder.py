@@ -203,8 +203,12 @@ class Catalogue:
             before = time.time() - older_than_s
             return _remove([log for log in trashed_logs(self.directory) if log.since <= before])
 
-    def make_room(self, wanted_bytes: float) -> TrashContents:
-        """Remove for good what has been in the trash for longest, until so much room is won or the trash is empty.
+    def make_room(self, wanted_bytes: float, *, older_than_s: float = 0.0) -> TrashContents:
+        """Remove for good what has been in the trash for longest, until so much room is won or nothing is left to go.
+
+        Args:
+            wanted_bytes: so much room.
+            older_than_s: what has not been in the trash for so long stays there.
 
         Returns:
             What was removed.
@@ -213,7 +217,9 @@ class Catalogue:
             StorageError: the disk refuses.
         """
         with self._change():
-            return _remove(list(oldest_until(trashed_logs(self.directory), wanted_bytes)))
+            before = time.time() - older_than_s
+            logs = [log for log in trashed_logs(self.directory) if log.since <= before]
+            return _remove(list(oldest_until(logs, wanted_bytes)))
 
     @contextmanager
     def _change(self) -> Iterator[None]:

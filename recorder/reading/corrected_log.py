@@ -3,7 +3,7 @@
 Of the original only the session's metadata record is replaced. The padding behind the opening makes up for its other
 length, so that chunks move by whole pages at most, usually not at all. Then the offsets in the summary are moved, and
 the checksums of data section and summary follow from those of the original: no pixel is read for them. So a log that is
-damaged is as damaged in its corrected form.
+damaged is as damaged in its corrected form (decision 0033).
 """
 
 import io

@@ -19,8 +19,11 @@ _DAY_S: Final = 86400.0
 #: Room is made before less than so much can be recorded, or two jumps.
 _SPARE_S: Final = 120.0
 _SPARE_JUMPS: Final = 2
+#: What was deleted a moment ago can be brought back, although room runs short; but not at the cost of a recording.
+_FRESH_S: Final = 600.0
 #: Between two looks the fastest rigs write some 500 MB, less than the usual reserve.
 _LOOK_S: Final = 5.0
+_LAST_S: Final = 3 * _LOOK_S
 #: A disk that hangs is not waited for longer.
 _END_S: Final = 2.0
 _GB: Final = 1e9
@@ -66,8 +69,12 @@ class TrashKeeper:
         )
         return status.model_copy(update={"disk": counted})
 
-    def make_room(self, seconds: float) -> None:
+    def make_room(self, seconds: float, *, spare_fresh: bool = False) -> None:
         """Remove from the trash what must go for a recording of so many seconds, what was deleted first at the front.
+
+        Args:
+            seconds: length of the recording.
+            spare_fresh: leave what was deleted a moment ago.
 
         Raises:
             StorageError: the disk refuses.
@@ -77,7 +84,8 @@ class TrashKeeper:
             return
         missing = seconds * bytes_per_s(self._rig) - usable_bytes(self._rig, free)
         if missing > 0:
-            self._say(self._catalogue.make_room(missing), "room was needed")
+            gone = self._catalogue.make_room(missing, older_than_s=_FRESH_S if spare_fresh else 0.0)
+            self._say(gone, "room was needed")
 
     def look(self) -> None:
         """Remove what is too old, make room if it runs short, and measure what is left.
@@ -86,7 +94,8 @@ class TrashKeeper:
             StorageError: the disk refuses.
         """
         self._say(self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S), f"it was older than {KEPT_DAYS} days")
-        self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._rig.recorder.jump_s))
+        self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._rig.recorder.jump_s), spare_fresh=True)
+        self.make_room(_LAST_S)
         self._contents = self._catalogue.trash()
 
     def _say(self, gone: TrashContents, why: str) -> None:

@@ -155,14 +155,16 @@ def save(
 @app.command("list")
 def list_(
     context: typer.Context,
+    search: Annotated[str, typer.Option(help="only those in which all these words stand: id, bib, athlete, tags")] = "",
     deleted: Annotated[bool, typer.Option("--deleted", help="list the recordings in the trash instead")] = False,
     as_json: Json = False,
 ) -> None:
     """List the recordings, newest first.
 
-    Example: svev ctl list
+    Example: svev ctl list --search "17 nordmann"
     """
-    found = _call(context, "GET", f"/api/recordings?deleted={str(deleted).lower()}")
+    wanted = urllib.parse.urlencode({"deleted": str(deleted).lower(), "search": search})
+    found = _call(context, "GET", f"/api/recordings?{wanted}")
     _show({"recordings": found}, recordings_lines, as_json)
 
 

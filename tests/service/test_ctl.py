@@ -59,6 +59,7 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         assert [line.split()[0] for line in listed.splitlines()] == [saved["id"], begun["id"]]
         assert "[18 Ola]" in listed
         assert "[19 Eva]" in listed
+        assert _ctl(url, "list", "--search", "ola 18", token=TOKEN).stdout.split()[0] == begun["id"]
         assert _json(_ctl(url, "delete", begun["id"], "--json", token=TOKEN))["deleted"]
         assert len(_json(_ctl(url, "list", "--json", token=TOKEN))["recordings"]) == 1
         assert not _json(_ctl(url, "restore", begun["id"], "--json", token=TOKEN))["deleted"]

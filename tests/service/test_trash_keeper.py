@@ -41,6 +41,9 @@ def test_room_is_made_only_when_it_runs_short(tmp_path: Path) -> None:
     keeper = TrashKeeper(plenty, catalogue, events.append)
     keeper.make_room(0.01)
     assert catalogue.trash().recordings == 2
+    with _without_room(tmp_path, spare_s=100) as rig:
+        TrashKeeper(rig, catalogue, events.append).look()
+        assert catalogue.trash().recordings == 2, "they were deleted just now, and there is room for a while"
     with _without_room(tmp_path) as rig:
         TrashKeeper(rig, catalogue, events.append).look()
     assert catalogue.trash().recordings == 0

@@ -158,6 +158,7 @@ export const en = {
   "select.one": "Select {who}",
   "select.all": "All shown",
   "select.count": "{count} selected, {size}",
+  "select.too_many": "{count} selected; at most {most} can be downloaded at once",
   "trash.title": "Trash",
   "trash.empty": "The trash is empty.",
   "trash.restore": "Restore",

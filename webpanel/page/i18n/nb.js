@@ -158,6 +158,7 @@ export const nb = {
   "select.one": "Velg {who}",
   "select.all": "Alle som vises",
   "select.count": "{count} valgt, {size}",
+  "select.too_many": "{count} valgt; høyst {most} kan lastes ned på én gang",
   "trash.title": "Papirkurv",
   "trash.empty": "Papirkurven er tom.",
   "trash.restore": "Hent tilbake",

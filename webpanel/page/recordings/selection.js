@@ -70,6 +70,7 @@ export function drawSelection() {
   setText($("select").querySelector("span"), t(choosing ? "select.end" : "select.begin"));
   $("select").setAttribute("aria-pressed", String(choosing));
   setText($("select-count"), t("select.count", { count: those.length, size: size(those.reduce((sum, { bytes }) => sum + bytes, 0)) }));
+  if (those.length > MOST_TOGETHER && !trash) setText($("select-count"), t("select.too_many", { count: those.length, most: MOST_TOGETHER }));
   for (const name of ["select-delete", "select-restore"]) $(name).disabled = !those.length;
   $("select-restore").hidden = !trash;
   $("select-download").hidden = trash;

@@ -210,8 +210,8 @@ class RigService(Protocol):
         """SHA-256 of a file if it was asked for before, otherwise empty."""
         ...
 
-    def zipped(self, recording_ids: Sequence[str]) -> Iterator[bytes]:
-        """Several recordings as one archive (ZIP), piece by piece. Errors of single recordings come at once."""
+    def zipped(self, recording_ids: Sequence[str]) -> tuple[int, Iterator[bytes]]:
+        """Several recordings as one archive (ZIP): its size in bytes, and they piece by piece. Errors come at once."""
         ...
 
     def pulses(self, recording_id: str) -> Pulses:

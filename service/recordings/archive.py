@@ -28,7 +28,7 @@ from rig.status import (
     Trash,
 )
 from rig.tag import TripletTag
-from service.recordings.download import download_of, sha256_of, zipped
+from service.recordings.download import download_of, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, tags_of, utc
 from service.seam import Download, FoundRecordings
 from triggering.ledger import pauses_in_words
@@ -131,9 +131,10 @@ class Archive(ABC):
         """SHA-256 of a file if it was asked for before, otherwise empty."""
         return self._checksums.get(download.tag, "")
 
-    def zipped(self, recording_ids: Sequence[str]) -> Iterator[bytes]:
-        """Several recordings as one archive, piece by piece."""
-        return zipped([self.download(recording_id) for recording_id in dict.fromkeys(recording_ids)])
+    def zipped(self, recording_ids: Sequence[str]) -> tuple[int, Iterator[bytes]]:
+        """Several recordings as one archive: its size, and its bytes piece by piece."""
+        downloads = [self.download(recording_id) for recording_id in dict.fromkeys(recording_ids)]
+        return zipped_size(downloads), zipped(downloads)
 
     def pulses(self, recording_id: str) -> Pulses:
         """What became of each pulse of a recording."""

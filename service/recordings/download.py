@@ -4,7 +4,7 @@ import hashlib
 import re
 import unicodedata
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -20,6 +20,9 @@ _NOT_IN_NAMES: Final = re.compile(r"[^\w.]+")
 _PART_MAX: Final = 40
 _PIECE: Final = 1 << 20
 _SUMS: Final = "SHA256SUMS"
+#: Bytes of the records around a member, beside its name: before it, behind it, in the directory at the end; what a
+#: member with 64-bit lengths has more (an extra field of 20, 8 more behind it); the head of an extra field; the ends.
+_LOCAL, _DESCRIPTOR, _CENTRAL, _ZIP64_MORE, _EXTRA, _END, _ZIP64_END = 30, 16, 46, 28, 4, 22, 76
 
 
 def download_of(entry: Entry, path: Path) -> Download:
@@ -87,6 +90,18 @@ def zipped(downloads: Iterable[Download]) -> Iterator[bytes]:
             sums.append(f"{digest.hexdigest()}  {download.name}\n")
         archive.writestr(_SUMS, "".join(sums))
     yield sink.taken()
+
+
+def zipped_size(downloads: Sequence[Download]) -> int:
+    """Bytes of the archive that `zipped` makes, by APPNOTE.TXT 6.3.10 and how `zipfile` applies it."""
+    sums = sum(len(f"{'0' * 64}  {download.name}\n".encode()) for download in downloads)
+    sizes = [(len(download.name.encode()), download.size, _ZIP64_MORE) for download in downloads]
+    place = central = 0
+    for name, size, more in [*sizes, (len(_SUMS), sums, 0)]:
+        large = [16] * (size > zipfile.ZIP64_LIMIT) + [8] * (place > zipfile.ZIP64_LIMIT)
+        central += _CENTRAL + name + (sum(large) + _EXTRA if large else 0)
+        place += _LOCAL + name + size + _DESCRIPTOR + more
+    return place + central + _END + (_ZIP64_END if place > zipfile.ZIP64_LIMIT else 0)
 
 
 class _Sink:

@@ -107,19 +107,20 @@ def files_router(service: RigService, downloads: Streams) -> APIRouter:
     )
     def download_together(ids: Ids) -> StreamingResponse:
         """Several recordings as one ZIP archive without compression; `SHA256SUMS` in it has their checksums."""
-        pieces = service.zipped(ids.split(","))
-        return StreamingResponse(pieces, media_type="application/zip", headers=_zip_headers(ids))
+        size, pieces = service.zipped(ids.split(","))
+        return StreamingResponse(pieces, media_type="application/zip", headers=_zip_headers(ids, size))
 
     @router.head("/recordings.zip", include_in_schema=False)
     def head_together(ids: Ids) -> Response:
-        service.zipped(ids.split(","))
-        return Response(media_type="application/zip", headers=_zip_headers(ids))
+        size, _ = service.zipped(ids.split(","))
+        return Response(media_type="application/zip", headers=_zip_headers(ids, size))
 
     return router
 
 
-def _zip_headers(ids: str) -> dict[str, str]:
-    return {"Content-Disposition": f'attachment; filename="svev_{len(set(ids.split(",")))}-jumps.zip"'}
+def _zip_headers(ids: str, size: int) -> dict[str, str]:
+    name = f"svev_{len(set(ids.split(',')))}-jumps.zip"
+    return {"Content-Disposition": f'attachment; filename="{name}"', "Content-Length": str(size)}
 
 
 def _attachment(name: str) -> str:

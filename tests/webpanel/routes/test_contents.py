@@ -182,7 +182,9 @@ def test_several_recordings_come_as_one_archive(client: httpx.Client, service: M
         assert archive.read(names[1]) == (service.catalogue.directory / "other.mcap").read_bytes()
         sums = [f"{hashlib.sha256(archive.read(name)).hexdigest()}  {name}" for name in names]
         assert archive.read("SHA256SUMS").decode().splitlines() == sums
-    assert client.head("/api/recordings.zip?ids=jump").headers["content-type"] == "application/zip"
+    assert int(answer.headers["content-length"]) == len(answer.content)
+    head = client.head("/api/recordings.zip?ids=jump,other").headers
+    assert (head["content-type"], head["content-length"]) == ("application/zip", answer.headers["content-length"])
     refused(client.get("/api/recordings.zip?ids=jump,nobody"), 404)
     for wrong in ("", "?ids=", "?ids=jump,", "?ids=a/b", "?ids=jump&ids=other"):
         refused(client.get(f"/api/recordings.zip{wrong}"), 422)

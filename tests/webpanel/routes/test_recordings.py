@@ -274,6 +274,11 @@ def test_a_bad_file_is_a_bad_row(client: httpx.Client, service: MemoryService) -
                 assert answer.status_code in {200, 404, 422, 503}, (name, part)
 
 
+def test_a_long_field_of_a_log_is_not_repeated_in_every_list(client: httpx.Client, service: MemoryService) -> None:
+    write_recording(service.catalogue.directory, "jump", session={"notes": "x" * 100_000})
+    assert len(client.get("/api/recordings", headers={"Accept-Encoding": "identity"}).content) < 5000
+
+
 def test_the_verdict_names_camera_and_cause(client: httpx.Client, service: MemoryService) -> None:
     k2_lost = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
     write_recording(service.catalogue.directory, "jump", (ALL_OK, k2_lost, ALL_OK, k2_lost))

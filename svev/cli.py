@@ -30,6 +30,7 @@ _COMMANDS: Final = {
     "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
     "keys": ("setup", "keys", "Make keys that protect published images."),
     "info": ("logs", "info_command", "Say what a log holds."),
+    "export": ("export", "export_command", "Make a video, pictures or a table of a log."),
     "recover": ("logs", "recover_command", "Repair a log that was not closed or is damaged."),
     "replay": ("replay", "replay_command", "Publish a log again, as it was published live."),
     "worker": ("worker", "worker_command", "Measure the jumper from published triplets."),

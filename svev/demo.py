@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from analysis.images.contact_sheet import write_contact_sheet
+from analysis.film.contact_sheet import write_contact_sheet
 from recorder.checking.verify import verify
 from recorder.log.truth_path import truth_path
 from recorder.publishing.subscriber import free_address, subscriber

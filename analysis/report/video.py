@@ -8,17 +8,15 @@ WebM and Matroska. The pulse number is written into the picture.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-import av
 import cv2
 import numpy as np
-from av.error import FFmpegError
-from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
+from analysis.film.video_file import ENDINGS, FFV1, VP9, VideoFile
+from analysis.film.whole import whole_file
 from analysis.measurements.model import Measurements
 from analysis.report.course import Course, course_of
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Windows, windows_of
@@ -41,8 +39,6 @@ Progress = Callable[[int, int], None]
 _AROUND_S: Final = 0.5
 #: Wider triplets are made smaller, unless the video is without loss: phones show no more.
 _WIDEST_PX: Final = 1920
-_TIME_BASE: Final = Fraction(1, 1_000_000)
-_VP9: Final = {"crf": "28", "b": "0", "deadline": "realtime", "cpu-used": "6", "g": "30"}
 _SHIFT: Final = 4  # bits of sub-pixels when lines are drawn
 _FONT: Final = cv2.FONT_HERSHEY_DUPLEX
 #: Blue, green, red.
@@ -91,79 +87,52 @@ def write_video(
     Raises:
         BadInputError: the log cannot be read or has no image of a jump, or `out` cannot be written.
     """
+    if out.suffix not in ENDINGS:
+        raise BadInputError(f"{out}: a video needs one of the endings {', '.join(ENDINGS)}; choose another name")
     if lossless and out.suffix != ".mkv":
         raise BadInputError(f"{out}: a video without loss needs the ending .mkv; choose another name")
     shown = _shown(result, measurements, system)
     windows = windows_of({pulse: one.overlays for pulse, one in shown.items()}, system)
-    done = 0
-    writer: _Writer | None = None
-    try:
-        for tag, image in frames_of(log, shown.keys()):
-            scale = 1.0 if lossless else min(1.0, _WIDEST_PX / image.shape[1])
-            picture = _picture(tag, image, shown[int(tag.pulse)], windows, scale)
-            if writer is None:
-                writer = _Writer(out, (picture.shape[1], picture.shape[0]), result.rate_hz, lossless=lossless)
-            writer.add(picture, tag)
-            done += 1
-            if progress is not None:
-                progress(done, len(shown))
-        if writer is not None:
-            writer.finish()
-    except (FFmpegError, OSError) as error:
-        raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another place") from None
-    finally:
-        if writer is not None:
-            writer.close()
-    if not done:
-        raise BadInputError(f"{log}: has no image of a jump, so that there is no video; look at it with `svev info`")
+    with whole_file(out) as part:
+        done = 0
+        video: VideoFile | None = None
+        clock = _Clock()
+        try:
+            for tag, image in frames_of(log, shown.keys()):
+                scale = 1.0 if lossless else min(1.0, _WIDEST_PX / image.shape[1])
+                picture = _picture(tag, image, shown[int(tag.pulse)], windows, scale)
+                if video is None:
+                    video = VideoFile(part, out.suffix, picture, result.rate_hz, FFV1 if lossless else VP9)
+                video.add(picture, clock.at_us(tag))
+                done += 1
+                if progress is not None:
+                    progress(done, len(shown))
+            if video is not None:
+                video.finish()
+        finally:
+            if video is not None:
+                video.close()
+        if not done:
+            raise BadInputError(
+                f"{log}: has no image of a jump, so that there is no video; look at it with `svev info`"
+            )
     return done
 
 
-class _Writer:
-    """One video file.
+class _Clock:
+    """Times of pictures in the video: those of their pulses, but between two jumps no longer than it waits around."""
 
-    Args:
-        out: the file.
-        size: of the pictures, px.
-        rate_hz: pulses per second.
-        lossless: FFV1.
-    """
-
-    def __init__(self, out: Path, size: tuple[int, int], rate_hz: float, *, lossless: bool) -> None:
-        self._size = size if lossless else (size[0] // 2 * 2, size[1] // 2 * 2)  # colours are halved
-        self._gap_us = round(_AROUND_S * 1e6)
-        options = {"video_track_timescale": str(_TIME_BASE.denominator)} if out.suffix == ".mp4" else {}
-        self._file = av.open(str(out), "w", options=options)
-        codec, pixels, settings = ("ffv1", "bgr0", {}) if lossless else ("libvpx-vp9", "yuv420p", _VP9)
-        rate = Fraction(rate_hz).limit_denominator(1000)
-        stream = self._file.add_stream(codec, rate=rate, options=settings)
-        if not isinstance(stream, VideoStream):
-            raise TypeError(f"{codec} makes no video")
-        stream.width, stream.height = self._size
-        stream.pix_fmt = pixels
-        stream.time_base = stream.codec_context.time_base = _TIME_BASE
-        self._stream = stream
+    def __init__(self) -> None:
         self._at_us = 0
         self._last: TripletTag | None = None
 
-    def add(self, picture: _Picture, tag: TripletTag) -> None:
-        """Append a picture at the time of its pulse."""
+    def at_us(self, tag: TripletTag) -> int:
+        """The time of the next picture, us."""
         if self._last is not None:
             step = round((tag.time - self._last.time) * 1e6 / NS_PER_S)
-            self._at_us += min(max(step, 1), self._gap_us)
+            self._at_us += min(max(step, 1), round(_AROUND_S * 1e6))
         self._last = tag
-        picture = np.ascontiguousarray(picture[: self._size[1], : self._size[0]])
-        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
-        frame.pts, frame.time_base = self._at_us, _TIME_BASE
-        self._file.mux(self._stream.encode(frame))
-
-    def finish(self) -> None:
-        """Write what the encoder still holds."""
-        self._file.mux(self._stream.encode(None))
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        return self._at_us
 
 
 def _shown(result: MeasuredRecording, measurements: Measurements, system: CameraSystem) -> dict[int, _Shown]:

@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.film.whole import whole_file
 from analysis.images.activity import liveliest
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.clocks import NS_PER_S
-from rig.errors import BadInputError, LogDamagedError
+from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
 from rig.tag import CameraTag
 from rig.topics import SESSION_METADATA
@@ -30,33 +31,33 @@ _SHEET_WIDTH = 2400
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
-def write_contact_sheet(log: Path, out: Path, count: int = 12) -> list[int]:
+def write_contact_sheet(log: Path, out: Path, count: int = 12, *, pulses: range | None = None) -> list[int]:
     """Draw `count` triplets, spread over the stretch of the log in which most moves.
 
     Args:
         log: the log; of a damaged one, the part that can be read.
         out: PNG file, overwritten if it exists.
         count: number of triplets.
+        pulses: choose among these; None: among all.
 
     Returns:
         The pulses shown.
 
     Raises:
         BadInputError: no such log, or `out` cannot be written.
+        StorageError: the disk is full or fails.
         LogDamagedError: the log holds no image.
     """
     with LogReader(log) as reader:
-        triplets = stored_triplets(reader)
+        triplets = [each for each in stored_triplets(reader) if pulses is None or each.tag.pulse in pulses]
         if not triplets:
             raise LogDamagedError(f"{log}: holds no image that could be shown; look at it with `svev verify`")
         chosen = liveliest(reader, triplets, count)
         images = [_shrunk(triplet.image(reader), _tile_size(triplets[0].tag.shape)) for triplet in chosen]
         sheet = _sheet(chosen, images, _title(reader.metadata.get(SESSION_METADATA, {}), triplets))
     _, data = cv2.imencode(".png", sheet)
-    try:
-        out.write_bytes(data.tobytes())
-    except OSError as error:
-        raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another file") from None
+    with whole_file(out) as part:
+        part.write_bytes(data.tobytes())
     return [triplet.tag.pulse for triplet in chosen]
 
 

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from analysis.film.contact_sheet import write_contact_sheet
 from analysis.images.activity import liveliest_pulse
-from analysis.images.contact_sheet import write_contact_sheet
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogWriter
 from rig.errors import BadInputError, LogDamagedError

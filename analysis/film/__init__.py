@@ -1,0 +1,1 @@
+"""Recordings as videos, pictures and tables for people and other programs."""

@@ -1,0 +1,71 @@
+"""Writes a file or a folder whole or not at all: beside its place first, then under its name."""
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+from av.error import FFmpegError
+
+from rig.errors import BadInputError, StorageError
+
+#: What the disk refuses although the place is right: full, quota used up, file too large, hardware error.
+_DISK: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+_UNFINISHED: Final = ".part"
+
+
+@contextmanager
+def whole_file(out: Path) -> Iterator[Path]:
+    """Give a path to write a file to; it takes the place of `out` when it is complete, and is removed otherwise.
+
+    Raises:
+        StorageError: the disk is full or fails.
+        BadInputError: `out` cannot be written.
+    """
+    part = out.with_name(f".{out.name}{_UNFINISHED}")
+    try:
+        with _in_one_line(out):
+            yield part
+            with part.open("rb") as written:
+                os.fsync(written.fileno())
+            part.replace(out)
+    finally:
+        with suppress(OSError):  # gone, if it has taken its place; the error of the disk, if any, is told above
+            part.unlink()
+
+
+@contextmanager
+def whole_folder(out: Path) -> Iterator[Path]:
+    """Give a folder to write into; it takes the place of `out` when it is complete, and is removed otherwise.
+
+    Raises:
+        StorageError: the disk is full or fails.
+        BadInputError: `out` cannot be written, or is there already with something in it.
+    """
+    if out.is_dir() and any(out.iterdir()):
+        raise BadInputError(f"{out}: holds files already; name a new folder")
+    part = out.with_name(f".{out.name}{_UNFINISHED}")
+    try:
+        with _in_one_line(out):
+            shutil.rmtree(part, ignore_errors=True)  # of a program that was killed
+            part.mkdir()
+            yield part
+            part.replace(out)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _in_one_line(out: Path) -> Iterator[None]:
+    """Say what the disk refused."""
+    try:
+        yield
+    except (FFmpegError, OSError) as error:
+        if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+            raise StorageError(f"{out}: the disk is full: make room on it or write to another one") from None
+        if error.errno in _DISK:
+            raise StorageError(f"{out}: the disk refuses ({error.strerror}): write to another one") from None
+        raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another place") from None

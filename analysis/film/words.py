@@ -1,0 +1,59 @@
+"""Writes words into grey pictures: bib, pulse and time, and why a frame is missing."""
+
+import unicodedata
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.film.shots import Shot
+from rig.clocks import NS_PER_S
+
+_FONT: Final = cv2.FONT_HERSHEY_DUPLEX
+_WHITE, _BLACK = 255, 0
+#: Height of the letters as a part of the picture's height, and limits, in units of the font (some 22 px).
+_PART, _LEAST, _MOST = 1 / 18, 0.3, 2.0
+_LETTER_PX: Final = 22
+_BIB_MAX: Final = 20
+#: Letters that have no accent that could be taken off.
+_PLAIN: Final = str.maketrans({"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "ß": "ss", "ł": "l", "Ł": "L"})
+
+
+def caption(shot: Shot, session: Mapping[str, str]) -> str:
+    """Bib, pulse and time of day of a pulse; the font has no signs beyond ASCII."""
+    bib = session.get("bib", "").strip()[:_BIB_MAX]
+    plain = unicodedata.normalize("NFKD", bib.translate(_PLAIN)).encode("ascii", "ignore").decode()
+    clock = datetime.fromtimestamp(shot.time // NS_PER_S, UTC).strftime("%H:%M:%S")
+    thousandths = shot.time % NS_PER_S // 1_000_000
+    return (f"bib {plain}  " if plain else "") + f"pulse {shot.pulse}  {clock}.{thousandths:03d} UTC"
+
+
+def write_caption(picture: NDArray[np.uint8], text: str) -> None:
+    """Write a line at the lower left, in place, as large as fits."""
+    size = _size(picture, text)
+    _write(picture, text, (round(8 * size), picture.shape[0] - round(12 * size)), size)
+
+
+def write_lacking(picture: NDArray[np.uint8], shot: Shot, columns: tuple[tuple[int, int], ...]) -> None:
+    """Write into each black block why there is no frame, in place."""
+    for place, word in shot.lacking.items():
+        block = picture[:, slice(*columns[place])]
+        size = _size(block, word)
+        (wide, high), _ = cv2.getTextSize(word, _FONT, size, 1)
+        _write(block, word, ((block.shape[1] - wide) // 2, (block.shape[0] + high) // 2), size)
+
+
+def _size(picture: NDArray[np.uint8], text: str) -> float:
+    """Size of the letters: a part of the height, smaller if the text would not fit."""
+    size = min(max(picture.shape[0] * _PART / _LETTER_PX, _LEAST), _MOST)
+    (wide, _), _ = cv2.getTextSize(text, _FONT, size, 1)
+    return float(min(size, size * 0.95 * picture.shape[1] / max(1, wide)))
+
+
+def _write(picture: NDArray[np.uint8], text: str, at: tuple[int, int], size: float) -> None:
+    thick = max(1, round(size))
+    cv2.putText(picture, text, at, _FONT, size, _BLACK, thick + 2, cv2.LINE_AA)
+    cv2.putText(picture, text, at, _FONT, size, _WHITE, thick, cv2.LINE_AA)

@@ -1,0 +1,55 @@
+"""What of a recording is to be exported and how: the words of the command line, the REST API and the program between.
+
+Names of fields are those of the API.
+"""
+
+from enum import StrEnum
+from typing import Annotated, Final, Self
+
+from pydantic import Field, model_validator
+
+from rig.status import WHOLE, Model
+
+_CAMERAS_MAX: Final = 8
+_PulseNumber = Annotated[int, Field(ge=1, le=2**53), WHOLE]
+
+
+class Kind(StrEnum):
+    """What comes out."""
+
+    H264 = "h264"  #: a video for people: MP4
+    FFV1 = "ffv1"  #: a video without loss: Matroska, grey
+    PNG = "png"  #: a picture of each frame, and the table
+    TIFF = "tiff"  #: the same, for programs that read no PNG
+    CSV = "csv"  #: a table: what became of each pulse in each camera
+    CONTACT_SHEET = "contact_sheet"  #: a page with triplets of the jump
+
+
+class Quality(StrEnum):
+    """Of a video for people: the worse, the smaller."""
+
+    SMALL = "small"
+    GOOD = "good"
+    BEST = "best"
+
+
+class ExportOrder(Model):
+    """What is to be exported."""
+
+    kind: Kind = Field(Kind.H264, description="what comes out")
+    cameras: tuple[Annotated[str, Field(min_length=1, max_length=100)], ...] = Field(
+        (), max_length=_CAMERAS_MAX, description="these cameras side by side, in this order; none: all"
+    )
+    first: _PulseNumber | None = Field(None, description="first pulse; null: the first of the recording")
+    last: _PulseNumber | None = Field(None, description="last pulse; null: the last of the recording")
+    slow: float = Field(1.0, ge=1, le=10, description="so many times slower, for videos")
+    quality: Quality = Field(Quality.GOOD, description="of a video for people")
+    burn_in: bool = Field(False, strict=True, description="write bib, pulse and time into the pictures of a video")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.first is not None and self.last is not None and self.last < self.first:
+            raise ValueError(f"the last pulse {self.last} comes before the first one {self.first}: exchange them")
+        if len(set(self.cameras)) < len(self.cameras):
+            raise ValueError("a camera is named twice: name each once")
+        return self

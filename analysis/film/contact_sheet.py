@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.film.whole import whole_file
+from analysis.film.words import FONT, write_outlined
 from analysis.images.activity import liveliest
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
@@ -28,7 +29,6 @@ _ALARM: Final[_Colour] = (90, 90, 245)
 
 _MARGIN, _CAPTION, _TITLE = 24, 40, 96
 _SHEET_WIDTH = 2400
-_FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
 def write_contact_sheet(log: Path, out: Path, count: int = 12, *, pulses: range | None = None) -> list[int]:
@@ -106,10 +106,10 @@ def _draw_camera(tile: NDArray[np.uint8], camera: CameraTag, scale: float) -> No
     left, right = round(camera.columns[0] * scale), round(camera.columns[1] * scale)
     if left:
         cv2.line(tile, (left, 0), (left, tile.shape[0]), _PAPER, 2)
-    _write(tile, camera.name, (left + 10, 26), 0.7, _INK, outline=True)
+    write_outlined(tile, camera.name, (left + 10, 26), 0.7)
     if camera.status is not FrameStatus.OK:
         word = camera.status.value
-        (wide, high), _ = cv2.getTextSize(word, _FONT, 1.0, 1)
+        (wide, high), _ = cv2.getTextSize(word, FONT, 1.0, 1)
         _write(tile, word, ((left + right - wide) // 2, (tile.shape[0] + high) // 2), 1.0, _ALARM)
 
 
@@ -124,9 +124,5 @@ def _title(session: dict[str, str], triplets: Sequence[StoredTriplet]) -> tuple[
     )
 
 
-def _write(
-    image: NDArray[np.uint8], text: str, at: tuple[int, int], size: float, colour: _Colour, *, outline: bool = False
-) -> None:
-    if outline:
-        cv2.putText(image, text, at, _FONT, size, _PAPER, 4, cv2.LINE_AA)
-    cv2.putText(image, text, at, _FONT, size, colour, 1, cv2.LINE_AA)
+def _write(image: NDArray[np.uint8], text: str, at: tuple[int, int], size: float, colour: _Colour) -> None:
+    cv2.putText(image, text, at, FONT, size, colour, 1, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""Writes words into grey pictures: bib, pulse and time, and why a frame is missing."""
+"""Writes words into pictures: bib, pulse and time, and why a frame is missing."""
 
 import unicodedata
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from analysis.film.shots import Shot
 from rig.clocks import NS_PER_S
 
-_FONT: Final = cv2.FONT_HERSHEY_DUPLEX
-_WHITE, _BLACK = 255, 0
+FONT: Final = cv2.FONT_HERSHEY_DUPLEX
+_WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 #: Height of the letters as a part of the picture's height, and limits, in units of the font (some 22 px).
 _PART, _LEAST, _MOST = 1 / 18, 0.3, 2.0
 _LETTER_PX: Final = 22
@@ -34,7 +34,7 @@ def caption(shot: Shot, session: Mapping[str, str]) -> str:
 def write_caption(picture: NDArray[np.uint8], text: str) -> None:
     """Write a line at the lower left, in place, as large as fits."""
     size = _size(picture, text)
-    _write(picture, text, (round(8 * size), picture.shape[0] - round(12 * size)), size)
+    write_outlined(picture, text, (round(8 * size), picture.shape[0] - round(12 * size)), size)
 
 
 def write_lacking(picture: NDArray[np.uint8], shot: Shot, columns: tuple[tuple[int, int], ...]) -> None:
@@ -42,18 +42,21 @@ def write_lacking(picture: NDArray[np.uint8], shot: Shot, columns: tuple[tuple[i
     for place, word in shot.lacking.items():
         block = picture[:, slice(*columns[place])]
         size = _size(block, word)
-        (wide, high), _ = cv2.getTextSize(word, _FONT, size, 1)
-        _write(block, word, ((block.shape[1] - wide) // 2, (block.shape[0] + high) // 2), size)
+        (wide, high), _ = cv2.getTextSize(word, FONT, size, 1)
+        write_outlined(block, word, ((block.shape[1] - wide) // 2, (block.shape[0] + high) // 2), size)
 
 
 def _size(picture: NDArray[np.uint8], text: str) -> float:
     """Size of the letters: a part of the height, smaller if the text would not fit."""
     size = min(max(picture.shape[0] * _PART / _LETTER_PX, _LEAST), _MOST)
-    (wide, _), _ = cv2.getTextSize(text, _FONT, size, 1)
+    (wide, _), _ = cv2.getTextSize(text, FONT, size, 1)
     return float(min(size, size * 0.95 * picture.shape[1] / max(1, wide)))
 
 
-def _write(picture: NDArray[np.uint8], text: str, at: tuple[int, int], size: float) -> None:
-    thick = max(1, round(size))
-    cv2.putText(picture, text, at, _FONT, size, _BLACK, thick + 2, cv2.LINE_AA)
-    cv2.putText(picture, text, at, _FONT, size, _WHITE, thick, cv2.LINE_AA)
+def write_outlined(picture: NDArray[np.uint8], text: str, at: tuple[int, int], size: float) -> None:
+    """Write white words with a black edge into a grey or coloured picture, in place; `at`: where they begin, px."""
+    edge, thick = max(1, round(1.5 * size)), max(1, round(size))
+    for dx in (-edge, 0, edge):  # a thicker pen would make the words longer
+        for dy in (-edge, 0, edge):
+            cv2.putText(picture, text, (at[0] + dx, at[1] + dy), FONT, size, _BLACK, thick, cv2.LINE_AA)
+    cv2.putText(picture, text, at, FONT, size, _WHITE, thick, cv2.LINE_AA)

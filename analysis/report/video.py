@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.film.video_file import ENDINGS, FFV1, VP9, VideoFile
 from analysis.film.whole import whole_file
+from analysis.film.words import write_outlined
 from analysis.measurements.model import Measurements
 from analysis.report.course import Course, course_of
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Windows, windows_of
@@ -40,7 +41,7 @@ _AROUND_S: Final = 0.5
 #: Wider triplets are made smaller, unless the video is without loss: phones show no more.
 _WIDEST_PX: Final = 1920
 _SHIFT: Final = 4  # bits of sub-pixels when lines are drawn
-_FONT: Final = cv2.FONT_HERSHEY_DUPLEX
+_LETTERS: Final = 0.6  # size of words, in units of the font
 #: Blue, green, red.
 _COLOURS: Final[Mapping[str, _Colour]] = {
     "body": (92, 243, 255),
@@ -180,8 +181,8 @@ def _picture(tag: TripletTag, image: Grey, shown: _Shown, windows: Windows, scal
             below[:] = cv2.resize(part, below.shape[1::-1], interpolation=cv2.INTER_CUBIC)[:, :, np.newaxis]
             _draw(below, _seen(overlay, window.corner, larger), 2)
             _draw(picture[:rows, left:right], _seen(overlay, np.full(2, -0.5), scale), 1)
-        _write(picture[:, left:right], name, (10, 24))
-    _write(picture, shown.words, (10, rows - 12))
+        write_outlined(picture[:, left:right], name, (10, 24), _LETTERS)
+    write_outlined(picture, shown.words, (10, rows - 12), _LETTERS)
     return picture
 
 
@@ -212,9 +213,3 @@ def _draw(block: _Picture, overlay: Overlay, width: int) -> None:
 def _fine(places: NDArray[np.float64]) -> NDArray[np.int32]:
     """Image coordinates as OpenCV takes sub-pixels."""
     return np.asarray(np.rint(np.clip(places, -1e5, 1e5) * (1 << _SHIFT)), np.int32)
-
-
-def _write(picture: _Picture, words: str, at: tuple[int, int]) -> None:
-    for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-        cv2.putText(picture, words, (at[0] + dx, at[1] + dy), _FONT, 0.6, (0, 0, 0), 1, cv2.LINE_AA)
-    cv2.putText(picture, words, at, _FONT, 0.6, _INK, 1, cv2.LINE_AA)

@@ -69,7 +69,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         trash_router(service, changes),
         contents_router(service),
         files_router(service, streams.downloads),
-        preview_router(service, streams.previews),
+        preview_router(service, streams),
         events_router(service, changes, streams.events),
         login_router(door),
         observing_router(service, metrics),

@@ -19,7 +19,8 @@ from webpanel.problems import CLOSING, problem
 REQUEST_S: Final = 10.0
 #: A client that takes nothing of an answer for this time is disconnected.
 STALL_S: Final = 20.0
-CONNECTIONS_MAX: Final = 128
+#: More than there are streams, waits and downloads at most (`webpanel.door.streams`): commands always find room.
+CONNECTIONS_MAX: Final = 256
 _GRACE_S = 3  # for answers under way at shutdown
 
 

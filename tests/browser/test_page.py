@@ -2,6 +2,7 @@
 
 import json
 import re
+import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -41,6 +42,7 @@ TOO_SMALL = """least =>
     .filter(e => e.checkVisibility() && !e.matches(".block"))
     .filter(e => Math.min(e.getBoundingClientRect().height, e.getBoundingClientRect().width) < least)
     .map(e => e.outerHTML)"""
+PICTURE = re.compile("^blob:")
 HIDE = (
     "Object.defineProperty(document, 'hidden', { value: true }); document.dispatchEvent(new Event('visibilitychange'))"
 )
@@ -322,19 +324,21 @@ def test_the_preview_runs_only_while_it_is_looked_at(panel: Panel, service: Memo
     service.arm()
     page = open_page(panel.url)
     image = page.locator("#preview img")
-    expect(image).to_have_attribute("src", "./api/preview.mjpg")
+    expect(image).to_have_attribute("src", PICTURE)
     expect(image).not_to_have_js_property("naturalWidth", 0)
-    previews = panel.server.config.app.state.streams.previews  # type: ignore[union-attr]
-    assert previews.open == 1
+    first = image.get_attribute("src") or ""
+    expect(image).not_to_have_attribute("src", first)
     page.get_by_role("button", name="K2 show large").click()
     expect(page.locator("#preview")).to_have_class(re.compile("single"))
     page.goto(f"{panel.url}/#/log")
-    expect(image).not_to_have_attribute("src", re.compile("preview"))
-    wait_until(lambda: previews.open == 0, "the stream is closed", 20)
+    expect(image).not_to_have_attribute("src", PICTURE)
+    pictures = panel.server.config.app.state.streams.pictures  # type: ignore[union-attr]
+    wait_until(lambda: pictures.open == 0, "nobody waits for a picture", 20)
     page.goto(f"{panel.url}/#/live")
-    expect(image).to_have_attribute("src", "./api/preview.mjpg")
+    expect(image).to_have_attribute("src", PICTURE)
     page.evaluate(HIDE)
-    expect(image).not_to_have_attribute("src", re.compile("preview"))
+    expect(image).not_to_have_attribute("src", PICTURE)
+    wait_until(lambda: pictures.open == 0, "nobody waits for a picture", 20)
 
 
 def test_norwegian_from_the_browser_and_by_choice(
@@ -369,15 +373,14 @@ def test_a_narrow_phone_scrolls_down_only_and_takes_gloves(
         assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX), view
 
 
-def test_the_rig_view_has_cameras_and_processes_also_when_it_is_opened_first(panel: Panel, open_page: Open) -> None:
-    def late(route: Route) -> None:
-        """The status comes after the rig file."""
-        expect(page.locator("#rig-name")).to_have_text("memory")
-        route.continue_()
-
-    page = open_page("about:blank")
-    page.route("**/api/events", late)
-    page.goto(f"{panel.url}/#/rig")
+def test_the_rig_view_has_cameras_and_processes_also_when_it_is_opened_first(
+    panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig_is_shown = threading.Event()
+    monkeypatch.setattr(service, "status", lambda: (rig_is_shown.wait(20), MemoryService.status(service))[1])
+    page = open_page(f"{panel.url}/#/rig")
+    expect(page.locator("#rig-name")).to_have_text("memory")
+    rig_is_shown.set()
     expect(page.locator("#rig-facts")).to_contain_text("K1")
     expect(page.locator("#rig-facts")).to_contain_text("recorder")
 

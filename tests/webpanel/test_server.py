@@ -203,7 +203,7 @@ def test_the_server_ends_while_clients_hang_on(service: MemoryService, loopback:
     service.arm()
     with contextlib.ExitStack() as clients:
         with serving(service, Access.for_address(loopback.host, environment={})) as panel:
-            for path in ("/api/events", "/api/preview.mjpg"):
+            for path in ("/api/events", "/api/preview.mjpg", "/api/preview.jpg?after=0"):
                 raw = clients.enter_context(panel.connect())
                 raw.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
                 assert raw.recv(15).startswith(b"HTTP/1.1 200 OK")

@@ -1,4 +1,4 @@
-"""Limits the number of long answers (event streams, previews, downloads), and ends the endless ones at shutdown."""
+"""Limits the number of long answers (streams, waits for a picture, downloads); ends the endless ones at shutdown."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -7,8 +7,9 @@ from http import HTTPStatus
 
 from webpanel.problems import ProblemError
 
-_EVENT_STREAMS_MAX = 32
+_EVENT_STREAMS_MAX = 64
 _PREVIEW_STREAMS_MAX = 16
+_PICTURES_MAX = 64
 _DOWNLOADS_MAX = 8  # recording comes first at the disk
 
 
@@ -59,13 +60,14 @@ class Streams:
 
 @dataclass(frozen=True, slots=True)
 class OpenStreams:
-    """The open streams of all kinds."""
+    """The open streams of all kinds; all together they leave room among the server's connections for commands."""
 
     events: Streams = field(default_factory=lambda: Streams(_EVENT_STREAMS_MAX))
     previews: Streams = field(default_factory=lambda: Streams(_PREVIEW_STREAMS_MAX))
+    pictures: Streams = field(default_factory=lambda: Streams(_PICTURES_MAX))
     downloads: Streams = field(default_factory=lambda: Streams(_DOWNLOADS_MAX))
 
     def end(self) -> None:
-        """Tell event streams and previews to end; a download ends by itself."""
+        """Tell event streams and previews to end; a download and a wait for a picture end by themselves."""
         self.events.end()
         self.previews.end()

@@ -15,8 +15,7 @@ import { startLast } from "./recordings/last.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
 import * as scrubber from "./recordings/scrubber.js";
-import { call, Problem } from "./shared/api.js";
-import { connect, connectNow, startBanner } from "./shared/connection.js";
+import { connect, startBanner } from "./shared/connection.js";
 import { startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
 import * as doctor from "./system/doctor.js";
@@ -40,17 +39,6 @@ function entered({ view, id }) {
   if (view === "rig") void rig.enterRig();
 }
 
-/** Ask once before the stream is opened: the service may want the token. */
-async function begin() {
-  try {
-    await call("GET", "status");
-    connect();
-  } catch (error) {
-    if (!(error instanceof Problem)) throw error;
-    if (error.status !== 401) connectNow();
-  }
-}
-
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
@@ -58,4 +46,4 @@ for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, 
 startLogin(() => location.reload());
 startRouter(entered);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));
-void begin();
+connect();

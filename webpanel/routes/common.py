@@ -49,7 +49,7 @@ _MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
           "too many wrong tokens from here: wait 42 s, then try again"),
     500: ("An error in svev itself.", "internal_error", "an error in svev itself (KeyError): try again"),
     503: ("It cannot be done now; `detail` says why.", "too_many_viewers",
-          "32 are connected already, which is the most: close some, or try again later"),
+          "64 are connected already, which is the most: close some, or try again later"),
     507: ("The disk is full or refuses.", "storage", "less than 2 GB are free: delete recordings"),
 }  # fmt: skip
 

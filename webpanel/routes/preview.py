@@ -4,23 +4,26 @@ import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from http import HTTPStatus
+from typing import Annotated
 
 import anyio
 import cv2
 import numpy as np
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, Query, Response
 from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
 
 from rig.errors import SvevError
 from rig.pulse import RigPulse
 from service.seam import RigService
-from webpanel.door.streams import Streams
+from webpanel.door.streams import OpenStreams, Streams
 from webpanel.problems import ProblemError
 from webpanel.routes.common import Responses, jpeg_answer, refusals, strict_router
 
 _APART_S = 0.1  # least time between two pictures: the eye needs no more than ten a second
+#: With more viewers than these the pictures come less often, so that serving them costs no more.
+_VIEWERS_AT_FULL_RATE = 16
 _WAIT_S = 1.0
 _WIDTH_MAX = 1280
 _QUALITY = 80
@@ -28,6 +31,7 @@ _BOUNDARY = "svev-triplet"
 #: A stream ends after so many seconds without a picture; the page asks again.
 _PATIENCE_S = 30
 _CONTENT = {"multipart/x-mixed-replace": {"schema": {"type": "string", "format": "binary"}}}
+_NOTHING_NEW: Responses = {204: {"description": "No other pulse has come within a second."}}
 _STREAM: Responses = {200: {"description": "Pictures, one after the other.", "content": _CONTENT}}
 
 
@@ -58,8 +62,9 @@ class Picture:
 class PreviewFeed:
     """The newest picture, fetched and encoded only when a viewer asks, and once for all who ask meanwhile."""
 
-    def __init__(self, service: RigService) -> None:
+    def __init__(self, service: RigService, streams: OpenStreams) -> None:
         self._service = service
+        self._streams = streams
         self._newest: Picture | None = None
         self._made_at = 0.0
         self._making: asyncio.Task[Picture | None] | None = None
@@ -71,7 +76,7 @@ class PreviewFeed:
         Args:
             pulse: the pulse that the viewer saw last, None: no pulse yet.
         """
-        fresh = asyncio.get_running_loop().time() - self._made_at < _APART_S
+        fresh = asyncio.get_running_loop().time() - self._made_at < self._apart_s
         if fresh and self._newest is not None and self._newest.pulse != pulse:
             return self._newest
         if self._making is None or self._making.done():
@@ -79,9 +84,14 @@ class PreviewFeed:
         # A viewer that disconnects must not cancel the picture that the others wait for.
         return await asyncio.shield(self._making)
 
+    @property
+    def _apart_s(self) -> float:
+        viewers = self._streams.previews.open + self._streams.pictures.open
+        return _APART_S * max(1.0, viewers / _VIEWERS_AT_FULL_RATE)
+
     async def _make(self, pulse: RigPulse) -> Picture | None:
         loop = asyncio.get_running_loop()
-        await asyncio.sleep(max(0.0, self._made_at + _APART_S - loop.time()))
+        await asyncio.sleep(max(0.0, self._made_at + self._apart_s - loop.time()))
         picture = await run_sync(self._grab, pulse, limiter=self._one_thread)
         if picture is not None:
             self._newest, self._made_at = picture, loop.time()
@@ -116,15 +126,28 @@ def to_jpeg(pixels: NDArray[np.uint8], width: int | None = None) -> bytes:
     return jpeg.tobytes()
 
 
-def preview_router(service: RigService, streams: Streams) -> APIRouter:
+def preview_router(service: RigService, streams: OpenStreams) -> APIRouter:
     """The routes of the preview."""
     router = strict_router("Watching")
-    feed = PreviewFeed(service)
+    feed = PreviewFeed(service, streams)
 
-    @router.get("/preview.jpg", response_class=Response, responses=jpeg_answer("The triplet.") | refusals(404))
-    async def get_preview() -> Response:
-        """The newest triplet, the cameras side by side. The headers say which pulse it is."""
-        picture = await feed.other_than(None)
+    @router.get(
+        "/preview.jpg",
+        response_class=Response,
+        dependencies=[Depends(streams.pictures.place)],
+        responses=jpeg_answer("The triplet.") | _NOTHING_NEW | refusals(404, 503),
+    )
+    async def get_preview(
+        after: Annotated[int | None, Query(ge=0, lt=2**63, description="pulse seen last; 0: none yet")] = None,
+    ) -> Response:
+        """The newest triplet, the cameras side by side. The headers say which pulse it is.
+
+        With `after` the answer waits up to a second for another pulse than this, and is 204 if none has come. A viewer
+        that asks for the next picture when it shows the last one gets as many as its connection carries.
+        """
+        picture = await feed.other_than(None if after is None else RigPulse(after))
+        if after is not None and (picture is None or picture.pulse == after):
+            return Response(status_code=HTTPStatus.NO_CONTENT)
         if picture is None:
             text = "no triplet has come: arm the rig, and see that pulses arrive"
             raise ProblemError(HTTPStatus.NOT_FOUND, "no_preview", text)
@@ -133,12 +156,14 @@ def preview_router(service: RigService, streams: Streams) -> APIRouter:
     @router.get(
         "/preview.mjpg",
         response_class=StreamingResponse,
-        dependencies=[Depends(streams.place)],
+        dependencies=[Depends(streams.previews.place)],
         responses=_STREAM | refusals(503),
     )
     async def watch_preview() -> StreamingResponse:
         """The newest triplets, at most ten a second, as a stream that an `<img>` shows. Ends after 30 s without any."""
-        return StreamingResponse(_parts(feed, streams), media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}")
+        return StreamingResponse(
+            _parts(feed, streams.previews), media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}"
+        )
 
     return router
 

@@ -110,7 +110,7 @@ def test_wrong_parameters(client: httpx.Client) -> None:
 def test_streams_are_limited_and_given_back(panel: Panel, service: MemoryService) -> None:
     with contextlib.ExitStack() as viewers:
         client = viewers.enter_context(panel.client(limits=httpx.Limits(max_connections=100)))
-        for _ in range(32):
+        for _ in range(64):
             assert viewers.enter_context(client.stream("GET", "/api/events")).status_code == 200
         assert refused(client.get("/api/events"), 503).code == "too_many_viewers"
     with panel.client() as client:

@@ -1,6 +1,8 @@
 """Live pictures: one encoding for all who look, an end when nobody does."""
 
 import contextlib
+import json
+import socket
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -59,6 +61,47 @@ def test_a_stream_of_new_pictures(panel: Panel, service: MemoryService) -> None:
     pulses = [pulse for pulse, _ in parts]
     assert pulses == sorted(set(pulses))
     assert all(decoded(jpeg) == SHAPE for _, jpeg in parts)
+
+
+def test_the_next_picture_is_waited_for(client: httpx.Client, service: MemoryService) -> None:
+    assert client.get("/api/preview.jpg?after=0").status_code == 204, "no triplet has come"
+    service.arm()
+    seen = 0
+    for _ in range(3):
+        answer = client.get(f"/api/preview.jpg?after={seen}")
+        assert answer.status_code == 200
+        assert int(answer.headers["x-svev-pulse"]) > seen
+        seen = int(answer.headers["x-svev-pulse"])
+    refused(client.get("/api/preview.jpg?after=-1"), 422)
+
+
+def test_forty_clients_watch_and_still_command(panel: Panel, service: MemoryService) -> None:
+    """Each has a stream of events and asks for pictures; one more reads nothing of its own stream."""
+    service.arm()
+    watching = threading.Barrier(41)
+
+    def watch(_: int) -> tuple[list[str], int]:
+        states, pictures, seen = [], 0, "0"
+        with panel.client() as client, client.stream("GET", "/api/events") as answer:
+            lines = (json.loads(line[6:]) for line in answer.iter_lines() if line.startswith('data: {"state"'))
+            states.append(next(lines)["state"])
+            watching.wait(20)
+            for _ in range(3):
+                picture = client.get(f"/api/preview.jpg?after={seen}")
+                pictures += picture.status_code == 200
+                seen = picture.headers["x-svev-pulse"]
+            states.append(next(state for line in lines if (state := line["state"]) != "armed"))
+        return states, pictures
+
+    with ThreadPoolExecutor(40) as pool, panel.connect() as slow, panel.client() as client:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.sendall(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        watchers = pool.map(watch, range(40))
+        watching.wait(20)
+        started = client.post("/api/recordings", json={}).json()
+        assert all(each == (["armed", "recording"], 3) for each in watchers)
+        assert client.post(f"/api/recordings/{started['id']}/stop").status_code == 200
+    wait_until(lambda: not panel.server.server_state.tasks, "nothing is left of them", 20)
 
 
 def test_many_viewers_share_one_encoding(panel: Panel, service: MemoryService) -> None:

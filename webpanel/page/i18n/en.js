@@ -24,6 +24,7 @@ export const en = {
   "state.pulses": "{pulses} pulses, all complete",
   "state.pulses_partial": "{pulses} pulses, {partial} lack a frame",
 
+  "slow.title": "News come late.",
   "lost.title": "Connection lost.",
   "lost.text": "What you see is old. A recording that runs goes on by itself.",
   "lost.retry_in": "Try now ({seconds})",

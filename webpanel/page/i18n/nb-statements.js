@@ -90,6 +90,7 @@ export const statements = {
   undo_round: ["en ny runde ble begynt"],
 
   page_no_connection: ["ingen forbindelse med tjenesten: sjekk nettverket og tjenesten, og prøv igjen"],
+  page_stream_broken: ["direkte nytt kommer ikke fram: siden spør hvert annet sekund"],
   page_timeout: ["ikke noe svar i tide: se om det skjedde likevel, og prøv igjen"],
   page_strange: ["tjenesten svarer noe uventet: se i loggen dens"],
 };

@@ -24,6 +24,7 @@ export const nb = {
   "state.pulses": "{pulses} pulser, alle komplette",
   "state.pulses_partial": "{pulses} pulser, {partial} mangler et bilde",
 
+  "slow.title": "Nytt kommer sent.",
   "lost.title": "Mistet forbindelsen.",
   "lost.text": "Det du ser, er gammelt. Et opptak som er i gang, fortsetter av seg selv.",
   "lost.retry_in": "Prøv nå ({seconds})",

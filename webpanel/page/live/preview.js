@@ -1,31 +1,32 @@
-/** The live picture of the triplet. The stream runs only while it is visible; when it breaks, it is opened anew. */
+/** The live picture of the triplet. Pictures come only while it is visible, the next one when the last one is shown. */
 
 import { say, t } from "../i18n/i18n.js";
+import { hear, wantPicture } from "../shared/connection.js";
 import { $, setText } from "../shared/dom.js";
 import { known, watch } from "../shared/store.js";
 import { makeViewer } from "../shared/viewer.js";
 
-const RETRY_MS = 2_000;
 const USUAL_ROWS = 480;
 const USUAL_COLUMNS = 640;
 
 /** @type {import("../shared/viewer.js").Viewer} */
 let viewer;
 let running = false;
-let notBefore = 0;
 let ratio = 0;
+/** Says that the picture that was set last is shown. */
+let shown = () => {};
+/** @type {{ code: string, text: string }|null} why the service gives no pictures */
+let refused = null;
 
 export function startPreview() {
   viewer = makeViewer($("preview"), showCamera);
   viewer.image.addEventListener("load", () => {
     ratio = viewer.image.naturalWidth / viewer.image.naturalHeight;
+    URL.revokeObjectURL(viewer.image.src);
+    shown();
     draw();
   });
-  viewer.image.addEventListener("error", () => {
-    stop();
-    notBefore = Date.now() + RETRY_MS; // every news of the status calls draw(), which is more often
-    setTimeout(draw, RETRY_MS);
-  });
+  hear({ picture: show, noPicture: (why) => { refused = why; draw(); } });
   watch(draw);
 }
 
@@ -45,13 +46,13 @@ export function shownCamera() {
 
 function wanted() {
   const { status, connected, visible, view } = known;
-  return Date.now() >= notBefore && connected && visible && view === "live" && ["armed", "recording"].includes(status?.state ?? "");
+  return connected && visible && view === "live" && ["armed", "recording"].includes(status?.state ?? "");
 }
 
 function draw() {
   if (wanted() && !running) {
     running = true;
-    viewer.image.src = "./api/preview.mjpg";
+    wantPicture(true);
   } else if (!wanted() && running) {
     stop();
   }
@@ -60,7 +61,19 @@ function draw() {
 
 function stop() {
   running = false;
+  wantPicture(false);
   viewer.image.removeAttribute("src");
+}
+
+/**
+ * @param {Blob} image
+ * @param {() => void} whenShown
+ */
+function show(image, whenShown) {
+  refused = null;
+  shown = whenShown;
+  if (running) viewer.image.src = URL.createObjectURL(image);
+  else shown();
 }
 
 /** @param {import("../shared/types.js").Status} status */
@@ -88,6 +101,7 @@ function drawBlocks({ cameras, state, pulses }) {
  */
 function hint(live, arriving) {
   if (!live) return t("preview.when_armed");
+  if (refused) return say(refused).text;
   if (!arriving) return t("preview.no_pulses");
   return t(viewer.selected() === null ? "preview.tap" : "preview.tap_back");
 }

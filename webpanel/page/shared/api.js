@@ -1,5 +1,7 @@
 /** Calls the REST API. Every failure is thrown as a Problem, whose message says what to do. */
 
+/** Where the API is, from the page as well as from a worker. */
+export const API = new URL("../api/", import.meta.url).href;
 const DEADLINE_MS = 10_000;
 
 /** An error to show: `code` for its translation, the message in English. */
@@ -26,6 +28,11 @@ let whenTokenIsNeeded = () => {};
  */
 export function onTokenNeeded(action) {
   whenTokenIsNeeded = action;
+}
+
+/** Ask for the token: the service wants it. */
+export function needToken() {
+  whenTokenIsNeeded();
 }
 
 /**
@@ -66,7 +73,7 @@ async function ask(method, path, body, deadlineMs) {
   const content = body === undefined ? {} : contentOf(body);
   let answer;
   try {
-    answer = await fetch(`./api/${path}`, {
+    answer = await fetch(API + path, {
       method, ...content, cache: "no-store", signal: AbortSignal.timeout(deadlineMs),
     });
     if (answer.ok) return { answer, content: answer.status === 204 ? null : await answer.json() };
@@ -77,7 +84,7 @@ async function ask(method, path, body, deadlineMs) {
       : new Problem(0, "page_no_connection", "no connection to the service: check network and service, then try again");
   }
   const problem = await asProblem(answer);
-  if (problem.status === 401 && path !== "login") whenTokenIsNeeded();
+  if (problem.status === 401 && path !== "login") needToken();
   throw problem;
 }
 
@@ -91,10 +98,12 @@ function contentOf(body) {
 }
 
 /**
+ * What an answer that is no success says.
+ *
  * @param {Response} answer
  * @returns {Promise<Problem>}
  */
-async function asProblem(answer) {
+export async function asProblem(answer) {
   if (!answer.headers.get("Content-Type")?.includes("json")) {
     return new Problem(answer.status, "page_strange", `the service answers ${answer.status} ${answer.statusText}: look at its log`);
   }

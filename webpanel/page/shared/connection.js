@@ -1,91 +1,124 @@
 /**
- * The connection to the service: the stream of server-sent events (status, log, changes of the list of recordings).
- * When it is lost, it is opened again after growing delays, and a banner says so.
+ * A tab's side of the connection to the service (hub.js): tells it what the tab wants to see, and puts what comes into
+ * the store. A banner says when the connection is lost, or when only the status gets through.
  */
 
-import { t } from "../i18n/i18n.js";
-import { call, Problem } from "./api.js";
+import { say, t } from "../i18n/i18n.js";
+import { needToken } from "./api.js";
 import { $, setText } from "./dom.js";
+import { makeHub } from "./hub.js";
 import { known, update, watch } from "./store.js";
 
-/** The service sends its status at least every 2 s. */
-const SILENCE_MS = 6_000;
-const FIRST_DELAY_MS = 500;
-const LONGEST_DELAY_MS = 8_000;
+/** A status comes at least every 2 s; one that is older than this is old. */
+const FRESH_MS = 6_000;
+/** The hub has news, good or bad, more often than this; if not, its worker has died. */
+const SILENCE_MS = 20_000;
 
 /** @typedef {import("./types.js").Event} Event */
-/** @typedef {{ opened: () => void, log: (event: Event) => void, recordings: () => void }} Hearer */
+/** @typedef {import("./hub.js").News} News */
+/** @typedef {{ opened: () => void, log: (event: Event) => void, recordings: () => void, picture: (image: Blob, shown: () => void) => void, noPicture: (why: import("./hub.js").Why|null) => void }} Hearer */
 
 /** @type {Hearer[]} */
 const hearers = [];
-/** @type {EventSource|null} */
-let source = null;
-let delayMs = FIRST_DELAY_MS;
-let retry = 0;
+/** @type {MessagePort|null} */
+let port = null;
 let watchdog = 0;
+let freshness = 0;
+let pictureWanted = false;
+let workerWorks = typeof SharedWorker !== "undefined";
 
 /**
- * Listen to what the stream brings beside the status.
+ * Listen to what comes beside the status.
  *
- * @param {Partial<Hearer>} hearer `opened`: a new stream begins, which sends the log from its beginning again.
+ * @param {Partial<Hearer>} hearer `opened`: the log comes from its beginning again; `picture`: call `shown` for the next one.
  */
 export function hear(hearer) {
-  hearers.push({ opened: () => {}, log: () => {}, recordings: () => {}, ...hearer });
+  hearers.push({ opened: () => {}, log: () => {}, recordings: () => {}, picture: (_, shown) => shown(), noPicture: () => {}, ...hearer });
 }
 
-/** Open the stream; an open one is closed first. */
+/** Begin to listen to the service. */
 export function connect() {
-  close();
-  source = new EventSource("./api/events");
-  source.addEventListener("status", (message) => {
-    heard();
-    update({ status: JSON.parse(message.data), connected: true, heard: Date.now(), retryAt: 0 });
-  });
-  source.addEventListener("log", (message) => hearers.forEach((hearer) => hearer.log(JSON.parse(message.data))));
-  source.addEventListener("recordings", () => hearers.forEach((hearer) => hearer.recordings()));
-  source.addEventListener("open", () => hearers.forEach((hearer) => hearer.opened()));
-  source.addEventListener("error", lost);
-  watchdog = setTimeout(lost, SILENCE_MS);
+  disconnect();
+  port = workerWorks ? joinWorker() : joinOwn();
+  port.onmessage = ({ data }) => heard(data);
+  wish();
+  port.postMessage({ type: "retry" });
+  document.addEventListener("visibilitychange", wish);
+  addEventListener("pagehide", disconnect);
+  addEventListener("pageshow", resume);
 }
 
-/** Try to connect now, and begin with short delays again. */
+/** Try to connect now. */
 export function connectNow() {
-  delayMs = FIRST_DELAY_MS;
-  void tryAgain();
-}
-
-function heard() {
-  delayMs = FIRST_DELAY_MS;
-  clearTimeout(watchdog);
-  watchdog = setTimeout(lost, SILENCE_MS);
-}
-
-function close() {
-  clearTimeout(retry);
-  clearTimeout(watchdog);
-  source?.close();
-  source = null;
-}
-
-function lost() {
-  close();
-  update({ connected: false, retryAt: Date.now() + delayMs });
-  retry = setTimeout(tryAgain, delayMs);
-  delayMs = Math.min(2 * delayMs, LONGEST_DELAY_MS);
-}
-
-/** An EventSource does not say why it fails. So fetch the status first: the service may want the token. */
-async function tryAgain() {
-  clearTimeout(retry);
   update({ retryAt: 0 });
-  try {
-    await call("GET", "status");
-  } catch (error) {
-    if (!(error instanceof Problem)) throw error;
-    if (error.status !== 401) lost(); // with 401 the login opens; after it the page is loaded anew
-    return;
+  port?.postMessage({ type: "retry" });
+}
+
+/**
+ * Say whether this tab shows the live picture.
+ *
+ * @param {boolean} wanted
+ */
+export function wantPicture(wanted) {
+  pictureWanted = wanted;
+  wish();
+}
+
+/** Say what this tab shows. */
+function wish() {
+  if (!document.hidden && Date.now() - known.heard > FRESH_MS) getOld(); // the tab or the whole device has slept
+  port?.postMessage({ type: "wish", visible: !document.hidden, picture: pictureWanted });
+}
+
+function joinWorker() {
+  const worker = new SharedWorker(new URL("./hub-worker.js", import.meta.url), { type: "module", name: "svev" });
+  worker.onerror = () => { // the browser cannot run it
+    workerWorks = false;
+    connect();
+  };
+  return worker.port;
+}
+
+function joinOwn() {
+  const channel = new MessageChannel();
+  makeHub(false)(channel.port1);
+  return channel.port2;
+}
+
+function getOld() {
+  if (known.connected) update({ connected: false, retryAt: 0 });
+}
+
+function disconnect() {
+  clearTimeout(watchdog);
+  port?.postMessage({ type: "bye" });
+  port?.close();
+  port = null;
+}
+
+/** @param {PageTransitionEvent} event */
+function resume(event) {
+  if (event.persisted) connect(); // back from the browser's memory of left pages
+}
+
+/** @param {News} news */
+function heard(news) {
+  clearTimeout(watchdog);
+  watchdog = setTimeout(connect, SILENCE_MS);
+  if (news.type === "status") {
+    clearTimeout(freshness);
+    freshness = setTimeout(getOld, FRESH_MS);
+    update({ status: news.status, connected: true, heard: news.heard, retryAt: 0, slow: news.why });
   }
-  if (!known.connected) connect();
+  if (news.type === "lost") update({ connected: false, retryAt: news.retryAt, slow: null });
+  if (news.type === "login") needToken();
+  if (news.type === "log") {
+    if (news.fresh) hearers.forEach((hearer) => hearer.opened());
+    for (const event of news.events) hearers.forEach((hearer) => hearer.log(event));
+  }
+  if (news.type === "recordings") hearers.forEach((hearer) => hearer.recordings());
+  if (news.type === "picture") hearers.forEach((hearer) => hearer.picture(news.image, () => port?.postMessage({ type: "shown" })));
+  if (news.type === "no-picture") hearers.forEach((hearer) => hearer.noPicture(news.why));
 }
 
 export function startBanner() {
@@ -95,11 +128,13 @@ export function startBanner() {
 }
 
 function drawBanner() {
-  const lost = !known.connected && known.heard > 0 || known.retryAt > 0;
-  $("banner").hidden = !lost;
-  if (!lost) return;
+  const lost = !known.connected && (known.heard > 0 || known.retryAt > 0);
+  $("banner").hidden = !lost && !known.slow;
+  if ($("banner").hidden) return;
+  setText($("banner-title"), t(lost ? "lost.title" : "slow.title"));
+  setText($("banner-text"), lost || !known.slow ? t("lost.text") : say(known.slow).text);
+  $("banner-retry").hidden = !lost;
   const seconds = Math.max(0, Math.ceil((known.retryAt - Date.now()) / 1000));
-  setText($("banner-text"), t("lost.text"));
   setText($("banner-retry"), seconds ? t("lost.retry_in", { seconds }) : t("lost.trying"));
   $("banner-retry").disabled = !known.retryAt;
 }

@@ -9,13 +9,14 @@
  * @property {boolean} connected whether that status is fresh
  * @property {number} heard when that status came, ms
  * @property {number} retryAt when the next attempt to connect begins, ms; 0: now
+ * @property {{ code: string, text: string }|null} slow why the status is asked for instead of told at once; null: it is told
  * @property {string} busy key of the words for the call that the service has not answered yet; "": there is none
  * @property {string} view name of the view that is shown
  * @property {boolean} visible whether anybody can see the page
  */
 
 /** @type {Known} */
-export const known = { status: null, connected: false, heard: 0, retryAt: 0, busy: "", view: "", visible: true };
+export const known = { status: null, connected: false, heard: 0, retryAt: 0, slow: null, busy: "", view: "", visible: true };
 
 /** @type {Set<() => void>} */
 const watchers = new Set();

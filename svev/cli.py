@@ -28,6 +28,7 @@ _COMMANDS: Final = {
     "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
     "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
     "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
+    "cameras": ("cameras", "app", "Find GigE Vision cameras, give them addresses."),
     "keys": ("setup", "keys", "Make keys that protect published images."),
     "info": ("logs", "info_command", "Say what a log holds."),
     "export": ("export", "export_command", "Make a video, pictures or a table of a log."),

@@ -10,8 +10,9 @@ import typer
 from recorder.publishing.keys import make_keys
 from rig.settings.file import CONFIG, load_rig, rig_schema
 from svev import console
-from svev.doctor.examination import firewire_probes, probes, run_probe
-from svev.doctor.finding import Finding, Level
+from svev.doctor.examination import Probe, firewire_probes, probes, run_probe
+from svev.doctor.finding import Finding, Level, Topic
+from svev.doctor.gige_cameras import look_for_cameras
 
 _STYLES: Final = {Level.PASS: "green", Level.WARN: "yellow", Level.FAIL: "bold red"}
 _SOMETHING_FAILS: Final = 3
@@ -27,6 +28,9 @@ def doctor(
         Literal["firewire"] | None,
         typer.Option(help="examine this bus only, and try each camera on it: set it up, 2 s of frames, a bus reset"),
     ] = None,
+    find: Annotated[
+        bool, typer.Option("--find", help="only look for cameras on all networks, and compare them with the rig file")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Examine computer, network, disk and cameras before a recording: PASS, WARN or FAIL, and what to do.
@@ -38,10 +42,16 @@ def doctor(
 
     Example: svev doctor --rig config/rigs/hill-gige.toml
 
+    Example: svev doctor --find --rig /etc/svev/rig.toml
+
     Example: svev doctor --bus firewire --rig config/rigs/hill-iidc.toml
     """
-    settings = load_rig(rig or CONFIG / "rigs" / ("hill-iidc.toml" if bus else "sim-gige.toml"))
-    todo = firewire_probes(settings) if bus else probes(settings, out or settings.recorder.directory)
+    usual = "hill-gige.toml" if find else "hill-iidc.toml" if bus else "sim-gige.toml"
+    settings = load_rig(rig or CONFIG / "rigs" / usual)
+    if find:
+        todo = [Probe("discovery", Topic.CAMERAS, lambda: look_for_cameras(settings), limit_s=10.0)]
+    else:
+        todo = firewire_probes(settings) if bus else probes(settings, out or settings.recorder.directory)
     findings: list[Finding] = []
     with console.progress("examining", len(todo)) as advance:
         for done, probe in enumerate(todo, start=1):

@@ -2,96 +2,13 @@
 
 import os
 import socket
-import struct
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rig.errors import BadInputError
 from rig.settings.model import CameraSettings, RigSettings
 from service.processes.replayed_log import check_replay
-from svev.doctor.finding import Finding, Topic, failure, passed
-
-_PORT = 3956
-_REQUEST = struct.Struct(">BBHHH")  # 0x42, flags, command, length, request id (GigE Vision 2.0, section 15)
-_ANSWER = struct.Struct(">HHHH")  # status, acknowledge, length, request id
-_KEY, _WANTS_ANSWER = 0x42, 0x01
-_DISCOVERY, _READ_REGISTER = 0x0002, 0x0080
-_CONTROL_CHANNEL_PRIVILEGE = 0x0A00
-_CONTROLLED = 0b11  # exclusive access or control access is taken
-_TRIES = 3
-
-
-@dataclass(frozen=True, slots=True)
-class GigeCamera:
-    """Answer of a camera to the discovery request, and whether a program controls it."""
-
-    vendor: str
-    model: str
-    serial: str
-    in_use: bool
-
-
-def ask_camera(address: str, timeout_s: float) -> GigeCamera | None:
-    """Ask the camera at `address` what it is.
-
-    Returns:
-        None if nothing answers within `timeout_s` seconds.
-
-    Raises:
-        OSError: there is no route to the address.
-        ValueError: the answer is not that of a camera.
-    """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
-        channel.connect((address, _PORT))
-        who = _ask(channel, _DISCOVERY, b"", timeout_s)
-        if who is None:
-            return None
-        if len(who) < 248:
-            raise ValueError(f"the discovery answer has {len(who)} bytes, 248 are due")
-        control = _ask(channel, _READ_REGISTER, struct.pack(">I", _CONTROL_CHANNEL_PRIVILEGE), timeout_s)
-    in_use = control is not None and len(control) == 4 and bool(control[3] & _CONTROLLED)
-    return GigeCamera(_text(who[72:104]), _text(who[104:136]), _text(who[216:232]), in_use)
-
-
-def _ask(channel: socket.socket, command: int, payload: bytes, timeout_s: float) -> bytes | None:
-    """The payload of the answer, None if there is none; repeats the request, since a datagram may get lost."""
-    for request_id in range(1, _TRIES + 1):
-        channel.send(_REQUEST.pack(_KEY, _WANTS_ANSWER, command, len(payload), request_id) + payload)
-        deadline = time.monotonic() + timeout_s / _TRIES
-        while (left := deadline - time.monotonic()) > 0:
-            channel.settimeout(left)
-            try:
-                answer = channel.recv(1024)
-            except (TimeoutError, ConnectionRefusedError):  # refused: the address is of a computer, not of a camera
-                break
-            if len(answer) >= _ANSWER.size and _ANSWER.unpack_from(answer)[1] == command + 1:
-                return answer[_ANSWER.size :]
-    return None
-
-
-def _text(field: bytes) -> str:
-    return field.split(b"\0")[0].decode(errors="replace")
-
-
-def discover() -> list[str]:
-    """GigE Vision cameras that answer a broadcast within a second: address, vendor, model, serial number."""
-    import gi  # noqa: PLC0415 - Aravis may be missing, which is a finding of its own
-
-    gi.require_version("Aravis", "0.8")
-    from gi.repository import Aravis  # noqa: PLC0415
-
-    Aravis.disable_interface("USB3Vision")
-    Aravis.disable_interface("Fake")
-    Aravis.update_device_list()
-    found = [
-        f"{Aravis.get_device_address(i)} {Aravis.get_device_vendor(i)} {Aravis.get_device_model(i)} "
-        f"serial {Aravis.get_device_serial_nbr(i)}"
-        for i in range(Aravis.get_n_devices())
-    ]
-    Aravis.shutdown()
-    return found
-
+from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras
 
 _ANSWER_S = 1.5
 _GVCP_PORT = 3956
@@ -116,13 +33,32 @@ def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
 
 
 def look_for_cameras(rig: RigSettings) -> Iterator[Finding]:
-    """List the cameras that Aravis finds on all networks of this machine; takes a second."""
+    """List the cameras on all networks of this machine; takes a second."""
     if rig.simulation is not None or not any(camera.backend == "aravis" for camera in rig.cameras):
         return
+    names = {camera.address: camera.name for camera in rig.cameras}
+    found = find_cameras()
+    if not found:
+        remedy = "check power and cables, and that no firewall blocks UDP port 3956"
+        yield warning(Topic.CAMERAS, "no camera answers a broadcast on any network", remedy)
+    for each in found:
+        yield judge_found(each, names)
 
-    found = discover()
-    what = ", ".join(found) if found else "none (a camera in another subnet is not found this way)"
-    yield passed(Topic.CAMERAS, f"found on the network: {what}")
+
+def judge_found(found: FoundCamera, names: dict[str, str]) -> Finding:
+    """Judge a camera that was found.
+
+    Args:
+        found: the camera.
+        names: names of the cameras in the rig file, by address.
+    """
+    camera, port = found.camera, found.interface
+    what = f"found behind {port.name}: {camera.vendor} {camera.model}, serial {camera.serial}, at {camera.address}"
+    if not found.reachable:
+        remedy = f"run: svev cameras set-ip {camera.serial} ADDRESS, or give {port.name} an address in its subnet"
+        return warning(Topic.CAMERAS, f"{what}, which is not in the subnet {port.network} of this port", remedy)
+    name = names.get(camera.address)
+    return passed(Topic.CAMERAS, f"{what}, {name} of the rig file" if name else f"{what}, not in the rig file")
 
 
 def _look_at_log(rig: RigSettings) -> Finding:
@@ -144,8 +80,9 @@ def _look_at_gige(camera: CameraSettings) -> Finding:
         return failure(Topic.CAMERAS, f"{where} cannot be asked: {error}", remedy)
     if answer is None:
         return failure(Topic.CAMERAS, f"{where} does not answer", remedy)
-    who = f"{where}: {answer.vendor} {answer.model}, serial {answer.serial}"
-    if answer.in_use:
+    camera_there, in_use = answer
+    who = f"{where}: {camera_there.vendor} {camera_there.model}, serial {camera_there.serial}"
+    if in_use:
         return failure(Topic.CAMERAS, f"{who}, is controlled by another program", "end that program (another svev?)")
     return passed(Topic.CAMERAS, who)
 

@@ -1,14 +1,8 @@
 """Examines the network: can the packets of GigE Vision cameras be received, and triplets be published?"""
 
-import fcntl
-import socket
-import struct
-import sys
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass
-from ipaddress import IPv4Address, IPv4Network
+from ipaddress import IPv4Address
 from pathlib import Path
 
 import zmq
@@ -19,60 +13,7 @@ from recorder.publishing.publisher import bind
 from rig.errors import BadInputError
 from rig.settings.model import CameraSettings, RigSettings
 from svev.doctor.finding import Finding, Topic, failure, passed, warning
-
-_SIOCGIFADDR, _SIOCGIFNETMASK, _SIOCGIFMTU = 0x8915, 0x891B, 0x8921  # linux/sockios.h
-_REQUEST = struct.Struct("16s24s")  # struct ifreq: name, then a sockaddr or a number
-_ANY_PORT = 9  # "connecting" a datagram socket sends nothing
-
-
-@dataclass(frozen=True, slots=True)
-class Interface:
-    """One network interface.
-
-    Attributes:
-        mtu: size of the largest packet, IP header included, bytes.
-        speed_mbps: speed of the link; None: it has none (loopback, virtual).
-        network: addresses that can be reached without a router.
-    """
-
-    name: str
-    mtu: int
-    speed_mbps: int | None
-    network: IPv4Network
-
-
-def interface_to(address: str) -> Interface | None:
-    """The interface through which packets to `address` (IPv4) leave; None if there is no route."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect((address, _ANY_PORT))
-        except OSError:
-            return None
-        own = IPv4Address(probe.getsockname()[0])
-        for _, name in socket.if_nameindex():
-            with suppress(OSError):  # interfaces without an address
-                here = IPv4Address(_ask(probe, _SIOCGIFADDR, name)[4:8])
-                mask = IPv4Address(_ask(probe, _SIOCGIFNETMASK, name)[4:8])
-                network = IPv4Network(f"{here}/{mask}", strict=False)
-                if here == own or (network.is_loopback and own in network):
-                    mtu = int.from_bytes(_ask(probe, _SIOCGIFMTU, name)[:4], sys.byteorder)
-                    return Interface(name, mtu, _speed(name), network)
-    return None
-
-
-def _ask(probe: socket.socket, request: int, name: str) -> bytes:
-    """The answer of netdevice(7), without the interface name at its beginning."""
-    return fcntl.ioctl(probe, request, _REQUEST.pack(name.encode(), b""))[16:]
-
-
-def _speed(name: str) -> int | None:
-    """Speed of the link, Mbit/s; None if the interface has none: no such file, not readable, or -1 in it."""
-    try:
-        speed = int(Path(f"/sys/class/net/{name}/speed").read_text())
-    except OSError:
-        return None
-    return speed if speed > 0 else None
-
+from svev.gige.interfaces import Interface, interface_to
 
 _CAP_NET_RAW = 13  # linux/capability.h
 _FULL = 0.9  # share of a link's speed above which packets cannot be sent again

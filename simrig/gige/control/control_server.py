@@ -5,11 +5,14 @@ import os
 import selectors
 import socket
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from itertools import count
 
 from rig.clocks import NS_PER_S, HostNs, host_now
+from rig.errors import BadInputError
 from simrig.gige.control.control_channel import Peer
 from simrig.gige.control.device import Device
 from simrig.gige.protocol.gvcp import (
@@ -17,6 +20,7 @@ from simrig.gige.protocol.gvcp import (
     Action,
     Command,
     Discovery,
+    ForceIp,
     NotGvcpError,
     PacketResend,
     ReadMemory,
@@ -56,7 +60,7 @@ class ControlServer:
 
     def __init__(self, device: Device, address: str, broadcast: str | None) -> None:
         self._device = device
-        self._handler = _CommandHandler(device)
+        self._handler = _CommandHandler(device, self._move)
         self._resources = ExitStack()
         self._selector = self._resources.enter_context(selectors.DefaultSelector())
         self._delayed: list[tuple[HostNs, int, bytes, Peer]] = []
@@ -90,6 +94,16 @@ class ControlServer:
         listener.setblocking(False)
         self._selector.register(listener, selectors.EVENT_READ)
         return listener
+
+    def _move(self, address: str) -> None:
+        """Listen at another address of the camera.
+
+        Raises:
+            BadInputError: it is in use or none of this machine's.
+        """
+        old, self._socket = self._socket, self._listen(address, shared=False)
+        self._selector.unregister(old)
+        old.close()
 
     def _run(self) -> None:
         while not self._stopping:
@@ -145,8 +159,8 @@ class _Answer:
 class _CommandHandler:
     """Turns commands into acknowledges. No datagram, however malformed, makes it raise."""
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
+    def __init__(self, device: Device, move: Callable[[str], None]) -> None:
+        self._device, self._move = device, move
         self._busy_ns = 0
         self._last: tuple[Peer, bytes] | None = None
         self._last_answers: list[_Answer] = []
@@ -170,7 +184,7 @@ class _CommandHandler:
         self._busy_ns = 0
         ack_data = self._do(request, peer)
         answers = self._answers(request, ack_data) if request.wants_ack and ack_data else []
-        if isinstance(request.body, WriteRegisters | WriteMemory | Action):
+        if isinstance(request.body, WriteRegisters | WriteMemory | Action | ForceIp):
             self._last, self._last_answers = (peer, datagram), answers
         return answers
 
@@ -185,6 +199,8 @@ class _CommandHandler:
         match request.body:
             case Discovery():
                 ack = acknowledge(Command.DISCOVERY, number, self._device.discovery_data())
+            case ForceIp() as order if (status := self._force_ip(order)) is not None:
+                ack = acknowledge(Command.FORCEIP, number, b"", status)
             case ReadRegisters(addresses):
                 ack = self._read_registers(number, addresses, peer)
             case WriteRegisters(writes):
@@ -198,6 +214,20 @@ class _CommandHandler:
             case Action() as action if (status := self._device.act(action)) is not None:
                 ack = acknowledge(Command.ACTION, number, b"", status)
         return ack
+
+    def _force_ip(self, order: ForceIp) -> Status | None:
+        """Move to another address; None if another camera is meant."""
+        if order.mac != self._device.mac:
+            return None
+        if self._device.control.controller is not None:
+            return Status.ACCESS_DENIED
+        try:
+            if order.address != self._device.address:
+                self._move(str(IPv4Address(order.address)))
+        except BadInputError:
+            return Status.INVALID_PARAMETER
+        self._device.moved(order)
+        return Status.SUCCESS
 
     def _read_memory(self, number: int, address: int, count: int, peer: Peer) -> bytes:
         try:

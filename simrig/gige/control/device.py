@@ -10,7 +10,7 @@ from simrig.gige.imaging.camera_clock import CameraClock
 from simrig.gige.imaging.frame_store import FrameStore
 from simrig.gige.imaging.sensor import Sensor
 from simrig.gige.imaging.transmitter import Transmitter
-from simrig.gige.protocol.gvcp import Action, Status
+from simrig.gige.protocol.gvcp import Action, ForceIp, Status
 from simrig.gige.protocol.gvsp import FrameFormat
 from simrig.gige.registers.register_map import RegisterError, RegisterMap, Value
 from simrig.gige.registers.register_table import (
@@ -74,6 +74,25 @@ class Device:
         self._peer = peer
         self._registers.write(address, data)
         return USER_SET_LOAD_NS if address == self._registers.address("UserSetLoad") else 0
+
+    @property
+    def mac(self) -> int:
+        """The camera's MAC address."""
+        return self._registers.number("GevMACAddressHigh") << 32 | self._registers.number("GevMACAddressLow")
+
+    @property
+    def address(self) -> int:
+        """The camera's present IPv4 address."""
+        return self._registers.number("GevCurrentIPAddress")
+
+    def moved(self, order: ForceIp) -> None:
+        """Stream from the address that the camera was given, and say so in the registers."""
+        if order.address != self.address:
+            self._link.move(str(ipaddress.IPv4Address(order.address)))
+            self._registers.set("GevSCSP", self._link.port)
+        self._registers.set("GevCurrentIPAddress", order.address)
+        self._registers.set("GevCurrentSubnetMask", order.mask)
+        self._registers.set("GevCurrentDefaultGateway", order.gateway)
 
     def discovery_data(self) -> bytes:
         """The answer to a discovery."""

@@ -25,6 +25,7 @@ class Command(IntEnum):
     """Commands that the camera knows; the acknowledge of each has the next number."""
 
     DISCOVERY = 0x0002
+    FORCEIP = 0x0004
     PACKETRESEND = 0x0040
     READREG = 0x0080
     WRITEREG = 0x0082
@@ -55,6 +56,16 @@ class Status(IntEnum):
 @dataclass(frozen=True, slots=True)
 class Discovery:
     """Ask every camera to identify itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForceIp:
+    """Give the camera with this MAC address another IPv4 address, until its power goes (section 14.2)."""
+
+    mac: int
+    address: int
+    mask: int
+    gateway: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +117,7 @@ class Action:
     time: int | None
 
 
-Body = Discovery | ReadRegisters | WriteRegisters | ReadMemory | WriteMemory | PacketResend | Action
+Body = Discovery | ForceIp | ReadRegisters | WriteRegisters | ReadMemory | WriteMemory | PacketResend | Action
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +183,12 @@ def _discovery(payload: bytes, flags: int) -> Discovery:
     return Discovery()
 
 
+def _force_ip(payload: bytes, flags: int) -> ForceIp:
+    del flags
+    mac_high, mac_low, address, mask, gateway = struct.unpack(">2xHI12xI12xI12xI", payload)
+    return ForceIp(mac_high << 32 | mac_low, address, mask, gateway)
+
+
 def _read_registers(payload: bytes, flags: int) -> ReadRegisters:
     del flags
     _require(payload, len(payload) > 0)
@@ -220,6 +237,7 @@ def _require(payload: bytes, holds: bool) -> None:
 
 _PARSERS: dict[Command, Callable[[bytes, int], Body]] = {
     Command.DISCOVERY: _discovery,
+    Command.FORCEIP: _force_ip,
     Command.READREG: _read_registers,
     Command.WRITEREG: _write_registers,
     Command.READMEM: _read_memory,

@@ -50,6 +50,18 @@ class Link:
         """Close the socket."""
         self._socket.close()
 
+    def move(self, address: str) -> None:
+        """Send from another address of the camera; nothing may be streaming.
+
+        Raises:
+            BadInputError: the address is none of this machine's.
+        """
+        old, self._socket = self._socket, bound(address)
+        old.close()
+        self._address, self._peer = address, None
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 << 20)
+        self.port = self._socket.getsockname()[1]
+
     def connect(self, address: str, port: int) -> None:
         """Choose the receiver; with port 0 (stream channel closed) the link sends nothing any more."""
         if port == 0:

@@ -2,7 +2,7 @@ import os
 import socket
 import subprocess
 import sys
-from ipaddress import IPv4Network
+from ipaddress import IPv4Address, IPv4Network
 from pathlib import Path
 
 import pytest
@@ -13,12 +13,12 @@ from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from svev.doctor import network
 from svev.doctor.finding import Level
-from svev.doctor.network import Interface, interface_to
+from svev.gige.interfaces import Interface, interface_to
 from tests.support.loopback import Loopback
 from tests.support.rigs import SIM, rig_with, write_rig
 
 HILL = load_rig(CONFIG / "rigs" / "hill-gige.toml")
-PORT = Interface("eth1", mtu=9000, speed_mbps=1000, network=IPv4Network("192.168.11.0/24"))
+PORT = Interface("eth1", 9000, 1000, IPv4Network("192.168.11.0/24"), IPv4Address("192.168.11.1"))
 
 
 def _fast(rig: RigSettings) -> RigSettings:
@@ -47,14 +47,16 @@ def test_a_good_port_passes() -> None:
 
 
 def test_packets_that_do_not_fit_fail() -> None:
-    finding = network.judge_interface(HILL, Interface("eth1", 1500, 1000, PORT.network), [HILL.cameras[0]])
+    finding = network.judge_interface(
+        HILL, Interface("eth1", 1500, 1000, PORT.network, PORT.address), [HILL.cameras[0]]
+    )
     assert finding.level is Level.FAIL
     assert "sudo ip link set eth1 mtu 9000" in finding.remedy
 
 
 def test_a_link_that_is_too_slow_fails() -> None:
     # 640 x 480 x 8 bit x 30 Hz = 74 Mbit/s each
-    slow = Interface("eth1", 9000, 100, PORT.network)
+    slow = Interface("eth1", 9000, 100, PORT.network, PORT.address)
     assert network.judge_interface(HILL, slow, [HILL.cameras[0]]).level is Level.PASS
     finding = network.judge_interface(HILL, slow, [HILL.cameras[0], HILL.cameras[0]])
     assert finding.level is Level.FAIL

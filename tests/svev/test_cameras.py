@@ -1,0 +1,70 @@
+"""`svev cameras` with simulated cameras: they are found by broadcast, moved to another address, and keep it."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from rig.settings.file import CONFIG
+from simrig.programs.simulated_hill import SimulatedHill
+from tests.simrig.gige.raw_client import CCP, GvcpClient
+from tests.support.loopback import Loopback
+
+_CURRENT_CONFIGURATION, _PERSISTENT_ADDRESS, _PERSISTENT_BIT = 0x0014, 0x064C, 1
+_CONTROL = 2
+
+
+def _cameras(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "svev", "cameras", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def _answer(*arguments: str) -> Any:
+    done = _cameras(*arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture
+def addresses(loopback: Loopback) -> Iterator[tuple[str, str, str]]:
+    """Addresses of two running cameras, and one that nobody has."""
+    left, right, free = loopback.cameras(3)
+    names, scenario = {"K1": left, "K2": right}, CONFIG / "scenarios" / "training.toml"
+    with SimulatedHill(scenario, names, 30.0, test_pattern=True, broadcast="127.255.255.255"):
+        yield left, right, free
+
+
+def test_a_camera_is_found_and_takes_an_address(addresses: tuple[str, str, str]) -> None:
+    left, right, free = addresses
+    # Other tests' cameras answer, too.
+    found = {each["address"]: each for each in _answer("list", "--interface", "lo")["cameras"]}
+    assert {left, right} <= set(found)
+    camera = found[left]
+    assert (camera["vendor"], camera["name"], camera["interface"], camera["reachable"]) == ("Svev", "K1", "lo", True)
+
+    moved = _answer("set-ip", camera["mac"], free, "--interface", "lo")
+
+    assert (moved["address"], moved["serial"], moved["kept"]) == (free, camera["serial"], True)
+    features = {each["name"]: each for each in _answer("show", free)["features"]}
+    exposure = features["ExposureTime"]
+    assert (exposure["unit"], exposure["allowed"]) == ("us", "10.0 to 1000000.0")
+    assert "Line1" in features["TriggerSource"]["allowed"]
+    with GvcpClient(free) as client:
+        assert client.read(_CURRENT_CONFIGURATION) & _PERSISTENT_BIT
+        assert client.read(_PERSISTENT_ADDRESS).to_bytes(4, "big") == bytes(map(int, free.split(".")))
+    assert _cameras("show", left).returncode == 2
+
+
+def test_a_camera_in_use_and_addresses_that_do_not_fit_are_refused(addresses: tuple[str, str, str]) -> None:
+    left, right, free = addresses
+    with GvcpClient(left) as client:
+        assert client.write(CCP, _CONTROL) == 0
+        done = _cameras("set-ip", left, free, "--interface", "lo")
+        assert (done.returncode, "has not taken the address" in done.stderr) == (5, True)
+    refused = {"192.168.77.5": "in the subnet 127.0.0.0/8", right: "is the address of camera", "K1": "no IPv4"}
+    for wanted, words in refused.items():
+        done = _cameras("set-ip", left, wanted, "--interface", "lo")
+        assert (done.returncode, words in done.stderr) == (2, True), done.stderr

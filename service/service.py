@@ -61,7 +61,9 @@ class Service(Archive):
 
     def status(self) -> Status:
         """The present status; the room on the disk counts what the trash holds."""
-        status = self._supervisor.status.model_copy(update={"next_jumper": self._jumpers.view().next})
+        status, shown = self._supervisor.status, self._jumpers.shown
+        if shown.version > status.next_jumper.version:  # somebody has just edited him
+            status = status.model_copy(update={"next_jumper": shown})
         return self._keeper.counted_in(status)
 
     @property

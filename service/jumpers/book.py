@@ -44,18 +44,28 @@ class JumperBook:
     Args:
         keeper: keeps the list; None: it is forgotten with the service.
         changed: called after every change, in the thread that made it.
+
+    Attributes:
+        shown: the next jumper as the status shows him: the following one only when the recording of the one before is
+            shown too, so that nobody sees a new name beside an old state.
     """
 
     def __init__(self, keeper: Keeper | None = None, changed: Callable[[], None] = lambda: None) -> None:
         self._keeper, self._changed = keeper, changed
         self._lock = threading.Lock()
         self._list = keeper.load() if keeper is not None else StartList()
+        self.shown = self._list.next
         self._before: deque[tuple[Statement, StartList]] = deque(maxlen=_UNDO_MAX)
         self._taken: _Taken | None = None
 
     def view(self) -> StartList:
         """The list as it is now."""
         return self._list
+
+    def announce(self) -> None:
+        """Show the next jumper: the status says by now whose recording has begun."""
+        with self._lock:
+            self.shown = self._list.next
 
     def take(self, recording: str, order: RecordingOrder) -> tuple[SessionFields, dict[str, str]]:
         """Say whom a recording is of, and go on to the following jumper.
@@ -75,9 +85,10 @@ class JumperBook:
         with self._lock:
             jumper, number = self._list.next, self._list.round
             said = _statement("undo_taken", f"{who(jumper.session)} was recorded", jumper.session)
+            before = self.shown
             self._put(moves.taken(self._list, recording), said)
+            self.shown = before
             self._taken = _Taken(recording, jumper, self._list.next)
-        self._tell()
         session = jumper.session.model_copy(update={name: text for name, text in given.items() if text})
         return session, jumper.more | ({} if jumper.line is None else {"round": str(number)})
 
@@ -235,6 +246,7 @@ class JumperBook:
         undo = self._before[-1][0] if self._before else None
         update = {"version": version, "undo": undo, "next": changed.next.model_copy(update={"version": version})}
         self._list = changed.model_copy(update=update)
+        self.shown = self._list.next
         if self._keeper is not None:
             self._keeper.keep(self._list)
 

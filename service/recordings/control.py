@@ -59,6 +59,7 @@ class RecordingControl:
         last: id of the recording that ended last.
         notice: why the last recording ended early, until another one starts.
         armed_at: when the rig was armed, on the monotonic clock, s.
+        emptied_at: since when memory can hold anything for the next recording, likewise: the last one took the rest.
     """
 
     def __init__(
@@ -76,8 +77,13 @@ class RecordingControl:
         self.current: RecordingInProgress | None = None
         self.last: str | None = None
         self.notice: Statement | None = None
-        self.armed_at = time.monotonic()
+        self.armed_at = self.emptied_at = time.monotonic()
         self._answers: list[Callable[[], None]] = []
+
+    @property
+    def opening(self) -> bool:
+        """Whether a log is being opened: the recording is ordered, and the state is not yet that of recording."""
+        return self.current is not None and self.current.opening
 
     def answer(self) -> None:
         """Answer the waiting threads; called after the status is renewed, so that they see the new state."""
@@ -181,10 +187,10 @@ class RecordingControl:
             current.waiting.append(ended)
         if self._session.processes is not None and (at_once or not current.stopping):
             current.stopping = True
-            mishap = order is not None and order.confirm and self._machine.phase.age_s < CONFIRM_S
-            if mishap:
+            current.mishap = order is not None and order.confirm and self._machine.phase.age_s < CONFIRM_S
+            if current.mishap:
                 self._jumpers.give_back(current.ids[0])
-            self._session.processes.tell(StopRecording(at_once=at_once, keep=mishap))
+            self._session.processes.tell(StopRecording(at_once=at_once, keep=current.mishap))
 
     def change_session(self, recording: str, change: SessionChange) -> Recording | None:
         """Change session fields of the recording in progress.
@@ -263,6 +269,7 @@ class RecordingControl:
         self._truths.closed([part.path for part in parts if not part.closed])
         if current is not None:
             self.last = current.id
+            self.emptied_at = self.armed_at if current.mishap else time.monotonic()
             self._machine.move(then)
             self._answers.append(partial(current.end, outcome))
 

@@ -29,6 +29,7 @@ class RecordingInProgress:
         path: the log, the last one if there are several.
         session: the session fields, later changes included.
         stopping: whether the recorder was told to stop.
+        mishap: whether an operator stopped it as soon as it had begun.
         waiting: are answered when the recording is over.
     """
 
@@ -37,7 +38,7 @@ class RecordingInProgress:
     ) -> None:
         self.ids, self.path, self.session, self.longest_s = [path.stem], path, session, longest_s
         self.waiting: list[Future[Outcome]] = []
-        self.stopping = False
+        self.stopping = self.mishap = False
         self._opened: Future[Recording] | None = opened
         self._ordered = datetime.now(UTC)
         self._started: datetime | None = None

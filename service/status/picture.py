@@ -12,6 +12,7 @@ from rig.status import (
     DiskStatus,
     LastJump,
     Level,
+    NextJumper,
     PrerollStatus,
     ProcessStatus,
     PulseStatus,
@@ -48,6 +49,7 @@ class Facts:
         pulses: rate of the pulses.
         room: on the disk.
         preroll_s: what is to be held in memory.
+        holding_s: for how long the present past has been held, s; the health record may be of before.
         pids: process ids by row of the process table.
         restarts: how often each row was started again.
     """
@@ -61,9 +63,11 @@ class Facts:
     pulses: PulseRate
     room: Room
     preroll_s: float
+    holding_s: float
     recording: Recording | None
     last_recording: str | None
     last_jump: LastJump | None
+    next_jumper: NextJumper
     pids: dict[str, int]
     restarts: dict[str, int]
 
@@ -111,6 +115,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         recording=facts.recording,
         last_recording=facts.last_recording,
         last_jump=facts.last_jump,
+        next_jumper=facts.next_jumper,
         processes=tuple(_process(name, pid, facts.restarts.get(name, 0)) for name, pid in facts.pids.items()),
     )
 
@@ -140,7 +145,8 @@ def _preroll(facts: Facts) -> PrerollStatus:
     if facts.health is None:
         return PrerollStatus(seconds=0.0, limit_s=facts.preroll_s, memory_mb=0.0)
     held = facts.health.preroll
-    return PrerollStatus(seconds=held.seconds, limit_s=held.limit_s, memory_mb=held.memory_mb)
+    seconds = min(held.seconds, round(facts.holding_s, 3))
+    return PrerollStatus(seconds=seconds, limit_s=held.limit_s, memory_mb=held.memory_mb)
 
 
 def _process(name: str, pid: int, restarts: int) -> ProcessStatus:

@@ -102,8 +102,9 @@ class Supervisor:
         self._machine = StateMachine(self._moved)
         self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder, hill=hill)
         self.truths = TruthWriter(hub.tell)
+        self._jumpers = jumpers or JumperBook()
         self.recordings = RecordingControl(
-            self._machine, self._session, jumpers or JumperBook(), rig_toml, calibration, self.truths
+            self._machine, self._session, self._jumpers, rig_toml, calibration, self.truths
         )
         self._fault = Fault()
         self._wanted = False
@@ -284,7 +285,7 @@ class Supervisor:
         present = any(camera.present for camera in processes.cameras)
         match state:
             case State.ARMING if self._settling.settled(processes):
-                self.recordings.armed_at = time.monotonic()
+                self.recordings.armed_at = self.recordings.emptied_at = time.monotonic()
                 self._machine.move(State.ARMED) if present else self._lack_cameras()
             case State.ARMED if not present:
                 self._lack_cameras()
@@ -318,6 +319,8 @@ class Supervisor:
     def _refresh(self) -> Status:
         self._dirty, self._pictured = False, time.monotonic()
         self._status = self._picture()
+        if not self.recordings.opening:
+            self._jumpers.announce()
         self.hub.wake()
         return self._status
 
@@ -337,9 +340,11 @@ class Supervisor:
             pulses=self._watch.pulses,
             room=room_for(self.rig, free or 0),
             preroll_s=self._recorder.preroll_s,
+            holding_s=time.monotonic() - self.recordings.emptied_at,
             recording=current.view() if current is not None and not current.opening else None,
             last_recording=self.recordings.last,
             last_jump=self._last_jump,
+            next_jumper=self._jumpers.shown if self.recordings.opening else self._jumpers.view().next,
             pids={} if processes is None else processes.pids,
             restarts={RECORDER: self._fault.deaths, **(processes.restarts if processes else {})},
         )

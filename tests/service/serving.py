@@ -14,7 +14,7 @@ import httpx
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
-_COMMAND = [sys.executable, "-m", "svev", "serve"]
+_COMMAND = (sys.executable, "-m", "svev", "serve")
 #: The machine may be busy: what is waited for takes a second or two on a quiet one.
 PATIENCE_S = 60.0
 

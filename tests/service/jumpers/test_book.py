@@ -79,6 +79,15 @@ def test_somebody_who_stands_in_no_line_takes_nobodys_turn_or_name(book: JumperB
     assert [jump(book, "d"), marks(book)] == ["3 Cecilia", "jjjw"]
 
 
+def test_the_following_jumper_is_shown_when_the_recording_is(book: JumperBook) -> None:
+    jump(book, "a")
+    assert (next_bib(book), book.shown.session.bib) == ("2", "1")
+    book.announce()
+    assert book.shown == book.view().next
+    book.change_next(JumperChange(wind="calm"))
+    assert book.shown.session.wind == "calm", "edits are shown at once"
+
+
 def test_a_recording_that_names_its_jumper_leaves_the_list_alone(book: JumperBook) -> None:
     session, more = book.take("a", RecordingOrder(bib="99"))
     assert (session.bib, session.athlete, session.gate, more) == ("99", "", "", {})

@@ -54,7 +54,6 @@ function take(found) {
   if (list && found.version < list.version) return;
   list = found;
   drawRows(found);
-  adopt(found.next);
   draw();
 }
 
@@ -66,7 +65,9 @@ function take(found) {
 async function change(method, path, body) {
   await flush();
   const found = await attempt(() => call(method, path, body));
-  if (found) take(found);
+  if (!found) return;
+  take(found);
+  adopt(found.next);
 }
 
 async function load() {

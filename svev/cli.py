@@ -12,8 +12,9 @@ import sys
 import traceback
 from collections.abc import Iterable, Sequence
 from importlib import import_module
+from importlib.metadata import version
 from io import StringIO
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -76,7 +77,18 @@ def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
     return app
 
 
-def _every_command() -> None:
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        console.say(f"svev {version('svev')}, in {sys.prefix}")
+        raise typer.Exit
+
+
+def _every_command(
+    _: Annotated[
+        bool,
+        typer.Option("--version", callback=_say_version, is_eager=True, help="say which version this is, and where"),
+    ] = False,
+) -> None:
     """Live capture and photogrammetry for three synchronized cameras at a ski jump."""
 
 

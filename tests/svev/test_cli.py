@@ -1,6 +1,7 @@
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,11 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--help"]) == 0
     listed = capsys.readouterr().out
     assert all(f"\n  {command} " in listed for command in _commands())
+
+
+def test_the_version_says_where_it_is_installed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"svev {version('svev')}, in {sys.prefix}\n"
 
 
 def test_recording_loads_nothing_that_measures() -> None:

@@ -112,10 +112,11 @@ export function makeHub(evenHidden) {
         if (fresh) events = [];
         events = [...events, ...news].slice(-EVENTS_KEPT);
         if (fresh || news.length) tell({ type: "log", fresh, events: news });
-        fresh = false;
         const status = messages.findLast(({ event }) => event === "status");
         if (status) tell({ type: "status", status: JSON.parse(status.data), heard: Date.now(), why: null });
-        if (messages.some(({ event }) => event === "recordings")) tell({ type: "recordings" });
+        // A change from before the stream was opened is told to nobody.
+        if (fresh || messages.some(({ event }) => event === "recordings")) tell({ type: "recordings" });
+        fresh = false;
       });
     } catch (error) {
       if (ending.signal.reason === UNWANTED) return null;

@@ -73,6 +73,10 @@ class UnknownLineError(SvevError):
     """The start list has no such line."""
 
 
+class UnknownExportError(SvevError):
+    """The service has no such export, or has removed it."""
+
+
 class StateForbidsError(SvevError):
     """The service refuses the call in its present state; the message says what to do instead."""
 

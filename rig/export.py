@@ -4,9 +4,9 @@ Names of fields are those of the API.
 """
 
 from enum import StrEnum
-from typing import Annotated, Final, Self
+from typing import Annotated, Final
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from rig.status import WHOLE, Model
 
@@ -23,6 +23,12 @@ class Kind(StrEnum):
     TIFF = "tiff"  #: the same, for programs that read no PNG
     CSV = "csv"  #: a table: what became of each pulse in each camera
     CONTACT_SHEET = "contact_sheet"  #: a page with triplets of the jump
+
+
+#: The ending of what comes out, empty for a folder.
+ENDINGS: Final = {
+    Kind.H264: ".mp4", Kind.FFV1: ".mkv", Kind.PNG: "", Kind.TIFF: "", Kind.CSV: ".csv", Kind.CONTACT_SHEET: ".png",
+}  # fmt: skip
 
 
 class Quality(StrEnum):
@@ -46,10 +52,26 @@ class ExportOrder(Model):
     quality: Quality = Field(Quality.GOOD, description="of a video for people")
     burn_in: bool = Field(False, strict=True, description="write bib, pulse and time into the pictures of a video")
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.first is not None and self.last is not None and self.last < self.first:
-            raise ValueError(f"the last pulse {self.last} comes before the first one {self.first}: exchange them")
-        if len(set(self.cameras)) < len(self.cameras):
-            raise ValueError("a camera is named twice: name each once")
-        return self
+
+class ExportState(StrEnum):
+    """How far an export is."""
+
+    WAITING = "waiting"  #: for another export
+    RUNNING = "running"
+    PAUSED = "paused"  #: while a recording runs
+    DONE = "done"
+    FAILED = "failed"
+
+
+class ExportJob(Model):
+    """An export that the service makes."""
+
+    id: str
+    recording: str = Field(description="id of the recording")
+    order: ExportOrder
+    state: ExportState
+    done: int = Field(0, description="pulses that are done")
+    pulses: int = Field(0, description="pulses to do; 0: not known yet")
+    name: str = Field(description="of the file")
+    bytes: int = Field(0, description="size of the file when it is done")
+    problem: str = Field("", description="why it failed, and what to do")

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import BinaryIO, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from prometheus_client.metrics_core import Metric
 
+from rig.export import ExportJob, ExportOrder
 from rig.frame import FrameStatus
 from rig.pulse import RigPulse
 from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
@@ -132,6 +134,31 @@ class Jumpers(Protocol):
         ...
 
 
+class Exports(Protocol):
+    """Exports of recordings: one is made after the other, and none while a recording runs.
+
+    Raises (each where it applies):
+        UnknownExportError: there is none of this id.
+        StateForbidsError: it is not done.
+    """
+
+    def jobs(self) -> list[ExportJob]:
+        """All that are kept, newest first."""
+        ...
+
+    def job(self, job_id: str) -> ExportJob:
+        """One of them."""
+        ...
+
+    def file(self, job_id: str) -> Path:
+        """The file of one that is done."""
+        ...
+
+    def remove(self, job_id: str) -> ExportJob:
+        """Remove one and its file; one that is not done is given up."""
+        ...
+
+
 class RigService(Protocol):
     """The running service. Any thread may call any method; none waits without a deadline.
 
@@ -200,6 +227,15 @@ class RigService(Protocol):
 
     def download(self, recording_id: str) -> Download:
         """A recording as a file, with its session as it was corrected. StateForbidsError: it is still being written."""
+        ...
+
+    @property
+    def exports(self) -> Exports:
+        """What is being exported, and what has been."""
+        ...
+
+    def start_export(self, recording_id: str, order: ExportOrder) -> ExportJob:
+        """Ask for an export. StateForbidsError: the recording is still being written; StorageError: no room."""
         ...
 
     def checksum(self, recording_id: str) -> str:

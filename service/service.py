@@ -15,6 +15,7 @@ from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.pulse import RigPulse
 from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, State, Status, StopOrder
 from rig.transport.preview import PreviewSlot
+from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
 from service.recordings.in_progress import Outcome
@@ -40,6 +41,7 @@ class Service(Archive):
         supervisor: owns the rig.
         jumpers: the start list and the next jumper.
         catalogue: of the folder of the recordings.
+        exports: of these recordings.
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
         examine: the doctor; examines what disturbs nothing in the given state.
@@ -50,11 +52,12 @@ class Service(Archive):
         supervisor: Supervisor,
         jumpers: JumperBook,
         catalogue: Catalogue,
+        exports: Exports,
         keeper: TrashKeeper,
         slot: PreviewSlot,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
-        super().__init__(catalogue)
+        super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
         self._slot, self._examine = slot, examine
         self._closing = threading.Event()
@@ -83,6 +86,7 @@ class Service(Archive):
         """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
         supervisor = self._supervisor
         if self.status().state is State.ARMED:
+            self.exports.tidy()
             self._keeper.make_room(supervisor.rig.recorder.jump_s if order.duration_s is None else order.duration_s)
 
         def start(opened: "Future[Recording]") -> None:

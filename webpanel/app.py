@@ -20,6 +20,7 @@ from webpanel.problems import handle_errors
 from webpanel.routes.common import COMMON
 from webpanel.routes.contents import contents_router
 from webpanel.routes.events import Changes, events_router
+from webpanel.routes.exports import exports_router
 from webpanel.routes.files import files_router
 from webpanel.routes.login import login_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
@@ -69,6 +70,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         trash_router(service, changes),
         contents_router(service),
         files_router(service, streams.downloads),
+        exports_router(service, streams.downloads),
         preview_router(service, streams),
         events_router(service, changes, streams.events),
         login_router(door),

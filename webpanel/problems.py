@@ -17,6 +17,7 @@ from rig.errors import (
     StateForbidsError,
     StorageError,
     SvevError,
+    UnknownExportError,
     UnknownLineError,
     UnknownRecordingError,
 )
@@ -42,6 +43,7 @@ MEDIA_TYPE = "application/problem+json"
 #: The status of an error of ours: that of the first class in the table that it belongs to.
 _STATUSES: tuple[tuple[type[SvevError], HTTPStatus], ...] = (
     (UnknownRecordingError, HTTPStatus.NOT_FOUND),
+    (UnknownExportError, HTTPStatus.NOT_FOUND),
     (UnknownLineError, HTTPStatus.NOT_FOUND),
     (StateForbidsError, HTTPStatus.CONFLICT),
     (BadInputError, HTTPStatus.UNPROCESSABLE_ENTITY),

@@ -15,7 +15,7 @@ from analysis.film.tag_table import write_tag_table
 from analysis.film.video_file import FFV1, VideoFile, h264
 from analysis.film.whole import whole_file, whole_folder
 from analysis.film.words import caption, write_caption, write_lacking
-from rig.export import ExportOrder, Kind, Quality
+from rig.export import ENDINGS, ExportOrder, Kind, Quality
 
 #: Told how many pulses are done, and of how many.
 Progress = Callable[[int, int], None]
@@ -26,10 +26,6 @@ _CRF: Final = {Quality.SMALL: 28, Quality.GOOD: 21, Quality.BEST: 14}
 _WIDEST_PX: Final = 4096
 _US_PER_NS: Final = 1e-3
 TABLE: Final = "tags.csv"
-#: The ending of what comes out, empty for a folder.
-ENDINGS: Final = {
-    Kind.H264: ".mp4", Kind.FFV1: ".mkv", Kind.PNG: "", Kind.TIFF: "", Kind.CSV: ".csv", Kind.CONTACT_SHEET: ".png",
-}  # fmt: skip
 #: Endings of single pictures, with OpenCV's settings: little compression is fast, and noise hardly shrinks further.
 _PICTURES: Final = {
     Kind.PNG: (".png", [cv2.IMWRITE_PNG_COMPRESSION, 1]),

@@ -13,6 +13,7 @@ from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from rig.clocks import NS_PER_S
 from rig.errors import StateForbidsError, StillRecordingError
+from rig.export import ExportJob, ExportOrder
 from rig.status import (
     Causes,
     Counts,
@@ -28,7 +29,8 @@ from rig.status import (
     Trash,
 )
 from rig.tag import TripletTag
-from service.recordings.download import download_of, sha256_of, zipped, zipped_size
+from service.exports.jobs import Exports
+from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, tags_of, utc
 from service.seam import Download, FoundRecordings
 from triggering.ledger import pauses_in_words
@@ -56,12 +58,16 @@ _LONGEST_SHOWN: Final = 4000
 class Archive(ABC):
     """The reading part of `service.seam.RigService`: all recordings of the folder, with the one in progress.
 
+    Attributes:
+        exports: what is being exported, and what has been.
+
     Args:
         catalogue: of the folder.
+        exports: of the same recordings.
     """
 
-    def __init__(self, catalogue: Catalogue) -> None:
-        self._catalogue = catalogue
+    def __init__(self, catalogue: Catalogue, exports: Exports) -> None:
+        self._catalogue, self.exports = catalogue, exports
         self._checksums: dict[str, str] = {}
         self._descriptions: dict[tuple[str, bool], tuple[Entry, Recording]] = {}
 
@@ -114,10 +120,24 @@ class Archive(ABC):
             StillRecordingError: it has not.
             BadInputError: the file may not be read, or is no regular file.
         """
+        self._check_ended(recording_id)
+        return download_of(self._catalogue.entry(recording_id), self._catalogue.file(recording_id))
+
+    def start_export(self, recording_id: str, order: ExportOrder) -> ExportJob:
+        """Ask for an export of a recording that has ended.
+
+        Raises:
+            StillRecordingError: it has not.
+            StorageError: there is not room enough.
+        """
+        self._check_ended(recording_id)
+        entry, log = self._catalogue.entry(recording_id), self._catalogue.file(recording_id)
+        return self.exports.start(recording_id, log, file_name(recording_id, entry.session, ""), order)
+
+    def _check_ended(self, recording_id: str) -> None:
         current = self.status().recording
         if current and current.id == recording_id:
             raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
-        return download_of(self._catalogue.entry(recording_id), self._catalogue.file(recording_id))
 
     def checksum(self, recording_id: str) -> str:
         """SHA-256 of that file, in hexadecimal."""

@@ -46,10 +46,10 @@ def download_of(entry: Entry, path: Path) -> Download:
     return Download(file_name(entry.id, entry.session), log.size, stat.st_mtime, tag, log.corrected, log.open)
 
 
-def file_name(recording: str, session: Mapping[str, str]) -> str:
-    """The name of a downloaded log: bib, athlete and id, e.g. `17_Ola-Nordmann_2026-11-20T10-15-03Z.mcap`."""
+def file_name(recording: str, session: Mapping[str, str], ending: str = ".mcap") -> str:
+    """The name of a downloaded file: bib, athlete and id, e.g. `17_Ola-Nordmann_2026-11-20T10-15-03Z.mcap`."""
     parts = [_part(session.get(field, "")) for field in ("bib", "athlete")]
-    return "_".join([*filter(None, parts), recording]) + ".mcap"
+    return "_".join([*filter(None, parts), recording]) + ending
 
 
 def sha256_of(download: Download) -> str:

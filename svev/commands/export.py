@@ -7,10 +7,10 @@ from typing import Annotated, Final
 import typer
 from pydantic import ValidationError
 
-from analysis.film.export import ENDINGS, export, in_file_name
+from analysis.film.export import export, in_file_name
 from analysis.film.shots import Recording
 from rig.errors import BadInputError
-from rig.export import ExportOrder, Kind, Quality
+from rig.export import ENDINGS, ExportOrder, Kind, Quality
 from svev import console
 from svev.commands.logs import AlsoJson, LogPath
 
@@ -71,7 +71,7 @@ def export_command(
             kind=kind, cameras=tuple(camera or ()), first=first, last=last, slow=slow, quality=quality, burn_in=burn_in
         )
     except ValidationError as error:
-        raise BadInputError(f"{error.errors()[0]['msg'].removeprefix('Value error, ')}; see --help") from None
+        raise BadInputError(f"{error.errors()[0]['loc'][0]}: {error.errors()[0]['msg']}; see --help") from None
     written: list[Path] = []
     pulses = 0
     for part, file in _parts(log, order, out, separate=separate):

@@ -10,15 +10,18 @@ from typing import Final
 
 from recorder.catalogue.folder import Catalogue
 from recorder.publishing.keys import check_publication
+from rig.disk import free_bytes
 from rig.events import Event, Level
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
+from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.jumpers.keeper import Keeper
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
+from service.recordings.storage import usable_bytes
 from service.recordings.trash_keeper import TrashKeeper
 from service.service import Service
 from service.status.event_hub import EventHub
@@ -79,7 +82,8 @@ def serve(settings: ServiceSettings) -> None:
         jumpers = JumperBook(Keeper(data, hub.tell), hub.wake)
         supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)
         keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
-        service = Service(supervisor, jumpers, catalogue, keeper, slot, PanelDoctor(rig, data).report)
+        exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
+        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, PanelDoctor(rig, data).report)
         server = make_server(create_app(service, settings.access))
         supervisor.on_turn = _Reporter(supervisor, server, notify, url(listener)).report
 
@@ -99,6 +103,15 @@ def serve(settings: ServiceSettings) -> None:
                 supervisor.stop(_STOP_S)
         if supervisor.failure is not None:
             raise supervisor.failure
+
+
+def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:
+    """The exports of the recordings, which leave the disk its reserve and stand still while a recording runs."""
+
+    def busy() -> bool:
+        return supervisor.status.recording is not None
+
+    return Exports(data, busy, lambda: usable_bytes(rig, free_bytes(data) or 0))
 
 
 def _tell_of_another_folder(settings: ServiceSettings, rig: RigSettings, hub: EventHub) -> None:

@@ -39,6 +39,7 @@ from rig.status import (  # fmt: skip
     Status,
     StopOrder,
 )
+from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
 from service.seam import Preview
@@ -66,7 +67,7 @@ class MemoryService(Archive):
 
     def __init__(self, folder: Path) -> None:
         self.catalogue = Catalogue(folder)
-        super().__init__(self.catalogue)
+        super().__init__(self.catalogue, Exports(folder, lambda: self.state is State.RECORDING, lambda: 1e12))
         self.state = State.IDLE
         self.well = True
         self.broken: Exception | None = None

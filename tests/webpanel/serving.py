@@ -54,6 +54,7 @@ def serving(service: MemoryService, access: Access) -> Iterator[Panel]:
         server.should_exit = True
         thread.join(20)
         listener.close()
+        service.exports.close()
     assert not thread.is_alive()
     wait_until(lambda: not _workers(), "the server's worker threads have ended", 20)
 

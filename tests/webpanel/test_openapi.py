@@ -27,6 +27,8 @@ CALLS = {
     "GET /api/next-jumper", "PATCH /api/next-jumper", "POST /api/next-jumper/skip",
     "GET /api/start-list", "PUT /api/start-list", "PATCH /api/start-list", "POST /api/start-list/undo",
     "POST /api/start-list/round", "POST /api/start-list/lines", "PATCH /api/start-list/lines/{line}",
+    "POST /api/recordings/{recording_id}/exports", "GET /api/exports", "GET /api/exports/{export_id}",
+    "DELETE /api/exports/{export_id}", "GET /api/exports/{export_id}/file",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 

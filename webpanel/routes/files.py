@@ -123,7 +123,7 @@ def _zip_headers(ids: str, size: int) -> dict[str, str]:
     return {"Content-Disposition": f'attachment; filename="{name}"', "Content-Length": str(size)}
 
 
-def _attachment(name: str) -> str:
+def attachment(name: str) -> str:
     """The header that names a file; other letters than ASCII in the extended form (RFC 6266, 4.3)."""
     apart = unicodedata.normalize("NFKD", name.translate(_PLAIN)).encode("ascii", "ignore").decode()
     extended = "" if apart == name else f"; filename*=UTF-8''{quote(name)}"
@@ -140,7 +140,7 @@ class RecordingFile(FileResponse):
 
     def __init__(self, download: Download, checksum: str) -> None:
         headers = {
-            "Content-Disposition": _attachment(download.name),
+            "Content-Disposition": attachment(download.name),
             "ETag": f'"{download.tag}"',
             "Last-Modified": formatdate(download.modified, usegmt=True),
             "X-Svev-Session": "corrected" if download.corrected else "as-recorded",

@@ -1,0 +1,219 @@
+"""The exports of the service: a queue, one process at a time, which stands still while a recording runs.
+
+The files lie in a hidden folder beside the recordings. They are removed after a day, sooner if their room is needed,
+and when the service starts.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from select import select
+from typing import Any, Final
+
+from rig.errors import StateForbidsError, StorageError, UnknownExportError
+from rig.export import ENDINGS, ExportJob, ExportOrder, ExportState
+
+FOLDER: Final = ".exports"
+#: A file is kept for so long, unless its room is needed.
+KEPT_S: Final = 86_400.0
+#: So many exports wait at most.
+_QUEUE_MAX: Final = 50
+_LOOK_S: Final = 0.2
+_END_S: Final = 10.0
+_PIECE: Final = 1 << 16
+_OVER: Final = (ExportState.DONE, ExportState.FAILED)
+
+
+class Exports:
+    """Any thread may call any method.
+
+    Args:
+        directory: folder of the recordings.
+        busy: whether a recording runs.
+        room: bytes that may still be used on the disk, beside the reserve.
+    """
+
+    def __init__(self, directory: Path, busy: Callable[[], bool], room: Callable[[], float]) -> None:
+        self._folder, self._busy, self._room = directory / FOLDER, busy, room
+        shutil.rmtree(self._folder, ignore_errors=True)  # nobody knows any more what they were
+        self._jobs: dict[str, ExportJob] = {}
+        self._logs: dict[str, Path] = {}
+        self._ended: dict[str, float] = {}
+        self._numbers = count(1)
+        self._lock = threading.RLock()
+        self._worker: threading.Thread | None = None
+        self._closed = threading.Event()
+
+    def start(self, recording_id: str, log: Path, name: str, order: ExportOrder) -> ExportJob:
+        """Ask for an export.
+
+        Args:
+            recording_id: id of the recording.
+            log: its log, which nobody writes any more.
+            name: of the file, without ending.
+            order: what of it, and how.
+
+        Raises:
+            StateForbidsError: too many are waiting, or the service ends.
+            StorageError: there is not room enough.
+        """
+        needed = log.stat().st_size  # no export is larger, but for those of noise
+        self.tidy(needed)
+        if self._room() < needed:
+            raise StorageError(
+                f"an export may take {needed / 1e9:.1f} GB, which the disk has not: delete recordings and empty the "
+                "trash"
+            )
+        with self._lock:
+            if self._closed.is_set() or sum(job.state not in _OVER for job in self._jobs.values()) >= _QUEUE_MAX:
+                raise StateForbidsError(f"{_QUEUE_MAX} exports are waiting already: wait, or cancel some")
+            job_id = str(next(self._numbers))
+            file = f"{name}{ENDINGS[order.kind] or '.zip'}"
+            job = ExportJob(id=job_id, recording=recording_id, order=order, state=ExportState.WAITING, name=file)
+            self._jobs[job_id], self._logs[job_id] = job, log
+            if self._worker is None:
+                self._worker = threading.Thread(target=self._work, name="exports", daemon=True)
+                self._worker.start()
+            return job
+
+    def jobs(self) -> list[ExportJob]:
+        """All exports that are kept, newest first."""
+        self.tidy()
+        with self._lock:
+            return list(reversed(self._jobs.values()))
+
+    def job(self, job_id: str) -> ExportJob:
+        """One of them.
+
+        Raises:
+            UnknownExportError: there is none of this id.
+        """
+        with self._lock:
+            if job_id not in self._jobs:
+                raise UnknownExportError(f"no export {job_id}: it was removed, or never asked for; ask for it again")
+            return self._jobs[job_id]
+
+    def file(self, job_id: str) -> Path:
+        """The file of an export that is done.
+
+        Raises:
+            UnknownExportError: there is none of this id.
+            StateForbidsError: it is not done.
+        """
+        job = self.job(job_id)
+        if job.state is not ExportState.DONE:
+            raise StateForbidsError(f"export {job_id} is {job.state.value}: wait until it is done")
+        return self._place(job)
+
+    def remove(self, job_id: str) -> ExportJob:
+        """Remove an export and its file; if it is not done yet, it is given up.
+
+        Raises:
+            UnknownExportError: there is none of this id.
+        """
+        with self._lock:
+            job = self.job(job_id)
+            del self._jobs[job_id], self._logs[job_id]
+            self._ended.pop(job_id, None)
+        if job.state in _OVER:  # the worker removes what it is about
+            shutil.rmtree(self._folder / job_id, ignore_errors=True)
+        return job
+
+    def tidy(self, needed: float = 0.0) -> None:
+        """Remove what is too old, and while less than `needed` bytes may be used, what was done first."""
+        with self._lock:
+            for job_id, ended in sorted(self._ended.items(), key=lambda item: item[1]):
+                if time.monotonic() - ended > KEPT_S or self._room() < needed:
+                    self.remove(job_id)
+
+    def close(self) -> None:
+        """Give up what is not done, and end the process."""
+        with self._lock:
+            self._closed.set()
+            worker = self._worker
+        if worker is not None:
+            worker.join(_END_S)
+
+    def _place(self, job: ExportJob) -> Path:
+        return self._folder / job.id / job.name
+
+    def _work(self) -> None:
+        """Make one export after the other; end when there is none."""
+        while True:
+            with self._lock:
+                waiting = [job for job in self._jobs.values() if job.state is ExportState.WAITING]
+                if not waiting or self._closed.is_set():
+                    self._worker = None
+                    return
+                job, log = waiting[0], self._logs[waiting[0].id]
+            if self._busy():
+                self._closed.wait(_LOOK_S)
+            else:
+                self._make(job, log)
+
+    def _make(self, job: ExportJob, log: Path) -> None:
+        place = self._place(job)
+        try:
+            place.parent.mkdir(parents=True)
+            command = [sys.executable, "-m", "service.exports.program"]
+            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+                try:
+                    asked = {"log": str(log), "order": job.order.model_dump(mode="json"), "out": str(place)}
+                    _write(child, json.dumps(asked))
+                    self._change(job.id, state=ExportState.RUNNING)
+                    self._follow(job.id, child)
+                finally:
+                    child.kill()
+        except OSError as error:
+            self._end(job.id, problem=f"the export cannot be made ({error.strerror}): try again")
+        if job.id not in self._jobs:
+            shutil.rmtree(place.parent, ignore_errors=True)
+
+    def _follow(self, job_id: str, child: "subprocess.Popen[bytes]") -> None:
+        """Hear what the program says until it has ended, or nobody wants the export any more."""
+        paused, said = False, b""
+        if child.stdout is None:
+            raise TypeError("the program that exports has no standard output")
+        while job_id in self._jobs and not self._closed.is_set():
+            if self._busy() != paused:
+                paused = not paused
+                _write(child, "pause" if paused else "go")
+                self._change(job_id, state=ExportState.PAUSED if paused else ExportState.RUNNING)
+            ready, _, _ = select([child.stdout], [], [], _LOOK_S)
+            if not ready:
+                continue
+            piece = os.read(child.stdout.fileno(), _PIECE)
+            *lines, said = (said + piece).split(b"\n")
+            for line in lines:
+                news: dict[str, Any] = json.loads(line)
+                if "done" not in news:
+                    self._end(job_id, **news)
+                    return
+                self._change(job_id, **news)
+            if not piece:
+                self._end(job_id, problem="the program that exports has ended by itself: try again")
+                return
+
+    def _end(self, job_id: str, **said: Any) -> None:
+        with self._lock:
+            if job_id in self._jobs:
+                self._change(job_id, state=ExportState.FAILED if "problem" in said else ExportState.DONE, **said)
+                self._ended[job_id] = time.monotonic()
+
+    def _change(self, job_id: str, **what: Any) -> None:
+        with self._lock:
+            if job_id in self._jobs:
+                self._jobs[job_id] = self._jobs[job_id].model_copy(update=what)
+
+
+def _write(child: "subprocess.Popen[bytes]", line: str) -> None:
+    if child.stdin is not None:
+        child.stdin.write(f"{line}\n".encode())
+        child.stdin.flush()

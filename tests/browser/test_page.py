@@ -30,7 +30,7 @@ READY = {
     "live": "#cameras li",
     "recordings": "#recordings-list li",
     "trash": "#recordings-empty",
-    "recordings/jump-2": "#frame-strip li",
+    "recordings/jump-2": "#frame-slider",
     "log": "#log-list li, #log-empty",
     "doctor": "#doctor-run",
     "rig": "#rig-facts div",

@@ -60,6 +60,7 @@ export const en = {
   "preview.when_armed": "The picture comes when the rig is armed.",
   "preview.no_pulses": "No trigger pulses: the picture stands still.",
   "preview.tap": "Tap a camera to see it large.",
+  "preview.swipe": "Swipe to see the other cameras, tap to see all.",
   "preview.tap_back": "Tap again to see all cameras.",
   "viewer.enlarge": "show large",
   "viewer.all": "is shown large; show all cameras",

@@ -2,16 +2,22 @@
 
 import { say, t } from "../i18n/i18n.js";
 import { hear, wantPicture } from "../shared/connection.js";
-import { $, setText } from "../shared/dom.js";
+import { $, make, setText } from "../shared/dom.js";
 import { known, watch } from "../shared/store.js";
 import { makeViewer } from "../shared/viewer.js";
 
+/** The window is too narrow for all cameras side by side: one is shown large, the others by swiping. */
+const NARROW = matchMedia("(max-width: 599px)");
+const SWIPE_PX = 40;
 const USUAL_ROWS = 480;
 const USUAL_COLUMNS = 640;
 
 /** @type {import("../shared/viewer.js").Viewer} */
 let viewer;
 let running = false;
+let cameras = 0;
+/** Where the finger was put down; null: it was not. @type {number|null} */
+let touchedAt = null;
 let ratio = 0;
 /** Says that the picture that was set last is shown. */
 let shown = () => {};
@@ -27,6 +33,9 @@ export function startPreview() {
     draw();
   });
   hear({ picture: show, noPicture: (why) => { refused = why; draw(); } });
+  $("preview").addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => { touchedAt = event.pointerType === "mouse" ? null : event.clientX; });
+  $("preview").addEventListener("pointerup", (/** @type {PointerEvent} */ event) => swiped(event.clientX - (touchedAt ?? event.clientX)));
+  NARROW.addEventListener("change", () => { viewer.select(NARROW.matches ? 0 : null); draw(); });
   watch(draw);
 }
 
@@ -37,11 +46,21 @@ export function startPreview() {
  */
 export function showCamera(index) {
   viewer.select(index);
+  draw();
 }
 
 /** Index of the camera shown large, null: all. */
 export function shownCamera() {
   return viewer.selected();
+}
+
+/** @param {number} pixels to the right */
+function swiped(pixels) {
+  touchedAt = null;
+  const selected = viewer.selected();
+  if (selected === null || Math.abs(pixels) < SWIPE_PX) return;
+  viewer.select((selected + (pixels < 0 ? 1 : -1) + cameras) % cameras);
+  draw();
 }
 
 function wanted() {
@@ -77,19 +96,26 @@ function show(image, whenShown) {
 }
 
 /** @param {import("../shared/types.js").Status} status */
-function drawBlocks({ cameras, state, pulses }) {
-  const blocks = cameras.map((camera, index) => ({
+function drawBlocks({ cameras: seen, state, pulses }) {
+  const blocks = seen.map((camera, index) => ({
     name: camera.name,
     columns: camera.columns ?? /** @type {[number, number]} */ ([index * USUAL_COLUMNS, (index + 1) * USUAL_COLUMNS]),
   }));
   const columns = blocks.at(-1)?.columns[1] ?? 1;
   viewer.layOut(blocks, ratio ? columns / ratio : USUAL_ROWS);
-  cameras.forEach((camera, index) => {
+  if (seen.length !== cameras) {
+    cameras = seen.length;
+    $("preview-places").replaceChildren(...seen.map(() => make("i")));
+    if (NARROW.matches) viewer.select(0);
+  }
+  $("preview-places").hidden = viewer.selected() === null;
+  [...$("preview-places").children].forEach((dot, index) => dot.classList.toggle("here", index === viewer.selected()));
+  seen.forEach((camera, index) => {
     const fine = camera.state === "ready";
     const { text, advice } = camera.state === "off" ? { text: "", advice: "" } : say(camera.statement);
     viewer.cover(index, camera.statement.level, fine ? "" : t(`camera.${camera.state}`), text, advice);
   });
-  viewer.image.alt = t("preview.alt", { cameras: cameras.map((camera) => camera.name).join(", ") });
+  viewer.image.alt = t("preview.alt", { cameras: seen.map((camera) => camera.name).join(", ") });
   const live = state === "armed" || state === "recording";
   $("preview").classList.toggle("dark", !live);
   setText($("preview-hint"), hint(live, pulses.arriving));
@@ -103,5 +129,5 @@ function hint(live, arriving) {
   if (!live) return t("preview.when_armed");
   if (refused) return say(refused).text;
   if (!arriving) return t("preview.no_pulses");
-  return t(viewer.selected() === null ? "preview.tap" : "preview.tap_back");
+  return t(viewer.selected() === null ? "preview.tap" : NARROW.matches ? "preview.swipe" : "preview.tap_back");
 }

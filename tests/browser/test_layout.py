@@ -1,0 +1,127 @@
+"""At every size of window, in both languages: no word is broken, nothing is cut off, what is needed is in sight."""
+
+import re
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from rig.status import State
+from tests.browser.conftest import Open
+from tests.browser.test_page import READY, enter, jumps
+from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.serving import Panel
+
+__all__ = ["jumps"]
+
+PHONE, ACROSS, TABLET, SMALL_LAPTOP, LAPTOP = (360, 780), (780, 360), (768, 1024), (1024, 768), (1280, 800)
+#: Words that stand on two lines, and buttons that do not hold their words.
+BROKEN = r"""() => {
+    const wrong = [];
+    const where = "button, .button, nav a, .brand, .pill, h1, h2, dt, label > span, .state-word";
+    for (const element of document.querySelectorAll(where)) {
+        if (!element.checkVisibility({ visibilityProperty: true })) continue;
+        if (element.matches("button, .button, nav a, .brand, .pill") && !element.matches(".block, .unseen")
+            && element.scrollWidth > element.clientWidth + 1) wrong.push("cut off: " + element.outerHTML);
+        const texts = document.createTreeWalker(element, NodeFilter.SHOW_TEXT);
+        while (texts.nextNode()) {
+            const text = texts.currentNode;
+            if (text.parentElement.closest(".unseen, .cover")) continue;
+            for (const word of text.data.matchAll(/[\p{L}\p{N}]+/gu)) {
+                const range = document.createRange();
+                range.setStart(text, word.index);
+                range.setEnd(text, word.index + word[0].length);
+                const lines = new Set([...range.getClientRects()].map(({ top }) => Math.round(top)));
+                if (lines.size > 1) wrong.push(`broken: ${word[0]}: ${element.outerHTML.slice(0, 200)}`);
+            }
+        }
+    }
+    return wrong;
+}"""
+
+
+BESIDE_THE_MESSAGE = """element => {
+    const snack = document.querySelector(".snack").getBoundingClientRect();
+    const own = element.getBoundingClientRect();
+    const across = snack.right <= own.left || own.right <= snack.left;
+    return across || snack.bottom <= own.top || own.bottom <= snack.top;
+}"""
+
+
+@pytest.mark.parametrize("size", [PHONE, ACROSS, TABLET, SMALL_LAPTOP, LAPTOP], ids="{0[0]}x{0[1]}".format)
+def test_no_word_is_broken_and_nothing_is_cut_off(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open, size: tuple[int, int]
+) -> None:
+    width, height = size
+    service.jumpers.import_table("bib;athlete\n1;Berit Kristiansdatter Øvrebø\n2;Anna\n".encode())
+    page = open_page(panel.url, width=width, height=height, reduced_motion="reduce")
+    for language in ("en", "nb"):
+        page.evaluate("language => localStorage.setItem('svev.language', JSON.stringify(language))", language)
+        page.reload()
+        expect(page.locator("html")).to_have_attribute("lang", language)
+        for view in READY:
+            enter(page, panel, view)
+            assert page.evaluate("document.documentElement.scrollWidth") == width, (language, view)
+            assert page.evaluate(BROKEN) == [], (language, view)
+        page.goto(f"{panel.url}/#/live")
+        for state in State:
+            service._become(state)
+            expect(page.locator("#state")).to_have_attribute("data-state", state.value)
+            assert page.evaluate(BROKEN) == [], (language, state)
+
+
+def in_sight(page: Page, element: Locator) -> bool:
+    """Whether all of an element is in the window, and nothing lies over its middle."""
+    found: bool = element.evaluate("""element => {
+        const { left, top, right, bottom } = element.getBoundingClientRect();
+        const front = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+        return top >= 0 && bottom <= innerHeight && left >= 0 && right <= innerWidth && element.contains(front);
+    }""")
+    return found
+
+
+@pytest.mark.parametrize("size", [ACROSS, SMALL_LAPTOP, LAPTOP], ids="{0[0]}x{0[1]}".format)
+def test_the_slider_of_a_jump_is_in_sight_also_with_one_camera_large(
+    panel: Panel, jumps: None, open_page: Open, size: tuple[int, int]
+) -> None:
+    page = open_page(f"{panel.url}/#/recordings/jump-2", width=size[0], height=size[1])
+    expect(page.locator("#frames img")).not_to_have_js_property("naturalWidth", 0)
+    needed = [page.locator("#frame-slider"), page.locator("#frame-play")]
+    assert all(in_sight(page, element) for element in needed)
+    page.locator("#frames .block").nth(0).click()
+    expect(page.locator("#frames")).to_have_class(re.compile("single"))
+    assert all(in_sight(page, element) for element in needed)
+
+
+@pytest.mark.parametrize("size", [PHONE, SMALL_LAPTOP, LAPTOP], ids="{0[0]}x{0[1]}".format)
+def test_messages_cover_neither_the_next_jumper_nor_the_buttons(
+    panel: Panel, service: MemoryService, open_page: Open, size: tuple[int, int]
+) -> None:
+    service.arm()
+    page = open_page(panel.url, width=size[0], height=size[1])
+    page.locator("#save-last").click()
+    expect(page.locator(".snack")).to_be_visible()
+    bib = page.get_by_role("textbox", name="Bib", exact=True).first
+    bib.evaluate("element => element.scrollIntoView({ block: 'center' })")
+    for element in (bib, page.locator("#next-step")):
+        assert element.evaluate(BESIDE_THE_MESSAGE)
+
+
+def test_a_phone_shows_one_camera_large_and_swiping_shows_the_others(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page(panel.url, width=360, height=780, has_touch=True, is_mobile=True)
+    shown = page.locator("#preview .block:visible .name")
+    expect(shown).to_have_text(["K1"])
+    box = page.locator("#preview").bounding_box()
+    assert box
+    assert box["height"] > 200
+    touch = page.context.new_cdp_session(page)
+    for distance, camera in ((-120, "K2"), (-120, "K3"), (-120, "K1"), (120, "K3")):
+        at = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+        for kind, x in (("touchStart", at[0]), ("touchMove", at[0] + distance / 2), ("touchMove", at[0] + distance)):
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": at[1]}]})
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        expect(shown).to_have_text([camera])
+    page.locator("#preview .block:visible").tap()
+    expect(shown).to_have_text(["K1", "K2", "K3"])

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,6 +268,10 @@ class RigService(Protocol):
 
     def events(self, after: int) -> list[Event]:
         """The events of the live log with numbers above `after` that are still kept, oldest first."""
+        ...
+
+    def tell(self, level: Literal["info", "warning"], name: str, message: str) -> None:
+        """Add an event to the live log and to the service's log."""
         ...
 
     def listen(self, wake: Callable[[], None]) -> Callable[[], None]:

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
-from typing import Final
+from typing import Final, Literal
 
 from prometheus_client.metrics_core import Metric
 
 from recorder.catalogue.folder import Catalogue
+from rig import events
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.pulse import RigPulse
 from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, State, Status, StopOrder
@@ -142,6 +143,10 @@ class Service(Archive):
     def events(self, after: int) -> list[Event]:
         """The events with numbers above `after` that are still kept, oldest first."""
         return self._supervisor.hub.after(after)
+
+    def tell(self, level: Literal["info", "warning"], name: str, message: str) -> None:
+        """Add an event to the live log and to the service's log."""
+        self._supervisor.hub.tell(events.Event.now(events.Level(level), name, message))
 
     def listen(self, wake: Callable[[], None]) -> Callable[[], None]:
         """Have `wake` called whenever status or events have changed."""

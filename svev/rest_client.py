@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rig.errors import BadInputError, ProcessDiedError, StorageError, SvevError
-from webpanel.door.access import TOKEN_VARIABLE
+from webpanel.door.tokens import TOKEN_VARIABLE
 
 if TYPE_CHECKING:
     import httpx

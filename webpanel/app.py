@@ -60,8 +60,8 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )  # fmt: skip
     app.state.streams = streams
-    door = Door(access)
-    app.add_middleware(Guard, door=door)
+    door = Door(access, warn=lambda text: service.tell("warning", "access", text))
+    app.add_middleware(Guard, door=door, note=lambda text: service.tell("info", "access", text))
     app.add_middleware(CountRequests, metrics=metrics)
     routers = (
         rig_router(service),
@@ -73,7 +73,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         exports_router(service, streams.downloads),
         preview_router(service, streams),
         events_router(service, changes, streams.events),
-        login_router(door),
+        login_router(door, service),
         observing_router(service, metrics),
     )
     for router in routers:

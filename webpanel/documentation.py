@@ -58,7 +58,7 @@ def _schema(app: FastAPI, access: Access) -> dict[str, Any]:
     for model in (Problem, Event):  # no route returns these by themselves
         described = model.model_json_schema(ref_template="#/components/schemas/{model}")
         components["schemas"] |= described.pop("$defs", {}) | {model.__name__: described}
-    if access.token is not None:
+    if access.tokens:
         components["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         schema["security"] = [{"token": []}]
         schema["paths"]["/api/login"]["post"]["security"] = []

@@ -20,11 +20,18 @@ def serve(
         Path | None, typer.Option(help="folder for recordings, made if missing; the rig file's if left out")
     ] = None,
     token_file: Annotated[
-        Path | None, typer.Option(help="file with the token; the environment variable SVEV_TOKEN if left out")
+        Path | None,
+        typer.Option(help="file with the token, or with one for each role; the variable SVEV_TOKEN if left out"),
     ] = None,
     allow_host: Annotated[
         list[str] | None,
         typer.Option(help="a name by which other computers call this one, e.g. hillpc.local; repeatable"),
+    ] = None,
+    proxy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="address of a web server that passes requests on, whose X-Forwarded headers count; repeatable"
+        ),
     ] = None,
     preroll: Annotated[
         float | None,
@@ -41,5 +48,5 @@ def serve(
 
     Example: svev serve --rig config/rigs/sim.toml
     """
-    access = Access.for_address(host, token_file, allow_host or ())
+    access = Access.for_address(host, token_file, allow_host or (), proxies=proxy or ())
     run_service(ServiceSettings(rig, data, port, access, preroll))

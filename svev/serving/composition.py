@@ -95,6 +95,8 @@ def serve(settings: ServiceSettings) -> None:
             supervisor.start()
             try:
                 _tell_of_another_folder(settings, rig, hub)
+                if settings.access.tokens.warning:
+                    hub.tell(Event.now(Level.WARNING, "access", settings.access.tokens.warning))
                 if rig.service.arm_at_start:
                     service.arm()
                 server.run(sockets=[listener])

@@ -470,6 +470,32 @@ def guarded(service: MemoryService, loopback: Loopback) -> Iterator[Panel]:
         yield running
 
 
+def test_who_may_only_watch_has_no_buttons_and_can_log_out(
+    service: MemoryService, loopback: Loopback, open_page: Open, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = tmp_path_factory.mktemp("tokens") / "tokens"
+    file.write_text("watch a-token-to-watch-with\noperate a-token-to-operate-with\n")
+    write_recording(service.catalogue.directory, "jump")
+    with serving(service, Access.for_address(loopback.host, file)) as panel:
+        page = open_page(panel.url)
+        page.locator("#login-token").fill("a-token-to-watch-with")
+        page.locator("#login-submit").click()
+        expect(page.locator(".only-watching")).to_be_visible()
+        expect(page.locator("#next-step")).to_be_hidden()
+        page.keyboard.press("r")
+        page.locator("#open-settings").click()
+        expect(page.locator("#role-words")).to_contain_text("You may watch")
+        page.locator("#logout").click()
+        page.locator("#login-token").fill("a-token-to-operate-with")
+        page.locator("#login-submit").click()
+        expect(page.locator("#next-step")).to_be_enabled()
+        expect(page.locator(".only-watching")).to_be_hidden()
+        page.goto(f"{panel.url}/#/recordings/jump")
+        expect(page.locator("#recording-buttons a")).to_be_visible()
+        expect(page.locator("#recording-buttons button")).to_be_hidden()
+    assert service.state is State.IDLE
+
+
 def test_the_token_is_asked_for_once(guarded: Panel, open_page: Open) -> None:
     page = open_page(guarded.url)
     dialog = page.get_by_role("dialog", name="Log in")

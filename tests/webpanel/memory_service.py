@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
@@ -218,9 +219,12 @@ class MemoryService(Archive):
 
     def say(self, message: str) -> None:
         """Add an event."""
+        self.tell("info", "service", message)
+
+    def tell(self, level: Literal["info", "warning"], name: str, message: str) -> None:
         with self._lock:
             self._numbers += 1
-            event = Event(number=self._numbers, time=datetime.now(UTC), level="info", name="service", message=message)
+            event = Event(number=self._numbers, time=datetime.now(UTC), level=level, name=name, message=message)
             self._events = [*self._events[-KEPT_EVENTS + 1 :], event]
         self._wake()
 

@@ -22,7 +22,7 @@ CALLS = {
     "POST /api/recordings/{recording_id}/restore", "GET /api/recordings/{recording_id}/file",
     "GET /api/recordings/{recording_id}/pulses", "GET /api/recordings/{recording_id}/pulses/{pulse}.jpg",
     "GET /api/recordings/{recording_id}/thumbnail.jpg", "POST /api/login", "POST /api/logout", "GET /metrics",
-    "GET /healthz", "GET /api/trash", "DELETE /api/trash", "DELETE /api/trash/{recording_id}",
+    "GET /api/access", "GET /healthz", "GET /api/trash", "DELETE /api/trash", "DELETE /api/trash/{recording_id}",
     "GET /api/recordings/{recording_id}/file.sha256", "GET /api/recordings.zip",
     "GET /api/next-jumper", "PATCH /api/next-jumper", "POST /api/next-jumper/skip",
     "GET /api/start-list", "PUT /api/start-list", "PATCH /api/start-list", "POST /api/start-list/undo",

@@ -1,18 +1,20 @@
 """The rules of access to the panel: the address it listens on, the names it answers to, the token."""
 
-import hmac
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from ipaddress import ip_address
+from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
 from pathlib import Path
+from typing import Final
+
+from starlette.requests import HTTPConnection
 
 from rig.errors import BadInputError
+from webpanel.door.tokens import TOKEN_MIN, TOKEN_VARIABLE, Tokens, read_tokens
 
-TOKEN_VARIABLE = "SVEV_TOKEN"  # noqa: S105 - the name of the variable
-_TOKEN_MIN = 16
-_TOKEN_MAX = 1000
 _LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+#: Who has one IPv6 address has a whole network of this size (RFC 6177, 2).
+_IPV6_SITE: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +23,15 @@ class Access:
 
     Attributes:
         host: the address that the service listens on.
-        token: the token that clients must send, None if they need none.
+        tokens: the tokens that clients must send one of, and their roles.
         names: host names that the service answers to, lower case.
+        proxies: networks of the proxies whose word on client and scheme is believed.
     """
 
     host: str
-    token: bytes | None = field(default=None, repr=False)
+    tokens: Tokens = field(default_factory=Tokens)
     names: frozenset[str] = _LOOPBACK_NAMES
+    proxies: tuple[IPv4Network | IPv6Network, ...] = ()
 
     @classmethod
     def for_address(
@@ -36,29 +40,48 @@ class Access:
         token_file: Path | None = None,
         allow_hosts: Iterable[str] = (),
         environment: Mapping[str, str] = os.environ,
+        proxies: Iterable[str] = (),
     ) -> "Access":
         """Access for a service that listens on `host`.
 
         Args:
             host: address or name to listen on.
-            token_file: file that holds the token; None: the token is in the variable SVEV_TOKEN.
+            token_file: file that holds the tokens; None: the token is in the variable SVEV_TOKEN.
             allow_hosts: further names that the service answers to, e.g. `hillpc.local`.
             environment: for the tests.
+            proxies: addresses or networks of trusted proxies, e.g. `127.0.0.1` or `10.0.0.0/24`.
 
         Raises:
-            BadInputError: other computers reach the address and there is no token, or the token is malformed.
+            BadInputError: other computers reach the address and there is no token, a token is malformed, or a proxy
+                is no address.
         """
-        token = _read_token(token_file, environment)
-        if token is None and not is_loopback(host):
+        tokens = read_tokens(token_file, environment)
+        if not tokens and not is_loopback(host):
             raise BadInputError(
-                f"{host} is reached from other computers, which needs a token: put {_TOKEN_MIN} or more characters "
+                f"{host} is reached from other computers, which needs a token: put {TOKEN_MIN} or more characters "
                 f"into a file and name it with --token-file, or set {TOKEN_VARIABLE}; or listen on 127.0.0.1"
             )
-        return cls(host, token, _LOOPBACK_NAMES | {_bare(name) for name in (host, *allow_hosts)})
+        names = _LOOPBACK_NAMES | {_bare(name) for name in (host, *allow_hosts)}
+        return cls(host, tokens, names, tuple(_network(proxy) for proxy in proxies))
 
-    def knows(self, candidate: str) -> bool:
-        """Whether this is the token, compared in constant time; False if there is none."""
-        return self.token is not None and hmac.compare_digest(candidate.encode("utf-8", "surrogateescape"), self.token)
+    def client_of(self, request: HTTPConnection) -> str:
+        """The IP address of the client: the one that connected, or the one that a trusted proxy names."""
+        address = request.client.host if request.client else ""
+        # Each proxy appends the address that it was called from; what stands left of a stranger's, he may have made up.
+        named = [part.strip() for part in ",".join(request.headers.getlist("x-forwarded-for")).split(",")]
+        while self._trusts(address) and named and _is_address(named[-1]):
+            address = named.pop()
+        return address
+
+    def is_https(self, request: HTTPConnection) -> bool:
+        """Whether the client speaks HTTPS, with this service or with a trusted proxy."""
+        if request.scope["scheme"] == "https":
+            return True
+        said = ",".join(request.headers.getlist("x-forwarded-proto")).rpartition(",")[2].strip().lower()
+        return said == "https" and self._trusts(request.client.host if request.client else "")
+
+    def _trusts(self, address: str) -> bool:
+        return _is_address(address) and any(ip_address(address) in network for network in self.proxies)
 
     def allows_host(self, host_header: str, own_address: str) -> bool:
         """Whether the service answers to this name, on any port.
@@ -83,26 +106,28 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def _read_token(token_file: Path | None, environment: Mapping[str, str]) -> bytes | None:
-    if token_file is not None:
-        where = str(token_file)
-        try:
-            with token_file.open("rb") as file:
-                token = file.read(_TOKEN_MAX + 2).strip()
-        except OSError as error:
-            raise BadInputError(
-                f"{where}: token cannot be read ({error.strerror}); check path and permissions"
-            ) from None
-    elif TOKEN_VARIABLE in environment:
-        where, token = TOKEN_VARIABLE, environment[TOKEN_VARIABLE].encode().strip()
-    else:
-        return None
-    if not _TOKEN_MIN <= len(token) <= _TOKEN_MAX or not all(0x21 <= byte <= 0x7E for byte in token):
+def site_of(address: str) -> str:
+    """What counts as one client for the brake: an IPv4 address, or the network of an IPv6 address."""
+    if not _is_address(address) or ip_address(address).version == 4:
+        return address
+    return str(ip_network(f"{address.partition('%')[0]}/{_IPV6_SITE}", strict=False))
+
+
+def _is_address(text: str) -> bool:
+    try:
+        ip_address(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _network(proxy: str) -> IPv4Network | IPv6Network:
+    try:
+        return ip_network(proxy.strip().strip("[]"))
+    except ValueError:
         raise BadInputError(
-            f"{where}: a token has {_TOKEN_MIN} to {_TOKEN_MAX} letters, digits and signs on one line, no spaces; "
-            "make one with: openssl rand -hex 24"
-        )
-    return token
+            f"--proxy {proxy}: no address and no network; give the address from which the proxy calls, e.g. 127.0.0.1"
+        ) from None
 
 
 def _bare(host: str) -> str:

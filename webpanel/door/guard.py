@@ -1,23 +1,25 @@
 """Checks every request before a route sees it: size, Host, Origin, token, body; puts security headers on answers."""
 
+from collections.abc import Callable
 from http import HTTPStatus
 from typing import Final
 from urllib.parse import urlsplit
 
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from webpanel.door.access import Access
-from webpanel.door.logins import Door
+from webpanel.door.logins import Caller, Door, check_role
+from webpanel.door.roles import READING, act
 from webpanel.problems import SECURITY_HEADERS, ProblemError
 
 BODY_MAX: Final = 64 * 1024
 HEAD_MAX: Final = 16 * 1024
 _HEADER_COST: Final = 32  # bytes that a header counts beside its text (RFC 9113, 6.5.2)
 _TOO_LARGE: Final = f"the request's body is too large: no call needs more than {BODY_MAX // 1024} KiB"
-_READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Paths that need the token. The page's files do not: the page has to ask for the token.
 _PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
 _OPEN: Final = frozenset({"/api/login", "/api/logout"})
@@ -26,11 +28,18 @@ _OTHER_BODIES: Final = {"/api/start-list": "text/csv"}
 
 
 class Guard:
-    """ASGI middleware: answers requests that fail a check with a problem, and adds the security headers."""
+    """ASGI middleware: answers requests that fail a check with a problem, and adds the security headers.
 
-    def __init__(self, app: ASGIApp, door: Door) -> None:
+    Args:
+        app: what it guards.
+        door: decides who gets in.
+        note: told who has changed what, in one line.
+    """
+
+    def __init__(self, app: ASGIApp, door: Door, note: Callable[[str], None]) -> None:
         self._app = app
         self._door = door
+        self._note = note
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -39,6 +48,7 @@ class Guard:
             return
 
         protected = scope["path"].startswith(_PROTECTED)
+        caller: Caller | None = None
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -47,25 +57,32 @@ class Guard:
                     headers.setdefault(name, value)
                 # The browser asks for the page's files each time, but gets only those that have changed.
                 headers.setdefault("cache-control", "no-store" if protected else "no-cache")
+                changed = scope["method"] not in READING and message["status"] < HTTPStatus.BAD_REQUEST
+                if changed and caller is not None:
+                    await run_in_threadpool(self._note, f"{act(scope['method'], scope['path'])} ({caller})")
             await send(message)
 
         try:
-            self._check(HTTPConnection(scope))
+            caller = self._check(HTTPConnection(scope))
         except ProblemError as error:
             await error.answer()(scope, receive, send_guarded)
         else:
+            scope.setdefault("state", {})["caller"] = caller
             await self._app(scope, _bounded(scope, receive), send_guarded)
 
-    def _check(self, request: HTTPConnection) -> None:
-        """Raise ProblemError if the request is to be refused."""
+    def _check(self, request: HTTPConnection) -> Caller | None:
+        """Who calls, None where nobody needs a token; raise ProblemError if the request is to be refused."""
         _check_size(request.scope)
-        headers, path, reading = request.headers, request.scope["path"], request.scope["method"] in _READING
+        headers, path, reading = request.headers, request.scope["path"], request.scope["method"] in READING
         check_host(request, self._door.access)
         if not reading or (path.startswith("/api/") and headers.get("sec-fetch-mode") != "navigate"):
             _check_origin(headers)
+        caller = None
         if path.startswith(_PROTECTED) and path not in _OPEN:
-            self._door.admit(request)
+            caller = self._door.admit(request)
+            check_role(caller, request.scope["method"], path)
         _check_body(headers, _OTHER_BODIES.get(path), reading=reading)
+        return caller
 
 
 def check_host(request: HTTPConnection, access: Access) -> None:
@@ -119,7 +136,7 @@ def _check_body(headers: Headers, other: str | None, *, reading: bool) -> None:
 
 def _bounded(scope: Scope, receive: Receive) -> Receive:
     """The size limit for a body whose length is not announced; a body of GET, HEAD and OPTIONS is dropped."""
-    reading = scope["method"] in _READING
+    reading = scope["method"] in READING
     received = 0
 
     async def receive_bounded() -> Message:

@@ -12,7 +12,8 @@ from typing import Final
 
 from starlette.requests import HTTPConnection
 
-from webpanel.door.access import Access
+from webpanel.door.access import Access, site_of
+from webpanel.door.roles import Role, needed_role
 from webpanel.problems import ProblemError
 
 COOKIE: Final = "svev_session"
@@ -24,91 +25,149 @@ _CLIENTS_MAX = 1000
 
 
 class Sessions:
-    """Session keys: random, valid for 12 hours. Only their hashes are kept."""
+    """Session keys: random, valid for 12 hours, each with a role. Only their hashes are kept."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._ends: OrderedDict[bytes, float] = OrderedDict()
+        self._open: OrderedDict[bytes, tuple[Role, float]] = OrderedDict()
 
-    def begin(self) -> str:
+    def begin(self, role: Role) -> str:
         """Begin a session, and return its key. If there are too many sessions, the oldest one ends."""
         key = secrets.token_urlsafe(32)
-        while len(self._ends) >= _SESSIONS_MAX:
-            self._ends.popitem(last=False)
-        self._ends[_digest(key)] = self._clock() + SESSION_S
+        while len(self._open) >= _SESSIONS_MAX:
+            self._open.popitem(last=False)
+        self._open[_digest(key)] = role, self._clock() + SESSION_S
         return key
 
-    def knows(self, key: str) -> bool:
-        """Whether the key belongs to a session that has not ended."""
-        return self._ends.get(_digest(key), 0.0) > self._clock()
+    def role_of(self, key: str) -> Role | None:
+        """The role of the session of this key, None if there is none or it has ended."""
+        role, ends = self._open.get(_digest(key), (None, 0.0))
+        return role if ends > self._clock() else None
 
     def end(self, key: str) -> None:
         """End the session of this key, if there is one."""
-        self._ends.pop(_digest(key), None)
+        self._open.pop(_digest(key), None)
 
 
 class Brake:
-    """Counts wrong tokens by client. After ten within a minute the client must wait until the minute is over."""
+    """Counts wrong tokens by client and token. After ten within a minute the client must wait until it is over.
+
+    The same wrong token counts once: a program with an old token guesses nothing.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._wrong: OrderedDict[str, tuple[int, float]] = OrderedDict()
+        self._wrong: OrderedDict[str, tuple[set[bytes], float]] = OrderedDict()
 
     def seconds_to_wait(self, client: str) -> float:
         """Time until this client may try again, 0 if it may now."""
-        count, ends = self._wrong.get(client, (0, 0.0))
-        return max(0.0, ends - self._clock()) if count >= _GUESSES_MAX else 0.0
+        guesses, ends = self._wrong.get(client, (set(), 0.0))
+        return max(0.0, ends - self._clock()) if len(guesses) >= _GUESSES_MAX else 0.0
 
-    def wrong(self, client: str) -> None:
-        """Count a wrong token."""
-        count, ends = self._wrong.pop(client, (0, 0.0))
+    def wrong(self, client: str, token: str) -> int:
+        """Count a wrong token.
+
+        Returns:
+            How many the client has tried within its minute, 0 if it has tried this one before.
+        """
+        guesses, ends = self._wrong.pop(client, (set[bytes](), 0.0))
         now = self._clock()
-        self._wrong[client] = (count + 1, ends) if now < ends else (1, now + _GUESSES_S)
+        if now >= ends:
+            guesses, ends = set(), now + _GUESSES_S
+        new = _digest(token) not in guesses
+        guesses.add(_digest(token))
+        self._wrong[client] = guesses, ends
         if len(self._wrong) > _CLIENTS_MAX:
             self._wrong.popitem(last=False)
+        return len(guesses) if new else 0
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who sent a request.
+
+    Attributes:
+        role: what he may do.
+        address: IP address.
+    """
+
+    role: Role
+    address: str
+
+    def __str__(self) -> str:
+        """For the live log, e.g. `operate, 192.168.1.7`."""
+        return f"{self.role}, {self.address}"
 
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """Decides which clients get in: by the rules of access, open sessions and the brake."""
+    """Decides which clients get in: by the rules of access, open sessions and the brake.
+
+    Attributes:
+        access: the rules.
+        warn: told of clients that send wrong tokens.
+    """
 
     access: Access
+    warn: Callable[[str], None]
     sessions: Sessions = field(default_factory=Sessions)
     brake: Brake = field(default_factory=Brake)
 
-    def check_token(self, candidate: str, client: str) -> None:
-        """Check a token that a client gave.
+    def check_token(self, candidate: str, client: str) -> Role:
+        """The role of a token that a client gave. A right one passes whatever was guessed at the same address.
 
         Raises:
             ProblemError: 401 it is wrong, 429 too many were wrong.
         """
-        wait_s = math.ceil(self.brake.seconds_to_wait(client))
+        if not self.access.tokens:
+            return Role.ADMINISTER
+        role = self.access.tokens.role_of(candidate)
+        if role is not None:
+            return role
+        site = site_of(client)
+        wait_s = math.ceil(self.brake.seconds_to_wait(site))
         if wait_s:
             text = f"too many wrong tokens from here: wait {wait_s} s, then try again"
             headers = {"Retry-After": str(wait_s)}
             raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, "too_many_wrong_tokens", text, headers)
-        if not self.access.knows(candidate):
-            self.brake.wrong(client)
-            raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")
+        count = self.brake.wrong(site, candidate)
+        if count == 1:
+            self.warn(f"wrong token from {client}")
+        elif count == _GUESSES_MAX:
+            self.warn(
+                f"{count} wrong tokens from {client} within a minute: somebody guesses; its tries are slowed down"
+            )
+        raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")
 
-    def admit(self, request: HTTPConnection) -> None:
-        """Check that a request carries the token or the cookie of an open session.
+    def admit(self, request: HTTPConnection) -> Caller:
+        """Check that a request carries a token or the cookie of an open session.
 
         Raises:
             ProblemError: 401 it carries neither, or a wrong token; 429 too many tokens were wrong.
         """
-        if self.access.token is None or self.sessions.knows(request.cookies.get(COOKIE, "")):
-            return
+        client = self.access.client_of(request)
+        if not self.access.tokens:
+            return Caller(Role.ADMINISTER, client)
         scheme, _, candidate = request.headers.get("authorization", "").partition(" ")
-        if scheme.lower() != "bearer":
+        if scheme.lower() == "bearer":
+            return Caller(self.check_token(candidate.strip(), client), client)
+        role = self.sessions.role_of(request.cookies.get(COOKIE, ""))
+        if role is None:
             text = "this needs the token: log in on the page, or send it as Authorization: Bearer TOKEN"
             raise _unauthorized("login_required", text)
-        self.check_token(candidate.strip(), client_of(request))
+        return Caller(role, client)
 
 
-def client_of(request: HTTPConnection) -> str:
-    """The IP address of the client."""
-    return request.client.host if request.client else ""
+def check_role(caller: Caller, method: str, path: str) -> None:
+    """Check that a caller's role allows a call.
+
+    Raises:
+        ProblemError: 403, it does not.
+    """
+    needed = needed_role(method, path)
+    if not caller.role.may(needed):
+        text = f"your token may only {caller.role}, and this needs one that may {needed}: log in with another token"
+        raise ProblemError(HTTPStatus.FORBIDDEN, "role_forbids", text)
 
 
 def _unauthorized(code: str, text: str) -> ProblemError:

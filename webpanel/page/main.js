@@ -2,6 +2,7 @@
 
 import { drawKeys, startKeys } from "./frame/keys.js";
 import { startLogin } from "./frame/login.js";
+import { startRole } from "./frame/role.js";
 import { startSettings } from "./frame/settings.js";
 import { startLanguage } from "./i18n/i18n.js";
 import { startActions } from "./live/actions.js";
@@ -43,6 +44,7 @@ startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
 for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
+startRole();
 startLogin(() => location.reload());
 startRouter(entered);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));

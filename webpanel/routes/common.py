@@ -32,7 +32,7 @@ _MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
           "the service is not called by this name: use its address, or start it with --allow-host NAME"),
     401: ("The token is missing or wrong.", "login_required",
           "this needs the token: log in on the page, or send it as Authorization: Bearer TOKEN"),
-    403: ("The request comes from a page of another site.", "foreign_origin",
+    403: ("The token's role does not allow it, or the request comes from a page of another site.", "foreign_origin",
           "the request comes from a page of another site: use the page of this service"),
     404: ("There is no such thing: recording, pulse, picture.", "unknown_recording",
           "no recording 'jump-7': see the list of recordings"),

@@ -4,9 +4,12 @@ from http import HTTPStatus
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
+from starlette.concurrency import run_in_threadpool
 
 from rig.status import Model
-from webpanel.door.logins import COOKIE, SESSION_S, Door, client_of
+from service.seam import RigService
+from webpanel.door.logins import COOKIE, SESSION_S, Caller, Door
+from webpanel.door.roles import Role
 from webpanel.routes.common import NoFields, refusals, strict_router
 
 
@@ -16,24 +19,45 @@ class Login(Model):
     token: str = Field(max_length=1000, examples=["the content of the token file"])
 
 
-def login_router(door: Door) -> APIRouter:
+class OwnAccess(Model):
+    """What the caller may do."""
+
+    role: Role = Field(description="each role may do what those before it may")
+    logged_in: bool = Field(description="by the session cookie, which `POST /api/logout` ends")
+
+
+def login_router(door: Door, service: RigService) -> APIRouter:
     """The routes that log a browser in and out."""
     router = strict_router("Login")
 
     @router.post("/login", status_code=HTTPStatus.NO_CONTENT, responses=refusals(413, 415))
     async def log_in(request: Request, response: Response, login: Login) -> None:
         """Give the token, get a session cookie for 12 hours. Programs send the token with each call instead."""
-        if door.access.token is not None:
-            door.check_token(login.token, client_of(request))
+        client = door.access.client_of(request)
+        role = door.check_token(login.token, client)
+        if door.access.tokens:
+            await run_in_threadpool(service.tell, "info", "access", f"logged in ({Caller(role, client)})")
         response.set_cookie(
-            COOKIE, door.sessions.begin(), max_age=int(SESSION_S), httponly=True, samesite="strict",
-            secure=request.url.scheme == "https",
+            COOKIE, door.sessions.begin(role), max_age=int(SESSION_S), httponly=True, samesite="strict",
+            secure=door.access.is_https(request),
         )  # fmt: skip
 
     @router.post("/logout", status_code=HTTPStatus.NO_CONTENT, responses=refusals(413, 415))
     async def log_out(request: Request, response: Response, _: NoFields = None) -> None:
         """End the session of this cookie."""
-        door.sessions.end(request.cookies.get(COOKIE, ""))
-        response.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=request.url.scheme == "https")
+        key = request.cookies.get(COOKIE, "")
+        role = door.sessions.role_of(key)
+        door.sessions.end(key)
+        if role is not None and door.access.tokens:
+            caller = Caller(role, door.access.client_of(request))
+            await run_in_threadpool(service.tell, "info", "access", f"logged out ({caller})")
+        response.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=door.access.is_https(request))
+
+    @router.get("/access")
+    async def get_access(request: Request) -> OwnAccess:
+        """What you may do: `watch`, `operate` or `administer`."""
+        caller: Caller = request.state.caller
+        logged_in = bool(door.access.tokens) and door.sessions.role_of(request.cookies.get(COOKIE, "")) is not None
+        return OwnAccess(role=caller.role, logged_in=logged_in)
 
     return router

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
@@ -10,8 +11,10 @@ from tests.support.loopback import Loopback
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused, serving
 from webpanel.door.access import Access
+from webpanel.door.roles import Role
 
 TOKEN = "a-token-for-the-tests-only"  # noqa: S105
+PEER = "127.0.0.1"  # from which the tests call, wherever the panel listens on loopback
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
 
 
@@ -164,22 +167,77 @@ def test_a_session_does_not_help_another_site(stranger: httpx.Client) -> None:
     refused(stranger.post("/api/arm", headers={"Origin": "http://evil.org"}), 403)
 
 
-def test_who_guesses_must_wait(stranger: httpx.Client) -> None:
-    for _ in range(10):
-        assert refused(stranger.post("/api/login", json={"token": "guess"}), 401).code == "wrong_token"
-    answer = stranger.post("/api/login", json={"token": TOKEN})
+def test_who_guesses_must_wait_and_the_right_token_passes(locked: Panel, stranger: httpx.Client) -> None:
+    for guess in range(10):
+        assert refused(stranger.post("/api/login", json={"token": f"guess {guess}"}), 401).code == "wrong_token"
+    answer = stranger.post("/api/login", json={"token": "guess 10"})
     assert refused(answer, 429).code == "too_many_wrong_tokens"
     assert 0 < int(answer.headers["retry-after"]) <= 60
-    refused(stranger.get("/api/status", headers=BEARER), 429)
+    refused(stranger.get("/api/status", headers={"Authorization": "Bearer guess"}), 429)
+    # The same address, as behind one router: who has the token gets in.
+    assert stranger.get("/api/status", headers=BEARER).status_code == 200
+    assert stranger.post("/api/login", json={"token": TOKEN}).status_code == 204
+    told = [event.message for event in locked.service.events(0) if event.level == "warning"]
+    assert [text.partition(":")[0] for text in told] == [
+        f"wrong token from {PEER}", f"10 wrong tokens from {PEER} within a minute",
+    ]  # fmt: skip
 
 
-def test_a_login_lasts_while_others_guess(locked: Panel, stranger: httpx.Client) -> None:
-    stranger.post("/api/login", json={"token": TOKEN})
-    with locked.client() as guesser:
-        for _ in range(11):
-            guesser.get("/api/status", headers={"Authorization": "Bearer guess"})
-        refused(guesser.get("/api/status", headers=BEARER), 429)
-    assert stranger.get("/api/status").status_code == 200
+def test_the_cookie_is_for_https_alone_behind_a_proxy_that_says_so(service: MemoryService, loopback: Loopback) -> None:
+    cookies = []
+    for proxies in ([PEER], []):
+        access = Access.for_address(loopback.host, environment={"SVEV_TOKEN": TOKEN}, proxies=proxies)
+        with serving(service, access) as panel, panel.client() as client:
+            headers = {"X-Forwarded-Proto": "https", "X-Forwarded-For": "192.0.2.7"}
+            cookies.append(client.post("/api/login", json={"token": TOKEN}, headers=headers).headers["set-cookie"])
+    assert ["Secure" in cookie for cookie in cookies] == [True, False]
+    told = [event.message for event in service.events(0)]
+    assert told == ["logged in (administer, 192.0.2.7)", f"logged in (administer, {PEER})"]
+
+
+ROLE_TOKENS = {role: f"the-token-to-{role}-with" for role in Role}
+CALLS = [
+    ("GET", "/api/status", Role.WATCH),
+    ("GET", "/metrics", Role.WATCH),
+    ("POST", "/api/arm", Role.OPERATE),
+    ("PATCH", "/api/next-jumper", Role.OPERATE),
+    ("POST", "/api/recordings", Role.OPERATE),
+    ("PATCH", "/api/recordings/jump", Role.OPERATE),
+    ("DELETE", "/api/recordings/jump", Role.ADMINISTER),
+    ("POST", "/api/recordings/jump/restore", Role.ADMINISTER),
+    ("DELETE", "/api/trash", Role.ADMINISTER),
+    ("POST", "/api/rig", Role.ADMINISTER),
+]
+
+
+def test_a_role_may_do_what_is_its_own(service: MemoryService, loopback: Loopback, tmp_path: Path) -> None:
+    file = tmp_path / "tokens"
+    file.write_text("".join(f"{role} {token}\n" for role, token in ROLE_TOKENS.items()))
+    write_recording(service.catalogue.directory, "jump")
+    with serving(service, Access.for_address(loopback.host, file)) as panel, panel.client() as client:
+        for role in Role:
+            headers = {"Authorization": f"Bearer {ROLE_TOKENS[role]}"}
+            own = client.get("/api/access", headers=headers).json()
+            assert own == {"role": role, "logged_in": False}
+            for method, path, needed in CALLS:
+                answer = client.request(method, path, json=None if method == "GET" else {}, headers=headers)
+                if role.may(needed):
+                    assert answer.status_code != 403, (role, method, path)
+                else:
+                    problem = refused(answer, 403)
+                    assert problem.code == "role_forbids"
+                    assert f"may only {role}, and this needs one that may {needed}" in problem.detail
+        assert client.post("/api/login", json={"token": ROLE_TOKENS[Role.OPERATE]}).status_code == 204
+        assert client.get("/api/access").json() == {"role": "operate", "logged_in": True}
+        refused(client.delete("/api/recordings/jump"), 403)
+    told = [event.message for event in service.events(0)]
+    for text in (
+        f"armed the rig (operate, {PEER})", f"started a recording (operate, {PEER})",
+        f"edited recording jump (operate, {PEER})", f"deleted recording jump (administer, {PEER})",
+        f"logged in (operate, {PEER})",
+    ):  # fmt: skip
+        assert text in told
+    assert not [text for text in told if "(watch" in text]
 
 
 def test_tokens_stand_in_no_log(stranger: httpx.Client, caplog: pytest.LogCaptureFixture) -> None:

@@ -34,7 +34,7 @@ const KEYS = [
   { keys: [" "], words: "keys.play", action: togglePlay, view: "recording" },
   { keys: ["g"], words: "keys.gap", action: () => nextGap(1), view: "recording" },
   { keys: DIGITS, words: "keys.camera", action: (event) => chooseCamera(Number(event.key) ? Number(event.key) - 1 : null), view: "recording" },
-  { keys: ["Delete"], words: "keys.delete", action: () => void deleteShown(), view: "recording" },
+  { keys: ["Delete"], words: "keys.delete", action: () => { if (known.role === "administer") void deleteShown(); }, view: "recording" },
   { keys: ["Escape"], words: "keys.escape", action: escape },
   { keys: ["?"], words: "keys.help", action: openSettings },
 ];

@@ -274,6 +274,12 @@ export const en = {
   "keys.escape": "back",
   "keys.help": "this help",
 
+  "role.title": "Your access",
+  "role.watch": "You may watch. For more, log out, then in with another token.",
+  "role.operate": "You may watch and operate. Deleting needs another token.",
+  "role.administer": "You may do everything.",
+  "role.logout": "Log out",
+  "role.only_watching": "Your token is for watching. To record, log out in the settings, then in with another token.",
   "login.title": "Log in",
   "login.lead": "This rig can be reached from the network, so it asks for its token once. Whoever set up the computer has it.",
   "login.token": "Token",

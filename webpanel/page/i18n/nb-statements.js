@@ -77,6 +77,7 @@ export const statements = {
   too_many_viewers: ["for mange ser på allerede: lukk en av de andre sidene"],
   no_preview: ["det finnes ikke noe bilde: gjør riggen klar"],
   unknown_host: ["tjenesten kjenner ikke dette navnet på datamaskinen: bruk adressen den ble startet med"],
+  role_forbids: ["nøkkelen din gir ikke lov til det: logg inn med en annen"],
   foreign_origin: ["kallet kom fra en fremmed side: åpne panelet på dets egen adresse"],
 
   undo_taken: ["{who} ble tatt opp"],

@@ -274,6 +274,12 @@ export const nb = {
   "keys.escape": "tilbake",
   "keys.help": "denne hjelpen",
 
+  "role.title": "Din tilgang",
+  "role.watch": "Du kan se på. For å gjøre mer: logg ut og inn med en annen nøkkel.",
+  "role.operate": "Du kan se på og betjene. For å slette trengs en annen nøkkel.",
+  "role.administer": "Du kan gjøre alt.",
+  "role.logout": "Logg ut",
+  "role.only_watching": "Nøkkelen din er til å se på. For å ta opp: logg ut i innstillingene og inn med en annen nøkkel.",
   "login.title": "Logg inn",
   "login.lead": "Denne riggen kan nås fra nettverket og spør derfor én gang etter nøkkelen. Den som satte opp datamaskinen, har den.",
   "login.token": "Nøkkel",

@@ -133,7 +133,7 @@ function refuse(words) {
 }
 
 function possible() {
-  return known.connected && !known.busy;
+  return known.connected && !known.busy && known.role !== "watch";
 }
 
 function held() {

@@ -143,7 +143,7 @@ function drawFacts({ id, started, duration_s, bytes, counts }) {
  * @param {() => Promise<void>} action
  */
 function makeButton(picture, words, action) {
-  return make("button", { type: "button", onclick: () => void action() }, icon(picture), make("span", {}, words));
+  return make("button", { type: "button", "data-needs": "administer", onclick: () => void action() }, icon(picture), make("span", {}, words));
 }
 
 async function restoreShown() {

@@ -142,7 +142,7 @@ function makeRow(recording) {
   if (!place().trash) return row;
   row.classList.add("deleted");
   row.append(
-    make("button", { type: "button", onclick: () => void restore(recording) }, icon("restore"), make("span", {}, t("trash.restore"))),
-    make("button", { type: "button", onclick: () => void removeForGood([recording]) }, icon("close"), make("span", {}, t("trash.remove"))));
+    make("button", { type: "button", "data-needs": "administer", onclick: () => void restore(recording) }, icon("restore"), make("span", {}, t("trash.restore"))),
+    make("button", { type: "button", "data-needs": "administer", onclick: () => void removeForGood([recording]) }, icon("close"), make("span", {}, t("trash.remove"))));
   return row;
 }

@@ -11,12 +11,13 @@
  * @property {number} retryAt when the next attempt to connect begins, ms; 0: now
  * @property {{ code: string, text: string }|null} slow why the status is asked for instead of told at once; null: it is told
  * @property {string} busy key of the words for the call that the service has not answered yet; "": there is none
+ * @property {string} role what this browser may do: "watch", "operate", "administer"; "": not known yet
  * @property {string} view name of the view that is shown
  * @property {boolean} visible whether anybody can see the page
  */
 
 /** @type {Known} */
-export const known = { status: null, connected: false, heard: 0, retryAt: 0, slow: null, busy: "", view: "", visible: true };
+export const known = { status: null, connected: false, heard: 0, retryAt: 0, slow: null, busy: "", role: "", view: "", visible: true };
 
 /** @type {Set<() => void>} */
 const watchers = new Set();

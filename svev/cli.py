@@ -31,6 +31,7 @@ _COMMANDS: Final = {
     "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
     "cameras": ("cameras", "app", "Find GigE Vision cameras, give them addresses."),
     "keys": ("setup", "keys", "Make keys that protect published images."),
+    "certificate": ("certificate", "certificate", "Make a certificate for HTTPS."),
     "info": ("logs", "info_command", "Say what a log holds."),
     "export": ("export", "export_command", "Make a video, pictures or a table of a log."),
     "recover": ("logs", "recover_command", "Repair a log that was not closed or is damaged."),

@@ -1,6 +1,7 @@
 """The REST client of `svev ctl`: JSON in, JSON out, refusals of the service as errors."""
 
 import os
+import ssl
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
@@ -13,6 +14,8 @@ from webpanel.door.tokens import TOKEN_VARIABLE
 if TYPE_CHECKING:
     import httpx
 
+#: The variable that names the file of a CA of one's own, beside which no other one counts.
+_CA_VARIABLE: Final = "SVEV_CA"
 _TIMEOUT_S: Final = 75.0  # closing a log may wait for the disk for a minute
 _TOKEN_NEEDED: Final = frozenset({HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN})
 _BAD_INPUT: Final = _TOKEN_NEEDED | {
@@ -89,7 +92,8 @@ class RestClient:
             # and nobody else is to get the token. Certificates are loaded (0.1 s) only where there is one to check.
             with httpx.stream(
                 method, self._url + path, json=body if table is None else None, content=table, headers=headers,
-                timeout=_TIMEOUT_S, trust_env=False, follow_redirects=False, verify=self._url.startswith("https:"),
+                timeout=_TIMEOUT_S, trust_env=False, follow_redirects=False,
+                verify=_trusted(os.environ) if self._url.startswith("https:") else False,
             ) as answer:  # fmt: skip
                 if not answer.is_success:
                     answer.read()
@@ -115,6 +119,18 @@ def read_token(file: Path | None, environment: Mapping[str, str] = os.environ) -
         return file.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInputError(f"{file}: token cannot be read ({error}); check path and permissions") from None
+
+
+def _trusted(environment: Mapping[str, str]) -> ssl.SSLContext:
+    """Trust the CA that the variable SVEV_CA names, or those of this computer."""
+    file = environment.get(_CA_VARIABLE) or None
+    try:
+        return ssl.create_default_context(cafile=file)
+    except OSError as error:
+        reason = error.strerror or error
+        raise BadInputError(
+            f"{file}: no certificate of a CA that can be read ({reason}); look at {_CA_VARIABLE}"
+        ) from None
 
 
 def _no_address(url: str) -> BadInputError:

@@ -13,6 +13,7 @@ from fastapi import FastAPI
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from webpanel.door.guard import HEAD_MAX
+from webpanel.door.tls import Tls
 from webpanel.problems import CLOSING, problem
 
 #: A request, headers and body, must be complete within this time of its first byte (or of the connection).
@@ -42,8 +43,10 @@ class PanelServer(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def make_server(app: FastAPI) -> PanelServer:
+def make_server(app: FastAPI, tls: Tls | None = None) -> PanelServer:
     """Make a server for the panel; run it with bound sockets: `server.run(sockets=[...])`.
+
+    With a certificate it speaks HTTPS, and HTTPS only.
 
     It writes no access log: addresses may hold what nobody should read later. /metrics counts requests.
     """
@@ -56,6 +59,8 @@ def make_server(app: FastAPI) -> PanelServer:
         access_log=False,
         server_header=False,
         proxy_headers=False,
+        ssl_certfile=tls.certificate if tls else None,
+        ssl_keyfile=tls.key if tls else None,
         h11_max_incomplete_event_size=HEAD_MAX,
         timeout_graceful_shutdown=_GRACE_S,
     )

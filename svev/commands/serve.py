@@ -8,6 +8,7 @@ import typer
 from svev.serving.composition import ServiceSettings
 from svev.serving.composition import serve as run_service
 from webpanel.door.access import Access
+from webpanel.door.tls import Tls
 
 
 def serve(
@@ -33,6 +34,10 @@ def serve(
             help="address of a web server that passes requests on, whose X-Forwarded headers count; repeatable"
         ),
     ] = None,
+    tls_certificate: Annotated[
+        Path | None, typer.Option(help="certificate with which the panel speaks HTTPS; svev certificate makes one")
+    ] = None,
+    tls_key: Annotated[Path | None, typer.Option(help="private key of the certificate")] = None,
     preroll: Annotated[
         float | None,
         typer.Option(min=0, max=600, help="seconds held in memory while armed; the rig file's if left out"),
@@ -49,4 +54,4 @@ def serve(
     Example: svev serve --rig config/rigs/sim.toml
     """
     access = Access.for_address(host, token_file, allow_host or (), proxies=proxy or ())
-    run_service(ServiceSettings(rig, data, port, access, preroll))
+    run_service(ServiceSettings(rig, data, port, access, preroll, Tls.of(tls_certificate, tls_key)))

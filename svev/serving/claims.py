@@ -56,7 +56,7 @@ def listen(host: str, port: int) -> socket.socket:
         ) from None
 
 
-def url(listener: socket.socket) -> str:
-    """The address of the panel that this socket serves."""
+def url(listener: socket.socket, scheme: str) -> str:
+    """The address of the panel that this socket serves; `scheme` is http or https."""
     host, port = listener.getsockname()[:2]
-    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+    return f"{scheme}://[{host}]:{port}/" if ":" in host else f"{scheme}://{host}:{port}/"

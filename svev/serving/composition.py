@@ -32,6 +32,7 @@ from svev.serving.panel_doctor import PanelDoctor
 from svev.serving.systemd import JournalHandler, Notify, write_line
 from webpanel.app import create_app
 from webpanel.door.access import Access
+from webpanel.door.tls import Tls
 from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
@@ -49,6 +50,7 @@ class ServiceSettings:
         port: port to listen on; 0: any that is free.
         access: who may reach the panel, and at which address it listens.
         preroll_s: length of the pre-roll, s; None: the rig file's.
+        tls: certificate of the panel; None: it speaks plain HTTP.
     """
 
     rig: Path
@@ -56,6 +58,7 @@ class ServiceSettings:
     port: int
     access: Access
     preroll_s: float | None
+    tls: Tls | None = None
 
 
 def serve(settings: ServiceSettings) -> None:
@@ -84,8 +87,10 @@ def serve(settings: ServiceSettings) -> None:
         keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
         exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
         service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, PanelDoctor(rig, data).report)
-        server = make_server(create_app(service, settings.access))
-        supervisor.on_turn = _Reporter(supervisor, server, notify, url(listener)).report
+        server = make_server(create_app(service, settings.access), settings.tls)
+        supervisor.on_turn = _Reporter(
+            supervisor, server, notify, url(listener, "https" if settings.tls else "http")
+        ).report
 
         def end() -> None:
             server.should_exit = True

@@ -12,6 +12,7 @@ from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from webpanel.app import create_app
 from webpanel.door.access import Access
+from webpanel.door.tls import Tls
 from webpanel.problems import Problem
 from webpanel.server import PanelServer, make_server
 
@@ -28,7 +29,8 @@ class Panel:
     @property
     def url(self) -> str:
         """Its address."""
-        return f"http://{self.host}:{self.port}"
+        scheme = "https" if self.server.config.ssl_certfile else "http"
+        return f"{scheme}://{self.host}:{self.port}"
 
     def client(self, **more: object) -> httpx.Client:
         """A client of its own; close it."""
@@ -40,9 +42,9 @@ class Panel:
 
 
 @contextmanager
-def serving(service: MemoryService, access: Access) -> Iterator[Panel]:
+def serving(service: MemoryService, access: Access, tls: Tls | None = None) -> Iterator[Panel]:
     """Serve meanwhile."""
-    server = make_server(create_app(service, access))
+    server = make_server(create_app(service, access), tls)
     listener = socket.create_server((access.host, 0))
     port = listener.getsockname()[1]
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="panel")

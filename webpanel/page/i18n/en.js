@@ -253,6 +253,11 @@ export const en = {
   "look.dark": "dark",
   "look.outdoor": "outdoor (most contrast)",
 
+  "signals.title": "Signals on this device",
+  "signals.sound": "Sounds: started, stopped, fault, one jump left",
+  "signals.vibration": "Vibration",
+  "signals.awake": "Keep the display on while armed",
+
   "keys.title": "Keys",
   "keys.on": "Keys are on",
   "keys.cap_space": "Space",

@@ -253,6 +253,11 @@ export const nb = {
   "look.dark": "mørkt",
   "look.outdoor": "utendørs (mest kontrast)",
 
+  "signals.title": "Signaler på denne enheten",
+  "signals.sound": "Lyd: startet, stoppet, feil, plass til ett hopp",
+  "signals.vibration": "Vibrasjon",
+  "signals.awake": "Hold skjermen på mens riggen er klar",
+
   "keys.title": "Taster",
   "keys.on": "Tastene er på",
   "keys.cap_space": "Mellomrom",

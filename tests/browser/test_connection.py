@@ -7,9 +7,11 @@ from playwright.sync_api import BrowserContext, Page, expect
 
 from service.supervision import tap_guard
 from tests.browser.conftest import Open
+from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
-from tests.webpanel.serving import Panel
+from tests.webpanel.serving import Panel, serving
+from webpanel.door.access import Access
 from webpanel.door.streams import OpenStreams
 
 TABS = 7  # a browser opens six connections to a host
@@ -17,6 +19,7 @@ SHOWN = """shown => {
     Object.defineProperty(document, 'hidden', { value: !shown, configurable: true });
     document.dispatchEvent(new Event('visibilitychange'));
 }"""
+TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
 NO_WORKER = "delete globalThis.SharedWorker"
 
 
@@ -96,3 +99,23 @@ def test_one_viewer_too_many_is_told_why_and_commands_all_the_same(
     monkeypatch.undo()
     expect(page.locator("#banner")).to_be_hidden()
     assert streams.events.open == 1
+
+
+def test_who_logs_out_in_one_tab_sees_nothing_in_the_others(
+    service: MemoryService, loopback: Loopback, open_page: Open
+) -> None:
+    access = Access.for_address(loopback.host, environment={"SVEV_TOKEN": TOKEN})
+    with serving(service, access) as panel:
+        first = open_page(panel.url)
+        first.locator("#login-token").fill(TOKEN)
+        first.locator("#login-submit").click()
+        expect(first.locator("#state-word")).to_have_text("Idle")
+        second = first.context.new_page()
+        second.goto(panel.url)
+        expect(second.locator("#state-word")).to_have_text("Idle")
+        first.locator("#open-settings").click()
+        first.locator("#logout").click()
+        for page in (first, second):
+            expect(page.locator("#login")).to_be_visible()
+        expect(first.locator("#state-word")).to_have_text("Waiting")
+        wait_until(lambda: open_streams(panel).events.open == 0, "the stream has ended", 20)

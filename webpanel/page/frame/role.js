@@ -7,6 +7,7 @@
 
 import { t } from "../i18n/i18n.js";
 import { call, Problem } from "../shared/api.js";
+import { renew } from "../shared/connection.js";
 import { $, setText } from "../shared/dom.js";
 import { attempt } from "../shared/snacks.js";
 import { known, update, watch } from "../shared/store.js";
@@ -49,6 +50,7 @@ function draw() {
 async function logOut() {
   await attempt(async () => {
     await call("POST", "logout");
+    renew();
     location.reload();
   });
 }

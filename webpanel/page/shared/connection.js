@@ -54,6 +54,11 @@ export function connectNow() {
   port?.postMessage({ type: "retry" });
 }
 
+/** Open the stream anew: this browser has logged out, which ends what it may see in all its tabs. */
+export function renew() {
+  port?.postMessage({ type: "renew" });
+}
+
 /**
  * Say whether this tab shows the live picture.
  *

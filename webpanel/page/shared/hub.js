@@ -9,8 +9,8 @@
  * @typedef {import("./types.js").Event} Event
  * @typedef {{ code: string, text: string }} Why
  *
- * @typedef {{ type: "wish", visible: boolean, picture: boolean } | { type: "shown" | "retry" | "bye" }} Request
- *   What a tab says; "shown": the last picture.
+ * @typedef {{ type: "wish", visible: boolean, picture: boolean } | { type: "shown" | "retry" | "renew" | "bye" }} Request
+ *   What a tab says; "shown": the last picture; "renew": this browser has logged out.
  *
  * @typedef {{ type: "status", status: Status, heard: number, why: Why|null }} StatusNews `why`: the stream is broken, so
  *   the status was asked for.
@@ -193,7 +193,8 @@ export function makeHub(evenHidden) {
       delayMs = FIRST_DELAY_MS;
       wake();
     }
-    if (!wanted()) {
+    if (request.type === "renew") [last, events] = [null, []];
+    if (!wanted() || request.type === "renew") {
       stream.abort(UNWANTED);
       wake();
     }

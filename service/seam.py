@@ -11,6 +11,7 @@ from prometheus_client.metrics_core import Metric
 
 from rig.export import ExportJob, ExportOrder
 from rig.frame import FrameStatus
+from rig.looking import Moment, Note
 from rig.pulse import RigPulse
 from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from rig.status import (
@@ -260,6 +261,18 @@ class RigService(Protocol):
 
     def liveliest_pulse(self, recording_id: str) -> int:
         """The pulse to show a recording by: the middle of the stretch in which most moves."""
+        ...
+
+    def moment(self, recording_id: str) -> Moment:
+        """The pulse at which to open a recording."""
+        ...
+
+    def notes(self, recording_id: str) -> list[Note]:
+        """The notes at single pulses, in order."""
+        ...
+
+    def note(self, recording_id: str, pulse: int, text: str) -> list[Note]:
+        """Set the note of a pulse; no text: remove it. StateForbidsError: there are too many."""
         ...
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:

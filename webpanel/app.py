@@ -68,7 +68,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         recordings_router(service, changes),
         start_list_router(service),
         trash_router(service, changes),
-        contents_router(service),
+        contents_router(service, changes),
         files_router(service, streams.downloads),
         exports_router(service, streams.downloads),
         preview_router(service, streams),

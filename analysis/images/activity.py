@@ -50,6 +50,26 @@ def liveliest_pulse(log: Path) -> int:
             raise LogDamagedError(f"{log}: an image is damaged ({error}); see which with `svev verify`") from None
 
 
+def busiest_pulse(log: Path) -> int | None:
+    """The pulse in the middle of the stretch in which most moves; None if nothing moves.
+
+    Raises:
+        BadInputError: the log cannot be read.
+    """
+    with LogReader(log, skim=True) as reader:
+        shown = [triplet for triplet in stored_triplets(reader) if triplet.tag.complete]
+        if not shown:
+            return None
+        samples = [shown[place] for place in _evenly(len(shown), _FEW_SAMPLES)]
+        try:
+            activity = _activity(reader, samples, _background(reader, samples))
+            if _lively_run(activity) == (0, len(activity) - 1):
+                return None
+            return liveliest(reader, shown, 3, _FEW_SAMPLES)[len(shown[:3]) // 2].tag.pulse
+        except ValueError:  # an image is damaged, as `svev verify` says; the recording is shown from its beginning
+            return None
+
+
 def liveliest(
     reader: LogReader, triplets: Sequence[StoredTriplet], count: int, samples: int = _SAMPLES
 ) -> list[StoredTriplet]:

@@ -7,13 +7,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.images.activity import liveliest_pulse
+from analysis.images.activity import busiest_pulse, liveliest_pulse
 from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from rig.clocks import NS_PER_S
 from rig.errors import StateForbidsError, StillRecordingError
 from rig.export import ExportJob, ExportOrder
+from rig.looking import Moment, MomentKind, Note
 from rig.status import (
     Causes,
     Counts,
@@ -30,8 +31,10 @@ from rig.status import (
 )
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
+from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, tags_of, utc
+from service.recordings.notes import noted, notes_of
 from service.seam import Download, FoundRecordings
 from triggering.ledger import pauses_in_words
 
@@ -167,6 +170,29 @@ class Archive(ABC):
     def liveliest_pulse(self, recording_id: str) -> int:
         """The pulse to show a recording by: the middle of the stretch in which most moves."""
         return liveliest_pulse(self._catalogue.file(recording_id))
+
+    def moment(self, recording_id: str) -> Moment:
+        """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves."""
+        log = self._catalogue.file(recording_id)
+        if (pulse := live_results.takeoff_pulse(log)) is not None:
+            return Moment(pulse=pulse, kind=MomentKind.TAKEOFF)
+        pulse = busiest_pulse(log)
+        return Moment(pulse=pulse, kind=MomentKind.NONE if pulse is None else MomentKind.ACTIVITY)
+
+    def notes(self, recording_id: str) -> list[Note]:
+        """The notes at single pulses, in order."""
+        return notes_of(self._catalogue.entry(recording_id).session)
+
+    def note(self, recording_id: str, pulse: int, text: str) -> list[Note]:
+        """Set the note of a pulse; no text: remove it.
+
+        Raises:
+            StateForbidsError: there are too many.
+        """
+        session = self._catalogue.entry(recording_id).session
+        if changes := noted(session, pulse, text):
+            session = self._catalogue.change_session(recording_id, changes).session
+        return notes_of(session)
 
 
 def as_recording(entry: Entry) -> Recording:

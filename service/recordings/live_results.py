@@ -1,6 +1,6 @@
 """The main figures of the jumps that were measured live, from the file beside their log, `LOG.jumper.json`.
 
-`service.processes.live_jumps` writes that file. Nothing is read here but its member `summaries`.
+`service.processes.live_jumps` writes that file. Nothing is read here but its member `summaries` and the take-off.
 """
 
 import json
@@ -16,6 +16,15 @@ from rig.status import LastJump
 def summaries(log: Path) -> list[LastJump]:
     """The main figures of the jumps of a log that were measured live; none if their file is missing or damaged."""
     return _read(jumper_path(log))
+
+
+def takeoff_pulse(log: Path) -> int | None:
+    """The pulse of the take-off in the first jump of a log that was measured live; None if there is none."""
+    try:
+        pulse: float = json.loads(jumper_path(log).read_bytes())["jumps"][0]["takeoff"]["pulse"]
+        return round(pulse)
+    except (OSError, ValueError, KeyError, IndexError, TypeError, OverflowError):
+        return None
 
 
 def latest(folder: Path) -> LastJump | None:

@@ -1,9 +1,11 @@
 """The list of recordings and the trash in a browser: long lists, filters, several at once, what cannot be shown."""
 
+import json
 import re
 import zipfile
 from pathlib import Path
 
+import httpx
 import pytest
 from playwright.sync_api import expect
 
@@ -153,3 +155,64 @@ def test_marks_and_filters(panel: Panel, open_page: Open) -> None:
     page.get_by_label("From day").fill("2099-01-01")
     expect(page.locator("#recordings-empty")).to_have_text("No jump fits this search and these filters.")
     expect(page.locator("#filters-toggle")).to_have_text("Filter (1)")
+
+
+def test_a_jump_opens_at_its_take_off_is_played_slowly_in_a_loop_noted_and_exported(
+    panel: Panel, service: MemoryService, client: httpx.Client, open_page: Open
+) -> None:
+    log = write_recording(service.catalogue.directory, "jump", (ALL_OK,) * 60)
+    log.with_suffix(".jumper.json").write_text('{"jumps": [{"takeoff": {"pulse": 31.2}}]}')
+    page = open_page(f"{panel.url}/#/recordings/jump", width=360, height=780, locale="nb-NO")
+    where = page.locator("#frame-where")
+    expect(where).to_have_text(re.compile("^31 / 60"))
+    page.keyboard.press("End")
+    expect(where).to_have_text(re.compile("^60 / 60"))
+    page.locator("#frame-moment").click()
+    expect(where).to_have_text(re.compile("^31 / 60"))
+    expect(page.locator("#frame-png")).to_have_attribute("href", re.compile("pulses/31.png"))
+    page.keyboard.press("m")
+    page.keyboard.type("åpne ski")
+    page.keyboard.press("Enter")
+    expect(page.locator("#notes li")).to_have_text(re.compile("31.*åpne ski"))
+    assert client.get("/api/recordings/jump/notes").json() == [{"pulse": 31, "text": "åpne ski"}]
+    page.keyboard.press("-")
+    expect(page.locator("#frame-speed")).to_have_value("2")
+    page.keyboard.press("o")
+    page.keyboard.press("End")
+    page.keyboard.press(" ")  # in a loop the beginning of the stretch follows its end
+    expect(page.locator("#frame-play")).to_have_attribute("aria-label", "Pause")
+    expect(where).to_have_text(re.compile("^[1-5] / 60"))
+    page.keyboard.press("Home")
+    page.locator("#notes .note").click()
+    expect(where).to_have_text(re.compile("^31 / 60"))
+    page.locator("#export-kind").select_option("csv")
+    expect(page.locator("#export-slow")).to_be_disabled()
+    page.locator("#export-form button[type=submit]").click()
+    with page.expect_download() as download:
+        page.locator("#exports a").click()
+    assert download.value.suggested_filename == "jump.csv"
+    page.locator("#exports button").click()
+    expect(page.locator("#exports li")).to_have_count(0)
+
+
+def test_two_jumps_stand_side_by_side_aligned_at_their_take_offs(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    for name, athlete, takeoff in (("one", "Anna Berg", 20), ("two", "Anna Berg", 31), ("three", "Ola Lie", 5)):
+        log = write_recording(service.catalogue.directory, name, (ALL_OK,) * 40, {"athlete": athlete})
+        log.with_suffix(".jumper.json").write_text(json.dumps({"jumps": [{"takeoff": {"pulse": takeoff}}]}))
+    page = open_page(f"{panel.url}/#/recordings/one")
+    expect(page.locator("#frame-where")).to_have_text(re.compile("^20 / 40"))
+    expect(page.locator("#compare option")).to_have_count(3)
+    assert page.locator("#compare option").nth(1).get_attribute("value") == "two"  # of the same athlete
+    page.locator("#compare").select_option("two")
+    expect(page.locator("#other-where")).to_have_text(re.compile("^31 .* 0.000 s"))
+    page.locator("#frame-on").click()
+    expect(page.locator("#other-where")).to_have_text(re.compile("^32 .* 0.033 s"))
+    expect(page.locator("#other-frames img")).to_have_attribute("src", re.compile("two/pulses/32.jpg"))
+    page.keyboard.press("End")  # the other one ends earlier after its take-off, and stands still
+    expect(page.locator("#other-where")).to_have_text(re.compile("^40 "))
+    page.keyboard.press("2")
+    expect(page.locator("#other-frames")).to_have_class(re.compile("single"))
+    page.locator("#compare").select_option("")
+    expect(page.locator("#other")).to_be_hidden()

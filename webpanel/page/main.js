@@ -13,22 +13,28 @@ import { startPreview } from "./live/preview.js";
 import { startSession } from "./live/session.js";
 import { startStartList } from "./live/startlist.js";
 import { startState } from "./live/state.js";
+import { drawExports, startExports } from "./recordings/exports.js";
 import { startLast } from "./recordings/last.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
-import * as scrubber from "./recordings/scrubber.js";
 import { connect, startBanner } from "./shared/connection.js";
 import { startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
 import * as doctor from "./system/doctor.js";
 import { startLog } from "./system/log.js";
 import * as rig from "./system/rig.js";
+import { drawChoices, startComparing } from "./viewing/comparing.js";
+import { drawNotes, startNotes } from "./viewing/notes.js";
+import * as scrubber from "./viewing/scrubber.js";
 
 /** Draw every part anew, after the language was changed. */
 function redraw() {
   update({});
   for (const part of [recordings, recording, doctor, rig]) part.draw();
   scrubber.drawWords();
+  drawNotes();
+  drawChoices();
+  drawExports();
   drawKeys();
 }
 
@@ -44,7 +50,8 @@ function entered({ view, id }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, recording.startRecording, rig.startRig, startKeys]) start();
+for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startExports]) start();
+for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();
 startLogin(() => location.reload());

@@ -4,15 +4,19 @@ from http import HTTPStatus
 from typing import Annotated
 
 import anyio
+import cv2
 import numpy as np
 from anyio.to_thread import run_sync
 from fastapi import APIRouter, Path, Query, Response
 from numpy.typing import NDArray
 
+from rig.looking import Moment, NewNote, Note
 from rig.status import Pulses, RecordingState
 from service.seam import RigService
 from webpanel.problems import ProblemError
-from webpanel.routes.common import RecordingId, jpeg_answer, refusals, strict_router
+from webpanel.routes.common import CHANGING, RecordingId, Responses, jpeg_answer, refusals, strict_router
+from webpanel.routes.events import Changes
+from webpanel.routes.files import attachment
 from webpanel.routes.preview import to_jpeg
 
 _THUMBNAIL_WIDTH = 480
@@ -22,9 +26,18 @@ _THUMBNAILS_MAX = 1000
 _KEPT = {"Cache-Control": "private, max-age=31536000, immutable"}
 #: Threads that read and encode images. They are few, so that looking through a recording never slows down recording.
 _READERS = 2
+Pulse = Annotated[int, Path(ge=1, le=2**53, description="number of the pulse", examples=[1])]
+OneCamera = Annotated[str | None, Query(max_length=100, description="only this camera", examples=["K2"])]
+OfferAsFile = Annotated[bool, Query(description="offer it as a file to keep")]
+_PNG: Responses = {
+    200: {
+        "description": "The triplet, or one camera's part of it.",
+        "content": {"image/png": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 
 
-def contents_router(service: RigService) -> APIRouter:
+def contents_router(service: RigService, changes: Changes) -> APIRouter:
     """The routes that read recordings."""
     router = strict_router("Recordings")
     readers = anyio.CapacityLimiter(_READERS)
@@ -42,13 +55,51 @@ def contents_router(service: RigService) -> APIRouter:
     )
     async def get_image(
         recording_id: RecordingId,
-        pulse: Annotated[int, Path(ge=1, le=2**53, description="number of the pulse", examples=[1])],
-        camera: Annotated[str | None, Query(max_length=100, description="only this camera", examples=["K2"])] = None,
+        pulse: Pulse,
+        camera: OneCamera = None,
         width: Annotated[int | None, Query(ge=16, le=8192, description="at most so many columns")] = None,
     ) -> Response:
         """One triplet of a recording, the cameras side by side."""
         jpeg = await run_sync(_jpeg, service, recording_id, pulse, camera, width, limiter=readers)
         return Response(jpeg, media_type="image/jpeg", headers=_KEPT)
+
+    @router.get(
+        "/recordings/{recording_id}/pulses/{pulse}.png",
+        response_class=Response,
+        responses=_PNG | refusals(404),
+    )
+    async def get_whole_image(
+        recording_id: RecordingId, pulse: Pulse, camera: OneCamera = None, download: OfferAsFile = False
+    ) -> Response:
+        """The same without loss: every pixel is that of the log."""
+        png = await run_sync(_png, service, recording_id, pulse, camera, limiter=readers)
+        name = f"{recording_id}_{pulse}{'' if camera is None else '_' + camera}.png"
+        offered = {"Content-Disposition": attachment(name)} if download else {}
+        return Response(png, media_type="image/png", headers=_KEPT | offered)
+
+    @router.get("/recordings/{recording_id}/moment", responses=refusals(404))
+    async def get_moment(recording_id: RecordingId) -> Moment:
+        """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves."""
+        return await run_sync(service.moment, recording_id, limiter=readers)
+
+    @router.get("/recordings/{recording_id}/notes", responses=refusals(404))
+    def list_notes(recording_id: RecordingId) -> list[Note]:
+        """The notes at single pulses, in order."""
+        return service.notes(recording_id)
+
+    @router.put("/recordings/{recording_id}/notes/{pulse}", responses=CHANGING | refusals(404))
+    def set_note(recording_id: RecordingId, pulse: Pulse, note: NewNote) -> list[Note]:
+        """Note something at a pulse, in place of what was noted there; the log itself is not changed."""
+        notes = service.note(recording_id, pulse, note.text)
+        changes.recordings_changed()
+        return notes
+
+    @router.delete("/recordings/{recording_id}/notes/{pulse}", responses=CHANGING | refusals(404))
+    def remove_note(recording_id: RecordingId, pulse: Pulse) -> list[Note]:
+        """Remove the note of a pulse; if it has none, nothing changes."""
+        notes = service.note(recording_id, pulse, "")
+        changes.recordings_changed()
+        return notes
 
     @router.get(
         "/recordings/{recording_id}/thumbnail.jpg",
@@ -75,6 +126,13 @@ def _jpeg(service: RigService, recording_id: str, pulse: int, camera: str | None
     """One triplet, or one camera's part of it, encoded."""
     image = service.image(recording_id, pulse)
     return to_jpeg(image if camera is None else _block(service.pulses(recording_id), image, camera), width)
+
+
+def _png(service: RigService, recording_id: str, pulse: int, camera: str | None) -> bytes:
+    """The same as PNG."""
+    image = service.image(recording_id, pulse)
+    _, png = cv2.imencode(".png", image if camera is None else _block(service.pulses(recording_id), image, camera))
+    return png.tobytes()
 
 
 def _block(pulses: Pulses, image: NDArray[np.uint8], camera: str) -> NDArray[np.uint8]:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analysis.film.contact_sheet import write_contact_sheet
-from analysis.images.activity import liveliest_pulse
+from analysis.images.activity import busiest_pulse, liveliest_pulse
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogWriter
 from rig.errors import BadInputError, LogDamagedError
@@ -52,6 +52,13 @@ def test_the_pulses_shown_are_those_in_which_something_moves(tmp_path: Path) -> 
 def test_the_pulse_that_stands_for_a_recording_is_one_in_which_something_moves(tmp_path: Path) -> None:
     _write_scene(tmp_path / "log.mcap", 300, range(240, 270), lost=range(250, 256))
     assert liveliest_pulse(tmp_path / "log.mcap") in {*range(240, 250), *range(256, 270)}
+
+
+def test_a_recording_opens_where_most_moves_and_at_its_beginning_where_nothing_does(tmp_path: Path) -> None:
+    _write_scene(tmp_path / "jump.mcap", 300, range(240, 270), lost=range(20, 30))
+    assert busiest_pulse(tmp_path / "jump.mcap") in range(240, 270)
+    _write_scene(tmp_path / "calm.mcap", 60, range(0))
+    assert busiest_pulse(tmp_path / "calm.mcap") is None
 
 
 @pytest.mark.parametrize("pulses", [1, 2, 3])

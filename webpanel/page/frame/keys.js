@@ -5,11 +5,12 @@ import { disarm, nextStep, saveLast } from "../live/actions.js";
 import { showCamera, shownCamera } from "../live/preview.js";
 import { nextJumper } from "../live/session.js";
 import { deleteShown } from "../recordings/recording.js";
-import { canScrub, chooseCamera, nextGap, step, toEnd, togglePlay } from "../recordings/scrubber.js";
 import { $, make } from "../shared/dom.js";
 import { go } from "../shared/router.js";
 import { clearSnacks } from "../shared/snacks.js";
 import { known, load, save } from "../shared/store.js";
+import { beginNote } from "../viewing/notes.js";
+import { canScrub, chooseCamera, nextGap, playerInUse, step, toEnd, toMoment, togglePlay } from "../viewing/scrubber.js";
 import { openSettings } from "./settings.js";
 
 const STEP = 10;
@@ -33,6 +34,10 @@ const KEYS = [
   { keys: ["Home", "End"], words: "keys.ends", action: (event) => toEnd(event.key === "End"), view: "recording" },
   { keys: [" "], words: "keys.play", action: togglePlay, view: "recording" },
   { keys: ["g"], words: "keys.gap", action: () => nextGap(1), view: "recording" },
+  { keys: ["t"], words: "keys.moment", action: toMoment, view: "recording" },
+  { keys: ["o"], words: "keys.loop", action: () => playerInUse().toggleLoop(), view: "recording" },
+  { keys: ["-", "+"], words: "keys.speed", action: (event) => playerInUse().changeSpeed(event.key === "-" ? 1 : -1), view: "recording" },
+  { keys: ["m"], words: "keys.note", action: beginNote, view: "recording" },
   { keys: DIGITS, words: "keys.camera", action: (event) => chooseCamera(Number(event.key) ? Number(event.key) - 1 : null), view: "recording" },
   { keys: ["Delete"], words: "keys.delete", action: () => { if (known.role === "administer") void deleteShown(); }, view: "recording" },
   { keys: ["Escape"], words: "keys.escape", action: escape },

@@ -8,8 +8,11 @@ import { makeFields, writeFields } from "../shared/fields.js";
 import { clock, day, number, size, timeOfDay, who } from "../shared/format.js";
 import { go, place } from "../shared/router.js";
 import { attempt, clearSnacks, tell } from "../shared/snacks.js";
+import { offer } from "../viewing/comparing.js";
+import { loadNotes } from "../viewing/notes.js";
+import { clearScrubber, scrub, setMoment } from "../viewing/scrubber.js";
 import { remove, restore, watchCatalogue } from "./catalogue.js";
-import { clearScrubber, scrub } from "./scrubber.js";
+import { loadExports } from "./exports.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 
@@ -82,11 +85,17 @@ async function load(id) {
   if (loaded.state === "recording" && recording && !isRunning()) return; // an answer that was overtaken
   recording = loaded;
   draw();
+  if (!isRunning()) void attempt(() => loadNotes(id));
   if (isRunning() || scrubbing || !recording.counts.pulses) return;
   scrubbing = true;
   try {
     const pulses = await call("GET", recordingPath(id, "/pulses"));
-    if (recording?.id === id && place().id === id) scrub(pulses);
+    if (recording?.id !== id || place().id !== id) return;
+    scrub(pulses);
+    void loadExports(id, pulses.cameras);
+    void attempt(() => offer(loaded));
+    const { pulse, kind } = await call("GET", recordingPath(id, "/moment"));
+    if (recording?.id === id && place().id === id) setMoment(pulse, kind);
   } catch (error) {
     scrubbing = false;
     throw error;
@@ -107,6 +116,7 @@ export function draw() {
   const empty = !isRunning() && !recording.counts.pulses;
   $("player").hidden = isRunning() || empty;
   $("recording-columns").hidden = false;
+  $("export-form").hidden = $("player").hidden;
   $("recording-empty").hidden = !empty;
   setText($("recording-empty"), empty ? t("recording.no_pulses") : "");
   const toRecover = ["verdict_unfinished", "verdict_damaged", "verdict_headless"].includes(verdict.code);

@@ -2,10 +2,11 @@
 
 import { t } from "../i18n/i18n.js";
 import { partOf } from "../shared/api.js";
-import { $, make, setIcon, setText } from "../shared/dom.js";
+import { $, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { makeViewer } from "../shared/viewer.js";
 import { makePan } from "./pan.js";
+import { makePlayer } from "./playing.js";
 import { drawStrip, makeStrip } from "./strip.js";
 
 /** @typedef {import("../shared/types.js").Pulses} Pulses */
@@ -18,18 +19,29 @@ let viewer;
 /** @type {import("./pan.js").Pan} */
 let pan;
 let loading = false;
-/** While playing: when that began, and its first pulse's time; null: not playing. @type {{ clock: number, time_s: number }|null} */
-let playing = null;
+/** @type {import("./playing.js").Player} */
+let player;
+
+/** Index of the pulse at which the recording begins to matter. @type {number|null} */
+let moment = null;
+/** Called whenever another pulse or camera is in sight. @type {() => void} */
+let whenShown = () => {};
+/** Whether somebody has moved in the recording; then it stays where it is. */
+let touched = false;
 
 export function startScrubber() {
   viewer = makeViewer($("frames"), chooseCamera);
   pan = makePan($("frames"), viewer.plane);
-  makeStrip($("frame-strip"), showIndex);
-  $("frame-slider").addEventListener("input", () => { pause(); showIndex(Number($("frame-slider").value)); });
+  player = makePlayer({ pulses: () => recording?.pulses ?? [], at: () => at, moment: () => moment, ready: () => !loading, show: showIndex });
+  makeStrip($("frame-strip"), (index) => { touched = true; showIndex(index); });
+  $("frame-slider").addEventListener("input", () => { touched = true; player.pause(); showIndex(Number($("frame-slider").value)); });
   $("frame-back").addEventListener("click", () => step(-1));
   $("frame-on").addEventListener("click", () => step(1));
   $("frame-play").addEventListener("click", togglePlay);
   $("frame-gap").addEventListener("click", () => nextGap(1));
+  $("frame-loop").addEventListener("click", player.toggleLoop);
+  $("frame-moment").addEventListener("click", toMoment);
+  player.draw();
   $("zoom-in").addEventListener("click", () => pan.zoom(1.5));
   $("zoom-out").addEventListener("click", () => pan.zoom(1 / 1.5));
   viewer.image.addEventListener("load", loaded);
@@ -38,9 +50,11 @@ export function startScrubber() {
 
 /** Show nothing until the next `scrub`. */
 export function clearScrubber() {
-  pause();
+  player.pause();
   recording = null;
-  loading = false;
+  moment = null;
+  loading = touched = false;
+  $("frame-moment").hidden = true;
   viewer.image.removeAttribute("src");
   viewer.image.alt = "";
   for (const words of ["frame-where", "frame-fate"]) setText($(words), "");
@@ -64,6 +78,50 @@ export function scrub(pulses) {
   showIndex(0);
 }
 
+/**
+ * Tell which pulse matters, and go there unless somebody has moved already.
+ *
+ * @param {number|null} pulse
+ * @param {string} kind how it was found
+ */
+export function setMoment(pulse, kind) {
+  const index = recording?.pulses.findIndex((each) => each.pulse === pulse) ?? -1;
+  moment = index < 0 ? null : index;
+  $("frame-moment").hidden = moment === null;
+  $("frame-moment").dataset.kind = kind;
+  drawMoment();
+  if (moment !== null && !touched) showIndex(moment);
+}
+
+/** Go to the pulse that matters. */
+export function toMoment() {
+  player.pause();
+  if (moment !== null) showIndex(moment);
+}
+
+/** @param {() => void} action called whenever another pulse or camera is in sight */
+export function onShown(action) {
+  whenShown = action;
+}
+
+/** How long after the pulse that matters the one in sight is, and which camera is large. */
+export function sinceMoment() {
+  const pulses = recording?.pulses ?? [];
+  return { since_s: (pulses[at]?.time_s ?? 0) - (pulses[moment ?? 0]?.time_s ?? 0), camera: viewer.selected() };
+}
+
+/** The pulse in sight; null: there is none. */
+export function pulseShown() {
+  return recording?.pulses[at]?.pulse ?? null;
+}
+
+/** Go to a pulse. @param {number} pulse */
+export function showPulse(pulse) {
+  player.pause();
+  const index = recording?.pulses.findIndex((each) => each.pulse === pulse) ?? -1;
+  if (index >= 0) showIndex(index);
+}
+
 /** Whether there are pulses to step through. */
 export function canScrub() {
   return recording !== null && recording.pulses.length > 0;
@@ -71,19 +129,22 @@ export function canScrub() {
 
 /** @param {number} frames */
 export function step(frames) {
-  pause();
+  touched = true;
+  player.pause();
   showIndex(at + frames);
 }
 
 /** Go to the first pulse, or to the last. @param {boolean} last */
 export function toEnd(last) {
-  pause();
+  touched = true;
+  player.pause();
   showIndex(last ? (recording?.pulses.length ?? 1) - 1 : 0);
 }
 
 /** @param {1|-1} direction */
 export function nextGap(direction) {
-  pause();
+  touched = true;
+  player.pause();
   const all = direction > 0 ? gaps() : gaps().reverse();
   const next = all.find((index) => (index - at) * direction > 0) ?? all[0];
   if (next !== undefined) showIndex(next);
@@ -93,42 +154,29 @@ export function nextGap(direction) {
 export function chooseCamera(index) {
   viewer.select(index);
   pan.reset();
+  drawPng();
+  whenShown();
   [...$("frame-cameras").children].forEach((button, place) => {
     button.setAttribute("aria-pressed", String(place === (viewer.selected() ?? -1) + 1));
   });
 }
 
 export function togglePlay() {
-  if (playing || !recording) return pause();
-  const start = at >= recording.pulses.length - 1 ? 0 : at;
-  playing = { clock: performance.now(), time_s: recording.pulses[start].time_s };
-  drawPlay();
-  showIndex(start);
-  requestAnimationFrame(playOn);
+  touched = true;
+  player.toggle();
+}
+
+/** The player, for keys. */
+export function playerInUse() {
+  return player;
 }
 
 /** Draw the words anew, in another language. */
 export function drawWords() {
   if (recording) makeCameraChoice(recording.cameras);
-  drawPlay();
+  drawMoment();
+  player.draw();
   if (recording) drawPlace();
-}
-
-function pause() {
-  playing = null;
-  drawPlay();
-}
-
-/** Play on at the speed of the jump. Frames for which the connection is too slow are skipped. */
-function playOn() {
-  if (!playing || !recording) return;
-  const now = playing.time_s + (performance.now() - playing.clock) / 1000;
-  const { pulses } = recording;
-  let next = at;
-  while (next < pulses.length - 1 && pulses[next + 1].time_s <= now) next += 1;
-  if (!loading && next !== at) showIndex(next);
-  if (at >= pulses.length - 1) pause();
-  else requestAnimationFrame(playOn);
 }
 
 /** @param {number} index */
@@ -163,15 +211,25 @@ function drawPlace() {
   setText($("frame-fate"), fates.join("  ·  "));
   $("frame-strip").style.setProperty("--at", String((at + 0.5) / recording.pulses.length));
   viewer.image.alt = t("scrub.alt", { pulse });
+  drawPng();
+  whenShown();
   statuses.forEach((status, index) => {
     const fine = status === "ok";
     viewer.cover(index, "warning", fine ? "" : t(`status.${status}`), fine ? "" : t(`status.${status}.means`), "");
   });
 }
 
-function drawPlay() {
-  setIcon($("frame-play").querySelector("svg"), playing ? "pause" : "play");
-  $("frame-play").setAttribute("aria-label", t(playing ? "scrub.pause" : "scrub.play"));
+/** The link to the picture in sight, without loss. */
+function drawPng() {
+  if (!recording) return;
+  const one = viewer.selected();
+  const camera = one === null ? "" : `&camera=${encodeURIComponent(recording.cameras[one])}`;
+  $("frame-png").href = partOf(recording.id, `pulses/${recording.pulses[at]?.pulse ?? 1}.png?download=true${camera}`);
+}
+
+function drawMoment() {
+  const takeoff = $("frame-moment").dataset.kind === "takeoff";
+  setText($("frame-moment").querySelector("span"), t(takeoff ? "scrub.takeoff" : "scrub.busiest"));
 }
 
 function gaps() {

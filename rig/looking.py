@@ -1,0 +1,40 @@
+"""What people look for in a recording: the moment at which it begins to matter, and notes at single pulses."""
+
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field
+
+from rig.status import Model
+
+#: All notes of a recording fit into the file of its session fields with room to spare.
+NOTE_MAX = 120
+NoteText = Annotated[str, Field(min_length=1, max_length=NOTE_MAX, pattern=r"^[^\x00-\x1f\x7f]*$")]
+
+
+class MomentKind(StrEnum):
+    """How a moment was found."""
+
+    TAKEOFF = "takeoff"  #: the jump was measured
+    ACTIVITY = "activity"  #: most moves there
+    NONE = "none"  #: nothing moves
+
+
+class Moment(Model):
+    """The pulse at which a viewer opens a recording."""
+
+    pulse: int | None = Field(description="null: nothing moves")
+    kind: MomentKind
+
+
+class NewNote(Model):
+    """What to note at a pulse."""
+
+    text: NoteText = Field(examples=["ski tip opens"])
+
+
+class Note(Model):
+    """A note at a pulse of a recording."""
+
+    pulse: int
+    text: str

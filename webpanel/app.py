@@ -15,6 +15,7 @@ from webpanel.documentation import DESCRIPTION, serve_documentation
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard
 from webpanel.door.logins import Door
+from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
 from webpanel.routes.common import COMMON
@@ -61,8 +62,6 @@ def create_app(service: RigService, access: Access) -> FastAPI:
     )  # fmt: skip
     app.state.streams = streams
     door = Door(access, warn=lambda text: service.tell("warning", "access", text))
-    app.add_middleware(Guard, door=door, note=lambda text: service.tell("info", "access", text))
-    app.add_middleware(CountRequests, metrics=metrics)
     routers = (
         rig_router(service),
         recordings_router(service, changes),
@@ -78,7 +77,11 @@ def create_app(service: RigService, access: Access) -> FastAPI:
     )
     for router in routers:
         app.include_router(router)
-    handle_errors(app, [route for router in routers for route in router.routes if isinstance(route, APIRoute)])
+    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
+    handle_errors(app, routes)
+    app.add_middleware(Guard, door=door, note=lambda text: service.tell("info", "access", text))
+    app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
+    app.add_middleware(CountRequests, metrics=metrics)
     serve_documentation(app, access)
     _serve_page(app)
     return app

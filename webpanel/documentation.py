@@ -9,13 +9,31 @@ from fastapi.responses import Response
 
 from rig.status import Event
 from webpanel.door.access import Access
+from webpanel.door.guard import OPEN, PROTECTED
+from webpanel.door.logins import COOKIE
+from webpanel.door.roles import needed_role
 from webpanel.problems import Problem
 
 DESCRIPTION: Final = """
 Operates the three-camera rig and its recordings. Times are UTC. Unknown fields and parameters are refused.
 
+`/api/v1/…` is the same as `/api/…`: programs that name the version go on working if a later one changes. Every path
+that takes GET takes HEAD.
+
+With tokens, each call needs a role, which stands with its security: `watch`, `operate` (which may watch too) or
+`administer` (which may do everything).
+
 Every error is a problem (RFC 9457, `application/problem+json`): `code` is stable, `detail` says what to do.
 """
+_TAGS: Final = {
+    "Rig": "The rig as a whole: its state, arming, the rig file, the doctor.",
+    "Recordings": "Starting and stopping, and what was recorded: list, session fields, pictures, files, the trash.",
+    "Jumpers": "The start list and the next jumper, whom every recording takes at its start.",
+    "Exports": "Videos, pictures and tables of recordings, made by the service beside its work.",
+    "Watching": "What happens now: events and live pictures.",
+    "Login": "Tokens, cookies and what one may do.",
+    "Observing": "For monitoring programs.",
+}
 #: Swagger UI draws its icons as data: images and sets styles from scripts.
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
@@ -53,13 +71,26 @@ def _asset(package: str, name: str, media_type: str) -> Any:
 
 
 def _schema(app: FastAPI, access: Access) -> dict[str, Any]:
-    schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
+    schema = get_openapi(
+        title=app.title, version=app.version, description=app.description, routes=app.routes,
+        tags=[{"name": name, "description": text} for name, text in _TAGS.items()],
+        servers=[{"url": "/", "description": "The service that serves this page."}],
+    )  # fmt: skip
     components = schema.setdefault("components", {})
     for model in (Problem, Event):  # no route returns these by themselves
         described = model.model_json_schema(ref_template="#/components/schemas/{model}")
         components["schemas"] |= described.pop("$defs", {}) | {model.__name__: described}
     if access.tokens:
-        components["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
-        schema["security"] = [{"token": []}]
-        schema["paths"]["/api/login"]["post"]["security"] = []
+        components["securitySchemes"] = {
+            "token": {"type": "http", "scheme": "bearer", "description": "A token of the service's token file."},
+            "session": {
+                "type": "apiKey", "in": "cookie", "name": COOKIE, "description": "The cookie of `POST /api/login`.",
+            },
+        }  # fmt: skip
+        schema["security"] = [{"token": []}, {"session": []}]
+        for path, methods in schema["paths"].items():
+            for method, operation in methods.items():
+                role = needed_role(method.upper(), path)
+                needs_token = path.startswith(PROTECTED) and path not in OPEN
+                operation["security"] = [{"token": [role]}, {"session": [role]}] if needs_token else []
     return schema

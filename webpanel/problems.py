@@ -128,7 +128,9 @@ def handle_errors(app: FastAPI, routes: Iterable[APIRoute]) -> None:
         headers = dict(error.headers or {})
         if status is HTTPStatus.METHOD_NOT_ALLOWED:
             methods = [route.methods or set() for route in table if route.path_regex.match(request.url.path)]
-            headers["Allow"] = ", ".join(sorted(set[str]().union(*methods))) or headers.get("Allow", "GET, HEAD")
+            allowed = set[str]().union(*methods)
+            allowed |= {"HEAD"} if "GET" in allowed else set()
+            headers["Allow"] = ", ".join(sorted(allowed)) or headers.get("Allow", "GET, HEAD")
         return problem(status, status.name.lower(), _ADVICE.get(status, error.detail), headers)
 
     @app.exception_handler(RequestValidationError)

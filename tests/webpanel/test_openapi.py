@@ -9,8 +9,8 @@ import httpx
 import pytest
 
 from tests.support.loopback import Loopback
-from tests.webpanel.memory_service import MemoryService
-from tests.webpanel.serving import serving
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import Panel, serving
 from webpanel.door.access import Access
 
 #: The calls of the contract, and those that the page needs beyond it.
@@ -114,8 +114,44 @@ def test_the_token_is_described_where_one_is_needed(service: MemoryService, loop
     access = Access.for_address(loopback.host, environment={"SVEV_TOKEN": token})
     with serving(service, access) as panel, panel.client(headers={"Authorization": f"Bearer {token}"}) as client:
         schema = client.get("/openapi.json").json()
-    assert schema["security"] == [{"token": []}]
-    assert schema["paths"]["/api/login"]["post"]["security"] == []
+    assert schema["security"] == [{"token": []}, {"session": []}]
+    assert set(schema["components"]["securitySchemes"]) == {"token", "session"}
+    needed = {name: operation["security"] for name, operation in operations(schema)}
+    assert needed["POST /api/login"] == needed["GET /healthz"] == []
+    assert needed["GET /api/status"] == [{"token": ["watch"]}, {"session": ["watch"]}]
+    assert needed["POST /api/arm"][0] == {"token": ["operate"]}
+    assert needed["DELETE /api/recordings/{recording_id}"][0] == {"token": ["administer"]}
+
+
+def test_chapters_and_server_are_described(schema: dict[str, Any]) -> None:
+    used = {tag for _, operation in operations(schema) for tag in operation["tags"]}
+    assert {tag["name"] for tag in schema["tags"] if tag["description"]} == used
+    assert [server["url"] for server in schema["servers"]] == ["/"]
+
+
+def test_head_answers_wherever_get_does(panel: Panel, service: MemoryService) -> None:
+    service.arm()
+    write_recording(service.catalogue.directory, "jump")
+    values = {"recording_id": "jump", "pulse": "1", "export_id": "1", "line": "1"}
+    with panel.client() as client:
+        for name, _ in operations(client.get("/openapi.json").json()):
+            path = name.partition(" ")[2].format(**values)
+            if not name.startswith("GET"):
+                continue
+            path += "?ids=jump" if path.endswith(".zip") else ""
+            head = client.head(path)
+            assert head.content == b"", path
+            with client.stream("GET", path) as got:
+                assert head.status_code == got.status_code, path
+                assert head.headers["content-type"] == got.headers["content-type"], path
+        wrong = client.head("/api/arm")
+        assert (wrong.status_code, wrong.headers["allow"]) == (405, "POST")
+
+
+def test_the_version_may_be_named(client: httpx.Client) -> None:
+    assert client.get("/api/v1/status").json()["state"] == client.get("/api/status").json()["state"]
+    assert client.post("/api/v1/arm").json()["state"] == "armed"
+    assert client.get("/api/v2/status").status_code == client.get("/api/v1").status_code == 404
 
 
 def test_the_page_of_the_description_needs_nothing_from_elsewhere(client: httpx.Client) -> None:

@@ -21,8 +21,8 @@ HEAD_MAX: Final = 16 * 1024
 _HEADER_COST: Final = 32  # bytes that a header counts beside its text (RFC 9113, 6.5.2)
 _TOO_LARGE: Final = f"the request's body is too large: no call needs more than {BODY_MAX // 1024} KiB"
 #: Paths that need the token. The page's files do not: the page has to ask for the token.
-_PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
-_OPEN: Final = frozenset({"/api/login", "/api/logout"})
+PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
+OPEN: Final = frozenset({"/api/login", "/api/logout"})
 #: Paths where a body may be something else than JSON; their routes look which call takes what.
 _OTHER_BODIES: Final = {"/api/start-list": "text/csv"}
 
@@ -47,7 +47,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
 
-        protected = scope["path"].startswith(_PROTECTED)
+        protected = scope["path"].startswith(PROTECTED)
         caller: Caller | None = None
 
         async def send_guarded(message: Message) -> None:
@@ -78,7 +78,7 @@ class Guard:
         if not reading or (path.startswith("/api/") and headers.get("sec-fetch-mode") != "navigate"):
             _check_origin(headers)
         caller = None
-        if path.startswith(_PROTECTED) and path not in _OPEN:
+        if path.startswith(PROTECTED) and path not in OPEN:
             caller = self._door.admit(request)
             check_role(caller, request.scope["method"], path)
         _check_body(headers, _OTHER_BODIES.get(path), reading=reading)

@@ -315,13 +315,13 @@ def test_an_unforeseen_error_tells_nothing_private(client: httpx.Client, service
 
 
 WRONG_METHODS = [
-    ("PUT", "/api/status", "GET"),
-    ("POST", "/api/status", "GET"),
+    ("PUT", "/api/status", "GET, HEAD"),
+    ("POST", "/api/status", "GET, HEAD"),
     ("GET", "/api/arm", "POST"),
-    ("DELETE", "/healthz", "GET"),
-    ("TRACE", "/api/status", "GET"),
-    ("PUT", "/api/recordings", "GET, POST"),
-    ("OPTIONS", "/api/recordings/x", "DELETE, GET, PATCH"),
+    ("DELETE", "/healthz", "GET, HEAD"),
+    ("TRACE", "/api/status", "GET, HEAD"),
+    ("PUT", "/api/recordings", "GET, HEAD, POST"),
+    ("OPTIONS", "/api/recordings/x", "DELETE, GET, HEAD, PATCH"),
     ("POST", "/main.js", "GET, HEAD"),
 ]
 

@@ -31,6 +31,11 @@ class Pause(msgspec.Struct, frozen=True):
     pulses: int
     idle: tuple[str, ...] = ()
 
+    @property
+    def between_logs(self) -> bool:
+        """Whether its pulses were counted, but are in no log: those between two logs of a recording."""
+        return self.before_pulse is not None and self.pulses == self.before_pulse - self.after_pulse - 1 > 0
+
     def in_words(self) -> str:
         """One line: where, how long, and what the frame numbers say."""
         if self.after_pulse == 0 and self.before_pulse is None:
@@ -41,6 +46,11 @@ class Pause(msgspec.Struct, frozen=True):
             where = f"in the first {self.seconds:.3g} s of the recording"
         else:
             where = f"for {self.seconds:.3g} s after pulse {self.after_pulse}"
+        if self.before_pulse is not None and self.between_logs:
+            where = f"in the {self.seconds:.3g} s between the log before this one and its first pulse"
+            first, last = self.after_pulse + 1, self.before_pulse - 1
+            what = f"pulse {first} is" if first == last else f"pulses {first}-{last} are"
+            return f"{what} in no log: nothing was recorded {where}"
         line = f"no pulses {where} ({self.pulses} at the rate of the others)"
         if self.idle:
             return f"{line}: {', '.join(self.idle)} took no frame in it, so the trigger paused or did not reach them"

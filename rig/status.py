@@ -283,6 +283,7 @@ class Recording(Model):
     deleted: bool = False
     favourite: bool = False
     tags: tuple[str, ...] = ()
+    continues: str = Field("", description="id of the recording of which this is the next part; empty: of none")
 
 
 class Sorting(StrEnum):

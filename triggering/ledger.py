@@ -92,13 +92,23 @@ class Ledger:
     _begin: UtcNs | None = None
     _end: UtcNs | None = None
     _runs: int = 0
+    _follows: PulseNumber = _NONE
+
+    def follows(self, last: PulseNumber) -> None:
+        """Say that an earlier log of the recording ends with pulse `last`, 0: there is none.
+
+        The pulses between it and the first one of this log have no tag anywhere: they are a pause, not missing here.
+        """
+        self._follows = last
+        if last and self.missing[:1] == [(1, self._first_pulse - 1)]:
+            del self.missing[0]
 
     def add(self, tag: TripletTag) -> None:
         """Add the next tag of the log."""
         if tag.pulse <= self.last_pulse:
             self.out_of_order.append(tag.pulse)
             return
-        if tag.pulse > self.last_pulse + 1:
+        if tag.pulse > self.last_pulse + 1 and not (self._last is None and self._follows):
             self.missing.append((self.last_pulse + 1, tag.pulse - 1))
         if self._last is None:
             self.first_time, self._first_pulse = tag.time, tag.pulse
@@ -171,19 +181,27 @@ class Ledger:
         finder = self._pauses
         if self._last is None:
             return tuple(self._margin(self._begin, self._end, None, finder.last_period()))
-        at_begin = self.first_time if self._first_pulse == 1 else None
+        at_begin = self.first_time if self._first_pulse == self._follows + 1 else None
         return (
+            *self._between_logs(),
             *self._margin(self._begin, at_begin, self._first_pulse, finder.first_period()),
             *finder.pauses(),
             *self._margin(self._last.time, self._end, None, finder.last_period()),
         )
+
+    def _between_logs(self) -> Iterator[Pause]:
+        """The pulses that neither the log before this one has nor this one."""
+        pulses = self._first_pulse - self._follows - 1
+        if self._follows and pulses > 0 and self._begin is not None and self.first_time is not None:
+            seconds = round((self.first_time - self._begin) / NS_PER_S, 6)
+            yield Pause(self._follows, self._first_pulse, seconds, pulses)
 
     def _margin(
         self, begin: UtcNs | None, end: UtcNs | None, before: PulseNumber | None, period: float | None
     ) -> Iterator[Pause]:
         if begin is None or end is None or period is None:
             return
-        after = self.last_pulse if before is None else _NONE
+        after = self.last_pulse if before is None else self._follows
         if (pause := pause_of_margin(begin, end, after, before, period)) is not None:
             yield pause
 

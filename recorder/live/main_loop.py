@@ -92,6 +92,8 @@ class RecorderLoop:
         poll = select.poll()
         poll.register(self._doorbell, select.POLLIN)
         poll.register(self._control, select.POLLIN)
+        for command in self._control.receive(0):  # commands that came together with the configuration ring no bell
+            self._obey(command)
         while not self._quit and not terminated():
             ready = {fd for fd, _ in poll.poll(self._sleep_ms(host_now()))}
             if self._doorbell in ready:

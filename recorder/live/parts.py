@@ -28,7 +28,7 @@ class Parts:
         self.earlier: list[Recording] = []
 
     def progress(self, present: Recording) -> RecordingProgress:
-        """What became of the pulses in all logs that are there; a pause has the pulse numbers of its own log."""
+        """What became of the pulses in all logs that are there; their numbers go on from log to log."""
         ledgers = [each.ledger for each in (*self.earlier, present) if each.is_there]
         times = (ledger.first_time for ledger in ledgers)
         return RecordingProgress(

@@ -66,6 +66,11 @@ class Preroll:
     def __iter__(self) -> Iterator[Held]:
         return iter(self._held)
 
+    def first_since(self, begin: HostNs) -> HostNs | None:
+        """Time of the first pulse at `begin` or later; None if there is none yet."""
+        times = (held.triplet.pulse.time for held in self)
+        return next((time for time in times if time >= begin), None)
+
     @property
     def oldest(self) -> Held | None:
         """The pulse at the front of the queue; None if the queue is empty."""

@@ -13,7 +13,7 @@ import msgspec
 
 from recorder.live.assembler import Assembler
 from recorder.live.preroll import Held
-from recorder.log.extent import FORGOTTEN, extent
+from recorder.log.extent import CONTINUES, CONTINUES_AFTER, FORGOTTEN, extent
 from recorder.log.tag_room import check_tag_fits
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
@@ -25,7 +25,7 @@ from rig.health import WritingHealth
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
-from rig.transport.messages import LogPart, StartRecording, TellResult
+from rig.transport.messages import GoesOn, LogPart, StartRecording, TellResult
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
 
@@ -42,7 +42,7 @@ class _InFlight:
 
 
 class Recording:
-    """Writes pulses into one log, numbered from 1.
+    """Writes pulses into one log, numbered from 1, or from where the log before it ends.
 
     The log is opened in the background. `log` is None until then.
 
@@ -70,7 +70,6 @@ class Recording:
         check_tag_fits(assembler.buffers.layout, [camera.name for camera in rig.cameras], session_name, order.recording)
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
         self._anchor = UtcAnchor.take()
-        self.continues = "" if after is None else after.id
         self.failure: StorageError | None = None
         self.trouble = ""
         self.ledger = Ledger()
@@ -78,24 +77,16 @@ class Recording:
         self._in_flight: deque[_InFlight] = deque()
         self._kept: deque[Held] = deque()
         self._ended = self._stopped = self.mishap = False
-        if after is None:
-            self.commanded = host_now()
-            back = order.preroll_s
-            self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
-            self._end = self._planned_end()
-            self._since_command = 0
-            self._account_from = self.commanded
-        else:
-            self.commanded, self.begin, self._end = after.commanded, after.begin, after._end
-            self._since_command = after._since_command
-            last = after.ledger.last_time
-            self._account_from = after._account_from if last is None else after._anchor.host(last)
+        self.continues = ""
+        self._last_before = self._first = PulseNumber(0)
+        self._begin(order) if after is None else self._go_on(after)
+        self.ledger.follows(self._last_before)
         self._account_until: HostNs | None = None
         self._tell_ledger()
         cameras = ", ".join(camera.name for camera in rig.cameras)
-        session = {"recording": order.recording, **order.session}
+        chain = {CONTINUES: self.continues, CONTINUES_AFTER: str(self._last_before)} if self.continues else {}
         description = LogDescription(
-            session=session | ({"continues": self.continues} if self.continues else {}),
+            session={"recording": order.recording, **order.session, **chain},
             rig={"name": rig.name, "cameras": cameras, "rate_hz": str(rig.trigger.rate_hz)},
             rig_toml=order.rig_toml.encode(),
             calibration_json=None if order.calibration is None else order.calibration.json,
@@ -104,6 +95,38 @@ class Recording:
         self.log: LogWriter | None = None
         self._opening = _in_background(partial(_open, order.path, description, assembler.buffers))
         self._opening_since = host_now()
+
+    def _begin(self, order: StartRecording) -> None:
+        back = order.preroll_s
+        self.commanded = host_now() if order.goes_on is None else order.goes_on.commanded
+        self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
+        self._end = self._planned_end()
+        self._since_command = 0
+        self._account_from = self.commanded
+        if order.goes_on is not None:
+            self._take_over(order.goes_on)
+
+    def _take_over(self, recording: GoesOn) -> None:
+        """Go on after the last pulse of a recorder that died."""
+        self.continues, self._last_before = recording.recording, recording.pulse
+        if recording.time is not None:
+            self._account_from = self._anchor.host(recording.time)
+            self.begin = HostNs(self._account_from + round(recording.period_ns / 2))
+
+    def _go_on(self, after: "Recording") -> None:
+        """Go on after the last pulse that is in a log which failed."""
+        self.continues, self._last_before = after.id, after.ledger.last_pulse or after._last_before
+        self.commanded, self.begin, self._end = after.commanded, after.begin, after._end
+        self._since_command = after._since_command
+        last = after.ledger.last_time
+        self._account_from = after._account_from if last is None else after._anchor.host(last)
+
+    def _first_number(self, time: HostNs) -> PulseNumber:
+        """Number of the log's first pulse: those that fired while there was no recorder are counted by time."""
+        dead, periods = self._order.goes_on, 1
+        if dead is not None and dead.time is not None:
+            periods = max(1, round((time - self._account_from) / dead.period_ns))
+        return PulseNumber(self._last_before + periods)
 
     def _planned_end(self) -> HostNs | None:
         order, period = self._order, self._assembler.rig.trigger.period_ns
@@ -134,7 +157,7 @@ class Recording:
         return self.log is not None
 
     def opening_s(self, now: HostNs) -> float:
-        """For how long the log has been being opened, s."""
+        """For how long it has been being opened, s."""
         return (now - self._opening_since) / NS_PER_S
 
     def give_up(self, error: StorageError) -> None:
@@ -150,7 +173,7 @@ class Recording:
         return self._ended or self._counted or (self._end is not None and settled > self._end + self._assembler.hold_ns)
 
     def hurry(self, now: HostNs) -> None:
-        """Let none of the recording's pulses wait for what later ones may tell, once its end has come."""
+        """Let none of its pulses wait for what later ones may tell, once its end has come."""
         if self._end is not None and now > self._end:
             self._assembler.pairer.hurry(self._end)
 
@@ -177,7 +200,9 @@ class Recording:
         """The tag of the next pulse of the recording, with its number in it."""
         cameras = self._assembler.camera_tags(pulse, self._anchor)
         session = self._order.session.get("session", "")
-        number, time = PulseNumber(self._handed + 1), self._anchor.utc(pulse.time)
+        if not self._handed:
+            self._first = self._first_number(pulse.time)
+        number, time = PulseNumber(self._first + self._handed), self._anchor.utc(pulse.time)
         return TripletTag(number, time, session, self.id, self._shape, cameras)
 
     def write(self, tag: TripletTag, held: Held, slot: int | None, encoded: bytes) -> None:
@@ -324,7 +349,7 @@ class Recording:
 
     def continuation(self, path: Path) -> StartRecording:
         """The order for a recording that continues this one in another log."""
-        return msgspec.structs.replace(self._order, path=path)
+        return msgspec.structs.replace(self._order, path=path, goes_on=None)
 
     def part(self) -> LogPart:
         """What became of the log."""

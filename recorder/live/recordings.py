@@ -43,8 +43,7 @@ from rig.transport.messages import (
 
 _SLICE_NS: Final = NS_PER_S // 200
 _OPEN_S: Final = 10.0  #: how long a log may take to be opened
-#: How long the end of a log may take to be written, s.
-_CLOSE_NS: Final = 10 * NS_PER_S
+_CLOSE_NS: Final = 10 * NS_PER_S  #: how long the end of a log may take to be written
 #: How often the disk is looked at.
 _LOOK_NS: Final = NS_PER_S // 5
 _PAUSE_S: Final = 0.002
@@ -93,7 +92,7 @@ class Recordings:
 
     @property
     def running(self) -> bool:
-        """Whether a recording is being opened, is running or is being closed."""
+        """Whether there is a recording that is not closed yet."""
         return self._recording is not None
 
     @property
@@ -159,7 +158,7 @@ class Recordings:
             self._preroll.trim(now)
 
     def progress(self) -> None:
-        """Report how far the recording is."""
+        """Report how far it is."""
         if self._recording is not None and self._recording.log is not None:
             self._report(self._parts.progress(self._recording))
 
@@ -255,8 +254,9 @@ class Recordings:
             text = f"recording {before.id} goes on as {recording.id}: {before.failure}"
             self._report(RecordingContinued(path=recording.path, before=before.part()))
         else:
-            held = (held.triplet.pulse.time for held in self._preroll)
-            first = next((time for time in held if time >= recording.begin), None)
+            if recording.continues:
+                text = f"recording {recording.continues} goes on as {recording.id}: the recorder was started again"
+            first = self._preroll.first_since(recording.begin)
             self._report(RecordingStarted(first_pulse=None if first is None else recording.utc(first)))
         for time_, note in self._preroll.take_notes(since=recording.begin):
             self._note(note, time_)

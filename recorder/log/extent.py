@@ -5,11 +5,15 @@ from collections.abc import Mapping
 from typing import Final
 
 from rig.clocks import NS_PER_S, UtcNs
-from rig.topics import RECORDING_METADATA, RIG_METADATA
+from rig.pulse import PulseNumber
+from rig.topics import RECORDING_METADATA, RIG_METADATA, SESSION_METADATA
 from triggering.ledger import Ledger
 
 #: Field of the record: after so many seconds the recording ended by itself, because nobody had stopped it.
 FORGOTTEN: Final = "forgotten_s"
+#: Fields of the session: id of the log that this one continues, and the number of the last pulse in it.
+CONTINUES: Final = "continues"
+CONTINUES_AFTER: Final = "continues_after"
 
 
 def extent(begin: UtcNs, end: UtcNs) -> dict[str, str]:
@@ -29,6 +33,7 @@ def apply_extent(metadata: Mapping[str, Mapping[str, str]], ledger: Ledger) -> N
         metadata: fields of the metadata records by name.
         ledger: of the log.
     """
+    ledger.follows(last_before(metadata))
     fields = metadata.get(RECORDING_METADATA, {})
     ledger.lasted(_time(fields, "begin_ns"), _time(fields, "end_ns"), _period_ns(metadata.get(RIG_METADATA, {})))
 
@@ -41,6 +46,12 @@ def forgotten_s(metadata: Mapping[str, Mapping[str, str]]) -> float:
     """
     text = metadata.get(RECORDING_METADATA, {}).get(FORGOTTEN, "")
     return float(text) if re.fullmatch(r"\d{1,5}(\.\d{1,3})?", text, re.ASCII) else 0.0
+
+
+def last_before(metadata: Mapping[str, Mapping[str, str]]) -> PulseNumber:
+    """The last pulse in the log that this one continues; 0: it continues none, or there was no pulse in it."""
+    text = metadata.get(SESSION_METADATA, {}).get(CONTINUES_AFTER, "")
+    return PulseNumber(int(text) if re.fullmatch(r"\d{1,10}", text, re.ASCII) else 0)
 
 
 def _time(fields: Mapping[str, str], name: str) -> UtcNs | None:

@@ -16,6 +16,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from recorder.log.extent import last_before
 from recorder.log.session_changes import session_changes
 from recorder.reading.items import Message
 from recorder.reading.log_reader import LogReader
@@ -150,6 +151,7 @@ class _Recovery:
         self._next_other = next(self._others, None)
         self._written: set[tuple[str, int, int]] = set()
         self.ledger = Ledger()
+        self.ledger.follows(last_before(reader.metadata))
         self.findings = scan.findings
         for text in chain.left_out:
             self.findings.add(text)

@@ -101,6 +101,24 @@ class Calibration(msgspec.Struct, frozen=True, kw_only=True):
     cameras: Mapping[str, bytes]
 
 
+class GoesOn(msgspec.Struct, frozen=True, kw_only=True):
+    """A recording whose recorder died, and which goes on in another log.
+
+    Attributes:
+        recording: id of its last log.
+        commanded: when the recording was started.
+        pulse: number of the last pulse in that log; 0: there is none.
+        time: of that pulse; None: there is none.
+        period_ns: time between two pulses, by which the number of the next one is found.
+    """
+
+    recording: str
+    commanded: HostNs
+    pulse: PulseNumber
+    time: UtcNs | None
+    period_ns: float
+
+
 class StartRecording(Message):
     """Command to the recorder: start a recording.
 
@@ -114,6 +132,7 @@ class StartRecording(Message):
         keep_s: so long after the command its pulses are held in memory too, for a stop that keeps them.
         rig_toml: the rig file as it was read, attached to the log.
         calibration: calibration of the cameras; None: not known.
+        goes_on: the recording that this one continues after the death of its recorder; None: it is a new one.
     """
 
     path: Path
@@ -125,6 +144,7 @@ class StartRecording(Message):
     keep_s: float = 0.0
     rig_toml: str = ""
     calibration: Calibration | None = None
+    goes_on: GoesOn | None = None
 
     @property
     def recording(self) -> str:

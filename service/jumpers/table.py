@@ -29,7 +29,7 @@ _NAMES: Final = {
 }
 _KNOWN: Final = {name: column for column, names in _NAMES.items() for name in names}
 #: Names that a log's session record has for other things.
-_RESERVED: Final = frozenset({"session", "recording", "continues", "round", "wind", "operator"})
+_RESERVED: Final = frozenset({"session", "recording", "continues", "continues_after", "round", "wind", "operator"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,12 @@ from analysis.images.activity import busiest_pulse, liveliest_pulse
 from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
+from recorder.log.extent import CONTINUES
 from rig.clocks import NS_PER_S
 from rig.errors import StateForbidsError, StillRecordingError
 from rig.export import ExportJob, ExportOrder
 from rig.looking import Moment, MomentKind, Note
+from rig.pulse import Pause
 from rig.status import (
     Causes,
     Counts,
@@ -212,6 +214,7 @@ def as_recording(entry: Entry) -> Recording:
         deleted=entry.deleted,
         favourite=is_favourite(entry),
         tags=tags_of(entry),
+        continues=entry.session.get(CONTINUES, "")[:_LONGEST_SHOWN],
     )
 
 
@@ -229,7 +232,8 @@ def verdict(entry: Entry) -> Statement:
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
         "failures": _failures(entry), "pauses": len(entry.pauses),
         "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1), "disk": entry.disk,
-        "longest_s": entry.forgotten_s,
+        "longest_s": entry.forgotten_s, "before": entry.session.get(CONTINUES, "")[:_LONGEST_SHOWN],
+        "unrecorded": sum(pause.pulses for pause in entry.pauses if pause.between_logs),
     }  # fmt: skip
     return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
 
@@ -255,6 +259,10 @@ def _judge(entry: Entry) -> tuple[Level, str, str, str]:
 
 
 def _judge_account(entry: Entry) -> tuple[Level, str, str, str]:
+    if (before := entry.session.get(CONTINUES, "")) and (gap := _between_logs(entry)) is not None:
+        text = f"Goes on from {before[:_LONGEST_SHOWN]}: {gap.pulses} pulses are in neither, {gap.seconds:.1f} s"
+        text += f"; of its {entry.pulses} pulses {entry.partial} lack a frame"
+        return Level.WARNING, "continued", text, "Look at both parts; svev verify says what is missing"
     lacking = f"{entry.partial} of {entry.pulses} pulses lack a frame: {_failures(entry)}"
     if entry.pauses:
         paused = pauses_in_words(entry.pauses)
@@ -267,6 +275,12 @@ def _judge_account(entry: Entry) -> tuple[Level, str, str, str]:
     if entry.partial:
         return Level.WARNING, "partial", lacking, ""
     return Level.GOOD, "complete", f"Complete: all {entry.pulses} pulses", ""
+
+
+def _between_logs(entry: Entry) -> Pause | None:
+    """The pulses that neither this log has nor the one that it continues, if there are no other pauses."""
+    gaps = [pause for pause in entry.pauses if pause.between_logs]
+    return gaps[0] if len(gaps) == len(entry.pauses) == 1 else None
 
 
 def _failures(entry: Entry) -> str:

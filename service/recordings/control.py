@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 
+from rig.clocks import NS_PER_S, host_now
 from rig.errors import (
     BadInputError,
     ProcessDiedError,
@@ -35,9 +36,22 @@ from rig.transport.messages import (
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RigProcesses
 from service.recordings.in_progress import Outcome, RecordingInProgress
+from service.recordings.interruption import (
+    DEATHS_MAX,
+    DEATHS_WITHIN_S,
+    Interruption,
+    died_too_often,
+    going_on,
+)
 from service.recordings.storage import check_room_for, new_log_path
 from service.recordings.truth import TruthWriter
-from service.status.statements import FORBIDDEN, recording_continued, recording_ended, recording_forgotten
+from service.status.statements import (
+    FORBIDDEN,
+    recording_continued,
+    recording_ended,
+    recording_forgotten,
+    recording_resumed,
+)
 from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
 from service.supervision.tap_guard import CONFIRM_S, check_seen, check_stop
@@ -133,11 +147,11 @@ class RecordingControl:
             StateForbidsError: not armed, or a recording is being opened.
         """
         processes = self._armed_processes()
-        longest_s = start.seconds if start.nobody_stops else None
-        self.current, self.notice = RecordingInProgress(start.path, session, opened, longest_s), None
+        order = msgspec.structs.replace(start, rig_toml=self._rig_toml, calibration=self._calibration)
+        self.current, self.notice = RecordingInProgress(order, session, opened), None
         if ended is not None:
             self.current.waiting.append(ended)
-        processes.tell(msgspec.structs.replace(start, rig_toml=self._rig_toml, calibration=self._calibration))
+        processes.tell(order)
 
     def _armed_processes(self) -> RigProcesses:
         state, processes = self._machine.state, self._session.processes
@@ -185,9 +199,12 @@ class RecordingControl:
             check_stop(self._machine.phase, order)
         if ended is not None:
             current.waiting.append(ended)
-        if self._session.processes is not None and (at_once or not current.stopping):
+        if current.interruption is not None and not current.interruption.resumed:
+            self.fail(current.interruption.error, self._machine.state)
+        elif self._session.processes is not None and (at_once or not current.stopping):
             current.stopping = True
-            current.mishap = order is not None and order.confirm and self._machine.phase.age_s < CONFIRM_S
+            fresh = self._machine.phase.age_s < CONFIRM_S and not current.deaths
+            current.mishap = order is not None and order.confirm and fresh
             if current.mishap:
                 self._jumpers.give_back(current.ids[0])
             self._session.processes.tell(StopRecording(at_once=at_once, keep=current.mishap))
@@ -209,6 +226,11 @@ class RecordingControl:
         if current is None:
             return
         match report:
+            case RecordingStarted() if current.interruption is not None:
+                self._truths.opened(current.order.path, self._session.truth)
+                current.continue_in(current.order.path)
+                self.armed_at = time.monotonic()
+                self._machine.move(State.RECORDING)
             case RecordingStarted():
                 self._answers.append(current.open(report))
                 self._truths.opened(current.path, self._session.truth)
@@ -225,12 +247,15 @@ class RecordingControl:
                 self._finished(current, report)
             case RecordingProgress():
                 current.progress(report)
+                self._tell_gap(current, report)
             case RecorderFailed():
-                self.fail(report.error(), State.ARMED)
+                self.fail(report.error(), State.ARMED if current.interruption is None else self._machine.state)
 
     def _finished(self, current: RecordingInProgress, report: RecordingFinished) -> None:
         current.progress(report)
-        counts = f"{report.counts.pulses} pulses, {report.counts.complete} complete, {report.counts.partial} partial"
+        self._tell_gap(current, report)
+        total = current.counts
+        counts = f"{total.pulses} pulses, {total.complete} complete, {total.partial} partial"
         self._say(Level.INFO, f"recording {current.id} stopped: {counts}")
         if report.failure is not None:
             self.notice = recording_ended(current.id, report.failure.error())
@@ -239,6 +264,54 @@ class RecordingControl:
             self.notice = recording_forgotten(current.id, current.longest_s)
             self._say(Level.WARNING, self.notice.text)
         self._over(report, State.ARMED)
+
+    def interrupt(self, error: SvevError) -> SvevError | None:
+        """Begin to continue the recording in progress, because its recorder died.
+
+        Returns:
+            None: it goes on as soon as there is a new recorder (`go_on`). Otherwise the error that ends it.
+        """
+        current = self.current
+        if current is None or current.opening or current.stopping:
+            return error
+        current.deaths.append(time.monotonic())
+        if died_too_often(current.deaths):
+            times = f"{DEATHS_MAX} times within {DEATHS_WITHIN_S:g} s"
+            return ProcessDiedError(f"the recorder ended {times}, so the recording is not continued again; {error}")
+        current.interruption = Interruption(current.path, error)
+        return None
+
+    @property
+    def may_restart(self) -> bool:
+        """Whether a new recorder may be started: not before it is known with which pulse a recording goes on."""
+        interruption = None if self.current is None else self.current.interruption
+        return interruption is None or interruption.over
+
+    def go_on(self) -> None:
+        """Have a new recorder continue the recording that the death of the last one interrupted, if there is one."""
+        current, processes = self.current, self._session.processes
+        if current is None or current.interruption is None or processes is None:
+            return
+        found, seconds = current.interruption.found(), current.order.seconds
+        late = seconds is not None and host_now() > current.commanded + round(seconds * NS_PER_S)
+        if found is None or late:
+            self.fail(current.interruption.error, self._machine.state)
+            return
+        period_ns = self._rig.trigger.period_ns
+        order = going_on(current.order, current.session, found, current.ids[0], current.commanded, period_ns)
+        current.go_on(order, found.ledger.counts())
+        current.interruption.resumed = True
+        processes.tell(order)
+
+    def _tell_gap(self, current: RecordingInProgress, report: RecordingProgress) -> None:
+        """Say what is missing where the recording went on, once its first pulse is there."""
+        before = current.order.goes_on
+        if current.interruption is None or before is None or report.first_pulse is None:
+            return
+        gap = next((pause for pause in report.pauses if pause.after_pulse == before.pulse), None)
+        self.notice = recording_resumed(before.recording, current.id, gap)
+        self._say(Level.WARNING, self.notice.text)
+        current.interruption = None
 
     def fail(self, error: SvevError, then: State) -> None:
         """End the recording in progress, if there is one, with an error, and go to the state `then`."""
@@ -270,7 +343,8 @@ class RecordingControl:
         if current is not None:
             self.last = current.id
             self.emptied_at = self.armed_at if current.mishap else time.monotonic()
-            self._machine.move(then)
+            if then is not self._machine.state:
+                self._machine.move(then)
             self._answers.append(partial(current.end, outcome))
 
     def _say(self, level: Level, text: str) -> None:

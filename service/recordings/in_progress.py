@@ -5,10 +5,11 @@ from concurrent.futures import Future
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rig.clocks import NS_PER_S
+from rig.clocks import NS_PER_S, host_now
 from rig.errors import SvevError
 from rig.status import Counts, Level, Recording, RecordingState, SessionChange, SessionFields, Statement
-from rig.transport.messages import RecordingFinished, RecordingProgress, RecordingStarted
+from rig.transport.messages import RecordingFinished, RecordingProgress, RecordingStarted, StartRecording
+from service.recordings.interruption import Interruption
 
 #: How a recording ended: the recorder's report, or the error that ended it.
 Outcome = RecordingFinished | SvevError
@@ -18,31 +19,40 @@ class RecordingInProgress:
     """A recording from the order to the recorder's last report of it.
 
     Args:
-        path: the log.
+        order: what the recorder was told.
         session: the session fields.
         opened: is answered when the log is open.
-        longest_s: it ends after so many seconds, because nobody said how long it is to be; None: somebody did.
 
     Attributes:
-        longest_s: as given.
+        order: as given; the order for the last log if the recorder died.
+        longest_s: it ends after so many seconds, because nobody said how long it is to be; None: somebody did.
+        commanded: when it was ordered.
         ids: ids of its logs; there are several if logs failed.
         path: the log, the last one if there are several.
         session: the session fields, later changes included.
         stopping: whether the recorder was told to stop.
         mishap: whether an operator stopped it as soon as it had begun.
+        counts: what became of the pulses in all its logs.
         waiting: are answered when the recording is over.
+        interruption: the death of its recorder, until it goes on; None: its recorder lives.
+        deaths: when its recorders died, on the monotonic clock, s.
     """
 
-    def __init__(
-        self, path: Path, session: SessionFields, opened: "Future[Recording]", longest_s: float | None = None
-    ) -> None:
-        self.ids, self.path, self.session, self.longest_s = [path.stem], path, session, longest_s
+    def __init__(self, order: StartRecording, session: SessionFields, opened: "Future[Recording]") -> None:
+        self.order, self.session = order, session
+        self.longest_s = order.seconds if order.nobody_stops else None
+        self.commanded = host_now()
+        self.ids, self.path = [order.path.stem], order.path
+        self.interruption: Interruption | None = None
+        self.deaths: list[float] = []
+        self._before: dict[str, Counts] = {}
+        self._gaps = 0
         self.waiting: list[Future[Outcome]] = []
         self.stopping = self.mishap = False
         self._opened: Future[Recording] | None = opened
         self._ordered = datetime.now(UTC)
         self._started: datetime | None = None
-        self._counts, self._pauses = Counts(), 0
+        self.counts, self._pauses = Counts(), 0
         self._bytes = 0
 
     @property
@@ -75,10 +85,23 @@ class RecordingInProgress:
         self.ids.append(path.stem)
         self.path = path
 
+    def go_on(self, order: StartRecording, before: Counts) -> None:
+        """Note that a new recorder is told to go on.
+
+        Args:
+            order: what it is told.
+            before: what became of the pulses in the last log of the dead one.
+        """
+        self.order = order
+        if order.goes_on is not None:
+            self._before[order.goes_on.recording] = before
+        self._gaps = self._pauses
+
     def progress(self, report: RecordingProgress) -> None:
         """Note the account so far."""
         self._note_first(report)
-        self._counts, self._pauses = report.counts, len(report.pauses)
+        self.counts = Counts.sum([*self._before.values(), report.counts])
+        self._pauses = self._gaps + len(report.pauses)
 
     def grown(self, size: int) -> None:
         """Note the size of the log, bytes."""
@@ -100,7 +123,7 @@ class RecordingInProgress:
     def view(self) -> Recording:
         """The recording for the status and the list of recordings."""
         started = self._started or self._ordered
-        counts = self._counts
+        counts = self.counts
         text = f"recording, {counts.pulses} pulses so far"
         if counts.partial:
             text += f", {counts.partial} of them incomplete"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from rig.errors import SvevError
+from rig.pulse import Pause
 from rig.settings.model import CameraSettings
 from rig.status import CameraState, Level, State, Statement
 from rig.transport.messages import CameraNews
@@ -188,6 +189,33 @@ def recording_continued(recording: str, path: Path, reason: str) -> Statement:
         text=f"recording {recording} goes on in {path}: {reason}",
         advice="after it, look at the disk before the next recording",
         values={"recording": recording, "log": str(path), "reason": reason},
+    )
+
+
+def recording_resumed(before: str, recording: str, gap: Pause | None) -> Statement:
+    """The recorder died, and a new one goes on with the recording in another log.
+
+    Args:
+        before: id of the log that the dead one wrote.
+        recording: id of the log in which it goes on.
+        gap: the pulses that are in neither; None: there are none.
+    """
+    values: dict[str, str | int | float] = {"before": before, "recording": recording}
+    text = f"the recorder was restarted, and recording {before} goes on in {recording}"
+    if gap is None or gap.before_pulse is None:
+        missing = "no pulse is missing"
+    else:
+        first, last = gap.after_pulse + 1, gap.before_pulse - 1
+        which = f"pulse {first} is" if first == last else f"pulses {first} to {last} are"
+        missing = f"{which} missing, {gap.seconds:.1f} s"
+        values |= {"first": first, "last": last, "seconds": round(gap.seconds, 1)}
+    advice = f"{before} was not closed, and is readable; svev recover closes it"
+    return Statement(
+        level=Level.WARNING,
+        code="recording_resumed" if "first" in values else "recording_resumed_whole",
+        text=f"{text}: {missing}",
+        advice=advice,
+        values=values,
     )
 
 

@@ -37,21 +37,24 @@ class Fault:
         """Note the error with which the recorder says that it is about to end."""
         self._complaint = error
 
-    def fail(self, error: SvevError, lived_s: float) -> str:
+    def fail(self, error: SvevError, lived_s: float, *, hurry: bool = False) -> str:
         """Note that setting up failed or that the recorder died.
 
         Args:
             error: the error; a complaint of the recorder, if there is one, is used instead, since it says more.
             lived_s: how long the rig had worked, s.
+            hurry: try again at once, because a recording is to go on.
 
         Returns:
             What happened and when the supervisor tries again, in words.
         """
         wait_s = self._back_off.died(lived_s)
+        if hurry:
+            wait_s = 0.0
         self._again_at = time.monotonic() + wait_s
         self.cause = self._complaint or error
         self.statement = failed(self.cause, wait_s)
-        return f"{self.cause}; starting again in {wait_s:g} s"
+        return f"{self.cause}; starting again {f'in {wait_s:g} s' if wait_s else 'at once'}"
 
     def lack_cameras(self) -> None:
         """Note that no camera answers; the grabbers go on trying."""

@@ -9,6 +9,8 @@
    └── disarming ◄── from all but recording     fault ◄──── from anywhere ┘
 ```
 
+From arming a recording goes on at once whose recorder died.
+
 Only the supervisor's thread moves the machine; any thread reads its phase.
 """
 
@@ -25,7 +27,7 @@ from rig.status import State
 FOLLOWS: Final[Mapping[State, frozenset[State]]] = MappingProxyType(
     {
         State.IDLE: frozenset({State.ARMING}),
-        State.ARMING: frozenset({State.ARMED, State.FAULT, State.DISARMING}),
+        State.ARMING: frozenset({State.ARMED, State.RECORDING, State.FAULT, State.DISARMING}),
         State.ARMED: frozenset({State.RECORDING, State.FAULT, State.DISARMING}),
         State.RECORDING: frozenset({State.ARMED, State.FAULT}),
         State.DISARMING: frozenset({State.IDLE}),

@@ -233,7 +233,7 @@ class Supervisor:
                 self._machine.move(State.IDLE)
             elif not self._session.busy:
                 self._session.begin_take_down(keep_hill=False)
-        elif self._wanted and not self._session.busy and self._fault.may_try:
+        elif self._wanted and not self._session.busy and self._fault.may_try and self.recordings.may_restart:
             processes = self._session.processes
             if processes is None or processes.recorder_died:
                 self._begin_arming()
@@ -241,6 +241,7 @@ class Supervisor:
                     self._session.begin_set_up()
                 else:
                     processes.restart_recorder()
+                    self.recordings.go_on()
 
     def _begin_arming(self) -> None:
         if self._machine.state is not State.ARMING:
@@ -299,8 +300,10 @@ class Supervisor:
 
     def _rig_failed(self, error: SvevError) -> None:
         """Handle that setting up failed or that the recorder died: try again later, or end if not `enduring`."""
-        text = self._fault.fail(error, time.monotonic() - self._settling.began)
-        self.recordings.fail(error, State.FAULT)
+        final = self.recordings.interrupt(error) if self._enduring and self._wanted else error
+        text = self._fault.fail(error, time.monotonic() - self._settling.began, hurry=final is None)
+        if final is not None:
+            self.recordings.fail(final, State.FAULT)
         if not self._enduring:
             self.failure, self._ending_by = self._fault.cause or error, time.monotonic()
             return

@@ -115,28 +115,6 @@ def test_a_killed_grabber_comes_back(tmp_path: Path, loopback: Loopback, fault_t
     fault_table.tell("Processes", "kill -9 of a grabber of the service", lost=lost, said=said)
 
 
-def test_a_killed_recorder_ends_the_recording_and_the_rig_is_armed_again(
-    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
-) -> None:
-    with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
-        service.arm()
-        recording = service.post("/api/recordings", {})
-        service.await_pulses(20)
-        os.kill(service.pids()["recorder"], signal.SIGKILL)
-        service.await_state("fault", "arming")
-        status = service.await_state("armed")
-        assert status["notice"]["code"] == "recording_ended"
-        assert recording["id"] in status["notice"]["text"]
-        found = service.get(f"/api/recordings/{recording['id']}")
-        assert found["state"] == "unfinished"
-        assert found["counts"]["pulses"] > 0
-        again = service.post("/api/recordings", {"duration_s": 0.5})
-        assert service.await_state("armed")["statement"]["code"] in {"state_armed", "state_armed_partly"}
-        assert service.get(f"/api/recordings/{again['id']}")["state"] == "finished"
-    said, lost = status["notice"]["text"], "those from then on; the next recording is whole"
-    fault_table.tell("Processes", "kill -9 of the recorder of the service", lost=lost, said=said)
-
-
 def test_a_killed_service_leaves_a_whole_log_and_no_process(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:

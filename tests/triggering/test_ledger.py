@@ -155,3 +155,21 @@ def test_memory_does_not_grow_with_the_pulses(every: int) -> None:
         tracemalloc.stop()
     assert grown < 40_000, f"{grown} bytes for 40 000 pulses"
     assert ledger.partial == 80_000 // every
+
+
+@pytest.mark.parametrize("known_first", [True, False])
+def test_pulses_between_two_logs_of_a_recording_are_counted_and_not_taken_for_unreadable(known_first: bool) -> None:
+    ledger, begin = Ledger(), START + 119 * PERIOD  # the log before this one ends with pulse 119
+    if known_first:
+        ledger.follows(PulseNumber(119))
+    for pulse in range(172, 232):
+        ledger.add(tag_at(pulse, START + pulse * PERIOD, [pulse, pulse, pulse]))
+    if not known_first:  # the session record of a damaged log may be found late
+        assert ledger.missing == [(1, 171)]
+        ledger.follows(PulseNumber(119))
+    ledger.lasted(UtcNs(begin), UtcNs(START + 231 * PERIOD), PERIOD)
+    (gap,) = ledger.pauses()
+    assert (gap.after_pulse, gap.before_pulse, gap.pulses, gap.between_logs) == (119, 172, 52, True)
+    assert gap.seconds == pytest.approx(53 * PERIOD / NS_PER_S)
+    assert gap.in_words().startswith("pulses 120-171 are in no log")
+    assert (ledger.missing, ledger.whole) == ([], False)

@@ -23,6 +23,8 @@ export const statements = {
   recording_continued: ["opptaket {recording} fortsetter i {log}: {reason}", "se etter disken før neste opptak"],
   recording_ended: ["opptaket {recording} tok slutt for tidlig: {reason}", "det som ble tatt opp til da, er tatt vare på; se hva opptaket sier"],
   recording_forgotten: ["opptaket {recording} tok slutt av seg selv etter {longest_s} s: ingen hadde stoppet det", "det som ble tatt opp, er tatt vare på; recorder.longest_s i riggfilen sier hvor lenge"],
+  recording_resumed: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: pulsene {first} til {last} mangler, {seconds} s", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
+  recording_resumed_whole: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: ingen puls mangler", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
   process_restarted: ["{process} ble startet på nytt {restarts} ganger", "skjer det igjen, sjekk riggen"],
 
   camera_off: ["riggen er ikke gjort klar"],
@@ -38,6 +40,7 @@ export const statements = {
   verdict_partial_disk: ["{partial} av {pulses} pulser mangler et bilde", "Disken var for treg: {disk}"],
   verdict_paused: ["{pulses} pulser, alle komplette, men i {paused_s} s kom det ingen", "Se på triggeren og på hva kameraene meldte da: svev verify sier når"],
   verdict_partial_paused: ["{partial} av {pulses} pulser mangler et bilde, og i {paused_s} s kom det ingen", "Se på triggeren og på hva kameraene meldte da: svev verify sier når"],
+  verdict_continued: ["Fortsetter {before}: {unrecorded} pulser er ikke i noen av delene, {paused_s} s; av {pulses} pulser mangler {partial} et bilde", "Se på begge delene; svev verify sier hva som mangler"],
   verdict_empty: ["Det kom ingen puls", "Se på triggeren"],
   verdict_forgotten: ["Tok slutt av seg selv etter {longest_s} s, fordi ingen hadde stoppet det; {partial} av {pulses} pulser mangler et bilde"],
   verdict_unfinished: ["Ble aldri avsluttet; {pulses} pulser kan leses", "svev recover lager en ordentlig logg av den"],

@@ -83,6 +83,7 @@
  * @property {boolean} deleted
  * @property {boolean} favourite
  * @property {string[]} tags
+ * @property {string} continues id of the recording of which this is the next part
  *
  * @typedef {object} Trash
  * @property {number} recordings

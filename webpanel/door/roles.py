@@ -21,7 +21,7 @@ class Role(StrEnum):
 READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Calls that change something and are not the operator's: what is deleted and restored, and the rig itself.
 _ADMINISTERING: Final = (
-    re.compile(r"DELETE /api/(recordings|trash)(/.*)?"),
+    re.compile(r"DELETE /api/(recordings|trash)(/[^/]*)?"),
     re.compile(r"POST /api/recordings/[^/]+/restore"),
     re.compile(r"[A-Z]+ /api/(rig|service)(/.*)?"),
 )
@@ -35,6 +35,8 @@ _ACTS: Final = (
     (r"POST /api/recordings/([^/]+)/restore", "restored recording {}"),
     (r"DELETE /api/trash", "emptied the trash"),
     (r"DELETE /api/trash/([^/]+)", "removed recording {} for good"),
+    (r"PUT /api/recordings/([^/]+)/notes/.*", "noted something in recording {}"),
+    (r"DELETE /api/recordings/([^/]+)/notes/.*", "removed a note of recording {}"),
     (r"POST /api/recordings/([^/]+)/exports?", "asked for an export of recording {}"),
     (r"DELETE /api/exports/[^/]+", "ended or removed an export"),
     (r"[A-Z]+ /api/next-jumper(?:/.*)?", "edited the next jumper"),

@@ -203,6 +203,7 @@ CALLS = [
     ("PATCH", "/api/next-jumper", Role.OPERATE),
     ("POST", "/api/recordings", Role.OPERATE),
     ("PATCH", "/api/recordings/jump", Role.OPERATE),
+    ("DELETE", "/api/recordings/jump/notes/1", Role.OPERATE),
     ("DELETE", "/api/recordings/jump", Role.ADMINISTER),
     ("POST", "/api/recordings/jump/restore", Role.ADMINISTER),
     ("DELETE", "/api/trash", Role.ADMINISTER),

@@ -72,6 +72,6 @@ function show(id, shown) {
   $("notes").replaceChildren(...notes.map(({ pulse, text }) => make(
     "li", {},
     make("button", { type: "button", class: "note", onclick: () => showPulse(pulse) }, make("b", {}, String(pulse)), make("span", {}, text)),
-    make("button", { type: "button", class: "square", "aria-label": t("note.remove", { pulse }), onclick: () => void remove(pulse) }, icon("close")),
+    make("button", { type: "button", class: "square", "data-needs": "operate", "aria-label": t("note.remove", { pulse }), onclick: () => void remove(pulse) }, icon("close")),
   )));
 }

@@ -98,7 +98,8 @@ class Recording:
 
     def _begin(self, order: StartRecording) -> None:
         back = order.preroll_s
-        self.commanded = host_now() if order.goes_on is None else order.goes_on.commanded
+        given = host_now() if order.commanded is None else order.commanded
+        self.commanded = given if order.goes_on is None else order.goes_on.commanded
         self.begin = HostNs(0 if back is None else self.commanded - round(back * NS_PER_S))
         self._end = self._planned_end()
         self._since_command = 0

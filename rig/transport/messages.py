@@ -128,6 +128,7 @@ class StartRecording(Message):
         pulses: stop after so many, counted from the command; None: until told.
         seconds: stop so long after the command even if fewer pulses came; None: until told.
         nobody_stops: `seconds` are over only if nobody stops the recording; its log says so then.
+        commanded: when the command was given; None: when it arrives.
         preroll_s: begin so long before the command, as far as pulses are held; None: with the oldest that is held.
         keep_s: so long after the command its pulses are held in memory too, for a stop that keeps them.
         rig_toml: the rig file as it was read, attached to the log.
@@ -140,6 +141,7 @@ class StartRecording(Message):
     pulses: int | None = None
     seconds: float | None = None
     nobody_stops: bool = False
+    commanded: HostNs | None = None
     preroll_s: float | None = 0.0
     keep_s: float = 0.0
     rig_toml: str = ""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from rig.clocks import NS_PER_S, host_now
+from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import (
     BadInputError,
     ProcessDiedError,
@@ -118,12 +118,14 @@ class RecordingControl:
         check_room_for(self._rig, self._data, length_s)
         path, longest_s = self._new_path(), self._rig.recorder.longest_s
         session, more = self._jumpers.take(path.stem, order)
+        now = host_now()
         start = StartRecording(
             path=path,
             session={name: text for name, text in (more | session.model_dump()).items() if text},
             seconds=longest_s if order.duration_s is None else order.duration_s,
             nobody_stops=order.duration_s is None,
-            preroll_s=self._reach_s(order),
+            commanded=now,
+            preroll_s=self._reach_s(order, now),
             keep_s=CONFIRM_S,
         )
         self.begin(start, session, opened)
@@ -167,9 +169,9 @@ class RecordingControl:
                 f"{self._data}: cannot be written; correct its permissions, or start the service with another --data"
             ) from None
 
-    def _reach_s(self, order: RecordingOrder) -> float:
+    def _reach_s(self, order: RecordingOrder, now: HostNs) -> float:
         """How far a recording begins in the past: not before the rig was armed, when cameras were missing."""
-        armed_s = time.monotonic() - self.armed_at
+        armed_s = now / NS_PER_S - self.armed_at
         return armed_s if order.preroll_s is None else min(order.preroll_s, armed_s)
 
     def stop(

@@ -3,11 +3,12 @@
 import re
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, TimeoutError, expect
 
 from rig.status import State
 from tests.browser.conftest import Open
 from tests.browser.test_page import READY, enter, jumps
+from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
 
@@ -123,5 +124,17 @@ def test_a_phone_shows_one_camera_large_and_swiping_shows_the_others(
             touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": at[1]}]})
         touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
         expect(shown).to_have_text([camera])
-    page.locator("#preview .block:visible").tap()
+    # On a busy machine the browser may take a tap for a long press, which does nothing.
+    wait_until(lambda: _tapped(page), "all cameras are shown", timeout_s=30)
     expect(shown).to_have_text(["K1", "K2", "K3"])
+
+
+def _tapped(page: Page) -> bool:
+    """Whether a tap on the one camera that is shown shows all of them."""
+    shown = page.locator("#preview .block:visible")
+    shown.first.tap()
+    try:
+        shown.nth(2).wait_for(timeout=1000)
+    except TimeoutError:
+        return False
+    return True

@@ -299,6 +299,29 @@ def test_a_second_tap_is_said_beside_the_button_and_a_long_press_stops(
     expect(page.locator("#snacks [data-level=error]")).to_have_count(0)
 
 
+def test_a_long_press_stops_at_any_time_wherever_the_button_goes_and_its_end_is_no_tap(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page(panel.url)
+    button = page.locator("#next-step")
+    expect(button).to_be_enabled()
+    button.click()
+    expect(button).to_have_text("Stophold to stop")
+    expect(button).to_have_text("Stop")
+    button.hover()
+    page.mouse.down()
+    button.evaluate("element => element.style.translate = '0 300px'")
+    expect(page.locator("#state-word")).to_have_text("Armed")
+    button.evaluate("element => element.style.translate = ''")
+    expect(button).to_be_enabled()
+    page.mouse.up()
+    button.click()
+    expect(page.locator("#state-word")).to_have_text("Recording")
+    expect(page.locator("#action-reason")).to_be_hidden()
+    assert len(service.catalogue.entries()) == 2
+
+
 def test_no_camera_is_not_green_and_old_news_hides_nothing_new(
     panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:

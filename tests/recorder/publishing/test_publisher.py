@@ -139,11 +139,14 @@ def test_a_subscriber_that_stands_still_blocks_nobody(loopback: Loopback, buffer
 
 def _arrives(publisher: Publisher, buffers: TripletBuffers, sub: "zmq.Socket[bytes]") -> bool:
     _publish(publisher, buffers, 0)
-    if not sub.poll(50):
-        return False
-    while sub.poll(50):
-        sub.recv_multipart()
-    return True
+    return bool(sub.poll(50))
+
+
+def _next_pulse(sub: "zmq.Socket[bytes]") -> int:
+    """The next pulse that is none of those by which the connection was tried."""
+    while not (pulse := _pulse(sub.recv_multipart())):
+        pass
+    return pulse
 
 
 def test_when_too_many_slots_are_out_triplets_are_dropped_and_counted(loopback: Loopback) -> None:

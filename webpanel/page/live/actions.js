@@ -44,7 +44,7 @@ export function startActions() {
   $("next-step").addEventListener("click", nextStep);
   $("save-last").addEventListener("click", saveLast);
   $("disarm").addEventListener("click", disarm);
-  onLongPress($("next-step"), () => stopsByLongPress() && possible(), () => void perform("actions.stopping", () => stop(true)));
+  onLongPress($("next-step"), () => known.status?.state === "recording" && possible(), () => void perform("actions.stopping", () => stop(true)));
   startTaps(draw);
   watch(draw);
 }

@@ -69,16 +69,24 @@ function left(until) {
  */
 export function onLongPress(button, wanted, done) {
   let timer = 0;
+  let fired = false;
   const end = () => {
     clearTimeout(timer);
     button.classList.remove("pressed");
   };
-  button.addEventListener("pointerdown", () => {
+  button.addEventListener("pointerdown", (event) => {
     end();
+    fired = false;
     if (!wanted()) return;
+    // What appears or goes above the button must not move it away from the finger.
+    button.setPointerCapture(event.pointerId);
     button.classList.add("pressed");
-    timer = setTimeout(() => { end(); done(); }, LONG_PRESS_MS);
+    timer = setTimeout(() => { end(); fired = true; done(); }, LONG_PRESS_MS);
   });
-  for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) button.addEventListener(name, end);
+  for (const name of ["pointerup", "pointercancel", "blur"]) button.addEventListener(name, end);
+  button.addEventListener("click", (event) => {
+    if (fired) event.stopImmediatePropagation(); // the end of the long press is no tap on the next step
+    fired = false;
+  }, { capture: true });
   button.addEventListener("contextmenu", (event) => event.preventDefault()); // a phone's menu for a long press
 }

@@ -3,7 +3,8 @@
 import re
 
 import pytest
-from playwright.sync_api import Locator, Page, TimeoutError, expect
+from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import TimeoutError as NotInTimeError
 
 from rig.status import State
 from tests.browser.conftest import Open
@@ -135,6 +136,6 @@ def _tapped(page: Page) -> bool:
     shown.first.tap()
     try:
         shown.nth(2).wait_for(timeout=1000)
-    except TimeoutError:
+    except NotInTimeError:
         return False
     return True

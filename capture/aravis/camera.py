@@ -11,10 +11,13 @@ from collections.abc import Collection, Mapping, Sequence
 
 import gi
 
+from capture.aravis.clock import CameraClock
+from capture.aravis.configuration import configure
+from capture.aravis.features import Features
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
 from capture.seam import Arrival
-from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
+from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.settings.model import CameraSettings, NetworkSettings
 from rig.transport.ring import CameraRing
@@ -26,12 +29,7 @@ from gi.repository import Aravis, GLib  # noqa: E402  (the version must be requi
 for _interface in ("USB3Vision", "Fake"):
     Aravis.disable_interface(_interface)
 
-# GigE Vision bootstrap registers (GigE Vision 2.0, section 28)
-_TIMESTAMP_FREQUENCY_HIGH, _TIMESTAMP_FREQUENCY_LOW = 0x093C, 0x0940
-_TIMESTAMP_CONTROL, _LATCH = 0x0944, 2
-_TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0948, 0x094C
-
-_STREAM_SOURCE_PORT = 0x0D1C
+_STREAM_SOURCE_PORT = 0x0D1C  # GigE Vision 2.0, section 28
 _IDS_16_BIT = 65535
 _RETENTION_US = 50_000  # enough to ask for lost packets several times and to receive them
 # How many empty buffers stand in Aravis's queue: half a second of frames, but no more than stay in the cache.
@@ -70,8 +68,9 @@ class AravisCamera:
                 raise _controlled_error(settings, "no control")
             filter_control(sockets, self._camera_host())
             self._device.connect("control-lost", self._on_control_lost)
+            self._features = Features(self._device)
             self._configure(settings, network)
-            self._tick_hz = self._timestamp_frequency()
+            self._clock = CameraClock(settings.name, self._device, self._features)
             self._stream = self._open_stream(network)
         except GLib.Error as error:
             self.close()
@@ -121,21 +120,16 @@ class AravisCamera:
             self._ring.return_slot(slot)
             return Arrival(whole=False, host_time=now)
         self._frame_came = True
+        frame_id = buffer.get_frame_id()
+        if frame_id > _IDS_16_BIT:
+            self._id_modulus = 0  # its ids are long, without a feature that says so
         return Arrival(
-            True, now, slot, buffer.get_frame_id(), self._id_modulus, DeviceNs(buffer.get_timestamp())
+            True, now, slot, frame_id, self._id_modulus, DeviceNs(buffer.get_timestamp())
         )  # fmt: skip
 
     def latch(self) -> ClockLatch:
-        """Read both clocks; the round trip is that of the register write that latches the device clock."""
-        try:
-            before = host_now()
-            self._device.write_register(_TIMESTAMP_CONTROL, _LATCH)
-            after = host_now()
-            ticks = self._read(_TIMESTAMP_HIGH) << 32 | self._read(_TIMESTAMP_LOW)
-        except GLib.Error as error:
-            raise CameraError(f"camera {self._name} does not tell its time: {error.message}") from None
-        device = DeviceNs(ticks * NS_PER_S // self._tick_hz)
-        return ClockLatch(device, HostNs((before + after) // 2), after - before)
+        """See `capture.aravis.clock.CameraClock.latch`."""
+        return self._clock.latch()
 
     def counters(self) -> Mapping[str, int]:
         """Aravis's own counters of the stream, and the temperature if the camera has a sensor."""
@@ -173,7 +167,9 @@ class AravisCamera:
             pass
         if "_source" in self.__dict__:
             self._source.close()
-        for name in ("_source", "_stream", "_device", "_camera"):
+        if "_features" in self.__dict__:
+            self._features.close()  # an error that is still shown refers to them
+        for name in ("_source", "_stream", "_clock", "_features", "_device", "_camera"):
             self.__dict__.pop(name, None)
         self._buffers.clear()
         self._of_slot.clear()
@@ -183,25 +179,14 @@ class AravisCamera:
         self._lost = True
 
     def _configure(self, settings: CameraSettings, network: NetworkSettings) -> None:
-        """Set everything that must be set before the stream is made, in the order that cameras accept."""
-        camera, region = self._camera, settings.region
-        camera.set_region(region.x, region.y, region.width, region.height)
-        camera.set_pixel_format_from_string(settings.pixel_format)
-        camera.gv_set_packet_size(network.packet_size)
+        """Set everything that must be set before the stream is made."""
+        # No local names for Aravis objects: the traceback of an error would keep the camera's sockets open.
+        self._notices += configure(self._features, settings)
+        self._camera.gv_set_packet_size(network.packet_size)
         if self._plain_socket:
-            camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
-        camera.set_trigger(settings.trigger_input)
-        edge = {"rising": "RisingEdge", "falling": "FallingEdge"}[settings.trigger_edge]
-        self._device.set_string_feature_value("TriggerActivation", edge)
-        camera.set_exposure_mode(Aravis.ExposureMode.TIMED)
-        camera.set_exposure_time(settings.exposure_us)
-        if camera.is_gain_available():
-            camera.set_gain(settings.gain_db)
-        self._id_modulus = _IDS_16_BIT
-        if self._device.is_feature_available("GevGVSPExtendedIDMode"):
-            self._device.set_string_feature_value("GevGVSPExtendedIDMode", "On")
-            self._id_modulus = 0
-        payload = camera.get_payload()
+            self._camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
+        self._id_modulus = 0 if self._features.switch("GevGVSPExtendedIDMode", on=True) else _IDS_16_BIT
+        payload = self._camera.get_payload()
         if payload != self._ring.frame_bytes:
             raise CameraError(
                 f"camera {self._name} sends {payload} bytes per frame, the rig file's region makes "
@@ -267,15 +252,6 @@ class AravisCamera:
 
     def _read(self, register: int) -> int:
         return int(self._device.read_register(register))
-
-    def _timestamp_frequency(self) -> int:
-        frequency = self._read(_TIMESTAMP_FREQUENCY_HIGH) << 32 | self._read(_TIMESTAMP_FREQUENCY_LOW)
-        if frequency == 0:
-            raise CameraError(
-                f"camera {self._name} has no clock (timestamp frequency 0), so its frames cannot be tied to pulses: "
-                "use another camera or its newest firmware"
-            )
-        return frequency
 
 
 def _opening_error(settings: CameraSettings, error: GLib.Error) -> CameraError | CameraNotFoundError:

@@ -18,6 +18,7 @@ from simrig.gige.imaging.sensor import Sensor
 from simrig.gige.imaging.transmitter import Transmitter
 from simrig.gige.protocol.link import Link
 from simrig.gige.registers.genicam import describe
+from simrig.gige.registers.makers import DIALECTS, Maker, registers_of
 from simrig.gige.registers.register_map import RegisterMap
 from simrig.gige.registers.register_table import MIN_WIDTH, XML_ADDRESS, Identity, all_registers
 from simrig.images.painter import Painter
@@ -51,6 +52,7 @@ class CameraConfig(StrictModel):
     first_block_id: int = Field(1, ge=1, lt=1 << 63, description="block id of the first frame after each start")
     tick_hz: int = Field(1_000_000_000, ge=1000, le=10_000_000_000, description="ticks of the device clock per second")
     resend: bool = Field(True, description="whether the camera can send lost packets again")
+    maker: Maker = Field(Maker.STANDARD, description="whose features the camera has")
     broadcast: str | None = Field(None, description="broadcast address for discovery, e.g. 127.255.255.255")
     ptp_offset_ns: int = Field(description="time of the PTP master minus host time, ns")
 
@@ -122,8 +124,9 @@ def _registers(config: CameraConfig) -> RegisterMap:
     address = int(ipaddress.IPv4Address(config.address))
     sensor = (config.width, config.height)
     identity = Identity(f"SIM-{address & 0xFFFFFF:06X}", config.name, address, sensor, config.tick_hz, config.resend)
-    xml = describe(all_registers(identity, 0))
-    return RegisterMap(all_registers(identity, len(xml)), {XML_ADDRESS: xml})
+    maker = config.maker
+    xml = describe(registers_of(maker, all_registers(identity, 0)), DIALECTS[maker])
+    return RegisterMap(registers_of(maker, all_registers(identity, len(xml))), {XML_ADDRESS: xml})
 
 
 def _clock(config: CameraConfig, scenario: Scenario, index: int) -> CameraClock:

@@ -19,6 +19,7 @@ from simrig.firewire.firewire_bus import BusState
 from simrig.firewire.host import wire
 from simrig.firewire.host.build import shim
 from simrig.gige.camera import CameraConfig
+from simrig.gige.registers.makers import Maker
 from simrig.programs.cameras import START_S, CameraProcess, HillCamera
 from simrig.programs.messages import AskBusState, BusConfig, Done, FireWireBus, GigeCamera, ResetBus, State
 from simrig.world.faults import OF_THE_CAMERA, Fault, FaultKind
@@ -39,6 +40,7 @@ class GigeOptions(TypedDict, total=False):
     first_block_id: int
     tick_hz: int
     resend: bool
+    maker: Maker
     broadcast: str | None
 
 

@@ -167,6 +167,8 @@ class Device:
         }.items():
             write(name, _command(command))
         clock, sensor = self._clock, self._sensor
+        if "TimestampLatch" in self._registers:
+            write("TimestampLatch", _command(self._latch_clock))
         read("PayloadSize", lambda: self._registers.number("Width") * self._registers.number("Height"))
         read("PtpStatus", lambda: clock.ptp_status(host_now()))
         read("CounterValue", lambda: sensor.trigger_count)
@@ -199,6 +201,11 @@ class Device:
     def _write_ptp_enable(self, value: Value) -> Value:
         self._clock.enable_ptp(bool(value), host_now())
         return value
+
+    def _latch_clock(self) -> None:
+        """Latch as cameras do that have a command for it: in ns."""
+        ticks, tick_hz = self._clock.ticks(host_now()), self._registers.number("GevTimestampTickFrequency")
+        self._registers.set("TimestampLatchValue", ticks * NS_PER_S // tick_hz)
 
     def _latch_ptp(self) -> None:
         self._registers.set("PtpOffsetFromMaster", self._clock.ptp_offset_ns(host_now()))

@@ -4,12 +4,13 @@ Names of features are those of the Standard Features Naming Convention.
 """
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from xml.etree import ElementTree as ET
 
 from simrig.gige.protocol.gvsp import MONO8
+from simrig.gige.registers.makers import Dialect
 from simrig.gige.registers.register_map import WORD, Kind, Register
 from simrig.gige.registers.register_table import (
     CLOCK_RESET,
@@ -160,9 +161,38 @@ _ROOT = {
 }  # fmt: skip
 
 
-def describe(registers: Sequence[Register]) -> bytes:
-    """The XML document for a camera with these registers, padded with line ends to a multiple of 4 bytes."""
-    features = _features(registers)
+def _of_the_maker(features: Sequence[Feature], dialect: Dialect, named: Mapping[str, Register]) -> Iterator[Feature]:
+    """The features of a maker's cameras."""
+    for feature in features:
+        if feature.name in dialect.without:
+            continue
+        entries = dialect.entries.get(feature.name)
+        yield replace(
+            feature,
+            name=dialect.names.get(feature.name, feature.name),
+            entries=feature.entries if entries is None else _numbered(entries),
+            maximum=_reachable(feature.maximum, dialect.without),
+        )
+    for extra in dialect.extra:
+        node = Node.FLOAT if extra.real else Node.ENUMERATION if extra.entries else Node.INTEGER
+        node = Node.COMMAND if extra.command else Node.BOOLEAN if extra.boolean else node
+        yield Feature(extra.name, node, _ACQUISITION, named[extra.name], entries=_numbered(extra.entries))
+
+
+def _numbered(entries: Sequence[str]) -> tuple[tuple[str, int], ...]:
+    return tuple((entry, number) for number, entry in enumerate(entries))
+
+
+def _reachable(formula: str, without: frozenset[str]) -> str:
+    """A formula without what the camera does not have: no offset, so the whole sensor."""
+    names = formula.split("-")
+    return names[0] if without.intersection(names) else formula
+
+
+def describe(registers: Sequence[Register], dialect: Dialect) -> bytes:
+    """The XML document for a maker's camera with these registers, padded with line ends to a multiple of 4 bytes."""
+    named = {register.name: register for register in registers}
+    features = list(_of_the_maker(_features(registers), dialect, named))
     root = ET.Element("RegisterDescription", _ROOT)
     categories = dict.fromkeys(feature.category for feature in features)
     _category(root, "Root", categories)

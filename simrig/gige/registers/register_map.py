@@ -135,6 +135,9 @@ class RegisterMap:
         """Ask `hook` for the value when a controller reads the register."""
         self._read_hooks[name] = hook
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._named
+
     def address(self, name: str) -> int:
         """Address of a register."""
         return self._named[name].address

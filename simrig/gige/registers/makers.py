@@ -1,0 +1,187 @@
+"""What cameras of different makers have and what they call it, from their public feature references.
+
+A simulated camera has all features of the naming convention (SFNC); as a camera of a maker it has others instead.
+Sources: Basler ace GigE (Product Documentation, "Features"), FLIR Blackfly S (Technical Reference), Hikrobot area scan
+cameras (GigE user manual), Allied Vision Manta and Mako ("GigE Features Reference"), JAI Go series (user manual),
+The Imaging Source 33G ("GigE property reference").
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Final
+
+from simrig.gige.registers.register_map import Kind, Register
+
+
+class Maker(StrEnum):
+    """Whose features a simulated camera has."""
+
+    STANDARD = "standard"
+    BASLER = "basler-ace"
+    FLIR = "flir-blackfly-s"
+    HIKROBOT = "hikrobot"
+    ALLIED_VISION = "allied-vision-manta"
+    JAI = "jai-go"
+    IMAGING_SOURCE = "imaging-source-33g"
+
+
+@dataclass(frozen=True, slots=True)
+class Extra:
+    """A feature beyond those of the standard camera.
+
+    Attributes:
+        default: value after a restart; for an enumeration the number of its entry.
+        entries: of an enumeration, numbered from 0; empty: it is a number, or a command if `command`.
+        real: whether the number is a float.
+        command: whether it is a command.
+        boolean: whether it is a boolean.
+        maximum: of a number.
+    """
+
+    name: str
+    default: float = 0
+    entries: tuple[str, ...] = ()
+    real: bool = False
+    boolean: bool = False
+    command: bool = False
+    maximum: float = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """Features of a maker's cameras.
+
+    Attributes:
+        names: the maker's name by standard name.
+        without: standard features that these cameras do not have.
+        entries: names of an enumeration's values, in their order.
+        extra: further features.
+        latch_register: whether the bootstrap register latches the clock.
+    """
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    without: frozenset[str] = frozenset()
+    entries: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    extra: tuple[Extra, ...] = ()
+    latch_register: bool = True
+
+
+_AUTO: Final = ("Off", "Once", "Continuous")
+_CONTINUOUS: Final = 2
+_SHORT_IDS: Final = frozenset({"GevGVSPExtendedIDMode"})
+_COUNTERS: Final = frozenset({"CounterValue", "CounterReset"})
+#: An entry's place is its value, so the first input is the one that the trigger cable is plugged into.
+
+DIALECTS: Final[Mapping[Maker, Dialect]] = {
+    Maker.STANDARD: Dialect(),
+    Maker.BASLER: Dialect(
+        names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
+        without=_SHORT_IDS | _COUNTERS | {"Gain", "PtpEnable", "PtpStatus", "DeviceTemperature"},
+        entries={
+            "TriggerSelector": ("FrameStart", "AcquisitionStart"), "TriggerSource": ("Line1", "Line3", "Software"),
+        },
+        extra=(
+            Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
+            Extra("GainSelector", 0, ("All",)), Extra("GainRaw", 40, maximum=500),
+            Extra("TriggerDelayAbs", 100.0, real=True), Extra("AcquisitionFrameCount", 5, maximum=255),
+            Extra("ExposureTimeRaw", 2000), Extra("TestImageSelector", 1, ("Off", "Testimage1")),
+            Extra("LineSelector", 0, ("Line1", "Out1")), Extra("LineDebouncerTimeAbs", 10.0, real=True),
+        ),
+    ),
+    Maker.FLIR: Dialect(
+        without=_COUNTERS | {"PtpEnable", "GevTimestampControlLatch", "GevTimestampControlReset"},
+        entries={
+            "TriggerSelector": ("AcquisitionStart", "FrameStart", "FrameBurstStart"),
+            "TriggerSource": ("Line0", "Line1", "Software", "Action0"),
+        },
+        extra=(
+            Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
+            Extra("GammaEnable", 1, boolean=True), Extra("TriggerOverlap", 0, ("Off", "ReadOut")),
+            Extra("TriggerDelay", 29.0, real=True), Extra("ReverseX", 1, boolean=True),
+            Extra("BinningHorizontal", 2, maximum=4), Extra("BinningVertical", 2, maximum=4),
+            Extra("TimestampLatch", command=True), Extra("TimestampLatchValue"),
+            Extra("DeviceLinkThroughputLimitMode", 1, ("Off", "On")),
+        ),
+        latch_register=False,
+    ),
+    Maker.HIKROBOT: Dialect(
+        without=_SHORT_IDS | _COUNTERS | {"PtpEnable", "GevIEEE1588", "GevIEEE1588Status", "AcquisitionFrameRate"},
+        entries={"TriggerSelector": ("FrameBurstStart",), "TriggerSource": ("Line0", "Line2", "Software")},
+        extra=(
+            Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
+            Extra("AcquisitionBurstFrameCount", 3, maximum=1023), Extra("TriggerDelay", 0.0, real=True),
+            Extra("LineSelector", 0, ("Line0", "Line1")), Extra("LineMode", 0, ("Input", "Strobe")),
+            Extra("LineDebouncerTime", 50), Extra("GammaEnable", 0, boolean=True),
+        ),
+    ),
+    Maker.ALLIED_VISION: Dialect(
+        names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
+        without=_COUNTERS | {"AcquisitionFrameRateEnable", "PtpEnable", "OffsetX", "OffsetY"},
+        entries={
+            "TriggerSelector": ("FrameStart", "AcquisitionStart", "AcquisitionEnd"),
+            "TriggerSource": ("Line1", "Line2", "Software", "Freerun"),
+        },
+        extra=(
+            Extra("ExposureAuto", _CONTINUOUS, ("Off", "Once", "Continuous", "Other")),
+            Extra("GainAuto", _CONTINUOUS, _AUTO), Extra("GainSelector", 0, ("All",)),
+            Extra("TriggerDelayAbs", 0.0, real=True), Extra("TriggerOverlap", 0, ("Off", "PreviousFrame")),
+        ),
+    ),
+    Maker.JAI: Dialect(
+        without=_COUNTERS | {"TriggerActivation", "AcquisitionFrameRateEnable", "PtpEnable", "GevIEEE1588"},
+        entries={
+            "ExposureMode": ("Timed", "TriggerWidth", "Off"),
+            "TriggerSource": ("Line5", "Line6", "Software", "PulseGenerator0"),
+        },
+        extra=(Extra("GainAuto", 0, _AUTO), Extra("TestPattern", 1, ("Off", "GreyHorizontalRamp"))),
+    ),
+    Maker.IMAGING_SOURCE: Dialect(
+        names={"ExposureTime": "Exposure"},
+        without=_SHORT_IDS | _COUNTERS | {"ExposureMode", "TriggerSelector", "PtpEnable", "GevIEEE1588"},
+        entries={"TriggerSource": ("Any",)},
+        extra=(Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO)),
+    ),
+}  # fmt: skip
+
+_BASE, _STEP = 0x11000, 8
+
+
+def registers_of(maker: Maker, standard: Sequence[Register]) -> list[Register]:
+    """Registers of a maker's cameras, made from those of the standard one."""
+    dialect = DIALECTS[maker]
+    extra = [_register(each, _BASE + _STEP * place) for place, each in enumerate(dialect.extra)]
+    return [*(_as_made(register, dialect) for register in standard), *extra]
+
+
+def _as_made(register: Register, dialect: Dialect) -> Register:
+    if register.name == "GevTimestampControl" and not dialect.latch_register:
+        return replace(register, writable=False)
+    if register.name == "AcquisitionFrameRateEnable" and register.name in dialect.without:
+        return replace(register, default=0)  # such a camera takes every pulse
+    if register.choices and register.name in dialect.entries:
+        return replace(register, choices=tuple(range(len(dialect.entries[register.name]))))
+    return register
+
+
+def _register(extra: Extra, address: int) -> Register:
+    if extra.command:
+        return Register(extra.name, address, writable=True, choices=(1,))
+    if extra.entries or extra.boolean:
+        choices = tuple(range(len(extra.entries) or 2))
+        return Register(extra.name, address, default=int(extra.default), writable=True, choices=choices)
+    if extra.real:
+        return Register(
+            extra.name,
+            address,
+            _STEP,
+            Kind.FLOAT,
+            float(extra.default),
+            writable=True,
+            minimum=0,
+            maximum=extra.maximum,
+        )
+    low = 1 if "Count" in extra.name or "Binning" in extra.name else 0
+    return Register(
+        extra.name, address, _STEP, Kind.UINT, int(extra.default), writable=True, minimum=low, maximum=extra.maximum
+    )

@@ -1,14 +1,23 @@
 """Errors that a person can act on, as a tree that is split by what the caller does next.
 
 Every message is one line that names what is wrong and ends in what to do about it. The command line prints the message
-without a traceback and exits with `exit_code`.
+without a traceback and exits with `exit_code`. Errors that the panel shows are raised with a `Phrase` instead of a
+text, so that it can translate them.
 """
+
+from rig.phrase import Phrase, plain
 
 
 class SvevError(Exception):
     """Base of all errors that a person can act on."""
 
     exit_code = 1
+
+    @property
+    def said(self) -> Phrase:
+        """The message with its code and values, where it has them."""
+        first = self.args[0] if self.args else ""
+        return first if isinstance(first, Phrase) else plain(str(self))
 
 
 class BadInputError(SvevError):

@@ -7,6 +7,7 @@ import msgspec
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from rig.clocks import UtcNs
+from rig.phrase import Phrase, Value
 
 
 class Level(StrEnum):
@@ -19,25 +20,29 @@ class Level(StrEnum):
     FATAL = "fatal"
 
 
-class Event(msgspec.Struct, frozen=True, rename={"time": "time_ns"}):
+class Event(msgspec.Struct, frozen=True, omit_defaults=True, rename={"time": "time_ns"}):
     """Something that happened to the rig or a recording.
 
     Attributes:
         time: when it happened, UTC.
         level: severity.
         name: which part it is about, e.g. "recorder" or "K2".
-        message: one line for people.
+        message: one line for people, in English.
+        code: stable name of the message, by which the panel translates it; empty: it is said in English only.
+        values: names and numbers in the message, for translation.
     """
 
     time: UtcNs
     level: Level
     name: str
     message: str
+    code: str = ""
+    values: dict[str, Value] = {}
 
     @classmethod
-    def now(cls, level: Level, name: str, message: str) -> "Event":
+    def now(cls, level: Level, name: str, said: Phrase) -> "Event":
         """An event of the present moment."""
-        return cls(UtcNs(time.time_ns()), level, name, message)
+        return cls(UtcNs(time.time_ns()), level, name, said.text, said.code, said.values)
 
     def to_protobuf(self) -> bytes:
         """The event as it stands in the log: a serialized `foxglove.Log`."""
@@ -48,7 +53,7 @@ class Event(msgspec.Struct, frozen=True, rename={"time": "time_ns"}):
 
     @classmethod
     def from_protobuf(cls, data: bytes | memoryview) -> "Event":
-        """Read what `to_protobuf` wrote.
+        """Read what `to_protobuf` wrote. Codes and values are not in the log.
 
         Raises:
             google.protobuf.message.DecodeError, ValueError, KeyError: the data is not an event.

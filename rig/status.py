@@ -13,6 +13,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
 
 from rig.frame import FrameStatus
+from rig.phrase import Phrase, Value
 from rig.pulse import PulseNumber
 
 
@@ -61,14 +62,20 @@ class Statement(Model):
         code: stable name of the statement, for translation, e.g. `camera_absent`.
         text: the statement in English, one line.
         advice: what to do about it, empty if nothing.
-        values: names and numbers in the text, for translation, e.g. `{"camera": "K2"}`.
+        values: names and numbers in the text, for translation, e.g. `{"camera": "K2"}`; also sentences with codes of
+            their own, e.g. why a recording ended.
     """
 
     level: Level = Level.INFO
     code: str
     text: str
     advice: str = ""
-    values: dict[str, str | int | float] = {}
+    values: dict[str, Value] = {}
+
+    @property
+    def said(self) -> Phrase:
+        """The statement without its level and advice."""
+        return Phrase(self.code, self.text, self.values)
 
 
 class CameraState(StrEnum):
@@ -367,7 +374,9 @@ class Event(Model):
     time: datetime
     level: Literal["debug", "info", "warning", "error", "fatal"]
     name: str = Field(description="who or what it is about, e.g. `recorder`, `K2`")
-    message: str
+    message: str = Field(description="what happened, in English")
+    code: str = Field("", description="stable name of the message, for translation; empty: there is none")
+    values: dict[str, Value] = Field({}, description="names and numbers in the message, for translation")
 
 
 class TapGuard(Model):
@@ -404,8 +413,10 @@ class Finding(Model):
 
     level: Literal["PASS", "WARN", "FAIL"]
     topic: str
-    what: str
-    remedy: str
+    code: str = Field(description="stable name of the finding, for translation; empty: there is none")
+    what: str = Field(description="what was found, in English")
+    remedy: str = Field(description="what to do about it, in English; empty if nothing")
+    values: dict[str, Value] = Field({}, description="names and numbers in both texts, for translation")
 
 
 class DoctorReport(Model):

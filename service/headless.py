@@ -206,7 +206,8 @@ class HeadlessRig:
 
     def _raise_absent(self, seen: WarmUp) -> None:
         reasons = "; ".join(
-            heard.text or f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
+            heard.said.text
+            or f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
             for camera, heard in zip(self._rig.cameras, seen.cameras or (), strict=True)
             if not heard.present
         )

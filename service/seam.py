@@ -12,6 +12,7 @@ from prometheus_client.metrics_core import Metric
 from rig.export import ExportJob, ExportOrder
 from rig.frame import FrameStatus
 from rig.looking import Moment, Note
+from rig.phrase import Phrase
 from rig.pulse import RigPulse
 from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from rig.status import (
@@ -283,7 +284,7 @@ class RigService(Protocol):
         """The events of the live log with numbers above `after` that are still kept, oldest first."""
         ...
 
-    def tell(self, level: Literal["info", "warning"], name: str, message: str) -> None:
+    def tell(self, level: Literal["info", "warning"], name: str, said: Phrase) -> None:
         """Add an event to the live log and to the service's log."""
         ...
 

@@ -13,6 +13,7 @@ from prometheus_client.metrics_core import Metric
 from recorder.catalogue.folder import Catalogue
 from rig import events
 from rig.errors import StateForbidsError, UnknownRecordingError
+from rig.phrase import Phrase
 from rig.pulse import RigPulse
 from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, State, Status, StopOrder
 from rig.transport.preview import PreviewSlot
@@ -144,9 +145,9 @@ class Service(Archive):
         """The events with numbers above `after` that are still kept, oldest first."""
         return self._supervisor.hub.after(after)
 
-    def tell(self, level: Literal["info", "warning"], name: str, message: str) -> None:
+    def tell(self, level: Literal["info", "warning"], name: str, said: Phrase) -> None:
         """Add an event to the live log and to the service's log."""
-        self._supervisor.hub.tell(events.Event.now(events.Level(level), name, message))
+        self._supervisor.hub.tell(events.Event.now(events.Level(level), name, said))
 
     def listen(self, wake: Callable[[], None]) -> Callable[[], None]:
         """Have `wake` called whenever status or events have changed."""

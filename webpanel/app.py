@@ -61,7 +61,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )  # fmt: skip
     app.state.streams = streams
-    door = Door(access, warn=lambda text: service.tell("warning", "access", text))
+    door = Door(access, warn=lambda said: service.tell("warning", "access", said))
     routers = (
         rig_router(service),
         recordings_router(service, changes),
@@ -79,7 +79,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         app.include_router(router)
     routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
     handle_errors(app, routes)
-    app.add_middleware(Guard, door=door, note=lambda text: service.tell("info", "access", text))
+    app.add_middleware(Guard, door=door, note=lambda said: service.tell("info", "access", said))
     app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
     app.add_middleware(CountRequests, metrics=metrics)
     serve_documentation(app, access)

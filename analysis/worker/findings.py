@@ -11,6 +11,7 @@ from analysis.result.model import MeasuredRecording, Quantity
 from rig.clocks import NS_PER_S, UtcNs
 from rig.events import Level
 from rig.jumper import JumperState
+from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 from rig.status import LastJump, MeasuredValue
 
@@ -43,7 +44,7 @@ class Findings(Protocol):
     def jump(self, jump: MeasuredJump) -> None:
         """A whole jump."""
 
-    def message(self, level: Level, text: str) -> None:
+    def message(self, level: Level, said: Phrase) -> None:
         """Something that people should know, one line."""
 
 

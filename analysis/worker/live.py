@@ -36,6 +36,7 @@ from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
 from rig.frame import FrameStatus
+from rig.phrase import phrase, plain
 from rig.tag import TripletTag
 
 #: A jumper is sought so often, in the candidates of so long a time, and followed once so many pulses show him.
@@ -145,7 +146,8 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             scene, _ = orient_from(static, self._source)
         except (BadInputError, NotSolvableError, NotConvergedError) as error:
             recording.try_again()
-            self._findings.message(Level.ERROR, f"the cameras are not oriented, it is tried again: {error}")
+            text = "the cameras are not oriented, it is tried again: {why}"
+            self._findings.message(Level.ERROR, phrase("event_not_oriented", text, why=error.said))
             return
         self._scene, moved = standing_in(scene)
         self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
@@ -153,7 +155,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         if said != self._said:
             self._said = said
             for message in said:
-                self._findings.message(Level.INFO, message)
+                self._findings.message(Level.INFO, plain(message))
         while recording.waiting and (finder := self._finder) is not None:
             self._measure(recording, finder, *recording.waiting.popleft())
 
@@ -185,7 +187,8 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recording.watched = tag.pulse
         if moves := self._watch.moves():
             for move in moves:
-                self._findings.message(Level.WARNING, f"{move.message}; the cameras are oriented anew")
+                said = phrase("event_camera_moved", "{what}; the cameras are oriented anew", what=move.message)
+                self._findings.message(Level.WARNING, said)
             recording.wait_anew()
             self._finder = self._watch = None
 

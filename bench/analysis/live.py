@@ -23,6 +23,7 @@ from recorder.reading.triplets import triplets
 from rig.clocks import UtcNs
 from rig.events import Level
 from rig.jumper import JumperState
+from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 
 _RATE_HZ: Final = 30.0
@@ -51,7 +52,7 @@ class _Told:
     def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
         """Of no interest here."""
 
-    def message(self, level: Level, text: str) -> None:
+    def message(self, level: Level, said: Phrase) -> None:
         """Of no interest here."""
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
+from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import RigSettings
 from rig.tag import CameraTag
 from rig.transport.messages import CameraChanged, CameraNews
@@ -177,11 +178,11 @@ class Assembler:
         changes, self._changes = self._changes, []
         return changes
 
-    def disconnected(self, camera: int, reason: str, time: HostNs) -> None:
+    def disconnected(self, camera: int, reason: Phrase, time: HostNs) -> None:
         """Note that a camera is gone: its grabber says so, or the grabber process died without a record of it."""
         self.pairer.disconnected(camera, time)
         self.connected[camera] = False
-        self._changes.append(CameraChanged(camera=camera, news=CameraNews.GONE, text=reason))
+        self._changes.append(CameraChanged(camera=camera, news=CameraNews.GONE, said=reason))
 
     def camera_tags(self, pulse: ClosedPulse, anchor: UtcAnchor) -> tuple[CameraTag, ...]:
         """The cameras' parts of a pulse's tag.
@@ -226,12 +227,13 @@ class Assembler:
         """If the first record is of a streaming camera, this recorder has replaced one that crashed."""
         self._heard[camera] = record.kind in (*_STREAMING, RecordKind.CONNECTED, RecordKind.DISCONNECTED)
         if record.kind in _STREAMING:
-            self._join(camera, record, "streaming since before the recorder was started")
+            text = "streaming since before the recorder was started"
+            self._join(camera, record, phrase("camera_streaming_before", text))
 
-    def _join(self, camera: int, record: Record, text: str) -> None:
+    def _join(self, camera: int, record: Record, said: Phrase) -> None:
         self.pairer.connected(camera, record.epoch, record.host_time)
         self.connected[camera] = True
-        self._changes.append(CameraChanged(camera=camera, news=CameraNews.CONNECTED, text=text))
+        self._changes.append(CameraChanged(camera=camera, news=CameraNews.CONNECTED, said=said))
 
     def _is_waiting(self, camera: int) -> bool:
         return any(camera == waiting for part in self._waiting for waiting, _ in part.pending)
@@ -244,11 +246,11 @@ class Assembler:
             case RecordKind.LATCH:
                 self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
             case RecordKind.CONNECTED:
-                self._join(camera, record, record.text)
+                self._join(camera, record, plain(record.text))
             case RecordKind.DISCONNECTED:
-                self.disconnected(camera, record.text, record.host_time)
+                self.disconnected(camera, plain(record.text), record.host_time)
             case RecordKind.NOTICE:
-                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, text=record.text))
+                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, said=plain(record.text)))
 
     def _place(self, camera: int, record: Record, pulse: OpenPulse) -> None:
         """Copy a frame into its triplet, or let it wait in its ring until a buffer is free."""
@@ -302,8 +304,8 @@ class Assembler:
         for camera, ring in enumerate(self._rings):
             if camera in silent and not self._asked[camera]:
                 ring.request_reconnect()
-                text = "three pulses behind the other cameras; looking after it"
-                self._changes.append(CameraChanged(camera=camera, news=CameraNews.SILENT, text=text))
+                said = phrase("camera_behind", "three pulses behind the other cameras; looking after it")
+                self._changes.append(CameraChanged(camera=camera, news=CameraNews.SILENT, said=said))
             self._asked[camera] = camera in silent
 
     def _tell_slow_cameras(self, now: HostNs) -> None:
@@ -312,5 +314,6 @@ class Assembler:
             if now >= self._slow_told[camera] + _TELL_SLOW_NS:
                 self._slow_told[camera] = now
                 late_ms = self.pairer.lag_ms(camera)
-                text = f"its frames come too late, {late_ms:.0f} ms after the usual time: the link is too slow for them"
-                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, text=text))
+                text = "its frames come too late, {late_ms:.0f} ms after the usual time: the link is too slow for them"
+                said = phrase("camera_late", text, late_ms=late_ms)
+                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, said=said))

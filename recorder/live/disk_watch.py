@@ -8,6 +8,7 @@ from recorder.writing.log_writer import LogWriter
 from rig.clocks import NS_PER_S, HostNs
 from rig.errors import StorageError
 from rig.events import Event, Level
+from rig.phrase import Phrase, phrase
 
 #: A disk that has finished nothing for so long hangs: much longer than any disk's housekeeping takes.
 _HANGS_S: Final = 2.0
@@ -61,13 +62,15 @@ class DiskWatch:
             self._rate = (written - before) / ((now - since) / NS_PER_S)
             if now - since > _BEHIND_NS and not self._told_behind and not self._hanging:
                 self._told_behind = True
-                yield Event.now(Level.WARNING, "disk", f"the disk falls behind: it takes {self._rates()}")
+                said = phrase("event_disk_behind", "the disk falls behind: it takes {rates}", rates=self._rates())
+                yield Event.now(Level.WARNING, "disk", said)
         new, self._underruns = underruns - self._underruns, underruns
         if new > 0 and (behind or was_behind):
             self.lost += new
             if not self._told_lost:
                 self._told_lost = True
-                yield Event.now(Level.ERROR, "disk", f"{self._cause()}: frames are lost; {_REMEDY}")
+                said = phrase("event_disk_lost", "{cause}: frames are lost; " + _REMEDY, cause=self._cause())
+                yield Event.now(Level.ERROR, "disk", said)
         if not behind:
             self._behind_since = None
 
@@ -85,19 +88,24 @@ class DiskWatch:
         if stalled_s >= _HANGS_S:
             self._hung_s = max(self._hung_s, stalled_s)
             if not self._hanging:
-                yield Event.now(
-                    Level.ERROR, "disk", f"the disk hangs: it has taken nothing for {_HANGS_S:g} s; look at `dmesg`"
-                )
+                text = "the disk hangs: it has taken nothing for {seconds:g} s; look at `dmesg`"
+                yield Event.now(Level.ERROR, "disk", phrase("event_disk_hangs", text, seconds=_HANGS_S))
         elif self._hanging:
-            yield Event.now(Level.WARNING, "disk", f"the disk takes data again, after {self._hung_s:.0f} s")
+            text = "the disk takes data again, after {seconds:.0f} s"
+            yield Event.now(Level.WARNING, "disk", phrase("event_disk_again", text, seconds=self._hung_s))
         self._hanging = stalled_s >= _HANGS_S
 
-    def _cause(self) -> str:
-        return f"the disk hung for {self._hung_s:.0f} s" if self._hung_s else f"disk too slow: it took {self._rates()}"
+    def _cause(self) -> Phrase:
+        if self._hung_s:
+            return phrase("why_disk_hung", "the disk hung for {seconds:.0f} s", seconds=self._hung_s)
+        return phrase("why_disk_slow", "disk too slow: it took {rates}", rates=self._rates())
 
-    def _rates(self) -> str:
-        rate = "few" if self._rate is None else f"{self._rate / _MB:.1f}"
-        return f"{rate} MB/s, the cameras make {self._wanted / _MB:.1f} MB/s"
+    def _rates(self) -> Phrase:
+        wanted = self._wanted / _MB
+        if self._rate is None:
+            return phrase("disk_rate_few", "few MB/s, the cameras make {wanted:.1f} MB/s", wanted=wanted)
+        text = "{taken:.1f} MB/s, the cameras make {wanted:.1f} MB/s"
+        return phrase("disk_rates", text, taken=self._rate / _MB, wanted=wanted)
 
 
 _REMEDY: Final = "record to a faster disk, and let nothing else use it"
@@ -114,13 +122,14 @@ def hung(path: Path, log: LogWriter, *, other_disk: bool) -> StorageError | None
     stalled = log.stalled_s()
     if stalled <= (_HUNG_WITH_OTHER_DISK_S if other_disk else _HUNG_S):
         return None
-    text = f"the disk has taken nothing for {stalled:.0f} s; look at `dmesg`, record to another disk"
-    return StorageError(f"{path}: {text}")
+    text = "{path}: the disk has taken nothing for {seconds:.0f} s; look at `dmesg`, record to another disk"
+    return StorageError(phrase("why_disk_takes_nothing", text, path=str(path), seconds=stalled))
 
 
-def too_full(log: LogWriter, reserve_gb: float) -> str | None:
+def too_full(log: LogWriter, reserve_gb: float) -> Phrase | None:
     """Why a recording ends while there is still room to close its log; None if there is more."""
     free = log.free_bytes
     if free is None or free >= reserve_gb * 1e9:
         return None
-    return f"only {free / 1e9:.1f} GB are free and {reserve_gb:g} GB are kept in reserve: recording stopped; make room"
+    text = "only {free_gb:.1f} GB are free and {reserve_gb:g} GB are kept in reserve: recording stopped; make room"
+    return phrase("why_disk_reserve", text, free_gb=free / 1e9, reserve_gb=reserve_gb)

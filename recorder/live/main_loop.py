@@ -19,6 +19,7 @@ from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
 from rig.events import Event, Level
+from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
 from rig.transport.messages import (
@@ -103,7 +104,10 @@ class RecorderLoop:
                     self._obey(command)
                 self._quit = self._quit or self._control.ended
             self._step(host_now())
-        self._recordings.wind_up("the service process is gone" if self._control.ended else "told to quit", _WIND_UP_S)
+        gone = phrase("why_service_gone", "the service process is gone")
+        self._recordings.wind_up(
+            gone if self._control.ended else phrase("why_told_to_quit", "told to quit"), _WIND_UP_S
+        )
         self._publisher.close()
         self._health.close()
         self._buffers.close()
@@ -156,7 +160,7 @@ class RecorderLoop:
     def _camera_changed(self, change: CameraChanged) -> None:
         self._tell(change)
         name = self._rig.cameras[change.camera].name
-        self._recordings.happened(Event.now(change.news.level, name, f"{change.news}: {change.text}"))
+        self._recordings.happened(change.event(name))
 
     def _tell_health(self, now: HostNs) -> None:
         """Report, publish and write the health record of the last second."""
@@ -176,15 +180,15 @@ class RecorderLoop:
         """Tell of reports that were dropped because the service does not read, and of refused subscribers."""
         dropped, self._unreported = self._control.dropped - self._unreported, self._control.dropped
         if dropped:
-            why = f"{dropped} reports are dropped: the service process does not read them; see whether it is stopped"
-            self._warn("recorder", why)
+            why = "{count} reports are dropped: the service process does not read them; see whether it is stopped"
+            self._warn("recorder", phrase("event_reports_dropped", why, count=dropped))
         for fault, count in self._publisher.refused().items():
-            what = f"{count} connections are closed, of a program that {fault}: end it, or publish on another address"
-            self._warn("publisher", what)
+            what = "{count} connections are closed, of a program that {fault}: end it, or publish on another address"
+            self._warn("publisher", phrase("event_subscribers_refused", what, count=count, fault=fault))
 
-    def _warn(self, name: str, text: str) -> None:
+    def _warn(self, name: str, said: Phrase) -> None:
         """Tell people at once, and write it into the log."""
-        event = Event.now(Level.WARNING, name, text)
+        event = Event.now(Level.WARNING, name, said)
         self._tell(RecorderEvent(event=event))
         self._recordings.happened(event)
 

@@ -10,6 +10,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.events import Event, Level
+from rig.phrase import phrase
 from rig.tag import TripletTag
 from triggering.pairing.pairer import ClosedPulse
 
@@ -71,8 +72,10 @@ class PulseWriter:
 
 def overruns(tag: TripletTag, pulse: ClosedPulse) -> Iterator[Event]:
     """Tell of pulses missed because a camera was busy: the remedy differs from that for pulses it did not see."""
-    why = "overrun: the camera saw it but was still busy with the frame before"
+    text = (
+        "pulse {pulse}: overrun: the camera saw it but was still busy with the frame before; shorten its exposure or "
+        "lower trigger.rate_hz"
+    )
     for camera, outcome in zip(tag.cameras, pulse.outcomes, strict=True):
         if outcome.overrun:
-            text = f"pulse {tag.pulse}: {why}; shorten its exposure or lower trigger.rate_hz"
-            yield Event.now(Level.WARNING, camera.name, text)
+            yield Event.now(Level.WARNING, camera.name, phrase("event_overrun", text, pulse=tag.pulse))

@@ -22,6 +22,7 @@ from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
 from rig.errors import FileVanishedError, StorageError
 from rig.events import Event
 from rig.health import WritingHealth
+from rig.phrase import phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
@@ -284,8 +285,8 @@ class Recording:
         """The error that the log has come to its end without being closed; None if it is closed."""
         if self.log is None or ((summary := self.log.summary) is not None and summary.closed):
             return None
-        text = "the disk did not take the end of the log; what is written so far stays readable"
-        return self.log.error or StorageError(f"{self.path}: {text}: svev recover")
+        text = "{path}: the disk did not take the end of the log; what is written so far stays readable: svev recover"
+        return self.log.error or StorageError(phrase("why_not_closed", text, path=str(self.path)))
 
     def event(self, event: Event) -> None:
         """Write one event.
@@ -360,7 +361,7 @@ class Recording:
             bytes=0 if self.log is None else self.log.statistics().bytes_written,
             counts=self.ledger.counts(),
             closed=summary is not None and summary.closed,
-            failure=str(self.failure or ""),
+            failure=None if self.failure is None else self.failure.said,
         )
 
     @property

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from enum import Enum, auto
 from typing import Final
 
+from recorder.live import wording
 from recorder.live.assembler import Assembler, Triplet
 from recorder.live.disk_watch import DiskWatch, hung, too_full
 from recorder.live.health import LatencyHistogram
@@ -30,6 +31,7 @@ from rig.errors import BadInputError, StorageError, SvevError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.health import WritingHealth
+from rig.phrase import Phrase, phrase
 from rig.topics import JUMPER
 from rig.transport.messages import (
     RecorderEvent,
@@ -132,8 +134,7 @@ class Recordings:
         self._recording.stop()
         self._recording.mishap = keep and not self._parts.earlier
         if at_once:
-            text = "it was stopped without waiting for the disk; what the disk had taken stays readable"
-            self._give_up(self._recording, StorageError(f"{self._recording.path}: {text}"), may_continue=False)
+            self._give_up(self._recording, wording.stopped_at_once(self._recording.path), may_continue=False)
 
     def take(self, triplet: Triplet) -> None:
         """Take a decided pulse, the latest so far, into the pre-roll."""
@@ -186,7 +187,7 @@ class Recordings:
         except StorageError as error:
             self._fail(recording, error)
 
-    def wind_up(self, why: str, patience_s: float) -> None:
+    def wind_up(self, why: Phrase, patience_s: float) -> None:
         """End a running recording now, with all pulses that are decided, and wait for the disk.
 
         Args:
@@ -197,14 +198,14 @@ class Recordings:
         while (recording := self._recording) is not None and host_now() < deadline:
             self.work(host_now())
             if self._recording is recording and self._phase is _Phase.RUNNING:
-                self.happened(Event.now(Level.ERROR, "recorder", f"recording ends early: {why}"))
+                said = phrase("event_ends_early", "recording ends early: {why}", why=why)
+                self.happened(Event.now(Level.ERROR, "recorder", said))
                 self._decide_now()
                 self._write_slice(recording, until=None)
                 recording.end_now()
             time.sleep(_PAUSE_S)
         if recording is not None:
-            text = f"the disk has not taken the rest within {patience_s:g} s; look at `dmesg`"
-            self._give_up(recording, StorageError(f"{recording.path}: {text}"), may_continue=False)
+            self._give_up(recording, wording.not_taken(recording.path, patience_s), may_continue=False)
             if self._recording is not None:
                 self._finish(self._recording)
 
@@ -226,8 +227,9 @@ class Recordings:
                 self._look_at_disk(now)
                 if self._recording is recording and recording.all_written:
                     recording.end_account()
-                    text = f"recording stopped: {recording.ledger.summary_line()}"
-                    self.happened(Event.now(Level.INFO, "recorder", text))
+                    counts = recording.ledger.summary_line()
+                    said = phrase("event_log_stopped", "recording stopped: {counts}", counts=counts)
+                    self.happened(Event.now(Level.INFO, "recorder", said))
                     self._close(recording, now, _CLOSE_NS)
             case _Phase.CLOSING:
                 if now > self._closing_until or self._parts.over(recording):
@@ -238,9 +240,7 @@ class Recordings:
             if recording.opened():
                 self._opened(recording)
             elif recording.opening_s(now) > _OPEN_S:
-                text = f"the disk does not let a file be made within {_OPEN_S:g} s; look at `dmesg`"
-                error = StorageError(f"{recording.path.parent}: {text}, record to another disk")
-                self._give_up(recording, error, may_continue=True)
+                self._give_up(recording, wording.not_made(recording.path.parent, _OPEN_S), may_continue=True)
         except SvevError as error:
             self._fail(recording, error)
 
@@ -248,19 +248,19 @@ class Recordings:
         self._phase = _Phase.RUNNING
         rows, columns = self._buffers.shape
         self._watch = DiskWatch(rows * columns * self._assembler.rig.trigger.rate_hz, self._underruns())
-        text = f"recording {recording.id} started"
+        said = wording.started(recording.id)
         if self._parts.earlier:
             before = self._parts.earlier[-1]
-            text = f"recording {before.id} goes on as {recording.id}: {before.failure}"
+            said = wording.goes_on(before.id, recording.id, before.failure)
             self._report(RecordingContinued(path=recording.path, before=before.part()))
         else:
             if recording.continues:
-                text = f"recording {recording.continues} goes on as {recording.id}: the recorder was started again"
+                said = wording.goes_on(recording.continues, recording.id, None)
             first = self._preroll.first_since(recording.begin)
             self._report(RecordingStarted(first_pulse=None if first is None else recording.utc(first)))
         for time_, note in self._preroll.take_notes(since=recording.begin):
             self._note(note, time_)
-        self.happened(Event.now(Level.INFO, "recorder", text))
+        self.happened(Event.now(Level.INFO, "recorder", said))
 
     def _close(self, recording: Recording, now: HostNs, patience_ns: int) -> None:
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
@@ -302,13 +302,13 @@ class Recordings:
         recording.failure = error if isinstance(error, StorageError) else None
         recording.mishap = False
         recording.forget()
-        self._publisher.event(Event.now(Level.FATAL, "recorder", str(error)))
+        self._publisher.event(Event.now(Level.FATAL, "recorder", error.said))
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
         if not whole:
             self._preroll.put_back(recording.take_back())
         path = self._parts.next_path(recording, error) if may_continue else None
         if path is not None:
-            event = Event.now(Level.ERROR, "disk", f"{error}; the recording goes on in {path}")
+            event = Event.now(Level.ERROR, "disk", wording.goes_on_in(path, error))
             self._report(RecorderEvent(event=event))
             self._parts.earlier.append(recording)
             recording.begin_close()
@@ -324,7 +324,8 @@ class Recordings:
     def _refuse(self, error: SvevError) -> None:
         """Report that a log could not be made."""
         if self._parts.earlier:
-            self._report(RecorderEvent(event=Event.now(Level.ERROR, "disk", f"there neither: {error}")))
+            said = phrase("event_there_neither", "there neither: {why}", why=error.said)
+            self._report(RecorderEvent(event=Event.now(Level.ERROR, "disk", said)))
             self._finish(self._parts.earlier.pop())
         else:
             self._report(RecorderFailed.of(error))
@@ -349,8 +350,7 @@ class Recordings:
             return
         self.happened(Event.now(Level.ERROR, "recorder", why))
         if self._recording is recording and self._phase is _Phase.RUNNING:
-            error = StorageError(f"{recording.path}: {why}; the log is whole up to there")
-            self._fail(recording, error, whole=True)
+            self._fail(recording, wording.reserve_reached(recording.path, why), whole=True)
 
     def _decide_now(self) -> None:
         """Take in the pulses that would have waited for what later ones may tell."""

@@ -16,6 +16,7 @@ import zmq
 from zmq.auth import load_certificate
 
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
 from rig.settings.model import NetworkSettings
 
 _TCP: Final = "tcp://"
@@ -85,18 +86,19 @@ def load_keys(path: Path) -> Keys:
     return Keys(public, secret)
 
 
-def exposure(address: str, keys: Keys | None) -> str:
-    """Why it is unwise to publish at an address, in words; empty if it is not."""
+def exposure(address: str, keys: Keys | None) -> Phrase | None:
+    """Why it is unwise to publish at an address, in words; None if it is not."""
     if keys is not None or not address.startswith(_TCP) or _is_loopback(address):
-        return ""
-    return f"whoever reaches {address} sees the images: publish on tcp://127.0.0.1, or with a key (svev keys)"
+        return None
+    text = "whoever reaches {address} sees the images: publish on tcp://127.0.0.1, or with a key (svev keys)"
+    return phrase("why_exposed", text, address=address)
 
 
-def check_publication(network: NetworkSettings) -> str:
+def check_publication(network: NetworkSettings) -> Phrase | None:
     """Check the keys that a rig file names, before anything starts.
 
     Returns:
-        Why it is unwise to publish like this, in words; empty if it is not.
+        Why it is unwise to publish like this, in words; None if it is not.
 
     Raises:
         BadInputError: the keys cannot be used.

@@ -19,6 +19,7 @@ from recorder.publishing.keys import Keys
 from recorder.publishing.peers import Peers
 from rig.errors import BadInputError
 from rig.events import Event
+from rig.phrase import phrase
 from rig.topics import DEFAULT_PUBLISH, EVENTS, HEALTH, JUMPER, TRIPLET, Topic
 from rig.transport import wire
 
@@ -232,11 +233,13 @@ def bind(socket: zmq.Socket[bytes], address: str) -> str:
 
 
 def _in_use(address: str) -> BadInputError:
-    return BadInputError(f"{address}: address in use; stop the other publisher or choose another address")
+    text = "{address}: address in use; stop the other publisher or choose another address"
+    return BadInputError(phrase("why_address_in_use", text, address=address))
 
 
 def _not_bound(address: str, reason: str) -> BadInputError:
-    return BadInputError(f"{address}: cannot be bound ({reason}); use e.g. {DEFAULT_PUBLISH}")
+    text = "{address}: cannot be bound ({why}); use e.g. {example}"
+    return BadInputError(phrase("why_not_bound", text, address=address, why=reason, example=DEFAULT_PUBLISH))
 
 
 def _somebody_listens(address: str) -> bool:

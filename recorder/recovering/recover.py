@@ -28,6 +28,7 @@ from recorder.writing.log_writer import LogDescription
 from rig.errors import BadInputError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
+from rig.phrase import plain
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -188,8 +189,8 @@ class _Recovery:
         lost = {"lost_pulses": runs_to_text(self.ledger.missing), "lost_pixels": runs_to_text(self.lost_pixels)}
         name, time = self._reader.path.name, datetime.now(UTC).isoformat(timespec="seconds")
         words = _loss(self.ledger, self.lost_pixels, self.findings.lines())
-        said = f"this is lost: {words}" if words else "no pulse is lost"
-        event = Event.now(Level.WARNING if words else Level.INFO, "recover", f"recovered from {name}: {said}")
+        said = f"recovered from {name}: {f'this is lost: {words}' if words else 'no pulse is lost'}"
+        event = Event.now(Level.WARNING if words else Level.INFO, "recover", plain(said))
         others = {
             key: each for key, each in self._reader.metadata.items() if key not in (SESSION_METADATA, RIG_METADATA)
         }

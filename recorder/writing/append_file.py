@@ -8,20 +8,28 @@ from pathlib import Path
 from recorder.log.mcap_layout import PAGE
 from rig.disk import ask_free_bytes, set_direct
 from rig.errors import BadInputError, FileVanishedError, StorageError
+from rig.phrase import phrase
 
 _REMEDIES = {
-    errno.ENOSPC: "the disk is full: make room on it or record to another one",
-    errno.EDQUOT: "your disk quota is used up: make room or record to another disk",
-    errno.EFBIG: "the file has reached the size limit: raise `ulimit -f`, or record to a file system without one",
-    errno.EROFS: "the file system has become read-only: look at `dmesg`, then record to another disk",
-    errno.EIO: "the disk fails: look at `dmesg` and its cable, and record to another disk",
+    errno.ENOSPC: phrase("disk_full", "the disk is full: make room on it or record to another one"),
+    errno.EDQUOT: phrase("disk_quota", "your disk quota is used up: make room or record to another disk"),
+    errno.EFBIG: phrase(
+        "disk_file_limit",
+        "the file has reached the size limit: raise `ulimit -f`, or record to a file system without one",
+    ),
+    errno.EROFS: phrase(
+        "disk_read_only", "the file system has become read-only: look at `dmesg`, then record to another disk"
+    ),
+    errno.EIO: phrase("disk_fails", "the disk fails: look at `dmesg` and its cable, and record to another disk"),
 }
 
 
 def storage_error(path: Path, error: OSError) -> StorageError:
     """The operating system's error as a StorageError that says what to do."""
-    remedy = _REMEDIES.get(error.errno or 0, f"{error.strerror or error}: look at `dmesg`, then record to another disk")
-    return StorageError(f"{path}: {remedy}; what is written so far stays readable")
+    other = "{system}: look at `dmesg`, then record to another disk"
+    why = _REMEDIES.get(error.errno or 0) or phrase("disk_refuses", other, system=error.strerror or str(error))
+    text = "{path}: {why}; what is written so far stays readable"
+    return StorageError(phrase("why_disk_refuses", text, path=str(path), why=why))
 
 
 class AppendFile:
@@ -135,8 +143,12 @@ class AppendFile:
         except FileNotFoundError:
             there = None
         if there is None or (there.st_dev, there.st_ino) != (own.st_dev, own.st_ino):
-            what = "was deleted while it was recorded" if own.st_nlink == 0 else "was moved away while it was recorded"
-            raise FileVanishedError(f"{self.path}: {what}; leave the folder of the recordings alone meanwhile")
+            path = str(self.path)
+            if own.st_nlink == 0:
+                text = "{path}: was deleted while it was recorded; leave the folder of the recordings alone meanwhile"
+                raise FileVanishedError(phrase("why_deleted", text, path=path))
+            text = "{path}: was moved away while it was recorded; leave the folder of the recordings alone meanwhile"
+            raise FileVanishedError(phrase("why_moved_away", text, path=path))
         return ask_free_bytes(self._fd)
 
     def discard(self) -> None:

@@ -30,6 +30,7 @@ from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.health import WritingHealth
+from rig.phrase import phrase
 from rig.tag import TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -316,8 +317,8 @@ class LogWriter:
         for channel, data in enumerate(calibrations.values(), FIRST_CALIBRATION_CHANNEL):
             self._write_small(channel, 1, data, now, now)
         if not self._file.direct:
-            text = "the file system takes no direct I/O: writing costs more"
-            self.write_event(Event(now, Level.WARNING, "recorder", text))
+            said = phrase("event_no_direct_io", "the file system takes no direct I/O: writing costs more")
+            self.write_event(Event.now(Level.WARNING, "recorder", said))
 
     def _closing_bytes(self) -> bytes:
         metadata = self._changed_metadata(self._file.size)

@@ -16,6 +16,7 @@ from recorder.log.mcap_layout import ChunkPlan, join_pages
 from recorder.writing.append_file import AppendFile, storage_error
 from rig.errors import StorageError
 from rig.health import WritingHealth
+from rig.phrase import phrase
 
 SYNC_INTERVAL_S = 1.0
 _SMALL_AT_ONCE = 64
@@ -100,10 +101,8 @@ class WriteThread:
                 raise self.error or StorageError(f"{self._file.path}: the log is closed; open another one")
             if slot is None:
                 if self._small_waiting >= _SMALL_WAITING_MAX:
-                    raise StorageError(
-                        f"{self._file.path}: the disk has taken nothing for long; look at `dmesg`, "
-                        "record to another disk"
-                    )
+                    text = "{path}: the disk has taken nothing for long; look at `dmesg`, record to another disk"
+                    raise StorageError(phrase("why_disk_takes_nothing_long", text, path=str(self._file.path)))
                 self._small_waiting += 1
             self._jobs.append(_Job(chunk, plan, slot, is_pulse))
             if self._busy_since is None:
@@ -258,8 +257,10 @@ class WriteThread:
 
     def _broken(self, error: BaseException) -> None:
         """Note an error of the program, which nobody foresaw."""
-        text = f"writing ended by {type(error).__name__}: {error}; what is written so far stays readable; report this"
-        self.error = self.error or StorageError(f"{self._file.path}: {text}")
+        text = "{path}: writing ended by {kind}: {error}; what is written so far stays readable; report this"
+        kind, path = type(error).__name__, str(self._file.path)
+        said = phrase("why_writing_broke", text, path=path, kind=kind, error=str(error))
+        self.error = self.error or StorageError(said)
 
     def _drain(self) -> None:
         """Release the slots of everything that nobody will write any more."""

@@ -4,7 +4,7 @@ The first message to a child is its configuration; then the parent sends command
 channel (`rig.transport.channel`) encodes and checks messages by these types.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import ClassVar, Final
@@ -16,6 +16,7 @@ from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.health import Health
+from rig.phrase import Phrase, phrase
 from rig.pulse import Pause, PulseNumber
 from rig.settings.model import RigSettings
 from rig.status import Counts, LastJump
@@ -170,7 +171,7 @@ class GrabberDied(Message):
     """To the recorder: the grabber process of a camera ended; no records come until it is started again."""
 
     camera: int
-    reason: str
+    reason: Phrase
 
 
 class TellEvent(Message):
@@ -248,6 +249,13 @@ class CameraNews(StrEnum):
         return _LEVELS[self]
 
 
+#: What an event says of the news.
+_NEWS: Final[dict[CameraNews, Callable[[Phrase], Phrase]]] = {
+    CameraNews.CONNECTED: lambda said: phrase("event_camera_connected", "connected: {said}", said=said),
+    CameraNews.SILENT: lambda said: phrase("event_camera_silent", "silent: {said}", said=said),
+    CameraNews.GONE: lambda said: phrase("event_camera_gone", "gone: {said}", said=said),
+    CameraNews.NOTICE: lambda said: phrase("event_camera_notice", "notice: {said}", said=said),
+}
 _LEVELS: Final = {
     CameraNews.CONNECTED: Level.INFO,
     CameraNews.SILENT: Level.WARNING,
@@ -270,12 +278,20 @@ class CameraChanged(Message):
     Attributes:
         camera: index of the camera.
         news: what happened.
-        text: description of the camera, or why it is gone.
+        said: description of the camera, or why it is gone.
     """
 
     camera: int
     news: CameraNews
-    text: str
+    said: Phrase
+
+    def event(self, name: str) -> Event:
+        """The change as an event.
+
+        Args:
+            name: of the camera.
+        """
+        return Event.now(self.news.level, name, _NEWS[self.news](self.said))
 
 
 class RecordingStarted(Message):
@@ -311,14 +327,14 @@ class LogPart(msgspec.Struct, frozen=True, kw_only=True):
         bytes: its size.
         counts: what became of the pulses that are in it.
         closed: the log was closed properly.
-        failure: why it ended before its time, empty if it did not.
+        failure: why it ended before its time, None if it did not.
     """
 
     path: Path
     bytes: int
     counts: Counts
     closed: bool = True
-    failure: str = ""
+    failure: Phrase | None = None
 
 
 class RecordingContinued(Message):
@@ -358,17 +374,17 @@ class RecorderFailed(Message):
     """A recording could not be started, or the recorder itself failed; the fields describe the error."""
 
     kind: str
-    message: str
+    said: Phrase
 
     @classmethod
     def of(cls, error: SvevError) -> "RecorderFailed":
         """The report of an error."""
-        return cls(kind=type(error).__name__, message=str(error))
+        return cls(kind=type(error).__name__, said=error.said)
 
     def error(self) -> SvevError:
         """The error that was reported."""
         kind = getattr(errors, self.kind, SvevError)
-        return kind(self.message) if issubclass(kind, SvevError) else SvevError(self.message)
+        return kind(self.said) if issubclass(kind, SvevError) else SvevError(self.said)
 
 
 class RecorderEvent(Message):

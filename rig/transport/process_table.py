@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 from rig.errors import ProcessDiedError
+from rig.phrase import phrase
 from rig.transport.channel import ControlChannel
 from rig.transport.messages import Quit
 
@@ -102,9 +103,11 @@ class Child:
             return message
         if self.control.ended:
             self.wait(_KILLED_S)
-            raise ProcessDiedError(f"{self.spec.name} ended by itself ({self.ending()}): see its messages above")
+            text, how = "{process} ended by itself ({how}): see its messages above", self.ending() or ""
+            raise ProcessDiedError(phrase("why_ended_by_itself", text, process=self.spec.name, how=how))
         self.kill()
-        raise ProcessDiedError(f"{self.spec.name} did not answer for {patience_s:.0f} s, so it was ended: restart it")
+        text = "{process} did not answer for {seconds:.0f} s, so it was ended: restart it"
+        raise ProcessDiedError(phrase("why_no_answer", text, process=self.spec.name, seconds=patience_s))
 
     def send_signal(self, number: int) -> None:
         """Send a signal; does nothing if the process has ended."""

@@ -10,6 +10,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from rig.events import Event, Level
+from rig.phrase import phrase, plain
 from rig.start_list import StartList
 
 NAME: Final = ".svev-start-list.json"
@@ -85,16 +86,21 @@ class Keeper:
         """Say once that the list is not kept, until it is again."""
         if not self._failed:
             self._failed = True
-            text = f"{self._path}: the start list cannot be kept ({error.strerror}); a restart of the service loses it"
-            self._tell(Event.now(Level.ERROR, "start list", text))
+            text = "{path}: the start list cannot be kept ({why}); a restart of the service loses it"
+            said = phrase("event_list_not_kept", text, path=str(self._path), why=error.strerror or str(error))
+            self._tell(Event.now(Level.ERROR, "start list", said))
 
     def _put_aside(self, error: Exception) -> StartList:
         aside = self._path.with_suffix(".unreadable")
-        why = error.strerror if isinstance(error, OSError) else "it is none of this version of svev"
-        text = f"{self._path}: cannot be read ({why}) and is put aside as {aside.name}; load the start list again"
+        other = phrase("why_other_version", "it is none of this version of svev")
+        why = plain(error.strerror or str(error)) if isinstance(error, OSError) else other
+        text = "{path}: cannot be read ({why}) and is put aside as {aside}; load the start list again"
+        said = phrase("event_list_put_aside", text, path=str(self._path), why=why, aside=aside.name)
         try:
             self._path.replace(aside)
         except OSError as refusal:
-            text = f"{self._path}: cannot be read ({why}) nor put aside ({refusal.strerror}); check its permissions"
-        self._tell(Event.now(Level.ERROR, "start list", text))
+            text = "{path}: cannot be read ({why}) nor put aside ({refusal}); check its permissions"
+            refused = refusal.strerror or str(refusal)
+            said = phrase("event_list_unreadable", text, path=str(self._path), why=why, refusal=refused)
+        self._tell(Event.now(Level.ERROR, "start list", said))
         return StartList()

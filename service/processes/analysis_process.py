@@ -18,6 +18,7 @@ from rig.clocks import UtcNs
 from rig.errors import StorageError, SvevError
 from rig.events import Event, Level
 from rig.jumper import JumperState
+from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 from rig.settings.model import AnalysisSettings, NetworkSettings, RigSettings
 from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
@@ -60,12 +61,12 @@ class _Reports(Findings):
         try:
             live_jumps.keep(jump, self._folders)
         except StorageError as error:
-            self.message(Level.ERROR, str(error))
+            self.message(Level.ERROR, error.said)
         self._control.send(JumpMeasured(jump=jump.summary))
 
-    def message(self, level: Level, text: str) -> None:
+    def message(self, level: Level, said: Phrase) -> None:
         """Something that people should know."""
-        self._control.send(AnalysisTold(event=Event.now(level, "analysis", text)))
+        self._control.send(AnalysisTold(event=Event.now(level, "analysis", said)))
 
 
 def main() -> None:
@@ -97,8 +98,8 @@ def _opened(
             return LiveAnalysis(settings.survey, settings.calibration, reports, exposures)
         except SvevError as error:
             if str(error) != said:
-                said = str(error)
-                reports.message(Level.ERROR, f"no jump is measured before this is put right: {said}")
+                said, text = str(error), "no jump is measured before this is put right: {why}"
+                reports.message(Level.ERROR, phrase("event_no_analysis", text, why=error.said))
             time.sleep(_WAKE_S)
     return None
 

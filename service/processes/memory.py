@@ -10,6 +10,7 @@ from recorder.live.assembler import in_flight_triplets
 from recorder.live.preroll import preroll_triplets
 from recorder.log.mcap_layout import SlotLayout
 from rig.errors import BadInputError
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.transport.ring import MAX_SLOTS
 
@@ -44,10 +45,16 @@ def check_memory(rig: RigSettings, preroll_s: float) -> None:
     if (total := sum(needed.values())) <= available:
         return
     largest = max(needed, key=lambda key: needed[key])
-    raise BadInputError(
-        f"the buffers of the rig need {total / _GB:.1f} GB of memory and {available / _GB:.1f} GB are available: lower "
-        f"{largest}, which takes {needed[largest] / _GB:.1f} GB, or the cameras' regions"
+    text = (
+        "the buffers of the rig need {total:.1f} GB of memory and {available:.1f} GB are available: lower {largest}, "
+        "which takes {takes:.1f} GB, or the cameras' regions"
     )
+    raise BadInputError(
+        phrase(
+            "why_no_memory", text,
+            total=total / _GB, available=available / _GB, largest=largest, takes=needed[largest] / _GB,
+        )
+    )  # fmt: skip
 
 
 def available_bytes(root: Path = Path("/")) -> int:

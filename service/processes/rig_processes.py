@@ -16,6 +16,7 @@ from rig.clocks import HostNs, host_now
 from rig.errors import ProcessDiedError
 from rig.events import Event, Level
 from rig.health import Health
+from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.transport.messages import (
     AnalysisConfig,
@@ -51,12 +52,12 @@ class CameraPresence:
 
     Attributes:
         news: what happened to the camera; None: no news yet.
-        text: description of the camera, or why it is gone.
+        said: description of the camera, or why it is gone.
         counted: for a silent camera: number of health records in a row in which it delivered frames again.
     """
 
     news: CameraNews | None = None
-    text: str = ""
+    said: Phrase = NOTHING
     counted: int = 0
 
     @property
@@ -159,7 +160,7 @@ class RigProcesses:
         control.send(command)
         if dropped == 0 < control.dropped:  # said once: a recorder that does not read for long is ended
             text = "does not read its commands, and some are dropped; it is started again if it stays so"
-            self._on_event(Event.now(Level.ERROR, RECORDER, text))
+            self._on_event(Event.now(Level.ERROR, RECORDER, phrase("event_commands_dropped", text)))
 
     def kill_recorder(self) -> None:
         """Kill a recorder that does not answer; the next `turn` raises ProcessDiedError."""
@@ -209,8 +210,8 @@ class RigProcesses:
 
     def _note_camera(self, change: CameraChanged) -> None:
         if change.news is not CameraNews.NOTICE:
-            self.cameras[change.camera] = CameraPresence(change.news, change.text)
-        self._on_event(Event.now(change.news.level, self._names[change.camera], f"{change.news}: {change.text}"))
+            self.cameras[change.camera] = CameraPresence(change.news, change.said)
+        self._on_event(change.event(self._names[change.camera]))
 
     def _note_recovered(self, health: Health) -> None:
         """Note which silent cameras deliver again, by the frames in their health records: no report says so."""
@@ -218,7 +219,7 @@ class RigProcesses:
             if camera.news is CameraNews.SILENT:
                 counted = camera.counted + 1 if health.cameras[index].frames_per_s else 0
                 news = CameraNews.CONNECTED if counted > 1 else CameraNews.SILENT
-                self.cameras[index] = CameraPresence(news, camera.text, counted)
+                self.cameras[index] = CameraPresence(news, camera.said, counted)
 
     def _tend(self) -> None:
         """Start dead grabbers again, after a wait that grows; raise if the recorder died."""
@@ -228,16 +229,22 @@ class RigProcesses:
             elif child.control.ended and not self.recorder_died:
                 self.recorder_died, self.ready, self.warm, self.health = True, False, False, None
                 self.cameras = [CameraPresence()] * len(self._names)
-                raise ProcessDiedError(f"the recorder process ended ({child.ending()}): if it recurs, run svev doctor")
+                text = "the recorder process ended ({how}): if it recurs, run svev doctor"
+                raise ProcessDiedError(phrase("why_recorder_ended", text, how=child.ending() or ""))
 
     def _tend_helper(self, child: Child) -> None:
         name, now = child.spec.name, time.monotonic()
         if child not in self._again:
-            what = "process" if name == ANALYSIS else "grabber process"
-            reason = f"{what} ended ({child.ending()})"
+            how = child.ending() or ""
+            if name == ANALYSIS:
+                reason = phrase("why_process_ended", "process ended ({how})", how=how)
+            else:
+                reason = phrase("why_grabber_ended", "grabber process ended ({how})", how=how)
             wait_s = self._back_offs[name].died(now - child.started)
             self._again[child] = now + wait_s
-            self._on_event(Event.now(Level.ERROR, name, f"{reason}; starting it again in {wait_s:g} s"))
+            text = "{why}; starting it again in {seconds:g} s"
+            said = phrase("event_process_again", text, why=reason, seconds=wait_s)
+            self._on_event(Event.now(Level.ERROR, name, said))
             if name != ANALYSIS:
                 self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
         elif now >= self._again[child]:

@@ -19,6 +19,7 @@ from rig.errors import (
     UnknownRecordingError,
 )
 from rig.events import Event, Level
+from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.status import Recording, RecordingOrder, SessionChange, SessionFields, State, Statement, StopOrder
 from rig.transport.messages import (
@@ -165,9 +166,8 @@ class RecordingControl:
         try:
             return new_log_path(self._data)
         except BadInputError:
-            raise StorageError(
-                f"{self._data}: cannot be written; correct its permissions, or start the service with another --data"
-            ) from None
+            text = "{folder}: cannot be written; correct its permissions, or start the service with another --data"
+            raise StorageError(phrase("why_folder_read_only", text, folder=str(self._data))) from None
 
     def _reach_s(self, order: RecordingOrder, now: HostNs) -> float:
         """How far a recording begins in the past: not before the rig was armed, when cameras were missing."""
@@ -237,14 +237,15 @@ class RecordingControl:
                 self._answers.append(current.open(report))
                 self._truths.opened(current.path, self._session.truth)
                 self._machine.move(State.RECORDING)
-                self._say(Level.INFO, f"recording {current.id} started")
+                self._say(Level.INFO, phrase("event_started", "recording {recording} started", recording=current.id))
             case RecorderHealth() if not current.opening:
                 with suppress(FileNotFoundError):  # somebody has moved the log away
                     current.grown(current.path.stat().st_size)
             case RecordingContinued():
                 current.continue_in(report.path)
                 self._truths.opened(report.path, self._session.truth)
-                self.notice = recording_continued(report.before.path.stem, report.path, report.before.failure)
+                why = report.before.failure or NOTHING
+                self.notice = recording_continued(report.before.path.stem, report.path, why)
             case RecordingFinished():
                 self._finished(current, report)
             case RecordingProgress():
@@ -257,14 +258,18 @@ class RecordingControl:
         current.progress(report)
         self._tell_gap(current, report)
         total = current.counts
-        counts = f"{total.pulses} pulses, {total.complete} complete, {total.partial} partial"
-        self._say(Level.INFO, f"recording {current.id} stopped: {counts}")
+        text = "recording {recording} stopped: {pulses} pulses, {complete} complete, {partial} partial"
+        said = phrase(
+            "event_stopped", text,
+            recording=current.id, pulses=total.pulses, complete=total.complete, partial=total.partial,
+        )  # fmt: skip
+        self._say(Level.INFO, said)
         if report.failure is not None:
             self.notice = recording_ended(current.id, report.failure.error())
-            self._say(Level.ERROR, self.notice.text)
+            self._say(Level.ERROR, self.notice.said)
         elif current.longest_s is not None and not current.stopping:
             self.notice = recording_forgotten(current.id, current.longest_s)
-            self._say(Level.WARNING, self.notice.text)
+            self._say(Level.WARNING, self.notice.said)
         self._over(report, State.ARMED)
 
     def interrupt(self, error: SvevError) -> SvevError | None:
@@ -278,8 +283,11 @@ class RecordingControl:
             return error
         current.deaths.append(time.monotonic())
         if died_too_often(current.deaths):
-            times = f"{DEATHS_MAX} times within {DEATHS_WITHIN_S:g} s"
-            return ProcessDiedError(f"the recorder ended {times}, so the recording is not continued again; {error}")
+            text = (
+                "the recorder ended {times} times within {seconds:g} s, so the recording is not continued again; {why}"
+            )
+            said = phrase("why_died_often", text, times=DEATHS_MAX, seconds=DEATHS_WITHIN_S, why=error.said)
+            return ProcessDiedError(said)
         current.interruption = Interruption(current.path, error)
         return None
 
@@ -312,7 +320,7 @@ class RecordingControl:
             return
         gap = next((pause for pause in report.pauses if pause.after_pulse == before.pulse), None)
         self.notice = recording_resumed(before.recording, current.id, gap)
-        self._say(Level.WARNING, self.notice.text)
+        self._say(Level.WARNING, self.notice.said)
         current.interruption = None
 
     def fail(self, error: SvevError, then: State) -> None:
@@ -326,7 +334,7 @@ class RecordingControl:
             self.current = None
             return
         self.notice = recording_ended(current.id, error)
-        self._say(Level.ERROR, self.notice.text)
+        self._say(Level.ERROR, self.notice.said)
         self._over(error, then)
 
     def abandon(self) -> None:
@@ -334,7 +342,8 @@ class RecordingControl:
         self.answer()
         current, self.current = self.current, None
         if current is not None:
-            error = ProcessDiedError("the service ends: look at the list of recordings when it runs again")
+            text = "the service ends: look at the list of recordings when it runs again"
+            error = ProcessDiedError(phrase("why_service_ends", text))
             current.refuse(error)
             current.end(error)
 
@@ -349,8 +358,8 @@ class RecordingControl:
                 self._machine.move(then)
             self._answers.append(partial(current.end, outcome))
 
-    def _say(self, level: Level, text: str) -> None:
-        self._session.tell(Event.now(level, "service", text))
+    def _say(self, level: Level, said: Phrase) -> None:
+        self._session.tell(Event.now(level, "service", said))
 
 
 def read_calibration(rig: RigSettings) -> Calibration | None:

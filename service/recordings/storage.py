@@ -8,6 +8,7 @@ from typing import Final
 from recorder.catalogue.trash import trash_contents
 from rig.disk import free_bytes
 from rig.errors import BadInputError, StorageError
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 
 
@@ -85,17 +86,25 @@ def check_room_for(rig: RigSettings, directory: Path, seconds: float) -> None:
     room = room_for(rig, free)
     if room.seconds < seconds:
         missing = seconds * bytes_per_s(rig) - usable_bytes(rig, free)
-        raise StorageError(
-            f"{directory}: there is room for {room.seconds:.0f} s and {seconds:g} s are wanted, beside the reserve of "
-            f"{rig.recorder.reserve_gb:g} GB: {_what_makes_room(directory, missing)}"
+        text = (
+            "{folder}: there is room for {room:.0f} s and {wanted:g} s are wanted, beside the reserve of "
+            "{reserve_gb:g} GB: {remedy}"
         )
+        remedy, reserve_gb = _what_makes_room(directory, missing), rig.recorder.reserve_gb
+        raise StorageError(
+            phrase(
+                "why_no_room", text,
+                folder=str(directory), room=room.seconds, wanted=seconds, reserve_gb=reserve_gb, remedy=remedy,
+            )
+        )  # fmt: skip
 
 
-def _what_makes_room(directory: Path, missing_bytes: float) -> str:
+def _what_makes_room(directory: Path, missing_bytes: float) -> Phrase:
     """What to do for so much more room. Deleting alone gives none: what is deleted lies in the trash."""
     trash = trash_contents(directory).bytes
     if trash >= missing_bytes:
-        return f"empty the trash, which frees {trash / _GB:.1f} GB"
+        return phrase("room_by_trash", "empty the trash, which frees {gb:.1f} GB", gb=trash / _GB)
     if trash:
-        return f"empty the trash, which frees {trash / _GB:.1f} GB, then delete recordings and empty it again"
-    return "delete recordings and then empty the trash, or move recordings to another disk"
+        text = "empty the trash, which frees {gb:.1f} GB, then delete recordings and empty it again"
+        return phrase("room_by_trash_and_more", text, gb=trash / _GB)
+    return phrase("room_by_deleting", "delete recordings and then empty the trash, or move recordings to another disk")

@@ -9,6 +9,7 @@ from recorder.catalogue.trash import TrashContents
 from rig.disk import free_bytes
 from rig.errors import StorageError
 from rig.events import Event, Level
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.status import DiskStatus, Status
 from service.recordings.storage import bytes_per_s, room_for, usable_bytes
@@ -85,7 +86,7 @@ class TrashKeeper:
         missing = seconds * bytes_per_s(self._rig) - usable_bytes(self._rig, free)
         if missing > 0:
             gone = self._catalogue.make_room(missing, older_than_s=_FRESH_S if spare_fresh else 0.0)
-            self._say(gone, "room was needed")
+            self._say(gone, phrase("why_room_needed", "room was needed"))
 
     def look(self) -> None:
         """Remove what is too old, make room if it runs short, and measure what is left.
@@ -93,16 +94,18 @@ class TrashKeeper:
         Raises:
             StorageError: the disk refuses.
         """
-        self._say(self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S), f"it was older than {KEPT_DAYS} days")
+        old = phrase("why_too_old", "it was older than {days} days", days=KEPT_DAYS)
+        self._say(self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S), old)
         self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._rig.recorder.jump_s), spare_fresh=True)
         self.make_room(_LAST_S)
         self._contents = self._catalogue.trash()
 
-    def _say(self, gone: TrashContents, why: str) -> None:
+    def _say(self, gone: TrashContents, why: Phrase) -> None:
         if gone.recordings:
             self._contents = self._catalogue.trash()
-            what = f"{gone.recordings} recordings, {gone.bytes / _GB:.1f} GB"
-            self._tell(Event.now(Level.INFO, "service", f"removed from the trash for good: {what}; {why}"))
+            text = "removed from the trash for good: {recordings} recordings, {gb:.1f} GB; {why}"
+            said = phrase("event_purged", text, recordings=gone.recordings, gb=gone.bytes / _GB, why=why)
+            self._tell(Event.now(Level.INFO, "service", said))
 
     def _run(self) -> None:
         while not self._over.is_set():
@@ -112,5 +115,5 @@ class TrashKeeper:
             except StorageError as error:
                 if str(error) != self._refused:
                     self._refused = str(error)
-                    self._tell(Event.now(Level.ERROR, "service", self._refused))
+                    self._tell(Event.now(Level.ERROR, "service", error.said))
             self._over.wait(_LOOK_S)

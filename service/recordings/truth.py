@@ -14,6 +14,7 @@ from recorder.reading.triplets import tags
 from rig.clocks import HostNs, UtcAnchor
 from rig.errors import ProcessDiedError, SvevError
 from rig.events import Event, Level
+from rig.phrase import phrase
 from rig.pulse import PulseNumber
 from service.processes.simulation import WriteTruth
 
@@ -121,8 +122,8 @@ class TruthWriter:
 
     def _lament(self, log: _Log, why: str) -> None:
         if log.path.exists():
-            text = f"what the simulated cameras saw is not written beside {log.path.name}: {why}"
-            self._tell(Event.now(Level.ERROR, "truth", text))
+            text = "what the simulated cameras saw is not written beside {log}: {why}"
+            self._tell(Event.now(Level.ERROR, "truth", phrase("event_no_truth", text, log=log.path.name, why=why)))
 
     def _pulses(self, log: _Log) -> Iterator[tuple[PulseNumber, HostNs]]:
         for tag in tags(log.path):

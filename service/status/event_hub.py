@@ -33,8 +33,11 @@ class EventHub:
             self._number += 1
             time = datetime.fromtimestamp(event.time / NS_PER_S, UTC)
             self._events.append(
-                Event(number=self._number, time=time, level=event.level.value, name=event.name, message=event.message)
-            )
+                Event(
+                    number=self._number, time=time, level=event.level.value, name=event.name,
+                    message=event.message, code=event.code, values=event.values,
+                )
+            )  # fmt: skip
             self._write_line(event)
         self.wake()
 

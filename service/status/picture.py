@@ -133,7 +133,7 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
                 backend=camera.backend,
                 address=camera.address,
                 state=state,
-                statement=about_camera(camera, state, presence.text),
+                statement=about_camera(camera, state, presence.said),
                 columns=columns,
                 **({} if report is None else {name: getattr(report, name) for name in _MEASURED}),
             )

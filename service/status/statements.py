@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from rig.errors import SvevError
+from rig.phrase import Phrase, Value, phrase
 from rig.pulse import Pause
 from rig.settings.model import CameraSettings
 from rig.status import CameraState, Level, State, Statement
@@ -34,15 +35,15 @@ def camera_state(trying: bool, heard: CameraPresence) -> CameraState:
     return CameraState.CONNECTING if heard.news is None else _CAMERA_STATES[heard.news]
 
 
-def about_camera(camera: CameraSettings, state: CameraState, text: str) -> Statement:
+def about_camera(camera: CameraSettings, state: CameraState, said: Phrase) -> Statement:
     """The state of a camera in words.
 
     Args:
         camera: the camera.
         state: its state.
-        text: the text of the last news of it, e.g. why it is not there.
+        said: the last news of it, e.g. why it is not there.
     """
-    values: dict[str, str | int | float] = {"camera": camera.name, "reason": text}
+    values: dict[str, Value] = {"camera": camera.name, "reason": said}
     match state:
         case CameraState.OFF:
             return Statement(code="camera_off", text=f"{camera.name} is off: the rig is not armed", values=values)
@@ -55,8 +56,15 @@ def about_camera(camera: CameraSettings, state: CameraState, text: str) -> State
             advice = "check its trigger cable; it is connected again by itself"
             return Statement(level=Level.WARNING, code="camera_silent", text=what, advice=advice, values=values)
         case CameraState.ABSENT:
-            what = f"{camera.name} is absent" + (f": {text}" if text else "")
-            return Statement(level=Level.ERROR, code="camera_absent", text=what, advice=_CAMERA_ADVICE, values=values)
+            return _absent(camera.name, said, values)
+
+
+def _absent(camera: str, said: Phrase, values: dict[str, Value]) -> Statement:
+    if not said.text:
+        what = f"{camera} is absent"
+        return Statement(level=Level.ERROR, code="camera_absent", text=what, advice=_CAMERA_ADVICE, values=values)
+    what = f"{camera} is absent: {said}"
+    return Statement(level=Level.ERROR, code="camera_absent_why", text=what, advice=_CAMERA_ADVICE, values=values)
 
 
 def about_state(
@@ -103,7 +111,7 @@ def _working(
 ) -> Statement:
     """Armed or recording. If cameras are missing, it works without them, and the statement says so."""
     missing = [c.name for c, s in zip(cameras, states, strict=True) if s is not CameraState.READY]
-    values: dict[str, str | int | float] = {
+    values: dict[str, Value] = {
         "present": len(cameras) - len(missing), "cameras": len(cameras), "missing": ", ".join(missing),
     }  # fmt: skip
     if rate_hz is not None:
@@ -125,6 +133,25 @@ def _working(
         advice="recording works; see the camera for what to do",
         values=values,
     )
+
+
+#: The states in words, for the log.
+_STATES: Final = {
+    State.IDLE: phrase("mode_idle", "idle"),
+    State.ARMING: phrase("mode_arming", "arming"),
+    State.ARMED: phrase("mode_armed", "armed"),
+    State.RECORDING: phrase("mode_recording", "recording"),
+    State.DISARMING: phrase("mode_disarming", "disarming"),
+    State.FAULT: phrase("mode_fault", "fault"),
+}
+
+
+def moved(before: State, to: State, fault: Statement | None) -> Phrase:
+    """The change from one state to another, with the fault if it is one."""
+    left, entered = _STATES[before], _STATES[to]
+    if fault is None:
+        return phrase("event_moved", "{before} -> {to}", before=left, to=entered)
+    return phrase("event_failed", "{before} -> {to}: {why}", before=left, to=entered, why=fault.said)
 
 
 def no_camera() -> Statement:
@@ -149,7 +176,7 @@ def failed(error: SvevError, again_in_s: float) -> Statement:
         code="fault_failed",
         text=str(error),
         advice=f"it is tried again in {again_in_s:g} s; arm to try at once, disarm to stop trying",
-        values={"reason": str(error), "again_in_s": again_in_s},
+        values={"reason": error.said, "again_in_s": again_in_s},
     )
 
 
@@ -160,7 +187,7 @@ def recording_ended(recording: str, error: SvevError) -> Statement:
         code="recording_ended",
         text=f"recording {recording} ended early: {error}",
         advice="what was recorded until then is kept; see the recording's verdict",
-        values={"recording": recording, "reason": str(error)},
+        values={"recording": recording, "reason": error.said},
     )
 
 
@@ -175,7 +202,7 @@ def recording_forgotten(recording: str, longest_s: float) -> Statement:
     )
 
 
-def recording_continued(recording: str, path: Path, reason: str) -> Statement:
+def recording_continued(recording: str, path: Path, reason: Phrase) -> Statement:
     """The log of a recording failed, and the recording goes on in another one.
 
     Args:
@@ -200,7 +227,7 @@ def recording_resumed(before: str, recording: str, gap: Pause | None) -> Stateme
         recording: id of the log in which it goes on.
         gap: the pulses that are in neither; None: there are none.
     """
-    values: dict[str, str | int | float] = {"before": before, "recording": recording}
+    values: dict[str, Value] = {"before": before, "recording": recording}
     text = f"the recorder was restarted, and recording {before} goes on in {recording}"
     if gap is None or gap.before_pulse is None:
         missing = "no pulse is missing"

@@ -3,6 +3,7 @@
 import time
 
 from rig.errors import SvevError
+from rig.phrase import Phrase, phrase
 from rig.status import Statement
 from rig.transport.process_table import BackOff
 from service.status.statements import failed, no_camera
@@ -37,7 +38,7 @@ class Fault:
         """Note the error with which the recorder says that it is about to end."""
         self._complaint = error
 
-    def fail(self, error: SvevError, lived_s: float, *, hurry: bool = False) -> str:
+    def fail(self, error: SvevError, lived_s: float, *, hurry: bool = False) -> Phrase:
         """Note that setting up failed or that the recorder died.
 
         Args:
@@ -54,7 +55,10 @@ class Fault:
         self._again_at = time.monotonic() + wait_s
         self.cause = self._complaint or error
         self.statement = failed(self.cause, wait_s)
-        return f"{self.cause}; starting again {f'in {wait_s:g} s' if wait_s else 'at once'}"
+        why = self.cause.said
+        if not wait_s:
+            return phrase("event_starting_at_once", "{why}; starting again at once", why=why)
+        return phrase("event_starting_again", "{why}; starting again in {seconds:g} s", why=why, seconds=wait_s)
 
     def lack_cameras(self) -> None:
         """Note that no camera answers; the grabbers go on trying."""

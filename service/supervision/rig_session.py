@@ -11,6 +11,7 @@ from functools import partial
 from rig.clocks import HostNs, host_now
 from rig.errors import ProcessDiedError, SvevError
 from rig.events import Event
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.transport.messages import RecorderOptions, TellEvent
 from service.processes.rig_processes import RigProcesses
@@ -118,9 +119,9 @@ class RigSession:
             return self._started()
         except OSError as error:
             what = error.filename or "the processes of the rig"
-            raise ProcessDiedError(
-                f"{what}: cannot be started ({error.strerror}); see what this login may use: ulimit -a"
-            ) from error
+            text = "{what}: cannot be started ({why}); see what this login may use: ulimit -a"
+            why = error.strerror or str(error)
+            raise ProcessDiedError(phrase("why_not_started", text, what=str(what), why=why)) from error
 
     def _started(self) -> RigProcesses:
         with ExitStack() as stack:

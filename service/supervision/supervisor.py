@@ -15,6 +15,7 @@ from rig.disk import free_bytes
 from rig.errors import ProcessDiedError, StateForbidsError, SvevError
 from rig.events import Event, Level
 from rig.health import Health
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.status import LastJump, State, Status
 from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderOptions, RecorderReport
@@ -26,7 +27,7 @@ from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.picture import Facts, picture
-from service.status.statements import FORBIDDEN
+from service.status.statements import FORBIDDEN, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.rig_session import RigSession, StartHill
@@ -183,7 +184,9 @@ class Supervisor:
             while self._ending_by is None or not self._ended(self._ending_by):
                 self._turn()
         except Exception as error:
-            self.hub.tell(Event.now(Level.FATAL, "service", f"the supervisor failed: {type(error).__name__}: {error}"))
+            why = f"{type(error).__name__}: {error}"
+            said = phrase("event_supervisor_failed", "the supervisor failed: {error}", error=why)
+            self.hub.tell(Event.now(Level.FATAL, "service", said))
             self.failure = error
             raise
         finally:
@@ -263,7 +266,8 @@ class Supervisor:
             else:
                 self._hear(report)
         if not processes.recorder_died and self._watch.stuck(processes):
-            self._session.tell(Event.now(Level.FATAL, RECORDER, f"no sign of life for {STUCK_S:g} s: it is ended"))
+            said = phrase("event_recorder_stuck", "no sign of life for {seconds:g} s: it is ended", seconds=STUCK_S)
+            self._session.tell(Event.now(Level.FATAL, RECORDER, said))
             processes.kill_recorder()
 
     def _hear(self, report: RecorderReport) -> None:
@@ -276,7 +280,9 @@ class Supervisor:
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
         level = Level.INFO if jump.ok else Level.WARNING
-        self._session.tell(Event.now(level, "analysis", f"jump {jump.jump} of {jump.recording}: {jump.verdict}"))
+        text = "jump {jump} of {recording}: {verdict}"
+        said = phrase("event_jump", text, jump=jump.jump, recording=jump.recording, verdict=jump.verdict)
+        self._session.tell(Event.now(level, "analysis", said))
 
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""
@@ -301,7 +307,7 @@ class Supervisor:
     def _rig_failed(self, error: SvevError) -> None:
         """Handle that setting up failed or that the recorder died: try again later, or end if not `enduring`."""
         final = self.recordings.interrupt(error) if self._enduring and self._wanted else error
-        text = self._fault.fail(error, time.monotonic() - self._settling.began, hurry=final is None)
+        said = self._fault.fail(error, time.monotonic() - self._settling.began, hurry=final is None)
         if final is not None:
             self.recordings.fail(final, State.FAULT)
         if not self._enduring:
@@ -311,13 +317,13 @@ class Supervisor:
             return
         if self._machine.state is not State.FAULT:
             self._machine.move(State.FAULT)
-        self._session.tell(Event.now(Level.FATAL, RECORDER, text))
+        self._session.tell(Event.now(Level.FATAL, RECORDER, said))
 
     def _moved(self, before: State, to: State) -> None:
         self._dirty = True
         level = Level.ERROR if to is State.FAULT else Level.INFO
-        why = f": {self._fault.statement.text}" if to is State.FAULT and self._fault.statement else ""
-        self._session.tell(Event.now(level, "service", f"{before} -> {to}{why}"))
+        fault = self._fault.statement if to is State.FAULT else None
+        self._session.tell(Event.now(level, "service", moved(before, to, fault)))
 
     def _refresh(self) -> Status:
         self._dirty, self._pictured = False, time.monotonic()

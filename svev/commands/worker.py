@@ -18,6 +18,7 @@ from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Level
 from rig.jumper import JumperState
+from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 from rig.topics import DEFAULT_PUBLISH, JUMPER
 from svev import console
@@ -133,6 +134,6 @@ class _Published:
         except OSError as error:
             raise StorageError(f"{path}: cannot be written ({error.strerror}); choose another folder") from error
 
-    def message(self, level: Level, text: str) -> None:
+    def message(self, level: Level, said: Phrase) -> None:
         """Say what people should know."""
-        console.say(_MARKS.get(level, "") + text, aside=True)
+        console.say(f"{_MARKS.get(level, '')}{said}", aside=True)

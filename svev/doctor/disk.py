@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.disk import free_bytes, set_direct
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from service.recordings.storage import bytes_per_s, room_for
-from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 
 _MB = 1_000_000
 _GB = 1_000_000_000
@@ -54,7 +55,7 @@ def look_at_disk(rig: RigSettings, directory: Path) -> Iterator[Finding]:
     place = existing_part(directory)
     try:
         with _unnamed_file(place) as fd:
-            yield passed(Topic.DISK, f"{directory} can be written")
+            yield passed(Topic.DISK, "check_disk_writable", "{folder} can be written", folder=str(directory))
             free = free_bytes(fd) or 0
             yield look_at_room(rig, directory, free)
             if free < 2 * _TRIAL:
@@ -63,8 +64,11 @@ def look_at_disk(rig: RigSettings, directory: Path) -> Iterator[Finding]:
     except OSError as error:
         yield failure(
             Topic.DISK,
-            f"{directory} cannot be written: {error.strerror}",
+            "check_disk_not_writable",
+            "{folder} cannot be written: {why}",
             "correct its permissions, or choose another recorder.directory or --out",
+            folder=str(directory),
+            why=error.strerror or str(error),
         )
 
 
@@ -72,14 +76,14 @@ def look_at_room(rig: RigSettings, directory: Path, free: int) -> Finding:
     """How long a recording fits into `free` bytes, with the reserve kept."""
     room = room_for(rig, free)
     minutes = room.seconds / 60
-    what = (
-        f"{free / _GB:.1f} GB free in {directory}: {minutes:.0f} min of recording, "
-        f"{room.jumps} jumps of {rig.recorder.jump_s:g} s"
-    )
+    said = phrase(
+        "check_room",
+        "{gb:.1f} GB free in {folder}: {minutes:.0f} min of recording, {jumps} jumps of {jump_s:g} s",
+        gb=free / _GB, folder=str(directory), minutes=minutes, jumps=room.jumps, jump_s=rig.recorder.jump_s,
+    )  # fmt: skip
     remedy = "remove old recordings, or choose another disk with recorder.directory or --out"
-    if room.jumps < 1:
-        return failure(Topic.DISK, what, remedy)
-    return passed(Topic.DISK, what) if minutes >= _ENOUGH_MIN else warning(Topic.DISK, what, remedy)
+    level = Level.FAIL if room.jumps < 1 else Level.PASS if minutes >= _ENOUGH_MIN else Level.WARN
+    return judged(level, Topic.DISK, said, remedy)
 
 
 def look_at_fallback(rig: RigSettings, directory: Path) -> Iterator[Finding]:
@@ -94,18 +98,25 @@ def look_at_fallback(rig: RigSettings, directory: Path) -> Iterator[Finding]:
     except OSError as error:
         yield failure(
             Topic.DISK,
-            f"{fallback} (recorder.fallback_directory) cannot be written: {error.strerror}",
+            "check_fallback_not_writable",
+            "{folder} (recorder.fallback_directory) cannot be written: {why}",
             "correct its permissions; under systemd allow it: sudo systemctl edit svev, [Service] ReadWritePaths=",
+            folder=str(fallback),
+            why=error.strerror or str(error),
         )
         return
     if place.stat().st_dev == existing_part(directory).stat().st_dev:
         yield warning(
             Topic.DISK,
-            f"{fallback} (recorder.fallback_directory) is on the same disk as {directory}",
+            "check_fallback_same_disk",
+            "{folder} (recorder.fallback_directory) is on the same disk as {first}",
             "choose a folder on another disk, and check that this one is mounted",
+            folder=str(fallback),
+            first=str(directory),
         )
     else:
-        yield passed(Topic.DISK, f"{free / _GB:.1f} GB free in {fallback}, if the first disk fails")
+        what = "{gb:.1f} GB free in {folder}, if the first disk fails"
+        yield passed(Topic.DISK, "check_fallback", what, gb=free / _GB, folder=str(fallback))
 
 
 def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Finding]:
@@ -113,25 +124,28 @@ def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Fin
     if not trial.same:
         yield failure(
             Topic.DISK,
-            f"{directory} does not give back what was written",
+            "check_disk_forgets",
+            "{folder} does not give back what was written",
             "the disk is failing: look at `dmesg`, replace it",
+            folder=str(directory),
         )
     if not trial.direct:
         yield warning(
             Topic.DISK,
-            f"the file system of {directory} has no direct I/O: recording costs several times the processor time",
+            "check_no_direct_io",
+            "the file system of {folder} has no direct I/O: recording costs several times the processor time",
             "record to ext4 or xfs on a local disk",
+            folder=str(directory),
         )
     needed = bytes_per_s(rig)
-    writes, reads = trial.write_bps / _MB, trial.read_bps / _MB
-    what = f"the disk writes {writes:.0f} and reads {reads:.0f} MB/s, {needed / _MB:.0f} MB/s are needed"
+    said = phrase(
+        "check_disk_speed",
+        "the disk writes {writes:.0f} and reads {reads:.0f} MB/s, {needed:.0f} MB/s are needed",
+        writes=trial.write_bps / _MB, reads=trial.read_bps / _MB, needed=needed / _MB,
+    )  # fmt: skip
     remedy = "record to a faster disk (NVMe), or lower trigger.rate_hz or the regions"
-    if trial.write_bps < needed:
-        yield failure(Topic.DISK, what, remedy)
-    elif trial.write_bps < _HEADROOM * needed:
-        yield warning(Topic.DISK, what, remedy)
-    else:
-        yield passed(Topic.DISK, what)
+    enough, ample = trial.write_bps >= needed, trial.write_bps >= _HEADROOM * needed
+    yield judged(Level.PASS if ample else Level.WARN if enough else Level.FAIL, Topic.DISK, said, remedy)
 
 
 def try_disk(fd: int, size: int = _TRIAL) -> Trial:

@@ -68,15 +68,16 @@ def run_probe(probe: Probe) -> list[Finding]:
             findings.extend(probe.look())
         except Exception as error:  # noqa: BLE001 - whatever stops a probe is a finding
             reason = f"{type(error).__name__}: {error}"
-            findings.append(
-                failure(probe.topic, f"{probe.name} cannot be examined: {reason}", "report it with this line")
-            )
+            what = "{probe} cannot be examined: {why}"
+            remedy = "report it with this line"
+            findings.append(failure(probe.topic, "check_broken", what, remedy, probe=probe.name, why=reason))
 
     # In a thread, because a probe may hang in the kernel or in a library, where nothing can interrupt it.
     worker = threading.Thread(target=look, name=f"doctor: {probe.name}", daemon=True)
     worker.start()
     worker.join(probe.limit_s)
     if worker.is_alive():
-        what = f"{probe.name} did not answer within {probe.limit_s:g} s"
-        return [failure(probe.topic, what, "see whether the disk, network or camera behind it hangs: look at `dmesg`")]
+        what = "{probe} did not answer within {seconds:g} s"
+        remedy = "see whether the disk, network or camera behind it hangs: look at `dmesg`"
+        return [failure(probe.topic, "check_hangs", what, remedy, probe=probe.name, seconds=probe.limit_s)]
     return findings

@@ -31,7 +31,8 @@ def look_at_firewire(rig: RigSettings) -> Iterator[Finding]:
         return
     if rig.simulation is not None:
         names = ", ".join(camera.name for camera in rig.cameras if camera.backend == "iidc")
-        yield passed(Topic.CAMERAS, f"{names} are simulated on an emulated FireWire bus")
+        what = "{cameras} are simulated on an emulated FireWire bus"
+        yield passed(Topic.CAMERAS, "check_firewire_simulated", what, cameras=names)
         return
     yield from _ask(rig, {}, trial=False)
 
@@ -40,7 +41,9 @@ def try_firewire(rig: RigSettings) -> Iterator[Finding]:
     """Set each camera up as a recording does, and take frames for two seconds."""
     if not has_firewire(rig):
         remedy = 'name a rig file whose cameras have backend = "iidc", e.g. --rig config/rigs/hill-iidc.toml'
-        yield failure(Topic.CAMERAS, f'the rig "{rig.name}" has no FireWire camera', remedy)
+        yield failure(
+            Topic.CAMERAS, "check_no_firewire", 'the rig "{rig}" has no FireWire camera', remedy, rig=rig.name
+        )
         return
     with hill_environment(rig, host_now()) as variables:
         yield from _ask(rig, variables, trial=True)
@@ -67,13 +70,13 @@ def _ask(rig: RigSettings, variables: Mapping[str, str], *, trial: bool) -> Iter
             child.kill()
         if findings is None:
             remedy = "plug the FireWire card's cables out and in, and look at `dmesg`"
-            yield failure(Topic.CAMERAS, f"the FireWire bus did not answer within {limit_s:g} s", remedy)
+            what = "the FireWire bus did not answer within {seconds:g} s"
+            yield failure(Topic.CAMERAS, "check_firewire_hangs", what, remedy, seconds=limit_s)
             return
         yield from findings
         if child.ending() != "exit code 0":
-            yield failure(
-                Topic.CAMERAS, f"FireWire cannot be examined: {_last_line(output)}", "report it with this line"
-            )
+            what, remedy = "FireWire cannot be examined: {why}", "report it with this line"
+            yield failure(Topic.CAMERAS, "check_firewire_broken", what, remedy, why=_last_line(output))
 
 
 def _findings(child: Child, deadline: float) -> list[Finding] | None:

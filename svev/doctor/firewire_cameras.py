@@ -9,14 +9,16 @@ from capture.iidc.configuration import READOUT_NS
 from capture.iidc.device import Device
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, CameraError
+from rig.phrase import phrase
 from rig.settings.model import CameraSettings, RigSettings
-from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 
 
 def told(message: str) -> Finding:
     """The finding FAIL of an error message of ours, which is "what is wrong: what to do"."""
     what, _, remedy = message.removeprefix("camera ").partition(": ")
-    return failure(Topic.CAMERAS, what, remedy or "see docs/firewire.md")
+    remedy = remedy or "see docs/firewire.md"
+    return failure(Topic.CAMERAS, "check_camera_refuses", "{what}", "{remedy}", what=what, remedy=remedy)
 
 
 def look_at_cameras(rig: RigSettings) -> Iterator[tuple[Finding, CameraSettings | None]]:
@@ -33,7 +35,8 @@ def look_at_cameras(rig: RigSettings) -> Iterator[tuple[Finding, CameraSettings 
                 return
             known = {int(camera.address, 16) for camera in cameras}
             if others := ", ".join(guid_text(guid) for guid in sorted(there - known)):
-                yield passed(Topic.CAMERAS, f"also on FireWire, but not in the rig file: {others}"), None
+                what = "also on FireWire, but not in the rig file: {others}"
+                yield passed(Topic.CAMERAS, "check_firewire_others", what, others=others), None
             for camera in cameras:
                 yield from _look_at_camera(bus, camera)
     except (BadInputError, CameraError) as error:
@@ -44,13 +47,17 @@ def _look_at_camera(bus: Bus, camera: CameraSettings) -> Iterator[tuple[Finding,
     try:
         with Device(bus, bus.find(int(camera.address, 16))) as device:
             if device.transmits():
-                what = f"{camera.name} ({device.name}) sends frames already"
+                what = "{camera} ({device}) sends frames already"
                 remedy = (
                     "end the program that uses it (another svev?); after a crash the next recording switches it off"
                 )
-                yield warning(Topic.CAMERAS, what, remedy), None
+                yield (
+                    warning(Topic.CAMERAS, "check_camera_sends", what, remedy, camera=camera.name, device=device.name),
+                    None,
+                )
                 return
-            yield passed(Topic.CAMERAS, f"{camera.name} is {device.name}"), camera
+            what = "{camera} is {device}"
+            yield passed(Topic.CAMERAS, "check_firewire_camera", what, camera=camera.name, device=device.name), camera
             yield _look_at_signature(camera, AvtRegisters(device)), None
     except (BadInputError, CameraError) as error:
         yield told(f"{camera.name}, {error}"), None
@@ -58,11 +65,14 @@ def _look_at_camera(bus: Bus, camera: CameraSettings) -> Iterator[tuple[Finding,
 
 def _look_at_signature(camera: CameraSettings, avt: AvtRegisters) -> Finding:
     if avt.signs:
-        return passed(Topic.CAMERAS, f"{camera.name} can sign its frames (secure image signature)")
+        what = "{camera} can sign its frames (secure image signature)"
+        return passed(Topic.CAMERAS, "check_signs", what, camera=camera.name)
     return warning(
         Topic.CAMERAS,
-        f"{camera.name} cannot sign its frames: torn frames pass as pictures, lost ones count as missed",
+        "check_signs_not",
+        "{camera} cannot sign its frames: torn frames pass as pictures, lost ones count as missed",
         "use an AVT camera with firmware 3.03 or newer where every frame counts",
+        camera=camera.name,
     )
 
 
@@ -74,7 +84,8 @@ def _look_at_bandwidth(rig: RigSettings, cameras: list[CameraSettings]) -> Findi
     needs = [need(camera, rig.trigger.rate_hz) for camera in cameras]
     each = ", ".join(f"{camera.name} {taken.units}" for camera, taken in zip(cameras, needs, strict=True))
     total = sum(taken.units for taken in needs)
-    return passed(Topic.CAMERAS, f"FireWire bandwidth: {total} of {UNITS_PER_BUS} units ({each})")
+    what = "FireWire bandwidth: {taken} of {units} units ({each})"
+    return passed(Topic.CAMERAS, "check_bandwidth", what, taken=total, units=UNITS_PER_BUS, each=each)
 
 
 def _look_at_exposure(camera: CameraSettings, rig: RigSettings) -> Finding:
@@ -82,10 +93,13 @@ def _look_at_exposure(camera: CameraSettings, rig: RigSettings) -> Finding:
     period_ms = rig.trigger.period_ns / 1e6
     exposure_ns = camera.exposure_us * NS_PER_US
     busy_ms = (exposure_ns + READOUT_NS + need(camera, rig.trigger.rate_hz).transport_ns) / 1e6
-    what = f"{camera.name}: exposure, readout and transfer take {busy_ms:.1f} of {period_ms:.1f} ms"
+    text = "{camera}: exposure, readout and transfer take {busy_ms:.1f} of {period_ms:.1f} ms"
+    said = phrase("check_exposure", text, camera=camera.name, busy_ms=busy_ms, period_ms=period_ms)
     remedy = "shorten exposure_us, make the region smaller, or lower trigger.rate_hz"
     if exposure_ns + READOUT_NS >= rig.trigger.period_ns:
-        return failure(Topic.CAMERAS, f"{what}: every other pulse will find it exposing", remedy)
+        what = "{said}: every other pulse will find it exposing"
+        return failure(Topic.CAMERAS, "check_exposure_long", what, remedy, said=said)
     if busy_ms > period_ms:
-        return warning(Topic.CAMERAS, f"{what}: pulses may find it busy (overrun)", remedy)
-    return passed(Topic.CAMERAS, what)
+        what = "{said}: pulses may find it busy (overrun)"
+        return warning(Topic.CAMERAS, "check_exposure_busy", what, remedy, said=said)
+    return judged(Level.PASS, Topic.CAMERAS, said, remedy)

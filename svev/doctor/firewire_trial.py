@@ -14,9 +14,10 @@ from capture.iidc.device import Device
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, host_now
 from rig.errors import BadInputError, CameraError
+from rig.phrase import phrase
 from rig.settings.model import CameraSettings
 from rig.transport.ring import CameraRing
-from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.doctor.firewire_cameras import told
 
 _TRIAL_NS: Final = 2 * NS_PER_S
@@ -27,6 +28,7 @@ _DELAY_NS: Final = 1_000_000
 #: A busy computer takes frames late: the trial is repeated before a delay is called wrong.
 _DELAY_TRIALS: Final = 3
 _MANUAL: Final = "see docs/firewire.md, the first day with real cameras"
+_AFTER_RESET: Final = "recordings connect it again by themselves; do not touch cables meanwhile"
 
 
 def try_camera(settings: CameraSettings, rate_hz: float) -> Iterator[Finding]:
@@ -35,7 +37,8 @@ def try_camera(settings: CameraSettings, rate_hz: float) -> Iterator[Finding]:
     with closing(CameraRing.create(name, settings.frame_bytes, _SLOTS)) as ring:
         try:
             with closing(IidcCamera(settings, ring, rate_hz)) as camera:
-                yield passed(Topic.CAMERAS, f"{name} is set up: {camera.description}")
+                what = "{camera} is set up: {description}"
+                yield passed(Topic.CAMERAS, "check_trial_set_up", what, camera=name, description=camera.description)
                 camera.start()
                 arrivals = _collect(camera, ring, _TRIAL_NS)
                 if not any(arrival.whole for arrival in arrivals):
@@ -62,13 +65,12 @@ def _collect(camera: IidcCamera, ring: CameraRing, duration_ns: int) -> list[Arr
 
 def _nothing_came(name: str, damaged: int) -> Finding:
     if damaged:
-        what = f"{name}: {damaged} frames came, none with a signature that makes sense"
-        return failure(
-            Topic.CAMERAS, what, "check cable and connectors; if it stays, report it with the camera's firmware"
-        )
-    what = f"{name} is set up, but no frame came in {_TRIAL_NS / NS_PER_S:g} s"
+        what = "{camera}: {count} frames came, none with a signature that makes sense"
+        remedy = "check cable and connectors; if it stays, report it with the camera's firmware"
+        return failure(Topic.CAMERAS, "check_trial_unsigned", what, remedy, camera=name, count=damaged)
+    what = "{camera} is set up, but no frame came in {seconds:g} s"
     remedy = "switch the pulse generator on; if it is, check its cable, trigger_input and trigger_edge, then try again"
-    return warning(Topic.CAMERAS, what, remedy)
+    return warning(Topic.CAMERAS, "check_trial_silent", what, remedy, camera=name, seconds=_TRIAL_NS / NS_PER_S)
 
 
 def _judge(settings: CameraSettings, camera: IidcCamera, arrivals: list[Arrival], rate_hz: float) -> Iterator[Finding]:
@@ -81,32 +83,47 @@ def _judge(settings: CameraSettings, camera: IidcCamera, arrivals: list[Arrival]
     yield _judge_rate(name, (triggers or taken) / span_s if span_s else 0.0, rate_hz)
     lost, damaged = taken + 1 - len(whole), len(arrivals) - len(whole)
     if lost or damaged:
-        what = f"{name}: of {taken + 1} frames {damaged} came damaged and {max(0, lost - damaged)} not at all"
-        yield warning(Topic.CAMERAS, what, "check cable and connectors; end programs that keep the computer busy")
+        yield warning(
+            Topic.CAMERAS,
+            "check_trial_lost",
+            "{camera}: of {frames} frames {damaged} came damaged and {lost} not at all",
+            "check cable and connectors; end programs that keep the computer busy",
+            camera=name,
+            frames=taken + 1,
+            damaged=damaged,
+            lost=max(0, lost - damaged),
+        )
     else:
-        yield passed(Topic.CAMERAS, f"{name}: {len(whole)} frames, none lost or damaged")
+        what = "{camera}: {frames} frames, none lost or damaged"
+        yield passed(Topic.CAMERAS, "check_trial_whole", what, camera=name, frames=len(whole))
     if camera.byte_order is None:
         return
-    yield passed(Topic.CAMERAS, f"{name} signs its frames, {camera.byte_order.name.lower()} end of each word first")
+    what, order = "{camera} signs its frames, {order} end of each word first", camera.byte_order.name.lower()
+    yield passed(Topic.CAMERAS, "check_trial_signs", what, camera=name, order=order)
     yield _judge_triggers(name, triggers, taken)
 
 
 def _judge_rate(name: str, rate_hz: float, wanted_hz: float) -> Finding:
-    what = f"{name} is triggered {rate_hz:.3f} times a second"
+    what, rate = "{camera} is triggered {rate} times a second", f"{rate_hz:.3f}"
     if abs(rate_hz - wanted_hz) <= _RATE_SHARE * wanted_hz:
-        return passed(Topic.CAMERAS, what)
+        return passed(Topic.CAMERAS, "check_trial_rate", what, camera=name, rate=rate)
+    what = "{camera} is triggered {rate} times a second, the rig file says {wanted:g}"
     remedy = "correct trigger.rate_hz in the rig file, or the pulse generator"
-    return warning(Topic.CAMERAS, f"{what}, the rig file says {wanted_hz:g}", remedy)
+    return warning(Topic.CAMERAS, "check_trial_rate_wrong", what, remedy, camera=name, rate=rate, wanted=wanted_hz)
 
 
 def _judge_triggers(name: str, triggers: int, frames: int) -> Finding:
     if triggers == 0:
-        what = f"{name}: its trigger counter stands still, so pulses that it was too busy for count as not seen"
-        return warning(Topic.CAMERAS, what, _MANUAL)
+        what = "{camera}: its trigger counter stands still, so pulses that it was too busy for count as not seen"
+        return warning(Topic.CAMERAS, "check_trial_counter", what, _MANUAL, camera=name)
     if triggers > frames:
-        what = f"{name}: {triggers - frames} of {triggers} pulses came while it was busy (overrun)"
-        return warning(Topic.CAMERAS, what, "shorten exposure_us, make the region smaller, or lower trigger.rate_hz")
-    return passed(Topic.CAMERAS, f"{name}: trigger and frame counter run together")
+        what = "{camera}: {missed} of {pulses} pulses came while it was busy (overrun)"
+        remedy = "shorten exposure_us, make the region smaller, or lower trigger.rate_hz"
+        missed = triggers - frames
+        return warning(Topic.CAMERAS, "check_trial_overrun", what, remedy, camera=name, missed=missed, pulses=triggers)
+    return passed(
+        Topic.CAMERAS, "check_trial_counters", "{camera}: trigger and frame counter run together", camera=name
+    )
 
 
 def _judge_delay(settings: CameraSettings, camera: IidcCamera, ring: CameraRing, whole: list[Arrival]) -> Finding:
@@ -118,13 +135,14 @@ def _judge_delay(settings: CameraSettings, camera: IidcCamera, ring: CameraRing,
         latch = camera.latch()
         latency_ns = min(arrival.host_time - latch.host - (arrival.device_time - latch.device) for arrival in whole)
         measured_ns = latency_ns - camera.transport_ns
-        what = (
-            f"{settings.name}: first packet {measured_ns / 1e6:.2f} ms after the signed time, "
-            f"{expected_ns / 1e6:.2f} ms expected from the exposure"
-        )
+        said = phrase(
+            "check_trial_delay",
+            "{camera}: first packet {measured} ms after the signed time, {expected} ms expected from the exposure",
+            camera=settings.name, measured=f"{measured_ns / 1e6:.2f}", expected=f"{expected_ns / 1e6:.2f}",
+        )  # fmt: skip
         if settings.iidc.trigger_mode == 1 or abs(measured_ns - expected_ns) < _DELAY_NS:
-            return passed(Topic.CAMERAS, what)
-    return warning(Topic.CAMERAS, what, _MANUAL)
+            return judged(Level.PASS, Topic.CAMERAS, said, _MANUAL)
+    return judged(Level.WARN, Topic.CAMERAS, said, _MANUAL)
 
 
 def _try_bus_reset(settings: CameraSettings, camera: IidcCamera, ring: CameraRing) -> Finding:
@@ -133,9 +151,11 @@ def _try_bus_reset(settings: CameraSettings, camera: IidcCamera, ring: CameraRin
     try:
         arrivals = _collect(camera, ring, _AFTER_RESET_NS)
     except CameraError as error:
-        what = f"{settings.name} does not go on after a bus reset ({error})"
-        return warning(Topic.CAMERAS, what, "recordings connect it again by themselves; do not touch cables meanwhile")
+        what = "{camera} does not go on after a bus reset ({why})"
+        return warning(
+            Topic.CAMERAS, "check_trial_reset_ends", what, _AFTER_RESET, camera=settings.name, why=str(error)
+        )
     if any(arrival.whole for arrival in arrivals):
-        return passed(Topic.CAMERAS, f"{settings.name} goes on after a bus reset")
-    what = f"{settings.name}: no frame came after a bus reset"
-    return warning(Topic.CAMERAS, what, "recordings connect it again by themselves; do not touch cables meanwhile")
+        return passed(Topic.CAMERAS, "check_trial_reset", "{camera} goes on after a bus reset", camera=settings.name)
+    what = "{camera}: no frame came after a bus reset"
+    return warning(Topic.CAMERAS, "check_trial_reset_silent", what, _AFTER_RESET, camera=settings.name)

@@ -5,9 +5,10 @@ import socket
 from collections.abc import Iterator
 
 from rig.errors import BadInputError
+from rig.phrase import phrase
 from rig.settings.model import CameraSettings, RigSettings
 from service.processes.replayed_log import check_replay
-from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras
 
 _ANSWER_S = 1.5
@@ -21,7 +22,8 @@ def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
     for camera in rig.cameras:
         match camera.backend:
             case "sim":
-                yield passed(Topic.CAMERAS, f"{camera.name} is simulated inside the program")
+                what = "{camera} is simulated inside the program"
+                yield passed(Topic.CAMERAS, "check_sim_camera", what, camera=camera.name)
             case "aravis" if rig.simulation is not None:
                 yield _look_at_simulated(camera)
             case "aravis":
@@ -40,7 +42,7 @@ def look_for_cameras(rig: RigSettings) -> Iterator[Finding]:
     found = find_cameras()
     if not found:
         remedy = "check power and cables, and that no firewall blocks UDP port 3956"
-        yield warning(Topic.CAMERAS, "no camera answers a broadcast on any network", remedy)
+        yield warning(Topic.CAMERAS, "check_none_found", "no camera answers a broadcast on any network", remedy)
     for each in found:
         yield judge_found(each, names)
 
@@ -53,12 +55,25 @@ def judge_found(found: FoundCamera, names: dict[str, str]) -> Finding:
         names: names of the cameras in the rig file, by address.
     """
     camera, port = found.camera, found.interface
-    what = f"found behind {port.name}: {camera.vendor} {camera.model}, serial {camera.serial}, at {camera.address}"
+    said = phrase(
+        "camera_found",
+        "found behind {port}: {model}, serial {serial}, at {address}",
+        port=port.name, model=f"{camera.vendor} {camera.model}", serial=camera.serial, address=camera.address,
+    )  # fmt: skip
     if not found.reachable:
-        remedy = f"run: svev cameras set-ip {camera.serial} ADDRESS, or give {port.name} an address in its subnet"
-        return warning(Topic.CAMERAS, f"{what}, which is not in the subnet {port.network} of this port", remedy)
-    name = names.get(camera.address)
-    return passed(Topic.CAMERAS, f"{what}, {name} of the rig file" if name else f"{what}, not in the rig file")
+        return warning(
+            Topic.CAMERAS,
+            "check_found_unreachable",
+            "{said}, which is not in the subnet {subnet} of this port",
+            "run: svev cameras set-ip {serial} ADDRESS, or give {port} an address in its subnet",
+            said=said,
+            subnet=str(port.network),
+            serial=camera.serial,
+            port=port.name,
+        )
+    if name := names.get(camera.address):
+        return passed(Topic.CAMERAS, "check_found", "{said}, {camera} of the rig file", said=said, camera=name)
+    return passed(Topic.CAMERAS, "check_found_other", "{said}, not in the rig file", said=said)
 
 
 def _look_at_log(rig: RigSettings) -> Finding:
@@ -66,34 +81,43 @@ def _look_at_log(rig: RigSettings) -> Finding:
         check_replay(rig)
     except BadInputError as error:
         remedy = "correct address, names, regions or trigger.rate_hz in the rig file, or replay another log"
-        return failure(Topic.CAMERAS, str(error), remedy)
-    names = ", ".join(camera.name for camera in rig.cameras)
-    return passed(Topic.CAMERAS, f"{names} are replayed from {rig.cameras[0].address}")
+        return failure(Topic.CAMERAS, "check_replay_wrong", "{why}", remedy, why=error.said)
+    names, what = ", ".join(camera.name for camera in rig.cameras), "{cameras} are replayed from {log}"
+    return passed(Topic.CAMERAS, "check_replay", what, cameras=names, log=rig.cameras[0].address)
 
 
 def _look_at_gige(camera: CameraSettings) -> Finding:
-    where = f"{camera.name} at {camera.address}"
+    name, address = camera.name, camera.address
     remedy = "check its power and cable, and that a network port of this machine has an address in its subnet"
     try:
-        answer = ask_camera(camera.address, _ANSWER_S)
+        answer = ask_camera(address, _ANSWER_S)
     except (OSError, ValueError) as error:
-        return failure(Topic.CAMERAS, f"{where} cannot be asked: {error}", remedy)
+        what = "{camera} at {address} cannot be asked: {why}"
+        return failure(Topic.CAMERAS, "check_not_asked", what, remedy, camera=name, address=address, why=str(error))
     if answer is None:
-        return failure(Topic.CAMERAS, f"{where} does not answer", remedy)
-    camera_there, in_use = answer
-    who = f"{where}: {camera_there.vendor} {camera_there.model}, serial {camera_there.serial}"
+        what = "{camera} at {address} does not answer"
+        return failure(Topic.CAMERAS, "check_no_answer", what, remedy, camera=name, address=address)
+    there, in_use = answer
+    said = phrase(
+        "check_answers",
+        "{camera} at {address}: {model}, serial {serial}",
+        camera=name, address=address, model=f"{there.vendor} {there.model}", serial=there.serial,
+    )  # fmt: skip
     if in_use:
-        return failure(Topic.CAMERAS, f"{who}, is controlled by another program", "end that program (another svev?)")
-    return passed(Topic.CAMERAS, who)
+        what, remedy = "{said}, is controlled by another program", "end that program (another svev?)"
+        return failure(Topic.CAMERAS, "check_controlled", what, remedy, said=said)
+    return judged(Level.PASS, Topic.CAMERAS, said, remedy)
 
 
 def _look_at_simulated(camera: CameraSettings) -> Finding:
     """Is the address of a simulated camera free? The camera itself is started with the recording."""
-    where = f"{camera.name} is simulated at {camera.address}"
+    remedy = "end the program that uses it (another svev?), or correct the address"
+    where = phrase("check_simulated", "{camera} is simulated at {address}", camera=camera.name, address=camera.address)
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind((camera.address, _GVCP_PORT))
     except OSError as error:
-        what = f"{where}, which cannot be taken: {os.strerror(error.errno) if error.errno else error}"
-        return failure(Topic.CAMERAS, what, "end the program that uses it (another svev?), or correct the address")
-    return passed(Topic.CAMERAS, where)
+        why = os.strerror(error.errno) if error.errno else str(error)
+        what = "{said}, which cannot be taken: {why}"
+        return failure(Topic.CAMERAS, "check_simulated_taken", what, remedy, said=where, why=why)
+    return judged(Level.PASS, Topic.CAMERAS, where, remedy)

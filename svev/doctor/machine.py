@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from service.processes.memory import available_bytes, memory_needed
-from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 
 _UNSYNCHRONIZED = 0x0040  # STA_UNSYNC, sys/timex.h
 _FAST = {"performance", "schedutil", "ondemand"}
@@ -43,11 +44,13 @@ def look_at_clock() -> Iterator[Finding]:
     if clock.status & _UNSYNCHRONIZED:
         yield warning(
             Topic.TIME,
+            "check_clock_free",
             "the clock is not synchronized: recordings carry whatever date and time this machine believes in",
             "run: sudo apt-get install systemd-timesyncd, then wait a minute; without a network set it with `date`",
         )
     else:
-        yield passed(Topic.TIME, f"the clock is synchronized, off by at most {clock.maxerror / 1000:.0f} ms")
+        what = "the clock is synchronized, off by at most {ms:.0f} ms"
+        yield passed(Topic.TIME, "check_clock", what, ms=clock.maxerror / 1000)
 
 
 def look_at_processor() -> Iterator[Finding]:
@@ -58,14 +61,21 @@ def look_at_processor() -> Iterator[Finding]:
     if slow := governors - _FAST:
         yield warning(
             Topic.PROCESSOR,
-            f"{cores} cores, governor {', '.join(sorted(slow))}: frames may wait for a core to wake up",
+            "check_governor_slow",
+            "{cores} cores, governor {governor}: frames may wait for a core to wake up",
             "run: echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
+            cores=cores,
+            governor=", ".join(sorted(slow)),
         )
+    elif governors:
+        what, told = "{cores} cores, governor: {governor}", ", ".join(sorted(governors))
+        yield passed(Topic.PROCESSOR, "check_governor", what, cores=cores, governor=told)
     else:
-        told = ", ".join(sorted(governors)) or "none (the machine below this one decides)"
-        yield passed(Topic.PROCESSOR, f"{cores} cores, governor: {told}")
+        what = "{cores} cores, governor: none (the machine below this one decides)"
+        yield passed(Topic.PROCESSOR, "check_governor_none", what, cores=cores)
     if cores < 2:
-        yield warning(Topic.PROCESSOR, "one core for all cameras", "use a machine with at least two cores")
+        remedy = "use a machine with at least two cores"
+        yield warning(Topic.PROCESSOR, "check_one_core", "one core for all cameras", remedy)
 
 
 _HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
@@ -77,13 +87,10 @@ _CAUTION = 0.5  # share of the available memory above which to warn, because oth
 def look_at_memory(rig: RigSettings) -> Iterator[Finding]:
     """Do the rings, the triplet buffers and the pre-roll fit into the available memory?"""
     needed, free = sum(memory_needed(rig, rig.recorder.preroll_s).values()), available_bytes()
-    what = f"buffers need {needed / _MB:.0f} MB, {free / _MB:.0f} MB are available"
-    if needed > free:
-        yield failure(Topic.MEMORY, what, _LESS_MEMORY)
-    elif needed > _CAUTION * free:
-        yield warning(Topic.MEMORY, what, _LESS_MEMORY)
-    else:
-        yield passed(Topic.MEMORY, what)
+    text = "buffers need {needed:.0f} MB, {free:.0f} MB are available"
+    said = phrase("check_memory", text, needed=needed / _MB, free=free / _MB)
+    level = Level.FAIL if needed > free else Level.WARN if needed > _CAUTION * free else Level.PASS
+    yield judged(level, Topic.MEMORY, said, _LESS_MEMORY)
 
 
 def look_at_shared_memory(rig: RigSettings) -> Iterator[Finding]:
@@ -100,31 +107,36 @@ def look_at_shared_memory(rig: RigSettings) -> Iterator[Finding]:
     except OSError as error:
         yield failure(
             Topic.MEMORY,
-            f"no shared memory of {size / _MB:.0f} MB for a camera's ring: {error.strerror}",
+            "check_no_shared_memory",
+            "no shared memory of {mb:.0f} MB for a camera's ring: {why}",
             "raise the memory limit of this login or container (ulimit -v, systemd MemoryMax)",
+            mb=size / _MB,
+            why=error.strerror or str(error),
         )
         return
-    yield passed(Topic.MEMORY, f"shared memory for a camera's ring, {size / _MB:.0f} MB")
+    yield passed(Topic.MEMORY, "check_shared_memory", "shared memory for a camera's ring, {mb:.0f} MB", mb=size / _MB)
 
 
 def look_at_huge_pages() -> Iterator[Finding]:
     """Are huge pages on? They save a third of the processor time from camera to disk."""
-    yield _look_at_huge_pages("triplets", _HUGE_PAGES / "enabled", "madvise", {"always", "madvise"})
-    rings = {"always", "within_size", "advise", "force"}
-    yield _look_at_huge_pages("the cameras' rings", _HUGE_PAGES / "shmem_enabled", "advise", rings)
+    triplets, good = phrase("user_triplets", "triplets"), {"always", "madvise"}
+    yield _look_at_huge_pages(triplets, _HUGE_PAGES / "enabled", "madvise", good)
+    rings, good = phrase("user_rings", "the cameras' rings"), {"always", "within_size", "advise", "force"}
+    yield _look_at_huge_pages(rings, _HUGE_PAGES / "shmem_enabled", "advise", good)
 
 
-def _look_at_huge_pages(user: str, path: Path, advised: str, good: set[str]) -> Finding:
+def _look_at_huge_pages(user: Phrase, path: Path, advised: str, good: set[str]) -> Finding:
     # The kernel lists all choices, with the one in force in brackets.
     chosen = re.search(r"\[(\w+)\]", path.read_text()) if path.exists() else None
     if chosen is None:
-        return warning(
-            Topic.MEMORY, f"this kernel has no huge pages for {user}", "use a kernel with transparent huge pages"
-        )
-    what = f"huge pages for {user}: {chosen[1]}"
+        what, remedy = "this kernel has no huge pages for {user}", "use a kernel with transparent huge pages"
+        return warning(Topic.MEMORY, "check_no_huge_pages", what, remedy, user=user)
+    what, remedy = "huge pages for {user}: {chosen}", "run: echo {advised} | sudo tee {path}"
     if chosen[1] in good:
-        return passed(Topic.MEMORY, what)
-    return warning(Topic.MEMORY, what, f"run: echo {advised} | sudo tee {path}")
+        return passed(Topic.MEMORY, "check_huge_pages", what, user=user, chosen=chosen[1])
+    return warning(
+        Topic.MEMORY, "check_huge_pages_off", what, remedy, user=user, chosen=chosen[1], advised=advised, path=str(path)
+    )
 
 
 #: A module of each Python package.
@@ -147,12 +159,15 @@ def look_at_python() -> Iterator[Finding]:
     """Is this the Python of the distribution? Any other one does not find Aravis."""
     version = ".".join(map(str, sys.version_info[:3]))
     if sys.base_prefix == _DISTRIBUTION_PREFIX:
-        yield passed(Topic.SOFTWARE, f"Python {version} of the distribution")
+        yield passed(Topic.SOFTWARE, "check_python", "Python {version} of the distribution", version=version)
     else:
         yield failure(
             Topic.SOFTWARE,
-            f"Python {version} in {sys.base_prefix} is not the distribution's, so it does not find Aravis",
+            "check_other_python",
+            "Python {version} in {prefix} is not the distribution's, so it does not find Aravis",
             "make the environment with: /usr/bin/python3 -m venv --system-site-packages .venv",
+            version=version,
+            prefix=sys.base_prefix,
         )
 
 
@@ -166,10 +181,13 @@ def look_at_packages() -> Iterator[Finding]:
         except ImportError as error:
             yield failure(
                 Topic.SOFTWARE,
-                f"{package} cannot be loaded: {error}",
+                "check_package_missing",
+                "{package} cannot be loaded: {why}",
                 "run `make setup`, or install svev's wheel again",
+                package=package,
+                why=str(error),
             )
-    yield passed(Topic.SOFTWARE, ", ".join(found))
+    yield passed(Topic.SOFTWARE, "check_packages", "{packages}", packages=", ".join(found))
 
 
 def look_at_camera_libraries(rig: RigSettings) -> Iterator[Finding]:
@@ -183,11 +201,12 @@ def _look_at_library(name: str, package: str, load: Callable[[], None], *, neede
     try:
         load()
     except (ImportError, ValueError, OSError) as error:
-        judge = failure if needed else warning
-        return judge(
-            Topic.SOFTWARE, f"{name} cannot be loaded: {error}", f"run: sudo apt-get install {package} python3-gi"
-        )
-    return passed(Topic.SOFTWARE, f"{name} {_debian_version(package)}")
+        what, why = "{library} cannot be loaded: {why}", str(error)
+        said = phrase("check_library_missing", what, library=name, why=why, package=package)
+        level = Level.FAIL if needed else Level.WARN
+        return judged(level, Topic.SOFTWARE, said, f"run: sudo apt-get install {package} python3-gi")
+    what, version = "{library} {version}", _debian_version(package)
+    return passed(Topic.SOFTWARE, "check_library", what, library=name, version=version)
 
 
 def _load_aravis() -> None:

@@ -11,8 +11,9 @@ from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, STALL_FRAMES, pre
 from recorder.publishing.keys import exposure, load_keys
 from recorder.publishing.publisher import bind
 from rig.errors import BadInputError
+from rig.phrase import phrase
 from rig.settings.model import CameraSettings, RigSettings
-from svev.doctor.finding import Finding, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.interfaces import Interface, interface_to
 
 _CAP_NET_RAW = 13  # linux/capability.h
@@ -31,12 +32,14 @@ def look_at_packet_sockets(rig: RigSettings) -> Iterator[Finding]:
     if not cameras:
         return
     if len(plain) == len(cameras):
-        yield passed(Topic.NETWORK, "frames are received through plain sockets, which suit slow cameras")
+        what = "frames are received through plain sockets, which suit slow cameras"
+        yield passed(Topic.NETWORK, "check_plain_sockets", what)
     elif _may_use_packet_sockets():
-        yield passed(Topic.NETWORK, "frames are received through packet sockets")
+        yield passed(Topic.NETWORK, "check_packet_sockets", "frames are received through packet sockets")
     else:
         yield warning(
             Topic.NETWORK,
+            "check_no_packet_sockets",
             "no right to packet sockets (CAP_NET_RAW): receiving costs several times the processor time",
             "run svev as root, or by: sudo setpriv --reuid=$USER --regid=$USER --init-groups --inh-caps=+net_raw "
             '--ambient-caps=+net_raw "$(which svev)" record ...',
@@ -56,12 +59,19 @@ def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
     wanted = {"rmem_max": min(SOCKET_BUFFER_BYTES, STALL_FRAMES * largest), "rmem_default": 2 * largest}
     for name, least in wanted.items():
         value = int(Path(f"/proc/sys/net/core/{name}").read_text())
-        what = f"net.core.{name} is {value}"
         if value >= least:
-            yield passed(Topic.NETWORK, what)
+            what = "net.core.{name} is {value}"
+            yield passed(Topic.NETWORK, "check_socket_buffer", what, name=name, value=str(value))
         else:
-            remedy = f"run: sudo sysctl -w net.core.{name}={least} (for good: a line in /etc/sysctl.d/90-svev.conf)"
-            yield warning(Topic.NETWORK, f"{what}, {least} is wanted: packets may be lost", remedy)
+            yield warning(
+                Topic.NETWORK,
+                "check_socket_buffer_small",
+                "net.core.{name} is {value}, {least} is wanted: packets may be lost",
+                "run: sudo sysctl -w net.core.{name}={least} (for good: a line in /etc/sysctl.d/90-svev.conf)",
+                name=name,
+                value=str(value),
+                least=str(least),
+            )
 
 
 def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
@@ -71,12 +81,13 @@ def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
         try:
             interface = interface_to(str(IPv4Address(camera.address)))
         except ValueError:
-            what = f"{camera.name}: {camera.address} is no IPv4 address"
-            yield failure(Topic.NETWORK, what, "correct its address in the rig file")
+            what, remedy = "{camera}: {address} is no IPv4 address", "correct its address in the rig file"
+            yield failure(Topic.NETWORK, "check_no_ipv4", what, remedy, camera=camera.name, address=camera.address)
             continue
         if interface is None:
             remedy = "give a network port an address in the camera's subnet"
-            yield failure(Topic.NETWORK, f"{camera.name}: no network leads to {camera.address}", remedy)
+            what = "{camera}: no network leads to {address}"
+            yield failure(Topic.NETWORK, "check_no_way", what, remedy, camera=camera.name, address=camera.address)
         else:
             behind[interface].append(camera)
     for interface, cameras in behind.items():
@@ -86,29 +97,43 @@ def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
 def judge_interface(rig: RigSettings, interface: Interface, cameras: list[CameraSettings]) -> Finding:
     """Judge an interface by the needs of the cameras behind it."""
     names = ", ".join(camera.name for camera in cameras)
-    link = f", {interface.speed_mbps} Mbit/s" if interface.speed_mbps else ""
-    what = f"{names} by {interface.name}: MTU {interface.mtu}{link}"
+    port, mtu, speed = interface.name, interface.mtu, interface.speed_mbps
+    if speed:
+        text = "{cameras} by {port}: MTU {mtu}, {speed} Mbit/s"
+        said = phrase("check_link_speed", text, cameras=names, port=port, mtu=str(mtu), speed=speed)
+    else:
+        said = phrase("check_link", "{cameras} by {port}: MTU {mtu}", cameras=names, port=port, mtu=str(mtu))
     if interface.mtu < rig.network.packet_size:
         return failure(
             Topic.NETWORK,
-            f"{what}, but packets of {rig.network.packet_size} bytes are asked for: no frame will arrive",
-            f"run: sudo ip link set {interface.name} mtu {rig.network.packet_size}; or set network.packet_size = "
-            f"{interface.mtu} in the rig file",
+            "check_mtu_small",
+            "{said}, but packets of {size} bytes are asked for: no frame will arrive",
+            "run: sudo ip link set {port} mtu {size}; or set network.packet_size = {mtu} in the rig file",
+            said=said,
+            size=str(rig.network.packet_size),
+            port=port,
+            mtu=str(mtu),
         )
     if not all(IPv4Address(camera.address) in interface.network for camera in cameras):
         return warning(
             Topic.NETWORK,
-            f"{what}, but not every camera is in its subnet {interface.network}: frames go through a router",
+            "check_router",
+            "{said}, but not every camera is in its subnet {subnet}: frames go through a router",
             "give the network port an address in the camera's subnet",
+            said=said,
+            subnet=str(interface.network),
         )
     load_mbps = sum(camera.frame_bytes for camera in cameras) * 8 * rig.trigger.rate_hz / 1e6
     if interface.speed_mbps and load_mbps > _FULL * interface.speed_mbps:
         return failure(
             Topic.NETWORK,
-            f"{what}, but the frames are {load_mbps:.0f} Mbit/s",
+            "check_link_full",
+            "{said}, but the frames are {load:.0f} Mbit/s",
             "give each camera a port of its own, check the cable, or lower trigger.rate_hz or the regions",
+            said=said,
+            load=load_mbps,
         )
-    return passed(Topic.NETWORK, what)
+    return judged(Level.PASS, Topic.NETWORK, said, "")
 
 
 def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
@@ -119,19 +144,25 @@ def look_at_publication(rig: RigSettings) -> Iterator[Finding]:
             bind(publisher, address)
         except BadInputError as error:
             remedy = "end the program that uses it (another svev?), or correct network.publish"
-            yield failure(Topic.NETWORK, f"triplets cannot be published: {error}", remedy)
+            what = "triplets cannot be published: {why}"
+            yield failure(Topic.NETWORK, "check_not_published", what, remedy, why=error.said)
             return
     try:
         keys = None if rig.network.curve_key_file is None else load_keys(rig.network.curve_key_file)
     except BadInputError as error:
-        yield failure(Topic.NETWORK, f"triplets cannot be published: {error}", "correct network.curve_key_file")
+        what, remedy = "triplets cannot be published: {why}", "correct network.curve_key_file"
+        yield failure(Topic.NETWORK, "check_keys_wrong", what, remedy, why=error.said)
         return
-    what = f"triplets can be published at {address}"
-    if exposed := exposure(address, keys):
-        reason, _, remedy = exposed.partition(": ")
-        yield warning(Topic.NETWORK, f"{what}; {reason}", remedy)
+    what = "triplets can be published at {address}"
+    if exposure(address, keys) is not None:
+        what = "triplets can be published at {address}; whoever reaches {address} sees the images"
+        remedy = "publish on tcp://127.0.0.1, or with a key (svev keys)"
+        yield warning(Topic.NETWORK, "check_published_openly", what, remedy, address=address)
+    elif keys is not None:
+        what = "triplets can be published at {address}, encrypted"
+        yield passed(Topic.NETWORK, "check_published_encrypted", what, address=address)
     else:
-        yield passed(Topic.NETWORK, what + (", encrypted" if keys is not None else ""))
+        yield passed(Topic.NETWORK, "check_published", what, address=address)
 
 
 def _prefers_plain_socket(rig: RigSettings, camera: CameraSettings) -> bool:

@@ -12,6 +12,7 @@ from recorder.catalogue.folder import Catalogue
 from recorder.publishing.keys import check_publication
 from rig.disk import free_bytes
 from rig.events import Event, Level
+from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.transport.messages import RecorderOptions
@@ -101,7 +102,7 @@ def serve(settings: ServiceSettings) -> None:
             try:
                 _tell_of_another_folder(settings, rig, hub)
                 if settings.access.tokens.warning:
-                    hub.tell(Event.now(Level.WARNING, "access", settings.access.tokens.warning))
+                    hub.tell(Event.now(Level.WARNING, "access", plain(settings.access.tokens.warning)))
                 if rig.service.arm_at_start:
                     service.arm()
                 server.run(sockets=[listener])
@@ -127,11 +128,9 @@ def _tell_of_another_folder(settings: ServiceSettings, rig: RigSettings, hub: Ev
     given = settings.data
     if given is None or "directory" not in rig.recorder.model_fields_set or given.resolve() == named.resolve():
         return
-    text = (
-        f"recordings go to {given} as --data says, not to {named} as {settings.rig} says: remove --data, or "
-        "recorder.directory"
-    )
-    hub.tell(Event.now(Level.WARNING, "service", text))
+    text = "recordings go to {given} as --data says, not to {named} as {rig} says: remove --data, or recorder.directory"
+    said = phrase("event_other_folder", text, given=str(given), named=str(named), rig=str(settings.rig))
+    hub.tell(Event.now(Level.WARNING, "service", said))
 
 
 class _Reporter:
@@ -160,8 +159,8 @@ class _Reporter:
             notify.feed_watchdog()
         if notify.unsent and not self._complained:
             self._complained = True
-            text = "systemd does not read its notification socket: it may restart svev"
-            supervisor.hub.tell(Event.now(Level.WARNING, "service", text))
+            said = phrase("event_systemd", "systemd does not read its notification socket: it may restart svev")
+            supervisor.hub.tell(Event.now(Level.WARNING, "service", said))
 
 
 @contextmanager

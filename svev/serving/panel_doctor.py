@@ -10,7 +10,7 @@ from rig import status as models
 from rig.settings.model import RigSettings
 from rig.status import CameraState, State, Status
 from svev.doctor.examination import probes, run_probe
-from svev.doctor.finding import Finding, Level, Topic, failure, passed, warning
+from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed
 
 _KEPT_S: Final = 10.0
 #: Names of probes that would disturb an armed rig (disk, cameras) or find its own sockets in the way.
@@ -58,7 +58,8 @@ class PanelDoctor:
             elif probe.name == "disk":
                 yield _room_of(status)
         if not idle:
-            yield passed(Topic.CAMERAS, "what would disturb the rig is not examined while it is armed: disarm for that")
+            what = "what would disturb the rig is not examined while it is armed: disarm for that"
+            yield passed(Topic.CAMERAS, "check_armed", what)
 
 
 def _cameras_of(status: Status) -> Iterator[Finding]:
@@ -67,24 +68,30 @@ def _cameras_of(status: Status) -> Iterator[Finding]:
         said = camera.statement
         match camera.state:
             case CameraState.ABSENT:
-                yield failure(Topic.CAMERAS, said.text, said.advice)
+                yield judged(Level.FAIL, Topic.CAMERAS, said.said, said.advice)
             case CameraState.SILENT:
-                yield warning(Topic.CAMERAS, said.text, said.advice)
+                yield judged(Level.WARN, Topic.CAMERAS, said.said, said.advice)
             case _:
-                yield passed(Topic.CAMERAS, said.text)
+                yield judged(Level.PASS, Topic.CAMERAS, said.said, "")
 
 
 def _room_of(status: Status) -> Finding:
     disk = status.disk
-    what = f"{disk.free_gb:g} GB free, room for {disk.jumps_left} jumps of {disk.jump_s:g} s"
-    if disk.jumps_left < 1:
-        return failure(
-            Topic.DISK, what, "empty the trash; delete recordings and empty it again, or move them to another disk"
-        )
-    return passed(Topic.DISK, f"{what}; disarm to have its speed examined")
+    gb, jumps, jump_s = disk.free_gb, disk.jumps_left, disk.jump_s
+    if jumps < 1:
+        what = "{gb:g} GB free, room for {jumps} jumps of {jump_s:g} s"
+        remedy = "empty the trash; delete recordings and empty it again, or move them to another disk"
+        return failure(Topic.DISK, "check_disk_full", what, remedy, gb=gb, jumps=jumps, jump_s=jump_s)
+    what = "{gb:g} GB free, room for {jumps} jumps of {jump_s:g} s; disarm to have its speed examined"
+    return passed(Topic.DISK, "check_room_armed", what, gb=gb, jumps=jumps, jump_s=jump_s)
 
 
 def _shown(finding: Finding) -> models.Finding:
     return models.Finding(
-        level=finding.level.value, topic=finding.topic.value, what=finding.what, remedy=finding.remedy
+        level=finding.level.value,
+        topic=finding.topic.value,
+        code=finding.code,
+        what=finding.what,
+        remedy=finding.remedy,
+        values=finding.values,
     )

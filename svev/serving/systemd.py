@@ -17,6 +17,7 @@ from sdnotify import SystemdNotifier  # type: ignore[import-untyped]
 
 from rig.clocks import NS_PER_S
 from rig.events import Event, Level
+from rig.phrase import plain
 from svev.console import visible
 
 #: Priorities of syslog, which the journal reads from the beginning of a line.
@@ -47,7 +48,7 @@ class JournalHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line."""
         levels = {logging.WARNING: Level.WARNING, logging.ERROR: Level.ERROR, logging.CRITICAL: Level.FATAL}
-        write_line(Event.now(levels.get(record.levelno, Level.INFO), record.name, self.format(record)))
+        write_line(Event.now(levels.get(record.levelno, Level.INFO), record.name, plain(self.format(record))))
 
 
 class Notify:

@@ -12,9 +12,11 @@ import httpx
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from rig.errors import StateForbidsError
+from rig.errors import StateForbidsError, StorageError
 from rig.frame import FrameStatus
+from rig.phrase import phrase, plain
 from rig.status import LastJump, Level, MeasuredValue, Recording, RecordingOrder, State, Statement, Status
+from service.status.statements import recording_ended
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK
 from tests.support.loopback import Loopback
@@ -63,7 +65,7 @@ def enter(page: Page, panel: Panel, view: str) -> None:
     expect(page.locator(f":is({READY[view]}):visible").first).to_be_attached()
     if view == "doctor":
         page.locator("#doctor-run").click()
-        expect(page.locator(".finding")).to_have_count(1)
+        expect(page.locator(".finding")).to_have_count(2)
 
 
 def test_an_unready_rig_offers_to_arm_and_nothing_else(panel: Panel, open_page: Open) -> None:
@@ -382,6 +384,32 @@ def test_norwegian_from_the_browser_and_by_choice(
     expect(page.locator("#recording-verdict")).to_contain_text("1 of 30 pulses lack a frame")
     page.reload()
     expect(page.locator("html")).to_have_attribute("lang", "en")
+
+
+def test_check_log_and_reasons_are_said_in_the_language_chosen(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    full = phrase("disk_full", "the disk is full: make room on it or record to another one")
+    service.tell("warning", "disk", phrase("event_there_neither", "there neither: {why}", why=full))
+    service.tell("info", "K1", plain("as the library says it"))
+    page = open_page(f"{panel.url}/#/log", locale="nb-NO")
+    told = page.locator("#log-list li", has_text="ikke der heller")
+    expect(told).to_contain_text("advarsel")
+    expect(told).to_contain_text("ikke der heller: disken er full: skaff plass på den, eller ta opp på en annen")
+    expect(page.locator("#log-list li", has_text="K1")).to_contain_text("as the library says it")
+    enter(page, panel, "doctor")
+    first, second = page.locator(".finding").all()
+    expect(first).to_contain_text("ADVARSEL nettverk")
+    expect(first).to_contain_text("K1 gjennom enp2s0: MTU 1500, men ikke alle kameraene er i subnettet 10.0.0.0/24")
+    expect(first.locator(".advice")).to_have_text("gi nettverksporten en adresse i kameraets subnett")
+    expect(second).to_contain_text("fast enough")
+    reason = StorageError(phrase("why_deleted", "{path}: was deleted", path="/data/jump.mcap"))
+    service.notice = recording_ended("jump", reason)
+    service.arm()
+    enter(page, panel, "live")
+    expect(page.locator("#state-notice")).to_contain_text(
+        "Opptaket jump tok slutt for tidlig: /data/jump.mcap: ble slettet under opptaket"
+    )
 
 
 @pytest.mark.parametrize("locale", ["en-GB", "nb-NO"])

@@ -1,10 +1,13 @@
 """The page's sources: types, words in both languages, shapes as the API has them, nothing from outside."""
 
+import ast
+import dataclasses
 import re
 import shutil
 import subprocess
 from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import BaseModel
@@ -18,7 +21,22 @@ MODULES = sorted(PAGE.rglob("*.js"))
 EVERYTHING = sorted(path for path in PAGE.rglob("*") if path.is_file())
 WORDS = re.compile(r'^  "([\w.]+)": "(.*)",$', re.MULTILINE)
 #: Keys that are put together in the code, by their beginnings.
-COMPOSED = ("state.", "actions.wait_", "camera.", "status.", "field.", "doctor.", "list.", "export.")
+COMPOSED = (
+    "state.",
+    "actions.wait_",
+    "camera.",
+    "status.",
+    "field.",
+    "doctor.",
+    "list.",
+    "export.",
+    "log.is_",
+    "log.of_",
+)
+#: The rooms whose sentences reach the page.
+SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
+#: Which argument of these calls is the code; the templates follow it.
+SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 
 
 def _words(language: str) -> dict[str, str]:
@@ -63,9 +81,17 @@ def test_every_key_that_is_used_has_words_and_the_other_way_round() -> None:
     assert {key for key in english if not key.startswith(COMPOSED)} <= used | called
 
 
+def _translated() -> dict[str, str]:
+    """Norwegian text and advice by code."""
+    found: list[tuple[str, str]] = []
+    for path in sorted((PAGE / "i18n").glob("nb-*.js")):
+        found += re.findall(r"^  (\w+): \[(.*)\],$", path.read_text(), re.MULTILINE)
+    assert len(found) == len(dict(found))
+    return dict(found)
+
+
 def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> None:
-    norwegian = (PAGE / "i18n" / "nb-statements.js").read_text()
-    translated = dict(re.findall(r"^  (\w+): \[(.*)\],$", norwegian, re.MULTILINE))
+    translated = _translated()
     stated = set()
     for path in [*(ROOT / "service").rglob("*.py"), *(ROOT / "webpanel").rglob("*.py")]:
         text = path.read_text()
@@ -83,6 +109,76 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
     assert stated <= set(translated)
 
 
+class _Module:
+    """What a module of ours says: codes, the placeholders of their templates, the values given with them."""
+
+    def __init__(self, path: Path) -> None:
+        tree = ast.parse(path.read_text())
+        self._named: dict[str, list[tuple[int, ast.expr]]] = {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Assign):
+                self._name(node.targets[0], node.value)
+            elif isinstance(node, ast.AnnAssign) and node.value is not None:
+                self._name(node.target, node.value)
+        self.calls = [
+            node
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in SAYING
+        ]
+
+    def _name(self, target: ast.expr, value: ast.expr) -> None:
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            for each, its in zip(target.elts, value.elts, strict=False):
+                self._name(each, its)
+        elif isinstance(target, ast.Name):
+            self._named.setdefault(target.id, []).append((target.lineno, value))
+
+    def said(self, call: ast.Call) -> tuple[str, set[str], set[str]]:
+        """Code, placeholders in English, names of the values."""
+        at = SAYING[ast.unparse(call.func)]
+        code = call.args[at]
+        assert isinstance(code, ast.Constant), f"the code is not written out: {ast.unparse(call)}"
+        templates = "".join(self._text(argument, call.lineno) for argument in call.args[at + 1 :])
+        return str(code.value), _placeholders(templates), {keyword.arg or "**" for keyword in call.keywords}
+
+    def _text(self, node: ast.expr, line: int) -> str:
+        """A template: written out, put together, or by the name that it was last given above this line."""
+        match node:
+            case ast.Constant(value=str(text)):
+                return re.sub(r"(\{\w+):[^}]*\}", r"\1}", text)
+            case ast.BinOp(left=left, right=right):
+                return self._text(left, line) + self._text(right, line)
+            case ast.BoolOp(values=values):
+                return "".join(self._text(value, line) for value in values)
+            case ast.Name(id=name) if name in self._named:
+                above = [(at, value) for at, value in self._named[name] if at <= line] or self._named[name]
+                return self._text(max(above, key=lambda each: each[0])[1], line)
+        raise AssertionError(f"line {line}: this template cannot be read: {ast.unparse(node)}")
+
+
+def test_findings_events_and_reasons_are_said_in_norwegian_too_with_the_values_that_they_have() -> None:
+    translated, heard = _translated(), set()
+    modules = [path for room in SPEAKING for path in sorted((ROOT / room).rglob("*.py"))]
+    for path in modules:
+        if path.name in {"phrase.py", "finding.py"} or not re.search(rf"\b({'|'.join(SAYING)})\(", path.read_text()):
+            continue
+        module = _Module(path)
+        for call in module.calls:
+            code, english, values = module.said(call)
+            where = f"{path.relative_to(ROOT)}:{call.lineno}: {code}"
+            assert code in translated, f"{where}: has no Norwegian text"
+            assert english <= values, f"{where}: {english - values} is not given"
+            assert _placeholders(translated[code]) <= values, f"{where}: {_placeholders(translated[code]) - values}"
+            heard.add(code)
+    assert len(heard) > 150
+    listed = [_listed(name) for name in ("nb-findings.js", "nb-events.js")]
+    assert set().union(*listed) == heard
+
+
+def _listed(name: str) -> set[str]:
+    return set(re.findall(r"^  (\w+): \[", (PAGE / "i18n" / name).read_text(), re.MULTILINE))
+
+
 def _types() -> dict[str, list[str]]:
     """Properties by name of the typedef."""
     types: dict[str, list[str]] = {}
@@ -98,8 +194,11 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    model: type[BaseModel] = getattr(start_list if hasattr(start_list, name) else status, name)
-    assert _types()[name] == list(model.model_fields)
+    model: type[Any] = getattr(start_list if hasattr(start_list, name) else status, name)
+    fields = (
+        list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]
+    )
+    assert _types()[name] == fields
 
 
 def test_modules_import_each_other_one_way() -> None:

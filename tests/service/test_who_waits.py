@@ -13,6 +13,7 @@ from recorder.checking.verify import verify
 from recorder.reading.log_reader import LogReader
 from rig.clocks import host_now
 from rig.events import Event, Level
+from rig.phrase import plain
 from rig.transport.messages import (
     RecorderOptions,
     RecordingFinished,
@@ -95,7 +96,7 @@ def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(
         recorder = processes.pids[RECORDER]
         os.kill(recorder, signal.SIGSTOP)
         for text in texts:
-            processes.tell(TellEvent(event=Event.now(Level.INFO, "test", text)))
+            processes.tell(TellEvent(event=Event.now(Level.INFO, "test", plain(text))))
         processes.tell(StopRecording())
         os.kill(recorder, signal.SIGCONT)
         wait_until(lambda: turned(RecordingFinished), "the recording is over", WAIT_S, 0.0)

@@ -11,6 +11,7 @@ import pytest
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.events import Event, Level
+from rig.phrase import plain
 from svev.console import visible
 from svev.serving.systemd import log_line
 from tests.capture.rigs import write_rig
@@ -53,7 +54,7 @@ def log(tmp_path: Path) -> Path:
     path = tmp_path / f"{EVIL[:4]}.mcap"
     description = LogDescription({"athlete": EVIL, "session": EVIL}, {"name": EVIL, "cameras": EVIL}, b"")
     with LogWriter(path, description, TripletBuffers((16, 16), 2)) as writer:
-        writer.write_event(Event.now(Level.ERROR, f"K1{EVIL}", f"connected: {EVIL}"))
+        writer.write_event(Event.now(Level.ERROR, f"K1{EVIL}", plain(f"connected: {EVIL}")))
     return path
 
 
@@ -85,7 +86,7 @@ def test_names_in_errors_and_wrong_usage(tmp_path: Path) -> None:
 
 
 def test_events_of_a_camera_on_the_terminal_and_in_the_journal() -> None:
-    event = Event.now(Level.INFO, "K1", f"connected: {EVIL}")
+    event = Event.now(Level.INFO, "K1", plain(f"connected: {EVIL}"))
     _is_harmless(log_line(event, journal=True), log_line(event, journal=False))
 
 

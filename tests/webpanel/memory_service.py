@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
@@ -16,6 +17,7 @@ from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.frame import FrameStatus
+from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
 from rig.status import (  # fmt: skip
     CameraState,
@@ -46,12 +48,14 @@ from service.recordings.archive import Archive, as_recording
 from service.seam import Preview
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
+from svev.doctor.finding import Topic, passed, warning
 from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
 
 SHAPE = (120, 480)
 COLUMNS = ((0, 160), (160, 320), (320, 480))
 CAMERAS = ("K1", "K2", "K3")
 KEPT_EVENTS = 1000
+LINK = phrase("check_link", "{cameras} by {port}: MTU {mtu}", cameras="K1", port="enp2s0", mtu="1500")
 
 
 class MemoryService(Archive):
@@ -63,6 +67,7 @@ class MemoryService(Archive):
         well: what `healthy` says.
         broken: raised by `status`, if set.
         last_jump: what the analysis measured last, set by tests.
+        notice: what befell the last recording, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -73,6 +78,7 @@ class MemoryService(Archive):
         self.well = True
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None
+        self.notice: Statement | None = None
         self.preview_calls = 0
         self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
@@ -112,6 +118,7 @@ class MemoryService(Archive):
                 recording=self._recording,
                 last_recording=self._last,
                 last_jump=self.last_jump,
+                notice=self.notice,
                 processes=(ProcessStatus(name="recorder", pid=1),),
             )
 
@@ -200,8 +207,10 @@ class MemoryService(Archive):
         return RigView(name="memory", toml=RIG_TOML.decode(), settings={"name": "memory"})
 
     def doctor(self) -> DoctorReport:
-        finding = Finding(level="PASS", topic="disk", what="fast enough", remedy="")
-        return DoctorReport(worst="PASS", findings=(finding,))
+        small = warning(Topic.NETWORK, "check_router", "{said}, but {subnet}", "do so", said=LINK, subnet="10.0.0.0/24")
+        found = (passed(Topic.DISK, "", "fast enough"), small)
+        findings = tuple(Finding(**asdict(finding)) for finding in found)
+        return DoctorReport(worst="WARN", findings=findings)
 
     def metrics(self) -> list[Metric]:
         frames = CounterMetricFamily("svev_frames", "Whole frames.", labels=("camera",))
@@ -219,12 +228,15 @@ class MemoryService(Archive):
 
     def say(self, message: str) -> None:
         """Add an event."""
-        self.tell("info", "service", message)
+        self.tell("info", "service", plain(message))
 
-    def tell(self, level: Literal["info", "warning"], name: str, message: str) -> None:
+    def tell(self, level: Literal["info", "warning"], name: str, said: Phrase) -> None:
         with self._lock:
             self._numbers += 1
-            event = Event(number=self._numbers, time=datetime.now(UTC), level=level, name=name, message=message)
+            event = Event(
+                number=self._numbers, time=datetime.now(UTC), level=level, name=name,
+                message=said.text, code=said.code, values=said.values,
+            )  # fmt: skip
             self._events = [*self._events[-KEPT_EVENTS + 1 :], event]
         self._wake()
 

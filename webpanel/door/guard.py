@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access
 from webpanel.door.logins import Caller, Door, check_role
 from webpanel.door.roles import READING, act
@@ -36,7 +37,7 @@ class Guard:
         note: told who has changed what, in one line.
     """
 
-    def __init__(self, app: ASGIApp, door: Door, note: Callable[[str], None]) -> None:
+    def __init__(self, app: ASGIApp, door: Door, note: Callable[[Phrase], None]) -> None:
         self._app = app
         self._door = door
         self._note = note
@@ -59,7 +60,9 @@ class Guard:
                 headers.setdefault("cache-control", "no-store" if protected else "no-cache")
                 changed = scope["method"] not in READING and message["status"] < HTTPStatus.BAD_REQUEST
                 if changed and caller is not None:
-                    await run_in_threadpool(self._note, f"{act(scope['method'], scope['path'])} ({caller})")
+                    done = act(scope["method"], scope["path"])
+                    said = phrase("event_act", "{act} ({caller})", act=done, caller=str(caller))
+                    await run_in_threadpool(self._note, said)
             await send(message)
 
         try:

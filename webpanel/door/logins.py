@@ -12,6 +12,7 @@ from typing import Final
 
 from starlette.requests import HTTPConnection
 
+from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access, site_of
 from webpanel.door.roles import Role, needed_role
 from webpanel.problems import ProblemError
@@ -109,7 +110,7 @@ class Door:
     """
 
     access: Access
-    warn: Callable[[str], None]
+    warn: Callable[[Phrase], None]
     sessions: Sessions = field(default_factory=Sessions)
     brake: Brake = field(default_factory=Brake)
 
@@ -132,11 +133,10 @@ class Door:
             raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, "too_many_wrong_tokens", text, headers)
         count = self.brake.wrong(site, candidate)
         if count == 1:
-            self.warn(f"wrong token from {client}")
+            self.warn(phrase("event_wrong_token", "wrong token from {client}", client=client))
         elif count == _GUESSES_MAX:
-            self.warn(
-                f"{count} wrong tokens from {client} within a minute: somebody guesses; its tries are slowed down"
-            )
+            text = "{count} wrong tokens from {client} within a minute: somebody guesses; its tries are slowed down"
+            self.warn(phrase("event_guessing", text, count=count, client=client))
         raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")
 
     def admit(self, request: HTTPConnection) -> Caller:

@@ -1,8 +1,11 @@
 """Roles: what the holder of a token may do, and which role a call needs."""
 
 import re
+from collections.abc import Callable
 from enum import StrEnum
 from typing import Final
+
+from rig.phrase import Phrase, phrase
 
 
 class Role(StrEnum):
@@ -25,22 +28,47 @@ _ADMINISTERING: Final = (
     re.compile(r"POST /api/recordings/[^/]+/restore"),
     re.compile(r"[A-Z]+ /api/(rig|service)(/.*)?"),
 )
-_ACTS: Final = (
-    (r"POST /api/arm", "armed the rig"),
-    (r"POST /api/disarm", "disarmed the rig"),
-    (r"POST /api/recordings", "started a recording"),
-    (r"POST /api/recordings/([^/]+)/stop", "stopped recording {}"),
-    (r"PATCH /api/recordings/([^/]+)", "edited recording {}"),
-    (r"DELETE /api/recordings/([^/]+)", "deleted recording {}"),
-    (r"POST /api/recordings/([^/]+)/restore", "restored recording {}"),
-    (r"DELETE /api/trash", "emptied the trash"),
-    (r"DELETE /api/trash/([^/]+)", "removed recording {} for good"),
-    (r"PUT /api/recordings/([^/]+)/notes/.*", "noted something in recording {}"),
-    (r"DELETE /api/recordings/([^/]+)/notes/.*", "removed a note of recording {}"),
-    (r"POST /api/recordings/([^/]+)/exports?", "asked for an export of recording {}"),
-    (r"DELETE /api/exports/[^/]+", "ended or removed an export"),
-    (r"[A-Z]+ /api/next-jumper(?:/.*)?", "edited the next jumper"),
-    (r"[A-Z]+ /api/start-list(?:/.*)?", "edited the start list"),
+#: What calls did, in words; a call about a recording has its id as the first group.
+_ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
+    (r"POST /api/arm", lambda: phrase("act_armed", "armed the rig")),
+    (r"POST /api/disarm", lambda: phrase("act_disarmed", "disarmed the rig")),
+    (r"POST /api/recordings", lambda: phrase("act_started", "started a recording")),
+    (
+        r"POST /api/recordings/([^/]+)/stop",
+        lambda recording: phrase("act_stopped", "stopped recording {recording}", recording=recording),
+    ),
+    (
+        r"PATCH /api/recordings/([^/]+)",
+        lambda recording: phrase("act_edited", "edited recording {recording}", recording=recording),
+    ),
+    (
+        r"DELETE /api/recordings/([^/]+)",
+        lambda recording: phrase("act_deleted", "deleted recording {recording}", recording=recording),
+    ),
+    (
+        r"POST /api/recordings/([^/]+)/restore",
+        lambda recording: phrase("act_restored", "restored recording {recording}", recording=recording),
+    ),
+    (r"DELETE /api/trash", lambda: phrase("act_emptied", "emptied the trash")),
+    (
+        r"DELETE /api/trash/([^/]+)",
+        lambda recording: phrase("act_removed", "removed recording {recording} for good", recording=recording),
+    ),
+    (
+        r"PUT /api/recordings/([^/]+)/notes/.*",
+        lambda recording: phrase("act_noted", "noted something in recording {recording}", recording=recording),
+    ),
+    (
+        r"DELETE /api/recordings/([^/]+)/notes/.*",
+        lambda recording: phrase("act_note_removed", "removed a note of recording {recording}", recording=recording),
+    ),
+    (
+        r"POST /api/recordings/([^/]+)/exports?",
+        lambda recording: phrase("act_exported", "asked for an export of recording {recording}", recording=recording),
+    ),
+    (r"DELETE /api/exports/[^/]+", lambda: phrase("act_export_ended", "ended or removed an export")),
+    (r"[A-Z]+ /api/next-jumper(?:/.*)?", lambda: phrase("act_next_jumper", "edited the next jumper")),
+    (r"[A-Z]+ /api/start-list(?:/.*)?", lambda: phrase("act_start_list", "edited the start list")),
 )
 
 
@@ -57,10 +85,10 @@ def needed_role(method: str, path: str) -> Role:
     return Role.ADMINISTER if any(pattern.fullmatch(call) for pattern in _ADMINISTERING) else Role.OPERATE
 
 
-def act(method: str, path: str) -> str:
+def act(method: str, path: str) -> Phrase:
     """What a call that changes something did, in words; e.g. `stopped recording 2026-02-14T10-15-30Z`."""
     call = f"{method} {path}"
     for pattern, words in _ACTS:
         if found := re.fullmatch(pattern, call):
-            return words.format(*found.groups())
-    return f"called {call}"
+            return words(*found.groups())
+    return phrase("act_called", "called {call}", call=call)

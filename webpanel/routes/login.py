@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from rig.phrase import phrase
 from rig.status import Model
 from service.seam import RigService
 from webpanel.door.logins import COOKIE, SESSION_S, Caller, Door
@@ -36,7 +37,8 @@ def login_router(door: Door, service: RigService) -> APIRouter:
         client = door.access.client_of(request)
         role = door.check_token(login.token, client)
         if door.access.tokens:
-            await run_in_threadpool(service.tell, "info", "access", f"logged in ({Caller(role, client)})")
+            said = phrase("event_logged_in", "logged in ({caller})", caller=str(Caller(role, client)))
+            await run_in_threadpool(service.tell, "info", "access", said)
         response.set_cookie(
             COOKIE, door.sessions.begin(role), max_age=int(SESSION_S), httponly=True, samesite="strict",
             secure=door.access.is_https(request),
@@ -50,7 +52,8 @@ def login_router(door: Door, service: RigService) -> APIRouter:
         door.sessions.end(key)
         if role is not None and door.access.tokens:
             caller = Caller(role, door.access.client_of(request))
-            await run_in_threadpool(service.tell, "info", "access", f"logged out ({caller})")
+            said = phrase("event_logged_out", "logged out ({caller})", caller=str(caller))
+            await run_in_threadpool(service.tell, "info", "access", said)
         response.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=door.access.is_https(request))
 
     @router.get("/access")

@@ -12,6 +12,7 @@ from recorder.reading.triplets import triplets
 from rig.clocks import UtcNs
 from rig.events import Level
 from rig.jumper import JumperState
+from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 from simrig.world.scenario import Scenario
 from tests.analysis.simulated import training
@@ -28,9 +29,9 @@ class Told:
         self.messages: list[tuple[Level, str]] = []
         self.jumps: list[object] = []
 
-    def message(self, level: Level, text: str) -> None:
+    def message(self, level: Level, said: Phrase) -> None:
         """Something to know."""
-        self.messages.append((level, text))
+        self.messages.append((level, said.text))
 
     def state(self, state: JumperState) -> None:
         """A state."""

@@ -29,6 +29,7 @@ from rig.clocks import HostNs
 from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
+from rig.phrase import plain
 from rig.transport.messages import RecorderReport, RecordingFinished, RecordingStarted, StartRecording
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
 from tests.support.waiting import wait_until
@@ -151,7 +152,7 @@ def _recorder(path: Path, publisher: Publisher, seconds: float, limit: int) -> I
         preroll, reports = Preroll(buffers, seconds, limit), list[RecorderReport]()
         recordings = Recordings(assembler, preroll, publisher, latency, lambda: 0, reports.append)
         yield Recorder(cameras, assembler, buffers, preroll, recordings, clock, path, latency, reports)
-        recordings.wind_up("the test is over", 10.0)
+        recordings.wind_up(plain("the test is over"), 10.0)
         while len(preroll):
             preroll.drop()
         assert buffers.free_count == buffers.count, "every slot came back"
@@ -276,9 +277,9 @@ def test_pulses_without_any_frame_keep_their_tags(tmp_path: Path, publisher: Pub
 
 def test_what_happened_during_the_preroll_stands_in_the_log(tmp_path: Path, publisher: Publisher) -> None:
     with _recorder(tmp_path, publisher, seconds=1.0, limit=100) as recorder:
-        recorder.recordings.happened(Event.now(Level.INFO, "K1", "long ago"))
+        recorder.recordings.happened(Event.now(Level.INFO, "K1", plain("long ago")))
         _expose(recorder, 1, 60)
-        recorder.recordings.happened(Event.now(Level.ERROR, "K2", "gone: unplugged"))
+        recorder.recordings.happened(Event.now(Level.ERROR, "K2", plain("gone: unplugged")))
         recorder.recordings.health(b'{"free_triplets":3}')
         first = recorder.start(None, seconds=0)
         recorder.finish()
@@ -303,7 +304,7 @@ def test_a_failing_disk_leaves_the_rest_of_the_past_for_another_try(tmp_path: Pa
         recording.log.give_up(StorageError("the disk fails: see to it"))
         failed = recorder.finish()
         assert failed.failure is not None
-        assert "the disk fails" in failed.failure.message
+        assert "the disk fails" in failed.failure.said.text
         path = recorder.start(None, seconds=0)
         recorder.finish()
     assert _pulses(path) == list(range(failed.counts.pulses + 1, 81))
@@ -434,7 +435,7 @@ def test_pulses_by_hand_are_all_in_the_log_however_the_recording_ends(
         recorder.step()
         assert recorder.assembler.pairer.health().open == 1
         if wind_up:
-            recorder.recordings.wind_up("test", 10.0)
+            recorder.recordings.wind_up(plain("test"), 10.0)
             report = recorder.reports[-1]
         else:
             recorder.recordings.stop()

@@ -179,7 +179,7 @@ def test_names_that_are_too_long_for_the_log_are_refused_and_the_recorder_goes_o
         failed = running.last(RecorderFailed)
         assert failed is not None
         assert isinstance(failed.error(), BadInputError)
-        assert "bytes too many for the tags of the log: shorten them" in failed.message
+        assert "bytes too many for the tags of the log: shorten them" in failed.said.text
         assert not long.exists()
         running.processes.tell(StartRecording(path=path, session={"session": "𝄞" * 200}, pulses=30))
         assert running.finished(path).counts.pulses >= 30

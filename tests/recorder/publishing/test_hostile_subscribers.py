@@ -16,6 +16,7 @@ from recorder.publishing.publisher import Publisher
 from recorder.reading.log_reader import LogReader
 from rig.clocks import host_now
 from rig.events import Event, Level
+from rig.phrase import plain
 from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording, StopRecording
 from service.processes.rig_processes import RECORDER, RigProcesses
 from tests.capture.rigs import make_rig
@@ -63,7 +64,7 @@ def test_whoever_asks_too_much_is_hung_up_on_and_counted(kind: str, loopback: Lo
 
         def is_refused() -> bool:
             for _ in range(10):
-                publisher.event(Event.now(Level.INFO, "test", "hello"))
+                publisher.event(Event.now(Level.INFO, "test", plain("hello")))
             refused.update(publisher.refused())
             return any(why.startswith(expected) for why in refused)
 
@@ -85,7 +86,7 @@ def test_a_slow_flood_of_topics_is_refused_as_well(loopback: Loopback) -> None:
                 sub.subscribe(b"%d %d" % (number, topic) + b"x" * 200)
 
         def too_many() -> bool:
-            publisher.event(Event.now(Level.INFO, "test", "hello"))
+            publisher.event(Event.now(Level.INFO, "test", plain("hello")))
             return "subscribed to too many topics" in publisher.refused()
 
         wait_until(too_many, "one of them is refused", WAIT_S)

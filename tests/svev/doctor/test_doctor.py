@@ -22,7 +22,7 @@ def test_a_probe_that_hangs_is_a_finding() -> None:
 
     def hang() -> Iterator[Finding]:
         release.wait()
-        yield passed(Topic.DISK, "never told")
+        yield passed(Topic.DISK, "check_disk_writable", "never told")
 
     (finding,) = run_probe(Probe("the disk", Topic.DISK, hang, limit_s=0.05))
     release.set()
@@ -34,7 +34,7 @@ def test_a_probe_that_hangs_is_a_finding() -> None:
 
 def test_a_probe_that_breaks_is_a_finding_and_keeps_what_it_found_before() -> None:
     def halfway() -> Iterator[Finding]:
-        yield passed(Topic.DISK, "first half")
+        yield passed(Topic.DISK, "check_disk_writable", "first half")
         raise RuntimeError("no second half")
 
     first, second = run_probe(Probe("the disk", Topic.DISK, halfway))
@@ -107,7 +107,7 @@ def test_the_command_reports_as_json(tmp_path: Path, loopback: Loopback, capsys:
     assert result["rig"] == "examined"
     assert sum(result["counts"].values()) == len(result["findings"])
     assert {finding["topic"] for finding in result["findings"]} == set(Topic)
-    assert set(result["findings"][0]) == {"level", "topic", "what", "remedy"}
+    assert set(result["findings"][0]) == {"level", "topic", "code", "what", "remedy", "values"}
 
 
 def test_something_that_fails_ends_the_command_with_3(

@@ -1,16 +1,18 @@
-/** Translates the page. Statements of the service come in English with a code, by which they are translated here. */
+/** Translates the page. What the service says comes in English with a code, by which it is translated here. */
 
 import { load, save } from "../shared/store.js";
 import { en } from "./en.js";
+import { events as nbEvents } from "./nb-events.js";
+import { findings as nbFindings } from "./nb-findings.js";
 import { statements as nbStatements } from "./nb-statements.js";
 import { nb } from "./nb.js";
 
 /** @typedef {import("../shared/types.js").Statement} Statement */
-/** @typedef {Record<string, string|number>} Values */
+/** @typedef {import("../shared/types.js").Values} Values */
 
 const LANGUAGES = { en, nb };
 /** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: nbStatements };
+const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents } };
 
 /** @type {"en"|"nb"} */
 let language = "en";
@@ -58,9 +60,9 @@ export function t(key, values = {}) {
 }
 
 /**
- * A statement of the service in the operator's language; in English where the translation is missing.
+ * What the service says in the operator's language; in English where the translation is missing.
  *
- * @param {{ code: string, text: string, advice?: string, values?: Values }} statement
+ * @param {{ code: string, text: string, advice?: string, values?: Values }} said
  * @returns {{ text: string, advice: string }}
  */
 export function say({ code, text, advice = "", values = {} }) {
@@ -78,6 +80,7 @@ export function say({ code, text, advice = "", values = {} }) {
 function fill(words, values) {
   return words.replace(/\{(\w+)\}/g, (_, name) => {
     const value = values[name];
+    if (typeof value === "object") return say(value).text;
     return typeof value === "number" ? value.toLocaleString(language, { maximumFractionDigits: 1 }) : String(value);
   });
 }

@@ -32,6 +32,7 @@ export const statements = {
   camera_ready: ["{camera} er klar"],
   camera_silent: ["{camera} sender ingen bilder mens de andre gjør det", "sjekk triggerkabelen; kameraet kobles til på nytt av seg selv"],
   camera_absent: ["{camera} er borte", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
+  camera_absent_why: ["{camera} er borte: {reason}", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
 
   recording_running: ["tar opp: {pulses} pulser, {partial} mangler et bilde"],
   recording_paused: ["tar opp: {pulses} pulser, {partial} mangler et bilde; {pauses} ganger kom det ingen pulser en stund"],

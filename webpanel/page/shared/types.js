@@ -4,12 +4,18 @@
  * @typedef {"idle"|"arming"|"armed"|"recording"|"disarming"|"fault"} State
  * @typedef {"good"|"info"|"warning"|"error"} Level
  *
+ * @typedef {object} Phrase A sentence in another one.
+ * @property {string} code
+ * @property {string} text
+ * @property {Values} values
+ * @typedef {{ [name: string]: string|number|Phrase }} Values What a sentence is filled in with.
+ *
  * @typedef {object} Statement One thing to tell a person, translatable by its code.
  * @property {Level} level
  * @property {string} code
  * @property {string} text
  * @property {string} advice
- * @property {Record<string, string|number>} values
+ * @property {Values} values
  *
  * @typedef {object} CameraStatus
  * @property {string} name
@@ -107,6 +113,8 @@
  * @property {"debug"|"info"|"warning"|"error"|"fatal"} level
  * @property {string} name
  * @property {string} message
+ * @property {string} code
+ * @property {Values} values
  *
  * @typedef {object} MeasuredValue
  * @property {number} value
@@ -179,8 +187,10 @@
  * @typedef {object} Finding
  * @property {"PASS"|"WARN"|"FAIL"} level
  * @property {string} topic
+ * @property {string} code
  * @property {string} what
  * @property {string} remedy
+ * @property {Values} values
  *
  * @typedef {object} DoctorReport
  * @property {"PASS"|"WARN"|"FAIL"} worst

@@ -1,6 +1,6 @@
 /** The view of the doctor: runs it, and shows each finding (PASS, WARN or FAIL) with what to do. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { call } from "../shared/api.js";
 import { $, icon, make, makeMark, setText } from "../shared/dom.js";
 import { tellProblem } from "../shared/snacks.js";
@@ -50,7 +50,8 @@ function gravity({ level }) {
 }
 
 /** @param {Finding} finding */
-function makeFinding({ level, topic, what, remedy }) {
+function makeFinding({ level, topic, code, what, remedy, values }) {
+  const { text, advice } = say({ code, text: what, advice: remedy, values });
   return make("li", { class: "finding", "data-level": LEVELS[level] }, icon(LEVELS[level]),
-    make("div", {}, make("p", {}, make("strong", {}, `${level} `), make("span", { class: "topic" }, topic)), make("p", {}, what), remedy ? make("p", { class: "advice" }, remedy) : null));
+    make("div", {}, make("p", {}, make("strong", {}, `${t(`doctor.mark_${level}`)} `), make("span", { class: "topic" }, t(`doctor.${topic}`))), make("p", {}, text), remedy ? make("p", { class: "advice" }, advice) : null));
 }

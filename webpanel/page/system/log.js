@@ -1,5 +1,6 @@
 /** The view of the live log, newest event on top. */
 
+import { say, t } from "../i18n/i18n.js";
 import { hear } from "../shared/connection.js";
 import { $, make } from "../shared/dom.js";
 import { timeOfDay } from "../shared/format.js";
@@ -7,6 +8,8 @@ import { known, watch } from "../shared/store.js";
 
 const LEVELS = ["debug", "info", "warning", "error", "fatal"];
 const KEPT = 500;
+/** What events are about, beside cameras, which have names of their own. */
+const NAMES = ["access", "analysis", "disk", "publisher", "recorder", "service", "start list", "truth"];
 
 /** @typedef {import("../shared/types.js").Event} Event */
 
@@ -42,6 +45,7 @@ function draw() {
   const shown = events.filter((event) => LEVELS.indexOf(event.level) >= least);
   $("log-empty").hidden = shown.length > 0;
   $("log-list").hidden = !shown.length;
-  $("log-list").replaceChildren(...shown.map(({ level, name, message, time }) => make("li", { "data-level": level },
-    make("time", { dateTime: time }, timeOfDay(time)), make("span", { class: "log-level" }, level), make("strong", {}, name), make("span", { class: "log-message" }, message))));
+  $("log-list").replaceChildren(...shown.map(({ level, name, code, message, values, time }) => make("li", { "data-level": level },
+    make("time", { dateTime: time }, timeOfDay(time)), make("span", { class: "log-level" }, t(`log.is_${level}`)), make("strong", {}, NAMES.includes(name) ? t(`log.of_${name.replace(" ", "_")}`) : name),
+    make("span", { class: "log-message" }, say({ code, text: message, values }).text))));
 }

@@ -12,6 +12,7 @@ from bench.analysis.live import run_live
 from bench.analysis.repeats import run_repeats
 from bench.analysis.smoothing import run_smoothing
 from bench.photogrammetry.adjustment import run_adjustment
+from bench.photogrammetry.gross_errors import run_gross_errors
 from bench.photogrammetry.intersection import run_intersection
 from bench.photogrammetry.planning import run_planning
 from bench.recording.capture import run_capture
@@ -140,6 +141,15 @@ def _smoothing(draws: int, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _gross_errors(draws: int, directory: Path) -> dict[str, Any]:
+    cases = run_gross_errors(draws)
+    path = write_results("gross-errors", cases, directory)
+    columns = ("culprits", "removed", "named", "undetected", "innocents", "refused", "wrong")
+    table = [f"{'of ' + str(draws) + ' networks each':34}" + "".join(f"{column:>11}" for column in columns)]
+    table += [f"{case['name']:34}" + "".join(f"{case[column]:11}" for column in columns) for case in cases]
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 #: Suites that go on for some seconds.
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
@@ -157,5 +167,5 @@ SUITES: dict[str, Suite] = {
     "jump-honesty": _honesty,
     "jump-repeats": _repeats,
 }
-#: Suites that draw jumps and the errors of their measurements.
-DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing}
+#: Suites that draw jumps or networks and the errors of their measurements.
+DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "gross-errors": _gross_errors}

@@ -31,7 +31,7 @@ from analysis.worker.stream import Received
 from analysis.worker.streamed import Streamed
 from analysis.worker.whole_jump import JumpTask
 from analysis.worker.wire_form import wire_form
-from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
@@ -144,7 +144,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         try:
             static = recording.static_images()
             scene, _ = orient_from(static, self._source)
-        except (BadInputError, NotSolvableError, NotConvergedError) as error:
+        except (BadInputError, NotSolvableError, NotConvergedError, RefusedError) as error:
             recording.try_again()
             text = "the cameras are not oriented, it is tried again: {why}"
             self._findings.message(Level.ERROR, phrase("event_not_oriented", text, why=error.said))

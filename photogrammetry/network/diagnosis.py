@@ -48,3 +48,9 @@ class NotConvergedError(SvevError):
     """The iteration did not reach an optimum."""
 
     exit_code = 4
+
+
+class RefusedError(SvevError):
+    """There is an optimum, but its data contradict each other so much that it must not be used."""
+
+    exit_code = 4

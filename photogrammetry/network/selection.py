@@ -17,12 +17,13 @@ from photogrammetry.network.model import (
     Reweight,
     Role,
 )
-from rig.arrays import Flags, Integers
+from rig.arrays import Flags, Floats, Integers
 from rig.errors import BadInputError
 
 _Relation = TypeVar("_Relation", Distance, Difference)
 
-_RAYS = 2  # a point without survey needs at least so many
+#: A point without survey needs at least so many.
+RAYS = 2
 
 
 def rays(network: Network) -> Integers:
@@ -100,7 +101,7 @@ def without_survey(network: Network) -> Network:
 
     Points that fewer than two images show are left out: the images alone do not determine them.
     """
-    seen = only_points(network, rays(network) >= _RAYS)
+    seen = only_points(network, rays(network) >= RAYS)
     return replace(
         seen,
         points=tuple(Point(point.name, Role.TIE) for point in seen.points),
@@ -110,6 +111,12 @@ def without_survey(network: Network) -> Network:
         datum=Datum(DatumType.INNER),
         reweight=Reweight.NONE,
     )
+
+
+def with_interior(network: Network, interior: Floats) -> Network:
+    """The network with other interior orientations (cameras, 10)."""
+    cameras = tuple(replace(camera, interior=values) for camera, values in zip(network.cameras, interior, strict=True))
+    return replace(network, cameras=cameras)
 
 
 def require_unknown_poses(network: Network, procedure: str) -> None:

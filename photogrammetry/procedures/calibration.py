@@ -11,14 +11,15 @@ from itertools import combinations
 import numpy as np
 
 from photogrammetry.adjustment.equations.unknowns import state_of
+from photogrammetry.adjustment.gross_errors.blunders import describe
 from photogrammetry.adjustment.run import Outcome, adjust
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.network.model import Datum, DatumType, Network, Point, Role
-from photogrammetry.network.selection import only_points, rays, require_unknown_poses
+from photogrammetry.network.selection import RAYS, only_points, rays, require_unknown_poses
+from photogrammetry.procedures.stages import refuse_absurd
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
-_RAYS = 2  # a target needs at least so many
 _STRONG = 0.95  # correlation beyond which two interior parameters can hardly be told apart
 
 
@@ -46,9 +47,16 @@ def calibrate(network: Network) -> Calibration:
     Raises:
         BadInputError: no camera estimates anything, or a pose is constant.
         NotSolvableError, NotConvergedError: as the adjustment.
+        RefusedError: the images contradict each other so much that no result can be believed.
     """
     free, notes = _free(network)
     outcome = adjust(free, state_of(complete(free)), snoop=True)
+    refuse_absurd(outcome, [describe(outcome.adjustment.network, blunder) for blunder in outcome.blunders])
+    if outcome.adjustment.scale_is_free:
+        notes.append(
+            "no distance gives the scale: all lengths and their sigmas are in units of unknown size; measure a "
+            "distance if the frame matters (the interior orientations do not depend on it)"
+        )
     return Calibration(outcome, (*notes, *_doubts(outcome.adjustment)))
 
 
@@ -63,7 +71,7 @@ def _free(network: Network) -> tuple[Network, list[str]]:
     unused = [
         i
         for i, (point, count) in enumerate(zip(network.points, rays(network), strict=True))
-        if point.role in (Role.CONTROL, Role.FIXED, Role.CHECK) and count < _RAYS
+        if point.role in (Role.CONTROL, Role.FIXED, Role.CHECK) and count < RAYS
     ]
     if unused:
         names = ", ".join(network.points[i].name for i in unused)

@@ -116,8 +116,20 @@ class ReferenceEstimate:
     controlled: Floats
 
     @classmethod
-    def of(cls, everything: Sequence[ReferencePoint], covariance: Floats, used: Sequence[int]) -> "ReferenceEstimate":
-        """Estimate from some of the points (indices).
+    def of(
+        cls,
+        everything: Sequence[ReferencePoint],
+        covariance: Floats,
+        used: Sequence[int],
+        at: Similarity | None = None,
+    ) -> "ReferenceEstimate":
+        """Estimate from some of the points.
+
+        Args:
+            everything: all reference points.
+            covariance: of their coordinates in the block.
+            used: indices of those that are used.
+            at: where to linearise for the tests, without any estimation; a point that is wrong by far would spoil it.
 
         Raises:
             BadInputError: they lie on a line.
@@ -127,20 +139,22 @@ class ReferenceEstimate:
         block = np.array([p.block for p in points])
         surveyed = np.array([p.surveyed for p in points])
         survey, free = np.diag(np.concatenate([p.sigma for p in points]) ** 2), covariance[np.ix_(rows, rows)]
-        transform = fit_similarity(block, surveyed)
+        transform = fit_similarity(block, surveyed) if at is None else at
         for _ in range(_ITERATIONS):
             placed = transform.apply(block)
             slopes = _slopes(placed)
             turned = _turned(transform, len(points))
             misclosures = turned @ free @ turned.T + survey
-            weights = _inverse(misclosures, slopes)
+            weights = np.linalg.inv(_regular(misclosures, slopes))
             half = weights @ slopes
             normals = slopes.T @ half
+            if at is not None:
+                break
             step = -np.linalg.solve(normals, half.T @ (placed - surveyed).ravel())
             transform = _moved(transform, step, placed.mean(axis=0))
             if np.abs(slopes @ step).max() <= _SETTLED * np.ptp(surveyed, axis=0).max():
                 break
-        projected = weights - half @ np.linalg.solve(normals, half.T)
+        projected = np.asarray(weights - half @ np.linalg.solve(normals, half.T), dtype=float)
         v = (transform.apply(block) - surveyed).ravel()
         controlled = np.einsum("ij,ji->i", misclosures, projected).reshape(-1, 3)
         # W is positive semidefinite; rounding of absurd numbers can make the square sum negative or no number at all.
@@ -164,12 +178,39 @@ class ReferenceEstimate:
         return float(np.sqrt(self.square_sum / self.redundancy))
 
     @property
+    def chance(self) -> float:
+        """Probability that the misclosures of sound points have a square sum so large."""
+        return float(special.chdtrc(self.redundancy, self.square_sum)) if self.redundancy > 0 else 1.0
+
+    @property
     def w(self) -> Floats:
         """Test values of single coordinates, whose misclosures are correlated: W v / (sigma0 root of W's diagonal)."""
         size = np.sqrt(np.maximum(np.diagonal(self.projected), 0.0)) * self.ratio
         known = (size > 0.0) & (self.controlled.ravel() > UNCONTROLLED)
         w = np.where(known, self.projected @ self.v / np.where(known, size, 1.0), np.nan)
         return np.asarray(w.reshape(-1, 3))
+
+    def misclosures(
+        self, everything: Sequence[ReferencePoint], covariance: Floats, order: Sequence[int]
+    ) -> tuple[Floats, Floats, Floats]:
+        """Misclosures of any points, used or not, under this transformation.
+
+        Args:
+            everything: all reference points.
+            covariance: of their coordinates in the block.
+            order: indices of m of them.
+
+        Returns:
+            Misclosures transformed - surveyed (3 m,), their covariance (3 m, 3 m), which is regular but indeterminate
+            along the parameters, and their derivatives by the parameters (3 m, 7).
+        """
+        points, rows = [everything[i] for i in order], _rows(order)
+        placed = self.transform.apply(np.array([p.block for p in points]))
+        slopes, turned = _slopes(placed), _turned(self.transform, len(points))
+        spread = turned @ covariance[np.ix_(rows, rows)] @ turned.T
+        spread += np.diag(np.concatenate([p.sigma for p in points]) ** 2)
+        v = (placed - np.array([p.surveyed for p in points])).ravel()
+        return v, _regular(spread, slopes), slopes
 
     def suspect(self, family_risk: float) -> Suspect | None:
         """The worst point, with its rivals; None if no point is significant."""
@@ -236,10 +277,10 @@ def _slopes(placed: Floats) -> Floats:
     return out.reshape(-1, _PARAMETERS)
 
 
-def _inverse(covariance: Floats, slopes: Floats) -> Floats:
-    """The inverse, made regular along the parameters, which changes neither estimate nor residuals (Rao)."""
+def _regular(covariance: Floats, slopes: Floats) -> Floats:
+    """The covariance, made regular along the parameters, which changes neither estimate nor residuals (Rao)."""
     free = slopes / np.linalg.norm(slopes, axis=0)
-    return np.asarray(np.linalg.inv(covariance + np.diagonal(covariance).max() * free @ free.T))
+    return np.asarray(covariance + np.diagonal(covariance).max() * free @ free.T)
 
 
 def _pseudo_inverse(matrix: Floats) -> Floats:

@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 
 from photogrammetry.adjustment.gross_errors.hypotheses import observation_row
-from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK
+from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK, SINGLE_RISK
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.similarity import fit_similarity
 from photogrammetry.network.model import Point
+from photogrammetry.procedures.consensus import agreeing_points
 from photogrammetry.procedures.reference_estimate import ImagePoint, ReferenceEstimate, ReferencePoint, Suspect
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
@@ -25,18 +26,25 @@ class ReferenceFit:
     Attributes:
         estimate: the final estimation, from the points that are left.
         removed: wrong points that were taken out, in that order.
-        suspect: a further wrong point, which cannot be located, or too many were taken out before it.
+        suspects: further points that do not agree, but cannot be located.
+        count: number of all reference points.
     """
 
     estimate: ReferenceEstimate
     removed: tuple[Suspect, ...]
-    suspect: Suspect | None
+    suspects: tuple[Suspect, ...]
+    count: int
+
+    @property
+    def too_many(self) -> bool:
+        """Whether so many points were taken out that the cause is not single points."""
+        return len(self.removed) > self.count // 3
 
 
 def fit_reference(
     points: Sequence[ReferencePoint], covariance: Floats, family_risk: float = FAMILY_RISK
 ) -> ReferenceFit:
-    """Carry a free block onto its reference points and take out wrong ones, the worst first.
+    """Carry a free block onto its reference points and take out wrong ones.
 
     Args:
         points: n reference points.
@@ -56,18 +64,16 @@ def fit_reference(
 
 
 def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: float) -> ReferenceFit:
-    used = list(range(len(points)))
-    removed: list[Suspect] = []
-    most = len(points) // 3  # with more wrong points the cause is not single points
+    used, removed, unsure = _agreeing(points, covariance, family_risk)
     while True:
         estimate = ReferenceEstimate.of(points, covariance, used)
         suspect = estimate.suspect(family_risk)
-        if suspect is None or not suspect.certain or len(removed) == most or len(used) <= _FEWEST:
+        if suspect is None:
             break
         remaining = [i for i in used if i != suspect.index]
-        try:
-            fit_similarity([points[i].block for i in remaining], [points[i].surveyed for i in remaining])
-        except BadInputError:
+        enough = len(used) > _FEWEST and len(removed) <= len(points) // 3
+        if not (suspect.certain and enough and _spans(points, remaining)):
+            unsure.append(suspect)
             break
         removed.append(suspect)
         used = remaining
@@ -75,7 +81,48 @@ def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: f
     wrong = [points[suspect.index] for suspect in removed]
     errors = [point.surveyed - estimate.transform.apply(point.block) for point in wrong]
     gone = tuple(replace(suspect, estimate=error) for suspect, error in zip(removed, errors, strict=True))
-    return ReferenceFit(estimate, gone, suspect)
+    return ReferenceFit(estimate, gone, tuple(unsure), len(points))
+
+
+def _agreeing(
+    points: Sequence[ReferencePoint], covariance: Floats, family_risk: float
+) -> tuple[list[int], list[Suspect], list[Suspect]]:
+    """The points to begin with, those that are certainly wrong, and those that may be.
+
+    If chance explains the misclosures of all points together, all are used. Otherwise each point that does not agree
+    with the majority is tested beside the majority alone, where no other error can hide it or pass for it.
+    """
+    everyone = list(range(len(points)))
+    if _chance(points, covariance) >= SINGLE_RISK:
+        return everyone, [], []
+    used = agreeing_points(points, covariance, min(SINGLE_RISK, family_risk / len(points)))
+    majority = ReferenceEstimate.of(points, covariance, used)
+    sound, removed, unsure = list(used), list[Suspect](), list[Suspect]()
+    for i in (i for i in everyone if i not in used):
+        suspect = ReferenceEstimate.of(points, covariance, sorted([*used, i]), majority.transform).suspect(family_risk)
+        if suspect is None:
+            sound.append(i)
+        else:
+            (removed if suspect.certain and suspect.index == i else unsure).append(suspect)
+    removed.sort(key=lambda suspect: -suspect.w)
+    return sorted(sound), removed, unsure
+
+
+def _chance(points: Sequence[ReferencePoint], covariance: Floats) -> float:
+    """Probability of such misclosures in sound points; 0 if a few points in another unit spoil the estimation."""
+    try:
+        return ReferenceEstimate.of(points, covariance, range(len(points))).chance
+    except np.linalg.LinAlgError:
+        return 0.0
+
+
+def _spans(points: Sequence[ReferencePoint], chosen: Sequence[int]) -> bool:
+    """Whether some of the points determine a transformation."""
+    try:
+        fit_similarity([points[i].block for i in chosen], [points[i].surveyed for i in chosen])
+    except BadInputError:
+        return False
+    return True
 
 
 def reference_points(free: Adjustment, surveyed: Sequence[Point]) -> tuple[list[ReferencePoint], Floats]:

@@ -55,7 +55,7 @@ def _poses(a: Adjustment) -> tuple[str | Table, ...]:
         place = [f"{value:.4f}" for value in a.state.position[i]]
         spread = [f"{value:.2g}" for value in (*sigma[i, :3], *np.degrees(sigma[i, 3:]) * 60.0)]
         rows.append((image.name, *place, *spread))
-    unit = a.network.length_unit
+    unit = a.length_unit
     head = ("image", "X0", "Y0", "Z0", *(f"sigma {name}" for name in _POSE))
     return (
         f"Lengths in {unit or 'length units'}, angles about the camera's own axes in minutes.",

@@ -6,7 +6,8 @@ from typing import Any
 
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.procedures.calibration import Calibration
-from photogrammetry.procedures.orientation import Orientation, PointTest, Stage
+from photogrammetry.procedures.findings import PointTest, Stage
+from photogrammetry.procedures.orientation import Orientation
 from photogrammetry.reports.adjusted import adjusted_sections
 from photogrammetry.reports.document import Report, Section, Table
 from photogrammetry.reports.result_file import outcome_to_json

@@ -13,6 +13,7 @@ from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.gross_errors.blunders import blunder_to_json, in_file_frame
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.adjustment.solution.global_test import GlobalTest
 from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.diagnosis import Defect
 from photogrammetry.network.model import AXES, Reweight, Role
@@ -67,7 +68,8 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "n_unknowns": a.problem.unknowns.count,
         "n_conditions": a.free.defect,
         "redundancy": a.redundancy,
-        "length_unit": network.length_unit,
+        "global_test": _global_test(a),
+        "length_unit": "" if a.scale_is_free else network.length_unit,
         "image_frame": network.image_frame.value,
         "cameras": _cameras(a),
         "images": _images(a),
@@ -90,6 +92,11 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
     if outcome.removed:
         result["removed"] = [blunder_to_json(gone.network, gone.blunder) for gone in outcome.removed]
     return result
+
+
+def _global_test(a: Adjustment) -> dict[str, Any]:
+    test = GlobalTest(a.ratio, a.redundancy)
+    return {"ratio": a.ratio, "probability": test.chance, "verdict": test.verdict.value, "words": test.words}
 
 
 def status_of(outcome: Outcome) -> str:

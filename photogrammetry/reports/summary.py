@@ -5,6 +5,7 @@ import numpy as np
 from photogrammetry.adjustment.gross_errors.blunders import describe
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.adjustment.solution.global_test import GlobalTest, Verdict
 from photogrammetry.network.model import ImageFrame, Role
 from photogrammetry.reports.result_file import status_of
 from rig.arrays import Integers
@@ -27,8 +28,10 @@ def summarise(outcome: Outcome) -> list[str]:
         lines.append(f"suspected gross errors ({len(outcome.blunders)}), the first is the suspect:")
         lines += [f"  {describe(a.network, blunder)}" for blunder in outcome.blunders[:_SHOWN]]
         lines += _more(len(outcome.blunders))
-    elif a.redundancy:
+    elif a.redundancy and GlobalTest(a.ratio, a.redundancy).verdict in (Verdict.AGREES, Verdict.SMALLER):
         lines.append("no gross error is suspected")
+    elif a.redundancy:
+        lines.append("no single observation explains the residuals")
     return lines
 
 
@@ -45,11 +48,7 @@ def _counts(a: Adjustment) -> str:
 
 
 def _verdict(a: Adjustment) -> str:
-    ratio = a.ratio
-    if ratio > 1.0:
-        words = f"the observations are {ratio:.2f} times less accurate than their sigmas say"
-    else:
-        words = f"the observations are {1.0 / max(ratio, 1e-12):.2f} times more accurate than their sigmas say"
+    words = GlobalTest(a.ratio, a.redundancy).words
     return f"sigma0 {a.sigma0:.5g} (a priori {a.network.sigma0:g}): {words}"
 
 
@@ -67,7 +66,7 @@ def _camera_lines(a: Adjustment) -> list[str]:
 
 def _point_lines(a: Adjustment) -> list[str]:
     """Median and worst sigma of points and positions; rms of the check points."""
-    unknowns, unit = a.problem.unknowns, a.network.length_unit
+    unknowns, unit = a.problem.unknowns, a.length_unit
     lines = _spread_lines(a, "points", "", unknowns.point, [point.name for point in a.network.points])
     lines += _spread_lines(a, "positions", "image ", unknowns.pose[:, :3], [image.name for image in a.network.images])
     deltas = [
@@ -90,7 +89,7 @@ def _spread_lines(a: Adjustment, what: str, kind: str, columns: Integers, names:
         return []
     sigma = np.linalg.norm(a.sigmas(columns[known]), axis=1)
     worst = names[np.flatnonzero(known)[int(np.argmax(sigma))]]
-    median = f"{np.median(sigma):.3g} {a.network.length_unit}"
+    median = f"{np.median(sigma):.3g} {a.length_unit}"
     return [f"{what}: sigma {median} (median), worst {sigma.max():.3g} at {kind}{worst}"]
 
 

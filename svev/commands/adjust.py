@@ -9,6 +9,8 @@ from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.run import adjust as adjust_network
 from photogrammetry.network.file import read_network
 from photogrammetry.network.model import Network
+from photogrammetry.procedures.doubtful_poses import refuse_ambiguous
+from photogrammetry.procedures.stages import snoop_network
 from photogrammetry.reports.adjusted import adjusted_sections
 from photogrammetry.reports.document import Report
 from photogrammetry.reports.result_extras import in_datum_of, joint_covariance, named_points, with_detectable
@@ -52,7 +54,8 @@ def adjust(
 ) -> None:
     """Adjust a network of images: bundle adjustment with covariance, tests and variance components.
 
-    Exit codes: 0 adjusted, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged.
+    Exit codes: 0 adjusted, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or with
+    --snoop refused because the data contradict each other.
 
     Example: svev adjust network.json -o result.json
     """
@@ -61,7 +64,8 @@ def adjust(
     named_points(given, covariance or (), "--covariance")
 
     def adjusted() -> tuple[dict[str, Any], list[str]]:
-        outcome = adjust_network(given, state_of(_started(given)), snoop=snoop)
+        outcome = snoop_network(given) if snoop else adjust_network(given, state_of(_started(given)))
+        refuse_ambiguous(given, outcome.adjustment)
         if datum:
             outcome = in_datum_of(outcome, datum)
         lines = summarise(outcome)

@@ -15,7 +15,12 @@ _NAMES = (*SUITES, *DRAWN)
 def bench(
     suites: Annotated[list[str] | None, typer.Argument(help=f"which of {', '.join(_NAMES)}; all if left out")] = None,
     seconds: Annotated[float, typer.Option(min=1, max=600, help="length of each run, seconds")] = 20.0,
-    draws: Annotated[int, typer.Option(min=1, max=10_000, help="number of jumps that smoothing draws")] = 18,
+    draws: Annotated[
+        int,
+        typer.Option(
+            min=1, max=10_000, help="number of jumps that smoothing draws, of networks of each kind for gross-errors"
+        ),
+    ] = 18,
     out: Annotated[Path, typer.Option(help="folder for the results, and for logs that are removed again")] = Path(
         "bench/results"
     ),
@@ -33,7 +38,8 @@ def bench(
     with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump
     measured again and again, and with another leg angle: how often a comparison finds a difference. live: how soon a
     worker tells the state of each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all
-    measurements and with a marker or a ski missing for a while; about two seconds a draw.
+    measurements and with a marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with
+    exchanged names, wrong survey, wrong image points or wrong units: what the search for gross errors makes of them.
 
     Example: svev bench saturated --seconds 10
     """

@@ -20,7 +20,8 @@ def calibrate(
 ) -> None:
     """Calibrate cameras: free adjustment of a frame of unknown targets with self-calibration.
 
-    Exit codes: 0 calibrated, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged.
+    Exit codes: 0 calibrated, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or refused
+    because the images contradict each other.
 
     Example: svev calibrate frame.json -o cameras.json --report calibration
     """

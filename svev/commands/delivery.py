@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from photogrammetry.network.model import Network, Reweight
 from photogrammetry.reports.document import Report, write_report
 from photogrammetry.reports.result_file import failure_to_json, write_result
@@ -34,6 +34,7 @@ PaperOption = Annotated[bool, typer.Option("--paper", help="estimate the weights
 #: Exit codes.
 NOT_SOLVABLE: Final = 3
 NOT_CONVERGED: Final = 4
+REFUSED: Final = RefusedError.exit_code
 _LISTS: Final = ("observations", "points", "images", "calibration")  # too long for a screen
 
 
@@ -54,7 +55,7 @@ def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Pat
         as_json: end with one JSON object on standard output, the result without its lists.
 
     Raises:
-        typer.Exit: 3 not solvable, 4 not converged.
+        typer.Exit: 3 not solvable, 4 not converged or refused.
     """
     code = 0
     try:
@@ -64,6 +65,8 @@ def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Pat
         lines = ["not solvable", *(f"  {defect.message}" for defect in error.defects)]
     except NotConvergedError as error:
         code, result, lines = NOT_CONVERGED, failure_to_json(f"not converged: {error}"), [f"not converged: {error}"]
+    except RefusedError as error:
+        code, result, lines = REFUSED, failure_to_json(f"refused: {error}"), [f"refused: {error}"]
     write_result(result, output)
     for line in lines:
         console.say(line, aside=as_json)

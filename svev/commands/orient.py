@@ -54,7 +54,8 @@ def orient(
 ) -> None:
     """Estimate the cameras' poses from reference points, with a search for gross errors in three stages.
 
-    Exit codes: 0 oriented, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged.
+    Exit codes: 0 oriented, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or refused
+    because images and survey contradict each other.
 
     Example: svev orient hill.json --calibration cameras.json -o poses.json --report orientation
     """

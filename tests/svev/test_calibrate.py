@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photogrammetry.network.file_writer import write_network
-from photogrammetry.network.model import Network
+from photogrammetry.network.model import Distance, Network
 from svev.cli import main
 from tests.photogrammetry.synthetic import hill, lab_frame
 
@@ -60,3 +60,19 @@ def test_exit_codes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     chance = np.random.default_rng(1).uniform(-300.0, 300.0, o.xy.shape)
     assert _run(tmp_path, replace(network, observations=replace(o, xy=chance))) == 4
     assert json.loads((tmp_path / "cameras.json").read_text())["converged"] is False
+
+
+def test_without_a_distance_nothing_is_in_metres(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    case = lab_frame(3, points=30)
+    assert _run(tmp_path, case.network, "--report", str(tmp_path / "report")) == 0
+    printed = capsys.readouterr().out
+    assert "no distance gives the scale" in printed
+    assert "points: sigma 0." in printed
+    assert " m (median)" not in printed
+    assert json.loads((tmp_path / "cameras.json").read_text())["length_unit"] == ""
+    length = float(np.linalg.norm(case.truth.xyz[0] - case.truth.xyz[7]))
+    assert _run(tmp_path, replace(case.network, distances=(Distance(0, 7, length, 1e-4),))) == 0
+    printed = capsys.readouterr().out
+    assert "no distance gives the scale" not in printed
+    assert " m (median)" in printed
+    assert json.loads((tmp_path / "cameras.json").read_text())["length_unit"] == "m"

@@ -35,7 +35,7 @@ Trial = Adjustment | NotSolvableError | NotConvergedError
 #: Snooping stops when this part of all observations has been taken out: the cause is not single observations then.
 _MOST_REMOVED = 0.1
 #: Above this ratio of the estimated to the a-priori sigma0, errors may have shifted the optimum.
-_BENT = 2.0
+BENT = 2.0
 _NAMED = 3  # suspects in an error message, at most
 _COMPARED = 3  # locatable blunders that are compared if the optimum is shifted
 _MOST_TRIALS = 12  # candidates; with more of them no trial is made
@@ -83,7 +83,7 @@ def point_of_view(network: Network, start: State, current: Adjustment | NotConve
     Raises:
         NotConvergedError: there is no optimum, and no robust solution either.
     """
-    if isinstance(current, Adjustment) and current.ratio <= _BENT:
+    if isinstance(current, Adjustment) and current.ratio <= BENT:
         return current
     try:
         return linearised_at(network, robust_state(network, start))
@@ -102,7 +102,7 @@ def suspicions(adjustment: Adjustment, start: State, family_risk: float) -> list
         family_risk: probability that all tests together suspect anything in sound data.
     """
     found = find_blunders(adjustment, family_risk)
-    if not found or adjustment.ratio <= _BENT:
+    if not found or adjustment.ratio <= BENT:
         return found
     return find_blunders(point_of_view(adjustment.network, start, adjustment), family_risk)
 
@@ -145,7 +145,7 @@ def _judged_all(view: Adjustment, family_risk: float) -> tuple[list[Blunder], tu
             left.append(judged)
             continue
         located.append((judged, trial))
-        if view.ratio <= _BENT or len(located) == _COMPARED:
+        if view.ratio <= BENT or len(located) == _COMPARED:
             break
     return left, min(located, key=lambda one: one[1].ratio) if located else None
 

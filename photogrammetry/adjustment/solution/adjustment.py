@@ -37,6 +37,10 @@ _SIGNIFICANT = 1.96
 _DOUBTFUL = 1e-11
 #: The redundancy numbers add up to the redundancy; a larger difference means that rounding has spoilt the solution.
 _LOST = 0.01
+#: Part of scale in the free motions of a network (rad, logarithm) that is rounding.
+_NO_SCALE = 1e-6
+#: Stands for the unit of lengths in a network without a scale.
+UNSCALED = "units without a scale"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,17 @@ class Adjustment:
     def redundancy(self) -> int:
         """Observations - unknowns + datum conditions."""
         return self.problem.n_observations - self.problem.unknowns.count + self.free.defect
+
+    @property
+    def scale_is_free(self) -> bool:
+        """Whether nothing observed gives the network its size."""
+        directions = np.abs(self.free.directions[3:])
+        return bool(directions[3].max(initial=0.0) > _NO_SCALE * directions.max(initial=0.0))
+
+    @property
+    def length_unit(self) -> str:
+        """The unit of lengths, for people; none without a scale."""
+        return UNSCALED if self.scale_is_free else self.network.length_unit
 
     @property
     def ratio(self) -> float:

@@ -81,7 +81,7 @@ def network_drawings(a: Adjustment, extras: Extras | None = None, *, a_priori: b
     points, cameras = _points(a, a_priori=a_priori), _cameras(a, a_priori=a_priori)
     nearby = [place for i, place in enumerate(points) if i not in extras.instead_of]
     nearby += extras.places
-    unit = a.network.length_unit
+    unit = a.length_unit
     far = _extent([*nearby, *cameras]) * _CLOSER > _extent(nearby)
     sights = _sights(a, np.array([place.xyz for place in nearby])) if len(cameras) <= _SIGHTED else []
     whole = [replaced for place in nearby for replaced in (_bare(place) if far else place,)]

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 from photogrammetry.geometry.rotation import nearest_rotation
 from photogrammetry.network.model import Network, Reweight, Role
 from photogrammetry.network.selection import only_points, rays
-from photogrammetry.procedures.orientation import Orientation, StageName, orient
+from photogrammetry.procedures.findings import StageName
+from photogrammetry.procedures.orientation import Orientation, orient
 from rig.errors import BadInputError
 from tests.photogrammetry.synthetic import Synthetic, hill
 

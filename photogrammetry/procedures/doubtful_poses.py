@@ -1,0 +1,156 @@
+"""Poses that must not be believed: one of several, not those that were given, or those of exchanged cameras."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from photogrammetry.adjustment.equations.unknowns import state_of
+from photogrammetry.adjustment.gross_errors.snooping import BENT
+from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
+from photogrammetry.network.diagnosis import (
+    Defect,
+    DefectKind,
+    NotConvergedError,
+    NotSolvableError,
+    RefusedError,
+)
+from photogrammetry.network.model import Network
+from photogrammetry.network.selection import with_interior
+from photogrammetry.start_values.resection import resect
+from photogrammetry.start_values.search import complete
+from photogrammetry.start_values.sightings import reduce_observations
+from rig.errors import BadInputError
+
+_FEWEST: Final = 3  # points of a resection; with so many up to four poses fit exactly
+#: Two images are exchanged if each lies so much nearer to where the other is given than to where itself is given.
+_NEARER: Final = 0.25
+#: Given poses are in another unit if all distances between them differ by one factor beyond this, ...
+_OTHER_UNIT: Final = 2.0
+_ALIKE: Final = 0.1  # ... whose logarithm varies by no more than this among at least so many distances
+_PAIRS: Final = 3
+_IMAGES: Final = 8  # with more images one exchange of cameras spoils little, and the pairs are many
+
+
+def refuse_ambiguous(given: Network, a: Adjustment) -> None:
+    """Refuse a result in which three points alone fix an image, and fix it in several ways.
+
+    Args:
+        given: the network before it got start values: an image whose pose it gives is decided by that.
+        a: the adjusted network.
+
+    Raises:
+        NotSolvableError: names the images with all their possible places.
+    """
+    known = {image.name for image in given.images if image.position is not None and image.rotation is not None}
+    defects = tuple(_ambiguities(a, known))
+    if defects:
+        raise NotSolvableError(defects)
+
+
+def _ambiguities(a: Adjustment, known: set[str]) -> Iterator[Defect]:
+    counts = np.bincount(a.network.observations.image, minlength=len(a.network.images))
+    doubtful = [
+        i
+        for i, image in enumerate(a.network.images)
+        if counts[i] == _FEWEST and image.estimate and image.name not in known and image.sigma_position is None
+    ]
+    if not doubtful:
+        return
+    sightings = reduce_observations(with_interior(a.network, a.state.interior))
+    for i in doubtful:
+        try:
+            found = resect(a.state.xyz[sightings.points[i]], sightings.xy[i], sightings.c_of(i))
+        except BadInputError:
+            continue  # two measurements of one point, or points on a line: the rank analysis has judged them
+        if found.ambiguous:
+            poses = (found.camera, *found.alternatives)
+            places = " or ".join(f"({', '.join(f'{x:.3f}' for x in pose.X0)})" for pose in poses)
+            name = a.network.images[i].name
+            words = (
+                f"image {name} shows three points only, which fit {len(poses)} poses equally: X0 {places}; measure a "
+                "fourth point in it, or give an approximate pose"
+            )
+            yield Defect(DefectKind.IMAGES, 0, words, images=(name,))
+
+
+def refuse_contradicted(given: Network, a: Adjustment) -> None:
+    """Refuse a result whose images lie where other images were given, or by a factor farther apart than given.
+
+    Args:
+        given: the network with approximate poses, or without.
+        a: the adjusted network.
+
+    Raises:
+        RefusedError: says which images or units look exchanged.
+    """
+    there = {image.name: image.position for image in given.images if image.position is not None}
+    pairs = [
+        (image.name, there[image.name], a.state.position[i])
+        for i, image in enumerate(a.network.images)
+        if image.name in there
+    ]
+    apart = []
+    for (one, one_given, one_found), (other, other_given, other_found) in combinations(pairs, 2):
+        straight = np.linalg.norm(one_found - one_given) + np.linalg.norm(other_found - other_given)
+        crossed = np.linalg.norm(one_found - other_given) + np.linalg.norm(other_found - one_given)
+        if crossed < _NEARER * straight:
+            raise RefusedError(
+                f"images {one} and {other} look exchanged: each was found where the other is given; exchange their "
+                "measurements, or their poses if those are wrong"
+            )
+        apart.append((float(np.linalg.norm(one_found - other_found)), float(np.linalg.norm(one_given - other_given))))
+    if len(apart) < _PAIRS or min(length for pair in apart for length in pair) <= 0.0:
+        return
+    factors = np.array([found / given for found, given in apart])
+    factor = float(np.median(factors))
+    if np.ptp(np.log(factors)) <= _ALIKE and not 1.0 / _OTHER_UNIT < factor < _OTHER_UNIT:
+        raise RefusedError(
+            f"the images were found {factor:.4g} times as far apart as their given poses are: survey and poses have "
+            "different units; give both in one"
+        )
+
+
+def refuse_exchanged_cameras(alone: Network, ratio: float) -> None:
+    """Refuse images that do not fit each other, but do once two of them exchange their cameras.
+
+    Args:
+        alone: the images without survey.
+        ratio: estimated over a-priori sigma0 that they have as they are; infinite if they form no block.
+
+    Raises:
+        RefusedError: names the two images.
+    """
+    if ratio <= BENT or len(alone.images) > _IMAGES:
+        return
+    trials = [(trial, pair) for pair, network in _exchanges(alone) if (trial := _ratio(network)) * BENT < ratio]
+    if not trials:
+        return
+    least, (one, other) = min(trials)
+    before = f"falls from {ratio:.3g} to {least:.3g}" if np.isfinite(ratio) else f"becomes {least:.3g}"
+    raise RefusedError(
+        f"images {one} and {other} look exchanged: sigma0 {before} times the a priori one once each has the other's "
+        "camera; exchange their measurements or their cameras"
+    )
+
+
+def _exchanges(network: Network) -> Iterator[tuple[tuple[str, str], Network]]:
+    """Pairs of images of different cameras, and the network with the cameras exchanged; no poses are given."""
+    images = [replace(image, position=None, rotation=None) for image in network.images]
+    for i, k in combinations(range(len(images)), 2):
+        one, other = images[i], images[k]
+        lenses = [network.cameras[image.camera].interior for image in (one, other)]
+        if np.array_equal(lenses[0], lenses[1]):
+            continue
+        changed = list(images)
+        changed[i], changed[k] = replace(one, camera=other.camera), replace(other, camera=one.camera)
+        yield (one.name, other.name), replace(network, images=tuple(changed))
+
+
+def _ratio(network: Network) -> float:
+    try:
+        return adjust_once(network, state_of(complete(network))).ratio
+    except (BadInputError, NotSolvableError, NotConvergedError):
+        return float("inf")

@@ -11,13 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.candidates.known_discs import DiscShape
-from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
+from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots
 from analysis.measurements.model import (
     ImageMeasurements,
     JumpMeasurements,
-    PointMeasurement,
     PulseMeasurements,
-    SkiMeasurement,
 )
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import distort
@@ -109,10 +107,15 @@ class Standing:
         shake = self.shake.get(name, {}).get(pulse)
         if shake is None or name not in self.system.cameras:
             return image
-        placed = self.system[name]
-        xy, added = steadied(placed, shake, image.spots.xy)
-        spots: Spots = replace(image.spots, xy=xy, covariance=image.spots.covariance + added)
-        return ImageCandidates(spots, tuple(_trace(placed, shake, trace) for trace in image.traces))
+        places = [image.spots.xy, *(trace.xy for trace in image.traces), *(trace.ends for trace in image.traces)]
+        (of_spots, added), *of_traces = _all_steadied(self.system[name], shake, places)
+        spots: Spots = replace(image.spots, xy=of_spots, covariance=image.spots.covariance + added)
+        count = len(image.traces)
+        traces = tuple(
+            replace(trace, xy=xy, ends=ends, common=_common(trace.common, of_axis))
+            for trace, (xy, of_axis), (ends, _) in zip(image.traces, of_traces[:count], of_traces[count:], strict=True)
+        )
+        return ImageCandidates(spots, traces)
 
 
 class _SteadyLook:
@@ -136,17 +139,16 @@ class _SteadyLook:
     ) -> Spots:
         """What `look` finds at places in the frames; all spots belong to one pulse, or each to its own."""
         shakes, placed, places = self._standing.shake.get(camera, {}), self._standing.system[camera], xy.copy()
-        if not any(pulse in shakes for pulse in pulses):
+        there = [i for i, pulse in enumerate(pulses) if pulse in shakes]
+        if not there:
             return look(xy)
-        for i, pulse in enumerate(pulses):
-            if pulse in shakes:
-                places[i] = steadied(placed, shakes[pulse].reversed(), xy[i : i + 1])[0][0]
+        places[there] = steadied_each(placed, [shakes[pulses[i]].reversed() for i in there], xy[there])[0]
         spots = look(places)
         found, covariance = spots.xy.copy(), spots.covariance.copy()
-        for pulse in set(pulses) & set(shakes):
-            own = np.array([p == pulse for p in pulses]) if len(pulses) > 1 else np.ones(len(spots), bool)
-            found[own], added = steadied(placed, shakes[pulse], spots.xy[own])
-            covariance[own] += added
+        own = there if len(pulses) > 1 else [0] * len(spots)
+        rows = there if len(pulses) > 1 else list(range(len(spots)))
+        found[rows], added = steadied_each(placed, [shakes[pulses[i]] for i in own], spots.xy[rows])
+        covariance[rows] += added
         return replace(spots, xy=found, covariance=covariance)
 
 
@@ -161,33 +163,47 @@ def steadied(placed: PlacedCamera, shake: FrameShake, xy: Floats) -> tuple[Float
     Returns:
         (n, 2) px, and (n, 2, 2) the covariance that the uncertainty of the shake adds.
     """
-    turns = np.concatenate((shake.turn[None], shake.turn + _DIFFERENCE * np.eye(3)))
+    return steadied_each(placed, [shake] * len(xy), xy)
+
+
+def steadied_each(placed: PlacedCamera, shakes: Sequence[FrameShake], xy: Floats) -> tuple[Floats, Floats]:
+    """The same for n places, each in a frame of its own; see `steadied`."""
+    turn = np.array([shake.turn for shake in shakes]).reshape(-1, 3)
+    covariance = np.array([shake.covariance for shake in shakes]).reshape(-1, 3, 3)
+    turns = turn + _DIFFERENCE * np.concatenate((np.zeros((1, 3)), np.eye(3)))[:, None]
     ideal = placed.reduced(xy)
     c = float(placed.camera.interior[0])
     rays = np.concatenate((ideal, np.full((*ideal.shape[:-1], 1), -c)), axis=-1)
-    turned = np.einsum("kij,nj->kni", rotation_from_vector(turns), rays)
+    turned = np.einsum("knij,nj->kni", rotation_from_vector(turns), rays)
     seen = np.asarray(distort(placed.camera.lens(), -c * turned[..., :2] / turned[..., 2:]), float)
     places = seen * np.array((1.0, -1.0)) + (placed.size - 1) / 2
     by_turn = ((places[1:] - places[0]) / _DIFFERENCE).transpose(1, 2, 0)
-    return places[0], by_turn @ shake.covariance @ by_turn.transpose(0, 2, 1)
+    return places[0], by_turn @ covariance @ by_turn.transpose(0, 2, 1)
+
+
+def _all_steadied(placed: PlacedCamera, shake: FrameShake, places: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
+    """What `steadied` gives for several arrays of places in one frame, all at once."""
+    xy, added = steadied(placed, shake, np.concatenate(places))
+    ends = np.cumsum([len(part) for part in places])[:-1]
+    return list(zip(np.split(xy, ends), np.split(added, ends), strict=True))
 
 
 def _image_measurements(placed: PlacedCamera, shake: FrameShake, image: ImageMeasurements) -> ImageMeasurements:
-    points: dict[str, PointMeasurement] = {}
-    for name, point in image.points.items():
-        xy, added = steadied(placed, shake, point.xy[None])
-        points[name] = replace(point, xy=xy[0], covariance=point.covariance + added[0])
-    skis: dict[str, SkiMeasurement] = {}
-    for side, ski in image.skis.items():
-        xy, added = steadied(placed, shake, ski.xy)
-        skis[side] = replace(ski, xy=xy, common=_common(ski.common, added))
-    return ImageMeasurements(points, skis)
-
-
-def _trace(placed: PlacedCamera, shake: FrameShake, trace: Trace) -> Trace:
-    xy, added = steadied(placed, shake, trace.xy)
-    ends, _ = steadied(placed, shake, trace.ends)
-    return replace(trace, xy=xy, ends=ends, common=_common(trace.common, added))
+    points, skis = image.points, image.skis
+    places = [*(point.xy[None] for point in points.values()), *(ski.xy for ski in skis.values())]
+    if not places:
+        return image
+    found = _all_steadied(placed, shake, places)
+    return ImageMeasurements(
+        {
+            name: replace(point, xy=xy[0], covariance=point.covariance + added[0])
+            for (name, point), (xy, added) in zip(points.items(), found[: len(points)], strict=True)
+        },
+        {
+            side: replace(ski, xy=xy, common=_common(ski.common, added))
+            for (side, ski), (xy, added) in zip(skis.items(), found[len(points) :], strict=True)
+        },
+    )
 
 
 def _common(before: float, added: Floats) -> float:

@@ -5,7 +5,7 @@ logarithm of its probability density against that of chance, which puts spots an
 three rays competes fairly with one of two, and a spot counts more where few others are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, TypeAlias
@@ -14,15 +14,16 @@ import numpy as np
 
 from analysis.identification.body import USUAL, implausibility
 from analysis.identification.prediction import Prediction
-from analysis.identification.space_points import Rays, SpacePoints, squared_distances
-from analysis.identification.views import Sight, Views, gate
+from analysis.identification.space_points import Rays, SpacePoints
+from analysis.identification.views import Views, gate
 from analysis.identification.window import Window
 from rig.arrays import Flags, Floats, Integers
 
 #: How much likelier than each rival, and than chance, an assignment must be: minus twice the logarithm of 1/1000.
 DECISIVE = 13.8
 DETECTED = 0.9  #: share of the markers in an image that are found as spots
-Strangeness: TypeAlias = dict[tuple[int, int, int, int], float]
+#: By pair of markers, the first one before the second: (options of the first, options of the second).
+Strangeness: TypeAlias = dict[tuple[int, int], Floats]
 
 _LITTLE = 0.03  #: change of a prediction, in its standard deviations, that changes no assignment
 MOST_OPTIONS = 5  #: of a marker
@@ -82,28 +83,19 @@ def assign(
     """
     steps, n, _ = predicted.xyz.shape
     m = len(views)
-    sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
-    known = well_known(predicted.covariance)
-    sights = [_Sights(views.see(k, predicted.xyz.reshape(-1, 3)), predicted.covariance) for k in range(m)]
     result = Assigned(np.full((steps, n, m), -1), np.full((steps, n, 3), np.nan), np.full((steps, n, 3, 3), np.nan))
-    same = np.zeros(steps, bool) if before is None else _same(before[0], predicted)
-    for t, rays in enumerate(window.rays):
-        if before is not None and same[t]:
-            for new, old in zip(_parts(result), _parts(before[1]), strict=True):
-                new[t] = old[t]
-            continue
+    known = well_known(predicted.covariance)
+    if before is not None:
+        same = _same(before[0], predicted)
+        known &= ~same[:, None]
+        for new, old in zip(_parts(result), _parts(before[1]), strict=True):
+            new[same] = old[same]
+    options = _options(views, window, predicted, known)
+    for t in np.flatnonzero(known.any(axis=1)).tolist():
         points = window.points[t]
-        rate = 2 * np.log(2 * np.pi / DETECTED * (1 + np.array([len(r.xy) for r in rays])) / sizes)
-        options = [[nothing(m)] for _ in range(n)]
-        for i in np.flatnonzero(known[t]).tolist():
-            own = [sight.of(t * n + i) for sight in sights]
-            expected = window.delivered[t] & np.array([one.inside for one in own])
-            missed = np.where(expected, -2 * np.log(1 - DETECTED), 0.0)
-            found = _points(rays, points, predicted.xyz[t, i], predicted.covariance[t, i], rate - missed)
-            found += _single_rays(own, rays, expected, rate - missed)
-            options[i] += _worthy(found)
-        strange = _strangeness(options, points, axes)
-        for i, (option, doubtful) in enumerate(jointly_best(options, strange)):
+        of_markers = [[nothing(m), *_worthy(options.get((t, i), ()))] for i in range(n)]
+        strange = _strangeness(of_markers, points, axes)
+        for i, (option, doubtful) in enumerate(jointly_best(of_markers, strange)):
             result.rays[t, i] = np.where(doubtful, -1, option.rays)
             if option.point >= 0 and not doubtful.any():
                 result.xyz[t, i] = points.xyz[option.point]
@@ -123,87 +115,141 @@ def _same(one: Prediction, other: Prediction) -> Flags:
     return np.asarray(((moved < _LITTLE) & (np.abs(ratio - 1) < _LITTLE)).all(axis=(1, 2)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Place:
-    """A predicted image point: (1, 2) px, (1, 2, 2) px^2 and whether it lies in the image."""
-
-    xy: Floats
-    covariance: Floats
-    inside: bool
-
-
-class _Sights:
-    """Predicted image points of all markers at all pulses in one camera."""
-
-    def __init__(self, sight: Sight, covariance: Floats) -> None:
-        self._sight = sight
-        spread = covariance.reshape(-1, 3, 3)
-        self._spread = sight.by_point @ spread @ sight.by_point.transpose(0, 2, 1) + sight.noise
-
-    def of(self, i: int) -> _Place:
-        return _Place(self._sight.xy[i : i + 1], self._spread[i : i + 1], bool(self._sight.inside[i]))
-
-
 def nothing(m: int) -> Option:
     """Nothing is found in m images."""
     return Option(0.0, np.full(m, -1), -1)
 
 
-def _points(rays: Sequence[Rays], points: SpacePoints, xyz: Floats, covariance: Floats, rate: Floats) -> list[Option]:
-    """Points in space that may be a marker; rate (m,): cost of a ray by chance and by not being missed."""
-    if not len(points):
-        return []
-    off = points.xyz - xyz
-    total = covariance + points.covariance
-    distance = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0])
-    options = []
-    for j in np.flatnonzero(distance < gate(3)):
-        seen = np.flatnonzero(points.rays[j] >= 0).tolist()
-        area = sum(2 * np.log(rays[k].variance[points.rays[j, k]]) + rays[k].odd[points.rays[j, k]] for k in seen)
-        area += np.linalg.slogdet(total[j])[1] - np.linalg.slogdet(points.covariance[j])[1]
-        cost = points.misfit[j] + distance[j] + area + rate[seen].sum()
-        options.append(Option(float(cost), points.rays[j], int(j)))
-    return options
-
-
-def _single_rays(places: Sequence[_Place], rays: Sequence[Rays], expected: Flags, rate: Floats) -> list[Option]:
-    """Single spots that may be a marker; places: predicted, by camera."""
-    options = []
-    for k in np.flatnonzero(expected).tolist():
-        distances = squared_distances(places[k].xy, places[k].covariance, rays[k])[0]
-        for s in np.flatnonzero(distances < gate(2)):
-            area = np.linalg.slogdet(places[k].covariance[0] + rays[k].covariance[s])[1]
-            single = np.full(len(rays), -1)
+def _options(views: Views, window: Window, predicted: Prediction, known: Flags) -> dict[tuple[int, int], list[Option]]:
+    """What may be each marker, by pulse and marker; those that are not known (t, n) have none."""
+    found: dict[tuple[int, int], list[Option]] = {}
+    steps = np.flatnonzero(known.any(axis=1))
+    if not len(steps):
+        return found
+    rays = [[window.rays[t][k] for t in steps] for k in range(len(views))]
+    counts = np.array([[len(of.xy) for of in of_camera] for of_camera in rays])
+    sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
+    rate = 2 * np.log(2 * np.pi / DETECTED * (1 + counts.T) / sizes)
+    xyz, covariance, known = predicted.xyz[steps], predicted.covariance[steps], known[steps]
+    sights = [views.see(k, xyz.reshape(-1, 3)) for k in range(len(views))]
+    inside = np.stack([sight.inside.reshape(known.shape) for sight in sights], axis=2)
+    expected = known[..., None] & window.delivered[steps][:, None] & inside
+    # (t, n, m) cost of a ray by chance and by not being missed
+    cost = rate[:, None] - np.where(expected, -2 * np.log(1 - DETECTED), 0.0)
+    points = [window.points[t] for t in steps]
+    for t, i, option in _points(rays, points, xyz, covariance, known, cost):
+        found.setdefault((int(steps[t]), i), []).append(option)
+    for k, sight in enumerate(sights):
+        spread = sight.by_point @ covariance.reshape(-1, 3, 3) @ sight.by_point.transpose(0, 2, 1) + sight.noise
+        places = sight.xy.reshape(*known.shape, 2), spread.reshape(*known.shape, 2, 2)
+        for t, i, s, value in _single_rays(places, rays[k], expected[..., k], cost[..., k]):
+            single = np.full(len(views), -1)
             single[k] = s
-            options.append(Option(float(distances[s] + rays[k].odd[s] + area + rate[k]), single, -1))
-    return options
+            found.setdefault((int(steps[t]), i), []).append(Option(value, single, -1))
+    return found
+
+
+def _points(
+    rays: Sequence[Sequence[Rays]],
+    points: Sequence[SpacePoints],
+    xyz: Floats,
+    covariance: Floats,
+    known: Flags,
+    cost: Floats,
+) -> Iterator[tuple[int, int, Option]]:
+    """Points in space that may be markers: pulse, marker, option.
+
+    Args:
+        rays: by camera and pulse.
+        points: by pulse.
+        xyz: (t, n, 3) predicted, with covariance (t, n, 3, 3).
+        covariance: see `xyz`.
+        known: (t, n) which predictions are of use.
+        cost: (t, n, m) of a ray by chance and by not being missed.
+    """
+    step, place = _numbered([len(of_pulse) for of_pulse in points])
+    if not len(step):
+        return
+    all_xyz, own, misfit, all_rays = (
+        np.concatenate([getattr(of_pulse, name) for of_pulse in points])
+        for name in ("xyz", "covariance", "misfit", "rays")
+    )
+    off = all_xyz[:, None] - xyz[step]
+    total = covariance[step] + own[:, None]
+    distance = np.einsum("pni,pni->pn", off, np.linalg.solve(total, off[..., None])[..., 0])
+    p, i = np.nonzero((distance < gate(3)) & known[step])
+    area, by_chance = np.zeros(len(p)), np.zeros(len(p))
+    for k, of_camera in enumerate(rays):
+        first = np.cumsum([0, *(len(of.xy) for of in of_camera)])
+        ray = all_rays[p, k]
+        seen = ray >= 0
+        at = first[step[p[seen]]] + ray[seen]
+        area[seen] += 2 * np.log(np.concatenate([of.variance for of in of_camera])[at])
+        area[seen] += np.concatenate([of.odd for of in of_camera])[at]
+        by_chance[seen] += cost[step[p[seen]], i[seen], k]
+    area += np.linalg.slogdet(total[p, i])[1] - np.linalg.slogdet(own[p])[1]
+    costs = misfit[p] + distance[p, i] + area + by_chance
+    for point, marker, value in zip(p.tolist(), i.tolist(), costs.tolist(), strict=True):
+        yield int(step[point]), marker, Option(value, all_rays[point], int(place[point]))
+
+
+def _single_rays(
+    places: tuple[Floats, Floats], rays: Sequence[Rays], expected: Flags, cost: Floats
+) -> Iterator[tuple[int, int, int, float]]:
+    """Single spots of one camera that may be markers: pulse, marker, spot, cost.
+
+    Args:
+        places: (t, n, 2) predicted image points with covariances (t, n, 2, 2), px.
+        rays: by pulse.
+        expected: (t, n) which markers it may show.
+        cost: (t, n) of a ray by chance and by not being missed.
+    """
+    step, place = _numbered([len(of_pulse.xy) for of_pulse in rays])
+    if not len(step):
+        return
+    xy, covariance, odd = (
+        np.concatenate([getattr(of_pulse, name) for of_pulse in rays]) for name in ("xy", "covariance", "odd")
+    )
+    total = places[1][step] + covariance[:, None]
+    x, y = np.moveaxis(places[0][step] - xy[:, None], -1, 0)
+    a, b, d = total[..., 0, 0], total[..., 0, 1], total[..., 1, 1]
+    determinant = a * d - b * b
+    distance = (d * x * x - 2 * b * x * y + a * y * y) / determinant
+    with np.errstate(invalid="ignore"):
+        spot, i = np.nonzero((distance < gate(2)) & expected[step])
+    values = distance[spot, i] + odd[spot] + np.log(determinant[spot, i]) + cost[step[spot], i]
+    yield from zip(step[spot].tolist(), i.tolist(), place[spot].tolist(), values.tolist(), strict=True)
+
+
+def _numbered(counts: Sequence[int]) -> tuple[Integers, Integers]:
+    """Of the elements of several lists, one after the other, the list and the place in it."""
+    which = np.repeat(np.arange(len(counts)), counts)
+    return which, np.arange(len(which)) - np.repeat(np.cumsum([0, *counts])[:-1], counts)
 
 
 def _worthy(options: Sequence[Option]) -> list[Option]:
     """The best options: those that chance does not explain, and no single ray of a spot that a better one has."""
     kept: list[Option] = []
-    for option in sorted(options, key=lambda o: o.cost):
-        part = option.point < 0 and any((o.rays == option.rays)[option.rays >= 0].all() for o in kept)
-        if option.cost < -DECISIVE and not part:
+    for option in sorted((o for o in options if o.cost < -DECISIVE), key=lambda o: o.cost):
+        seen = option.rays >= 0
+        if option.point >= 0 or not any((o.rays == option.rays)[seen].all() for o in kept):
             kept.append(option)
-    return kept[:MOST_OPTIONS]
+        if len(kept) == MOST_OPTIONS:
+            break
+    return kept
 
 
 def _strangeness(options: Sequence[Sequence[Option]], points: SpacePoints, axes: Floats) -> Strangeness:
     """Costs of two options being markers of one body: what looks like one costs nothing."""
-
-    def cost(one: int, a: Option, other: int, b: Option) -> float:
-        if a.point < 0 or b.point < 0:
-            return 0.0
-        difference = (points.xyz[b.point] - points.xyz[a.point]) @ axes.T
-        return max(0.0, float(implausibility(one, other, difference[None])[0]) - USUAL)
-
-    return {
-        (i, p, j, q): cost(i, a, j, b)
-        for (i, one), (j, other) in combinations(enumerate(options), 2)
-        for p, a in enumerate(one)
-        for q, b in enumerate(other)
-    }
+    of_marker = [np.array([option.point for option in several]) for several in options]
+    costs: Strangeness = {}
+    for (i, one), (j, other) in combinations(enumerate(of_marker), 2):
+        costs[i, j] = np.zeros((len(one), len(other)))
+        p, q = np.nonzero((one[:, None] >= 0) & (other >= 0))
+        if len(p):
+            difference = (points.xyz[other[q]] - points.xyz[one[p]]) @ axes.T
+            costs[i, j][p, q] = np.maximum(0.0, implausibility(i, j, difference) - USUAL)
+    return costs
 
 
 def jointly_best(
@@ -213,33 +259,36 @@ def jointly_best(
 
     Args:
         options: of each marker, nothing among them.
-        strangeness: costs of two options together, by marker, option, other marker and its option.
+        strangeness: costs of two options together, by pair of markers.
 
     Returns:
         The option of each, and (m,) the images in which a rival is nearly as good.
     """
-    used = [[{(k, s) for k, s in enumerate(o.rays.tolist()) if s >= 0} for o in of_marker] for of_marker in options]
-    joint: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
-    for i, of_marker in enumerate(options):
-        joint = [
-            (
-                cost + option.cost + sum((strangeness or {}).get((j, q, i, p), 0.0) for j, q in enumerate(so_far)),
-                (*so_far, p),
-            )
-            for cost, so_far in joint
-            for p, option in enumerate(of_marker)
-            if all(used[j][q].isdisjoint(used[i][p]) for j, q in enumerate(so_far))
-        ]
-    costs = np.array([cost for cost, _ in joint])
-    spots = np.array([[options[i][p].rays for i, p in enumerate(picked)] for _, picked in joint])
+    rays = [np.array([option.rays for option in of_marker]) for of_marker in options]
+    costs = _joint_costs(options, rays, strangeness or {})
     best = int(costs.argmin())
-    rivals = costs - costs[best] < DECISIVE
-    rivals[best] = False
+    rivals = np.flatnonzero(costs.ravel() - costs.flat[best] < DECISIVE)
+    picked = np.unravel_index(rivals[rivals != best], costs.shape)
+    spots = np.stack([own[p] for own, p in zip(rays, picked, strict=True)], axis=1)
     chosen = []
-    for i, p in enumerate(joint[best][1]):
-        mine = options[i][p].rays
-        other_spot = (spots[rivals, i] != mine) & (spots[rivals, i] >= 0) & (mine >= 0)
-        others = np.delete(spots[rivals], i, axis=1)
-        elsewhere = ((others == mine) & (mine >= 0)).any(axis=1)
-        chosen.append((options[i][p], np.asarray((other_spot | elsewhere).any(axis=0))))
+    for i, p in enumerate(np.unravel_index(best, costs.shape)):
+        mine = rays[i][p]
+        used = (spots == mine) & (mine >= 0)
+        other_spot = (spots[:, i] >= 0) & (mine >= 0) & ~used[:, i]
+        used[:, i] = False
+        chosen.append((options[i][int(p)], np.asarray(other_spot.any(axis=0) | used.any(axis=(0, 1)))))
     return chosen
+
+
+def _joint_costs(
+    options: Sequence[Sequence[Option]], rays: Sequence[Integers], strangeness: Mapping[tuple[int, int], Floats]
+) -> Floats:
+    """Costs of all combinations, one axis for each marker; infinite where they use a spot twice."""
+    costs = np.zeros(())
+    for i, of_marker in enumerate(options):
+        costs = costs[..., None] + np.array([option.cost for option in of_marker])
+        for j in range(i):
+            clash = ((rays[j][:, None] == rays[i]) & (rays[i] >= 0)).any(axis=2)
+            pair = np.where(clash, np.inf, strangeness.get((j, i), 0.0))
+            costs = costs + pair.reshape(len(options[j]), *(1,) * (i - j - 1), len(of_marker))
+    return costs

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.identification.body import REACH_M
 from analysis.identification.space_points import SpacePoints
@@ -22,7 +22,7 @@ ACCELERATION_M_S2 = 15.0
 _STEEPEST = np.sin(np.radians(50.0))  #: of a path, down or up
 _LEAST_POINTS = 4  #: of a track; three fix place, velocity and one check
 _MOST_MISSED_S = 0.12  #: in a track, between one point and the next
-_FITS = float(chi2.ppf(0.999, 3))
+_FITS = float(chdtri(3, 0.001))
 _MOST_USES = 2  #: of a spot, by points of tracks
 _WEAK = 0.5  #: weight of a point that two rays show and nothing controls
 #: A body that is hidden for longer than this is not the same one any more, s.
@@ -94,96 +94,169 @@ def _thinned(points: SpacePoints) -> SpacePoints:
     return SpacePoints(points.xyz[kept], points.covariance[kept], points.rays[kept], points.misfit[kept])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Arrivals:
+    """Steps that arrive at the points of one pulse, by point.
+
+    Attributes:
+        link: (n,) number of the step.
+        at: (n,) the point at which it arrives, ascending.
+        back_s: (n,) time that it took.
+        xyz: (n, 3) where it came from, with covariance (n, 3, 3).
+        covariance: see `xyz`.
+    """
+
+    link: Integers
+    at: Integers
+    back_s: Floats
+    xyz: Floats
+    covariance: Floats
+
+    @classmethod
+    def joined(cls, parts: Sequence["_Arrivals"]) -> "_Arrivals":
+        """The steps of several earlier pulses."""
+        at = np.concatenate([part.at for part in parts])
+        order = np.argsort(at, kind="stable")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts])[order] for name in cls.__slots__))
+
+    def of(self, points: Integers) -> tuple[Integers, Integers]:
+        """Of n points of the pulse the pairs of index (below n) and arrival."""
+        first, last = np.searchsorted(self.at, points), np.searchsorted(self.at, points, side="right")
+        which = np.repeat(np.arange(len(points)), last - first)
+        return which, np.arange(len(which)) - np.repeat(np.cumsum(last - first) - last, last - first)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Following:
+    """Which of k steps may follow which earlier ones: n pairs, by step.
+
+    Attributes:
+        before: (n,) number of the earlier step.
+        gain: (n,) what a chain gains by the later one.
+        step: (k,) number of the later one, ascending.
+        first: (k,) its first pair.
+        count: (k,) of its pairs.
+    """
+
+    before: Integers
+    gain: Floats
+    step: Integers
+    first: Integers
+    count: Integers
+
+    @classmethod
+    def of(cls, step: Integers, before: Integers, gain: Floats) -> "_Following":
+        """Pairs (n,) of steps, ascending, and earlier ones."""
+        return cls(before, gain, *np.unique(step, return_index=True, return_counts=True))
+
+    def best(self, score: Floats) -> tuple[Integers, Floats]:
+        """For each step the best earlier one, and the score with it."""
+        value = score[self.before] + self.gain
+        best = np.maximum.reduceat(value, self.first)
+        hit = np.flatnonzero(value == np.repeat(best, self.count))
+        return self.before[hit[np.searchsorted(hit, self.first)]], best
+
+
 class _Links:
     """Steps from a point to one of a later pulse, and which step may follow which."""
 
     def __init__(self, points: Sequence[SpacePoints], time_s: Floats) -> None:
-        self._weight = [np.where(p.count > 2, 1.0, _WEAK) for p in points]
-        self._ends: list[tuple[tuple[int, int], tuple[int, int]]] = []
-        self._before: list[list[tuple[int, float]]] = []
-        self._used: set[tuple[int, int]] = set()
-        arriving: dict[tuple[int, int], list[int]] = {}
+        weights = [np.where(p.count > 2, 1.0, _WEAK) for p in points]
+        numbers = np.cumsum([0, *(len(weight) for weight in weights)])
+        self._step = np.repeat(np.arange(len(weights)), np.diff(numbers))  # of each point of all pulses
+        self._first = numbers[self._step]
+        self._weight = np.concatenate(weights) if weights else np.empty(0)
+        self._used = np.zeros(len(self._weight), bool)
+        self._count = 0
+        self._following: list[_Following] = []
+        starts: list[Integers] = []
+        ends: list[Integers] = []
+        arriving: list[_Arrivals | None] = [None]
         for b in range(1, len(points)):
-            first = int(np.searchsorted(time_s, time_s[b] - _MOST_MISSED_S))
-            for a in range(min(first, b - 1), b):
-                self._link(points, time_s, a, b, arriving)
+            found, new = int(np.searchsorted(time_s, time_s[b] - _MOST_MISSED_S)), []
+            for a in range(min(found, b - 1), b):
+                if len(points[a]) and len(points[b]):
+                    i, j = _steps(points[a], points[b], dt := float(time_s[b] - time_s[a]))
+                    new.append(self._added(points[a], points[b], i, j, dt, weights[b], arriving[a]))
+                    starts.append(numbers[a] + i)
+                    ends.append(numbers[b] + j)
+            arriving.append(_Arrivals.joined(new) if new else None)
+        self._ends = np.stack([np.concatenate(of) if of else np.empty(0, int) for of in (starts, ends)])
 
-    def _link(
+    def _added(
         self,
-        points: Sequence[SpacePoints],
-        time_s: Floats,
-        a: int,
-        b: int,
-        arriving: dict[tuple[int, int], list[int]],
-    ) -> None:
-        """Add the steps from pulse a to pulse b."""
-        if not len(points[a]) or not len(points[b]):
-            return
-        dt = float(time_s[b] - time_s[a])
-        way = points[b].xyz[None] - points[a].xyz[:, None]
-        distance = np.maximum(np.linalg.norm(way, axis=2), 1e-9)
-        blur = points[b].covariance[None] + points[a].covariance[:, None]
-        spread = 3 * np.sqrt(np.einsum("abi,abij,abj->ab", way, blur, way)) / distance
-        fast = (distance + spread > SPEEDS_M_S[0] * dt) & (distance - spread < SPEEDS_M_S[1] * dt)
-        level = np.abs(way[..., 2]) < _STEEPEST * distance + spread
-        for i, j in np.argwhere(fast & level):
-            before = self._predecessors(points, time_s, (a, int(i)), (b, int(j)), arriving)
-            arriving.setdefault((b, int(j)), []).append(len(self._ends))
-            self._ends.append(((a, int(i)), (b, int(j))))
-            self._before.append(before)
-
-    def _predecessors(
-        self,
-        points: Sequence[SpacePoints],
-        time_s: Floats,
-        middle: tuple[int, int],
-        end: tuple[int, int],
-        arriving: dict[tuple[int, int], list[int]],
-    ) -> list[tuple[int, float]]:
-        """Steps that arrive at `middle` with the velocity that leads on to `end`, and their misfits."""
-        steps = arriving.get(middle, [])
-        if not steps:
-            return []
-        starts = [self._ends[step][0] for step in steps]
-        dt = time_s[end[0]] - time_s[middle[0]]
-        back = time_s[middle[0]] - time_s[[s for s, _ in starts]]
-        ratio = dt / back
-        here, there = points[middle[0]], points[end[0]]
-        came = here.xyz[middle[1]] - np.array([points[s].xyz[p] for s, p in starts])
-        off = there.xyz[end[1]] - here.xyz[middle[1]] - ratio[:, None] * came
-        bend = ACCELERATION_M_S2 * dt * (dt + back) / 2
-        covariance = (
-            there.covariance[end[1]]
-            + ((1 + ratio) ** 2)[:, None, None] * here.covariance[middle[1]]
-            + (ratio**2)[:, None, None] * np.array([points[s].covariance[p] for s, p in starts])
-            + (bend**2)[:, None, None] * np.eye(3)
-        )
-        misfit = np.einsum("ni,ni->n", off, np.linalg.solve(covariance, off[..., None])[..., 0])
-        return [(step, float(value)) for step, value in zip(steps, misfit, strict=True) if value < _FITS]
+        here: SpacePoints,
+        there: SpacePoints,
+        i: Integers,
+        j: Integers,
+        dt: float,
+        weight: Floats,
+        arrivals: _Arrivals | None,
+    ) -> _Arrivals:
+        """Add steps from points i (n,) of one pulse to points j (n,) of another, dt later."""
+        number = self._count + np.arange(len(i))
+        self._count += len(i)
+        if arrivals is not None:
+            step, came, misfit = _following(here, there, i, j, dt, arrivals)
+            gain = weight[j[step]] * (1 - misfit / (2 * _FITS))
+            if len(step):
+                self._following.append(_Following.of(number[step], arrivals.link[came], gain))
+        return _Arrivals(number, j, np.full(len(i), dt), here.xyz[i], here.covariance[i])
 
     def best_chain(self) -> list[tuple[int, int]] | None:
         """The chain with the greatest weight less misfit; its points are taken out. None: no chain is long enough."""
-        n = len(self._ends)
-        score, came, length = np.full(n, -np.inf), np.full(n, -1), np.zeros(n, int)
-        for link, (start, end) in enumerate(self._ends):
-            if start in self._used or end in self._used:
-                continue
-            gain = self._weight[end[0]][end[1]]
-            score[link], length[link] = self._weight[start[0]][start[1]] + gain, 2
-            for before, misfit in self._before[link]:
-                value = score[before] + gain * (1 - misfit / (2 * _FITS))
-                if value > score[link]:
-                    score[link], came[link], length[link] = value, before, length[before] + 1
+        start, end = self._ends
+        gone = self._used[start] | self._used[end]
+        score = np.where(gone, -np.inf, self._weight[start] + self._weight[end])
+        came, length = np.full(len(score), -1), np.full(len(score), 2)
+        for following in self._following:
+            step, (before, value) = following.step, following.best(score)
+            better = (value > score[step]) & ~gone[step]
+            step, before = step[better], before[better]
+            score[step], came[step], length[step] = value[better], before, length[before] + 1
         score[length < _LEAST_POINTS] = -np.inf
-        if not n or not np.isfinite(score.max()):
+        if not len(score) or not np.isfinite(score.max()):
             return None
         link = int(score.argmax())
-        chain = [self._ends[link][1]]
+        chain = [int(end[link])]
         while link >= 0:
-            chain.append(self._ends[link][0])
+            chain.append(int(start[link]))
             link = int(came[link])
-        self._used.update(chain)
-        return chain[::-1]
+        self._used[chain] = True
+        return [(int(self._step[p]), int(p - self._first[p])) for p in reversed(chain)]
+
+
+def _steps(here: SpacePoints, there: SpacePoints, dt: float) -> tuple[Integers, Integers]:
+    """Pairs of points of two pulses, dt apart, between which a jumper may have moved."""
+    way = there.xyz[None] - here.xyz[:, None]
+    distance = np.maximum(np.linalg.norm(way, axis=2), 1e-9)
+    blur = there.covariance[None] + here.covariance[:, None]
+    spread = 3 * np.sqrt(np.einsum("abi,abij,abj->ab", way, blur, way)) / distance
+    fast = (distance + spread > SPEEDS_M_S[0] * dt) & (distance - spread < SPEEDS_M_S[1] * dt)
+    level = np.abs(way[..., 2]) < _STEEPEST * distance + spread
+    i, j = np.nonzero(fast & level)
+    return i, j
+
+
+def _following(
+    here: SpacePoints, there: SpacePoints, i: Integers, j: Integers, dt: float, arrivals: _Arrivals
+) -> tuple[Integers, Integers, Floats]:
+    """Which steps may follow which: index of a step from point i to point j, that of an arrival, and their misfit."""
+    step, came = arrivals.of(i)
+    i, j, back = i[step], j[step], arrivals.back_s[came]
+    ratio = (dt / back)[:, None]
+    off = there.xyz[j] - here.xyz[i] - ratio * (here.xyz[i] - arrivals.xyz[came])
+    bend = ACCELERATION_M_S2 * dt * (dt + back) / 2
+    ratio = ratio[:, None]
+    covariance = (
+        there.covariance[j]
+        + (1 + ratio) ** 2 * here.covariance[i]
+        + ratio**2 * arrivals.covariance[came]
+        + (bend**2)[:, None, None] * np.eye(3)
+    )
+    misfit = np.einsum("ni,ni->n", off, np.linalg.solve(covariance, off[..., None])[..., 0])
+    fits = misfit < _FITS
+    return step[fits], came[fits], misfit[fits]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

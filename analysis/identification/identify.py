@@ -1,12 +1,13 @@
 """Finds the jumps in the candidates of a recording and names markers and skis in every image."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
 from analysis.identification.flights import Flight, find_flights, find_tracks
-from analysis.identification.markers import BINDINGS, follow_further, follow_markers
+from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.refinement import refined
 from analysis.identification.ski_traces import StraightTrace, straightened
 from analysis.identification.skis import follow_skis
@@ -24,7 +25,7 @@ from analysis.measurements.model import (
     SkiMeasurement,
 )
 from analysis.scene.camera_system import CameraSystem
-from rig.arrays import Integers
+from rig.arrays import Flags, Integers
 
 _SEARCH_HZ = 30.0  #: tracks are sought in so many pulses per second: displacements that stand out of the noise
 _BEYOND_S = 0.6  #: that markers are followed before the first and after the last point of a track
@@ -51,18 +52,86 @@ def identify(
     Returns:
         The jumps in order, each from the first to the last pulse in which the jumper was found. None: nobody jumped.
     """
+    jumps: list[JumpMeasurements] = []
+    for sighting in find_sightings(candidates, system, rate_hz, exposures_s):
+        if pulses := sighting.measured(look):
+            jumps.append(JumpMeasurements(len(jumps) + 1, pulses))
+    return jumps
+
+
+def find_sightings(
+    candidates: Sequence[PulseCandidates],
+    system: CameraSystem,
+    rate_hz: float,
+    exposures_s: Mapping[str, float] | None = None,
+) -> "list[Sighting]":
+    """What moves like a jumper, with its markers as far as the first look tells them; arguments as of `identify`."""
     views = Views(system, exposures_s)
     stride = max(1, round(rate_hz / _SEARCH_HZ))
     sought = candidates[::stride]
     search = Window(views, sought, rate_hz)
-    jumps: list[JumpMeasurements] = []
+    sightings = []
     for flight in find_flights(find_tracks(search.points, search.time_s)):
         begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
         near = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
-        pulses = _measured(views, near, rate_hz, flight, _appearance(views, sought, flight), look)
-        if sum(len(_named(pulse)) >= _LEAST_NAMES for pulse in pulses) >= _LEAST_PULSES:
-            jumps.append(JumpMeasurements(len(jumps) + 1, tuple(pulses)))
-    return jumps
+        appearance = _appearance(views, sought, flight)
+        window = Window(views, near, rate_hz, flight, appearance)
+        markers = follow_markers(views, window, flight)
+        late_s = lateness(views, window, markers, flight)
+        if late_s.any():
+            window = Window(views, near, rate_hz, flight, appearance, late_s)
+            markers = follow_markers(views, window, flight)
+        sightings.append(Sighting(views, window, flight, appearance, markers))
+    return sightings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """Something that moves like a jumper.
+
+    Attributes:
+        views: the cameras.
+        window: the pulses in which he may be in sight.
+        flight: his path.
+        appearance: of his markers.
+        markers: as the first look names them.
+    """
+
+    views: Views
+    window: Window
+    flight: Flight
+    appearance: Appearance
+    markers: Markers
+
+    def pulses(self) -> range:
+        """From the first to the last pulse with a named marker; empty if he shows too few of them to be a jumper."""
+        named: Flags = np.asarray(np.any(self.markers.assigned.rays >= 0, axis=2))
+        there = np.flatnonzero(named.any(axis=1))
+        if np.count_nonzero(named.sum(axis=1) >= _LEAST_NAMES) < _LEAST_PULSES:
+            return range(0)
+        first, last = (self.window.candidates[int(t)].pulse for t in there[[0, -1]])
+        return range(first, last + 1)
+
+    def measured(self, look: SecondLook | None) -> tuple[PulseMeasurements, ...]:
+        """What was measured of him, from his first to his last appearance; empty if he is no jumper.
+
+        Args:
+            look: as of `identify`; what it finds is added to the window.
+        """
+        views, window, flight, markers = self.views, self.window, self.flight, self.markers
+        if look is not None:
+            markers = follow_further(views, window, flight, markers, look)
+            markers = refined(views, window, flight, markers, self.appearance, look)
+        traces = straight_traces(views, window)
+        skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
+        pulses = [
+            named_pulse(views, c, markers.assigned.rays[t], skis.traces[t], traces[t])
+            for t, c in enumerate(window.candidates)
+        ]
+        if sum(len(_named(pulse)) >= _LEAST_NAMES for pulse in pulses) < _LEAST_PULSES:
+            return ()
+        found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
+        return tuple(pulses[found[0] : found[-1] + 1])
 
 
 def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Flight) -> Appearance:
@@ -80,34 +149,6 @@ def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Fli
 
 def _named(pulse: PulseMeasurements) -> set[str]:
     return {label for image in pulse.images.values() for label in image.points}
-
-
-def _measured(
-    views: Views,
-    candidates: Sequence[PulseCandidates],
-    rate_hz: float,
-    flight: Flight,
-    appearance: Appearance,
-    look: SecondLook | None,
-) -> list[PulseMeasurements]:
-    """What was measured of a flight, from its first to its last appearance."""
-    window = Window(views, candidates, rate_hz, flight, appearance)
-    markers = follow_markers(views, window, flight)
-    late_s = lateness(views, window, markers, flight)
-    if late_s.any():
-        window = Window(views, candidates, rate_hz, flight, appearance, late_s)
-        markers = follow_markers(views, window, flight)
-    if look is not None:
-        markers = follow_further(views, window, flight, markers, look)
-        markers = refined(views, window, flight, markers, appearance, look)
-    traces = straight_traces(views, window)
-    skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
-    pulses = [
-        named_pulse(views, c, markers.assigned.rays[t], skis.traces[t], traces[t])
-        for t, c in enumerate(window.candidates)
-    ]
-    found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
-    return pulses[found[0] : found[-1] + 1] if found else []
 
 
 def straight_traces(views: Views, window: Window) -> list[list[list[StraightTrace]]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.candidates.model import Trace
 from analysis.identification.views import Views, gate
-from rig.arrays import Flags, Floats
+from rig.arrays import Flags, Floats, Integers
 
 _PERSPECTIVE = 0.05  #: share of a distance across the ski that neglects the perspective of 3 m
 _HALF_M = 1.2  #: points so far from A carry the projected line; about half a ski
@@ -81,16 +81,57 @@ def _break(one: StraightTrace, other: StraightTrace) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations:
-    """What a trace says about a ski.
+class Lines:
+    """The straight traces of one camera at all pulses.
 
     Attributes:
-        off: (2,) px, how far the ski lies from its ends, across the trace.
-        by_ski: (2, 6) derivatives by A and d.
-        aside: (2,) px, the same across the ski; right also for a trace that runs across the ski.
-        by_ski_aside: (2, 6) derivatives by A and d.
-        covariance: (2, 2) px^2, of the ends.
-        along: (2,) m, where along the ski its ends are, from A.
+        step: (n,) index of the pulse; ascending.
+        place: (n,) index among those of the pulse.
+        ends: (n, 2, 2) px.
+        normal: (n, 2).
+        covariance: (n, 2, 2) px^2, as in `StraightTrace`.
+    """
+
+    step: Integers
+    place: Integers
+    ends: Floats
+    normal: Floats
+    covariance: Floats
+
+    @classmethod
+    def of(cls, traces: Sequence[Sequence[StraightTrace]]) -> "Lines":
+        """The traces of each pulse."""
+        lines = [line for of_pulse in traces for line in of_pulse]
+        return cls(
+            np.repeat(np.arange(len(traces)), [len(of_pulse) for of_pulse in traces]),
+            np.array([i for of_pulse in traces for i in range(len(of_pulse))], int),
+            np.array([line.ends for line in lines]).reshape(-1, 2, 2),
+            np.array([line.normal for line in lines]).reshape(-1, 2),
+            np.array([line.covariance for line in lines]).reshape(-1, 2, 2),
+        )
+
+    def only(self, chosen: Integers) -> "Lines":
+        """Some of them, which may repeat."""
+        return Lines(
+            self.step[chosen], self.place[chosen], self.ends[chosen], self.normal[chosen], self.covariance[chosen]
+        )
+
+    def at(self, step: Integers, place: Integers) -> "Lines":
+        """Those with these places among the traces of these pulses."""
+        return self.only(np.searchsorted(self.step, step) + place)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equations:
+    """What n traces say about a ski each.
+
+    Attributes:
+        off: (n, 2) px, how far the ski lies from the ends of its trace, across the trace.
+        by_ski: (n, 2, 6) derivatives by A and d.
+        aside: (n, 2) px, the same across the ski; right also for a trace that runs across the ski.
+        by_ski_aside: (n, 2, 6) derivatives by A and d.
+        covariance: (n, 2, 2) px^2, of the ends.
+        along: (n, 2) m, where along the ski the ends are, from A.
     """
 
     off: Floats
@@ -100,31 +141,53 @@ class Equations:
     covariance: Floats
     along: Floats
 
-    def near(self, spread: Floats) -> bool:
-        """Whether the trace lies within the uncertainty of the ski."""
-        total = self.by_ski_aside @ spread @ self.by_ski_aside.T + self.covariance
-        total = total + np.diag((_PERSPECTIVE * self.aside) ** 2)
-        return bool(self.aside @ np.linalg.solve(total, self.aside) < gate(2))
+    def only(self, chosen: Integers) -> "Equations":
+        """Some of them, which may repeat."""
+        return Equations(
+            self.off[chosen],
+            self.by_ski[chosen],
+            self.aside[chosen],
+            self.by_ski_aside[chosen],
+            self.covariance[chosen],
+            self.along[chosen],
+        )
 
-    def misfit(self, state: Floats, spread: Floats) -> tuple[float, float]:
-        """Chi-square for a ski that differs by `state` (6,), and the logarithm of its covariance's determinant."""
-        total = self.by_ski @ spread @ self.by_ski.T + self.covariance
-        (a, b), (_, d) = total
-        x, y = self.off - self.by_ski @ state
-        determinant = a * d - b * b
-        return float((d * x * x - 2 * b * x * y + a * y * y) / determinant), float(np.log(determinant))
+    def near(self, spread: Floats) -> Flags:
+        """Whether each trace lies within the uncertainty (n, 6, 6) of its ski."""
+        total = self.by_ski_aside @ spread @ self.by_ski_aside.swapaxes(1, 2) + self.covariance
+        total += ((_PERSPECTIVE * self.aside) ** 2)[:, None] * np.eye(2)
+        return np.asarray(_squares(total, self.aside)[0] < gate(2))
+
+    def misfit(self, state: Floats, spread: Floats) -> tuple[Floats, Floats]:
+        """Chi-squares (n,) for skis that differ by `state` (n, 6), and log determinants of their covariances."""
+        total = self.by_ski @ spread @ self.by_ski.swapaxes(1, 2) + self.covariance
+        squares, determinant = _squares(total, self._left(state))
+        return squares, np.asarray(np.log(determinant))
 
     def updated(self, state: Floats, spread: Floats) -> tuple[Floats, Floats]:
-        """The ski with what the trace says."""
-        gain = spread @ self.by_ski.T @ np.linalg.inv(self.by_ski @ spread @ self.by_ski.T + self.covariance)
-        return state + gain @ (self.off - self.by_ski @ state), spread - gain @ self.by_ski @ spread
+        """The skis (n, 6) and (n, 6, 6) with what the traces say."""
+        turned = spread @ self.by_ski.swapaxes(1, 2)
+        gain = turned @ np.linalg.inv(self.by_ski @ turned + self.covariance)
+        return state + (gain @ self._left(state)[..., None])[..., 0], spread - gain @ self.by_ski @ spread
+
+    def _left(self, state: Floats) -> Floats:
+        """What is left (n, 2) of the distances."""
+        return np.asarray(self.off - (self.by_ski @ state[..., None])[..., 0])
+
+
+def _squares(covariance: Floats, off: Floats) -> tuple[Floats, Floats]:
+    """Chi-squares (n,) of deviations (n, 2) with covariances (n, 2, 2), and the determinants of these."""
+    a, b, d = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    x, y = off.T
+    determinant = a * d - b * b
+    return (d * x * x - 2 * b * x * y + a * y * y) / determinant, determinant
 
 
 class SeenSkis:
-    """n skis in one camera: what traces say about them.
+    """Skis in one camera: what traces say about them.
 
     Attributes:
-        inside: (n,) whether the ski's middle lies in the image.
+        inside: (s,) whether the ski's middle lies in the image.
     """
 
     def __init__(self, views: Views, k: int, values: Floats) -> None:
@@ -135,16 +198,23 @@ class SeenSkis:
         self._pose = (low.pose + high.pose) / 2
         self.inside: Flags = views.see(k, place).inside
 
-    def equations(self, i: int, line: StraightTrace) -> Equations:
-        """What a trace says about ski i."""
-        low, high = self._xy[i]
+    def equations(self, skis: Integers, lines: Lines) -> Equations:
+        """What n traces say about a ski (n,) each."""
+        low, high = self._xy[skis].swapaxes(0, 1)
         axis = high - low
-        share = (line.ends - low) @ axis / (axis @ axis)
+        from_low = lines.ends - low[:, None]
+        share = (from_low @ axis[..., None])[..., 0] / (axis**2).sum(axis=1, keepdims=True)
         along = _HALF_M * (2 * share - 1)
-        by_point = np.multiply.outer(1 - share, self._by_point[i, 0]) + np.multiply.outer(share, self._by_point[i, 1])
-        by_ski = np.concatenate((by_point, along[:, None, None] * by_point), axis=2)
-        normal = np.array((-axis[1], axis[0])) / np.linalg.norm(axis)
-        deviation = (line.ends - low) @ normal
-        covariance = line.covariance + normal @ self._pose[i] @ normal
-        off = (line.ends - low - share[:, None] * axis) @ line.normal
-        return Equations(off, line.normal @ by_ski, deviation, normal @ by_ski, covariance, along)
+        one, other = self._by_point[skis].swapaxes(0, 1)[:, :, None]
+        by_point = (1 - share)[..., None, None] * one + share[..., None, None] * other
+        by_ski = np.concatenate((by_point, along[..., None, None] * by_point), axis=3)
+        normal = np.stack((-axis[:, 1], axis[:, 0]), axis=1) / np.linalg.norm(axis, axis=1, keepdims=True)
+        pose = np.einsum("ni,nij,nj->n", normal, self._pose[skis], normal)
+        return Equations(
+            ((from_low - share[..., None] * axis[:, None]) @ lines.normal[..., None])[..., 0],
+            np.einsum("ni,neij->nej", lines.normal, by_ski),
+            (from_low @ normal[..., None])[..., 0],
+            np.einsum("ni,neij->nej", normal, by_ski),
+            lines.covariance + pose[:, None, None],
+            along,
+        )

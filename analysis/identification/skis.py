@@ -22,7 +22,7 @@ from analysis.identification.assignment import (
 )
 from analysis.identification.flights import Flight
 from analysis.identification.prediction import Part, Prediction, predict
-from analysis.identification.ski_traces import Equations, SeenSkis, StraightTrace
+from analysis.identification.ski_traces import Equations, Lines, SeenSkis, StraightTrace
 from analysis.identification.views import Views, gate
 from analysis.identification.window import Window
 from analysis.measurements.model import SIDES
@@ -148,13 +148,8 @@ class _Search:
         flight: Flight,
         bindings: Places,
     ) -> None:
-        self._views, self._traces, self._delivered, self._flight, self._bindings = (
-            views,
-            traces,
-            delivered,
-            flight,
-            bindings,
-        )
+        self._views, self._delivered, self._flight, self._bindings = views, delivered, flight, bindings
+        self._lines = [Lines.of([of_pulse[k] for of_pulse in traces]) for k in range(len(views))]
         sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(bindings.covariance, nan=1e6))[..., -1])
         self._known = sigma < MOST_VAGUE_M
         height = np.array([placed.size.min() for placed in views.placed])
@@ -202,74 +197,66 @@ class _Search:
 
     def assigned(self, belief: tuple[Floats, Floats]) -> Integers:
         """Traces (t, 2, m) of the skis."""
-        steps, m = self._delivered.shape
-        seen = [SeenSkis(self._views, k, belief[0].reshape(-1, 6)) for k in range(m)]
-        found = np.full((steps, 2, m), -1)
+        values, spread = belief[0].reshape(-1, 6), belief[1].reshape(-1, 6, 6)
+        beams = _Beams.begun(np.flatnonzero(self._known.ravel()), spread, len(self._views))
+        for k in range(len(self._views)):
+            beams = self._continued(beams, k, values, spread)
+        found = np.full((*self._known.shape, len(self._views)), -1)
         for t in np.flatnonzero(self._known.any(axis=1)).tolist():
-            options = [[nothing(m)] for _ in SIDES]
-            for side in np.flatnonzero(self._known[t]).tolist():
-                options[side] += self._options(seen, t, side, belief[1][t, side])
+            options = [beams.options(2 * t + side) for side in range(len(SIDES))]
             for side, (option, doubtful) in enumerate(jointly_best(options)):
                 found[t, side] = np.where(doubtful, -1, option.rays)
         return found
 
-    def _options(self, seen: Sequence[SeenSkis], t: int, side: int, covariance: Floats) -> list[Option]:
-        """Options of one ski, the best first."""
-        m = len(self._views)
-        beam = [(0.0, np.full(m, -1), np.zeros(6), covariance)]
-        for k in range(m):
-            if not self._delivered[t, k] or not seen[k].inside[2 * t + side]:
-                continue
-            chance = (len(self._traces[t][k]) + 1) / self._space[k]
-            rate = 2 * np.log(2 * np.pi * chance / DETECTED) + 2 * np.log(1 - DETECTED)
-            equations = [seen[k].equations(2 * t + side, line) for line in self._traces[t][k]]
-            beyond = [self._beyond(e, side) for e in equations]
-            near = [i for i, e in enumerate(equations) if _near(e, covariance) and beyond[i] < gate(2)]
-            longer = list(beam)
-            for cost, rays, state, spread in beam:
-                for i in near:
-                    misfit, area = equations[i].misfit(state, spread)
-                    if misfit < gate(2):
-                        more = rays.copy()
-                        more[k] = i
-                        longer.append(
-                            (cost + misfit + beyond[i] + area + rate, more, *equations[i].updated(state, spread))
-                        )
-            beam = sorted(longer, key=lambda hypothesis: hypothesis[0])[:_BEAM]
-        options = [Option(cost, rays, 0) for cost, rays, _, _ in beam if cost < -DECISIVE]
-        return options[: 2 * MOST_OPTIONS]
+    def _continued(self, beams: "_Beams", k: int, values: Floats, spread: Floats) -> "_Beams":
+        """Hypotheses with the traces of one more camera."""
+        seen, lines = SeenSkis(self._views, k, values), self._lines[k]
+        usable = self._known & self._delivered[:, k, None] & seen.inside.reshape(self._known.shape)
+        line, side = np.nonzero(usable[lines.step])
+        skis = 2 * lines.step[line] + side
+        equations = seen.equations(skis, lines.only(line))
+        beyond = self._beyond(equations, side)
+        near = np.flatnonzero(_near(equations, spread[skis]) & (beyond < gate(2)))
+        chance = (np.bincount(lines.step, minlength=len(usable)) + 1) / self._space[k]
+        rate = 2 * np.log(2 * np.pi * chance / DETECTED) + 2 * np.log(1 - DETECTED)
+        extra = beyond[near] + rate[lines.step[line[near]]]
+        return beams.longer(k, skis[near], lines.place[line[near]], equations.only(near), extra)
 
-    def _beyond(self, equations: Equations, side: int) -> float:
-        """Chi-square of a trace reaching beyond tail or tip; that it may be shorter costs nothing."""
-        tail, tip = self._ends[side]
-        over = max(0.0, tail - equations.along.min()), max(0.0, equations.along.max() - tip)
-        return float(over[0] ** 2 + over[1] ** 2) / self._ends_sigma**2
+    def _beyond(self, equations: Equations, side: Integers) -> Floats:
+        """Chi-squares (n,) of traces reaching beyond tail or tip of a ski; that they may be shorter costs nothing."""
+        tail, tip = self._ends[side].T
+        over = np.maximum(0.0, tail - equations.along.min(axis=1)), np.maximum(0.0, equations.along.max(axis=1) - tip)
+        return np.asarray((over[0] ** 2 + over[1] ** 2) / self._ends_sigma**2)
 
     def learn_ends(self, belief: tuple[Floats, Floats], found: Integers) -> None:
         """Where tail and tip are, from the longest of the traces that were found; they stay there all the jump."""
-        seen = [SeenSkis(self._views, k, belief[0].reshape(-1, 6)) for k in range(found.shape[2])]
-        reaches: tuple[list[Floats], list[Floats]] = ([], [])
-        for t, side, k in np.argwhere(found >= 0).tolist():
-            reaches[side].append(seen[k].equations(2 * t + side, self._traces[t][k][found[t, side, k]]).along)
-        if min(len(reach) for reach in reaches) < _LEAST_TRACES:
+        sides, along = [], []
+        for k in range(found.shape[2]):
+            t, side = np.nonzero(found[..., k] >= 0)
+            sides.append(side)
+            along.append(self._equations(k, belief[0], found, t, side).along)
+        side, reach = np.concatenate(sides), np.concatenate(along)
+        if np.bincount(side, minlength=len(SIDES)).min() < _LEAST_TRACES:
             return
-        for side, reach in enumerate(reaches):
-            self._ends[side] = np.quantile(np.min(reach, axis=1), 0.25), np.quantile(np.max(reach, axis=1), 0.75)
+        for i in range(len(SIDES)):
+            own = reach[side == i]
+            self._ends[i] = np.quantile(own.min(axis=1), 0.25), np.quantile(own.max(axis=1), 0.75)
         self._ends_sigma = _END_SIGMA_M
 
     def measured(self, belief: tuple[Floats, Floats], found: Integers) -> tuple[Floats, Floats, Flags]:
         """Skis (t, 2, 6) with covariance, by their traces with little prior; (t, 2) which have two views or more."""
-        values, covariance = belief[0].copy(), belief[1].copy()
-        m = found.shape[2]
-        seen = [SeenSkis(self._views, k, values.reshape(-1, 6)) for k in range(m)]
-        for t, side in np.argwhere((found >= 0).sum(axis=2) >= 2).tolist():
-            state, spread = np.zeros(6), covariance[t, side]
-            for k in np.flatnonzero(found[t, side] >= 0).tolist():
-                equations = seen[k].equations(2 * t + side, self._traces[t][k][found[t, side, k]])
-                state, spread = equations.updated(state, spread)
-            values[t, side] += state
-            covariance[t, side] = spread
-        return values, covariance, np.asarray((found >= 0).sum(axis=2) >= 2)
+        state, covariance = np.zeros_like(belief[0]), belief[1].copy()
+        known = np.asarray((found >= 0).sum(axis=2) >= 2)
+        for k in range(found.shape[2]):
+            t, side = np.nonzero(known & (found[..., k] >= 0))
+            equations = self._equations(k, belief[0], found, t, side)
+            state[t, side], covariance[t, side] = equations.updated(state[t, side], covariance[t, side])
+        return belief[0] + state, covariance, known
+
+    def _equations(self, k: int, values: Floats, found: Integers, t: Integers, side: Integers) -> Equations:
+        """What the traces of some skis that were found in a camera say about them."""
+        lines = self._lines[k].at(t, found[t, side, k])
+        return SeenSkis(self._views, k, values.reshape(-1, 6)).equations(2 * t + side, lines)
 
     def angles(self, lines: tuple[Floats, Floats, Flags]) -> tuple[Floats, Floats]:
         """Slope and heading (t, 2, 2) of measured skis with covariance; NaN where not measured."""
@@ -306,13 +293,80 @@ class _Search:
         return mean, spread + _STEADY_M**2 * np.eye(2)
 
 
-def _near(equations: Equations, covariance: Floats) -> bool:
-    """Whether a trace may be the ski.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Beams:
+    """Hypotheses about the traces of each ski, those of one ski one after the other, the best first.
 
-    As long as the direction of the ski is hardly known, a leg that ends at the binding may look like half a ski. Then
+    Attributes:
+        ski: (h,) number of the ski, ascending.
+        cost: (h,) as in `assignment`.
+        rays: (h, m) index of the trace in each image; -1: none.
+        state: (h, 6) by how much the ski differs from what was believed.
+        spread: (h, 6, 6) of it.
+    """
+
+    ski: Integers
+    cost: Floats
+    rays: Integers
+    state: Floats
+    spread: Floats
+
+    @classmethod
+    def begun(cls, skis: Integers, spread: Floats, m: int) -> "_Beams":
+        """Skis of which nothing is found yet in m images; spread (n, 6, 6) of all skis."""
+        n = len(skis)
+        return cls(skis, np.zeros(n), np.full((n, m), -1), np.zeros((n, 6)), spread[skis])
+
+    def longer(self, k: int, skis: Integers, traces: Integers, equations: Equations, extra: Floats) -> "_Beams":
+        """The best hypotheses with and without a trace of camera k.
+
+        Args:
+            k: number of the camera.
+            skis: (n,) skis that traces may show.
+            traces: (n,) index of the trace.
+            equations: of these n pairs.
+            extra: (n,) their costs but for how they fit.
+        """
+        first, last = np.searchsorted(self.ski, skis), np.searchsorted(self.ski, skis, side="right")
+        pair = np.repeat(np.arange(len(skis)), last - first)
+        came = np.arange(len(pair)) - np.repeat(np.cumsum(last - first) - last, last - first)
+        misfit, area = equations.only(pair).misfit(self.state[came], self.spread[came])
+        fits = misfit < gate(2)
+        pair, came = pair[fits], came[fits]
+        cost = self.cost[came] + misfit[fits] + extra[pair] + area[fits]
+        rays = self.rays[came]
+        rays[:, k] = traces[pair]
+        state, spread = equations.only(pair).updated(self.state[came], self.spread[came])
+        return _Beams(
+            np.concatenate((self.ski, skis[pair])),
+            np.concatenate((self.cost, cost)),
+            np.concatenate((self.rays, rays)),
+            np.concatenate((self.state, state)),
+            np.concatenate((self.spread, spread)),
+        )._best()
+
+    def _best(self) -> "_Beams":
+        """The best hypotheses of each ski."""
+        order = np.lexsort((self.cost, self.ski))
+        ski = self.ski[order]
+        order = order[np.arange(len(ski)) - np.searchsorted(ski, ski) < _BEAM]
+        return _Beams(self.ski[order], self.cost[order], self.rays[order], self.state[order], self.spread[order])
+
+    def options(self, ski: int) -> list[Option]:
+        """Options of one ski, the best first: nothing, and what chance does not explain."""
+        first, last = np.searchsorted(self.ski, (ski, ski + 1)).tolist()
+        found = [Option(float(self.cost[i]), self.rays[i], 0) for i in range(first, last) if self.cost[i] < -DECISIVE]
+        return [nothing(self.rays.shape[1]), *found[: 2 * MOST_OPTIONS]]
+
+
+def _near(equations: Equations, covariance: Floats) -> Flags:
+    """Whether traces may be skis with covariances (n, 6, 6).
+
+    As long as the direction of a ski is hardly known, a leg that ends at the binding may look like half a ski. Then
     the trace must reach beyond the binding to both sides.
     """
-    if not equations.near(covariance) or equations.misfit(np.zeros(6), covariance)[0] > gate(2):
-        return False
-    known = np.linalg.eigvalsh(covariance[3:, 3:])[-1] < _KNOWN_RAD**2
-    return bool(known or (equations.along.min() < -_BEYOND_M and equations.along.max() > _BEYOND_M))
+    near = equations.near(covariance)
+    near &= equations.misfit(np.zeros((len(near), 6)), covariance)[0] <= gate(2)
+    known = np.linalg.eigvalsh(covariance[:, 3:, 3:])[:, -1] < _KNOWN_RAD**2
+    both = (equations.along.min(axis=1) < -_BEYOND_M) & (equations.along.max(axis=1) > _BEYOND_M)
+    return np.asarray(near & (known | both))

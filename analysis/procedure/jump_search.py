@@ -1,8 +1,8 @@
 """Finds the jumps in the candidates of a recording whose cameras may have moved.
 
-At first the gates are as wide as the cameras moved. For each jump that is found so, the cameras are taken as they stood
-in it, frame by frame, and unless they stood still it is identified once more with gates as narrow as the measurements
-allow.
+At first the gates are as wide as the cameras moved. For each jumper who is sighted so, the cameras are taken as they
+stood meanwhile, frame by frame, and unless they stood still he is identified once more with gates as narrow as the
+measurements allow.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from analysis.cameras.pose_change import changed
 from analysis.cameras.standing import Standing
 from analysis.cameras.steadiness import Steadiness
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook
-from analysis.identification.identify import identify
+from analysis.identification.identify import find_sightings, identify
 from analysis.measurements.model import JumpMeasurements
 from analysis.procedure.log_facts import LogFacts
 from analysis.scene.camera_system import CameraSystem
@@ -48,20 +48,23 @@ def find_jumps(
     }
     loose = [_loosened(seen, moves_px) for seen in candidates]
     found: list[JumpMeasurements] = []
-    for jump in identify(loose, system, facts.rate_hz, exposures, None if moves_px else look):
+    for sighting in find_sightings(loose, system, facts.rate_hz, exposures):
+        if not (pulses := sighting.pulses()):
+            continue
         around = round(_AROUND_S * facts.rate_hz)
-        first, last = jump.pulses[0].pulse - around, jump.pulses[-1].pulse + around
+        first, last = pulses[0] - around, pulses[-1] + around
         window = [seen for seen in candidates if first <= seen.pulse <= last]
         standing = steadiness.during([seen.pulse for seen in window])
         if not moves_px and _stood_still(standing, system):
-            found.append(JumpMeasurements(len(found) + 1, jump.pulses))
+            if measured := sighting.measured(look):
+                found.append(JumpMeasurements(len(found) + 1, measured))
             continue
         steady = [standing.candidates(seen) for seen in window]
         again = identify(steady, standing.system, facts.rate_hz, exposures, standing.look(look))
         best = max(again, key=lambda one: len(one.pulses), default=None)
         if best is not None:
-            pulses = tuple(standing.in_frames(pulse) for pulse in best.pulses)
-            found.append(JumpMeasurements(len(found) + 1, pulses))
+            steadied = tuple(standing.in_frames(pulse) for pulse in best.pulses)
+            found.append(JumpMeasurements(len(found) + 1, steadied))
     return found
 
 

@@ -16,17 +16,17 @@ from math import comb, log, log10, pi
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.scene.hypotheses import Approximate, Hypothesis, Search, spread_triples
-from analysis.scene.single_pose import SinglePose, fit_pose, predict
+from analysis.scene.single_pose import Matched, SinglePose, fit_poses, predict, predict_all
 from analysis.scene.survey import KnownPoints
 from photogrammetry.geometry.camera_model import undistort
 from photogrammetry.network.model import Camera
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 
-GATE: Final = float(chi2.ppf(0.999, 2))
+GATE: Final = float(chdtri(2, 0.001))
 MODEL_SIGMA: Final = 0.1  #: px; what the interior orientation and the balls' shape may leave out
 FEWEST: Final = 4  #: balls of an image
 _TIERS = ((14, 8), (26, 60), (60, 14))  # detections, the best ones, and triples of balls tried on them
@@ -141,14 +141,16 @@ class _Image:
     def _with(self, found: Sequence[Naming], hypotheses: Sequence[Hypothesis], enough: float = np.inf) -> list[Naming]:
         """The best distinct namings after more hypotheses; one of more than `enough` decades ends it."""
         more = list(found)
-        for hypothesis in hypotheses:
-            if any(_is_part(hypothesis, naming) for naming in more):
-                continue
-            naming = self._refined(hypothesis)
-            if naming is not None:
-                more.append(naming)
-                if naming.decades > enough:
-                    break
+        waiting = list(hypotheses)
+        most = 1  # the first one is often right: then the others need not be refined
+        while waiting := [one for one in waiting if not any(_is_part(one, naming) for naming in more)]:
+            for naming in self._refined(waiting[:most]):
+                if naming is not None:
+                    more.append(naming)
+                    if naming.decades > enough:
+                        return self._distinct(more)
+            del waiting[:most]
+            most = len(waiting)
         return self._distinct(more)
 
     def _with_rivals(self, search: Search, found: list[Naming]) -> list[Naming]:
@@ -164,47 +166,70 @@ class _Image:
         per_triple = max(1.0, search.tried / max(1, search.triples))
         return log10(per_triple) + log10(comb(len(self.known.names), 3))
 
-    def _refined(self, start: Hypothesis) -> Naming | None:
-        """Fit the pose and look for all balls again, until the same ones are found; None if it falls apart."""
-        points, hits = start.points, start.detections
-        pose: SinglePose | None = SinglePose(start.position, start.rotation, np.zeros((6, 6)))
+    def _refined(self, starts: Sequence[Hypothesis]) -> list[Naming | None]:
+        """Fit each pose and look for all balls again, until the same ones are found; None where one falls apart."""
+        pairs = [(start.points, start.detections) for start in starts]
+        poses: list[SinglePose | None] = [SinglePose(s.position, s.rotation, np.zeros((6, 6))) for s in starts]
+        active = list(range(len(starts)))
         for _ in range(_ROUNDS):
-            pose = self._fitted(pose, points, hits) if pose is not None and len(points) >= FEWEST else None
-            if pose is None:
-                return None
-            before = points, hits
-            points, hits = self._matched(pose)
-            if np.array_equal(points, before[0]) and np.array_equal(hits, before[1]):
+            fitted = self._fitted([poses[i] for i in active], [pairs[i] for i in active])
+            for i, pose in zip(active, fitted, strict=True):
+                poses[i] = pose
+            sound = [(i, pose) for i, pose in zip(active, fitted, strict=True) if pose is not None]
+            active = []
+            for (i, _), new in zip(sound, self._matched([pose for _, pose in sound]), strict=True):
+                if not (np.array_equal(new[0], pairs[i][0]) and np.array_equal(new[1], pairs[i][1])):
+                    active.append(i)
+                pairs[i] = new
+            if not active:
                 break
-        return self._weighed(pose, points, hits) if pose is not None and len(points) >= FEWEST else None
+        return [
+            None if pose is None else self._weighed(pose, *pair)
+            for pose, pair in zip(self._fitted(poses, pairs), pairs, strict=True)
+        ]
 
-    def _fitted(self, pose: SinglePose, points: Integers, hits: Integers) -> SinglePose | None:
-        xyz, covariance = self.known.xyz[points], self.known.covariance[points]
-        return fit_pose(self.camera.lens(), pose, xyz, covariance, self.spots.xy[hits], self._covariance()[hits])
+    def _fitted(
+        self, poses: Sequence[SinglePose | None], pairs: Sequence[tuple[Integers, Integers]]
+    ) -> list[SinglePose | None]:
+        """Poses by their points and detections; None where there was none, or too few points."""
+        there = [
+            (i, pose, *pair)
+            for i, (pose, pair) in enumerate(zip(poses, pairs, strict=True))
+            if pose is not None and len(pair[0]) >= FEWEST
+        ]
+        spread = self._covariance()
+        matched = [
+            Matched(self.known.xyz[points], self.known.covariance[points], self.spots.xy[hits], spread[hits])
+            for _, _, points, hits in there
+        ]
+        found = fit_poses(self.camera.lens(), [pose for _, pose, _, _ in there], matched)
+        fitted: list[SinglePose | None] = [None] * len(poses)
+        for (i, *_), of_pose in zip(there, found, strict=True):
+            fitted[i] = of_pose
+        return fitted
 
     def _covariance(self) -> Floats:
         """(n, 2, 2) of the detections with what the model leaves out."""
         return self.spots.covariance + MODEL_SIGMA**2 * np.eye(2)
 
-    def _matched(self, pose: SinglePose) -> tuple[Integers, Integers]:
-        """Known points and the detections on which they fall: mutually nearest, and within the gate."""
-        xy, from_point, from_pose = predict(self.camera.lens(), pose, self.known.xyz, self.known.covariance)
-        sight = np.flatnonzero(np.isfinite(xy).all(axis=1))
-        if not len(sight):
-            return sight, sight
-        off = self.spots.xy[None] - xy[sight, None]
-        total = (from_point + from_pose)[sight, None] + self._covariance()[None]
-        squares = np.einsum("pdi,pdij,pdj->pd", off, np.linalg.inv(total), off)
-        nearest, back = squares.argmin(axis=1), squares.argmin(axis=0)
-        rows = np.arange(len(sight))
-        good = (back[nearest] == rows) & (squares[rows, nearest] < GATE)
-        return sight[good], nearest[good]
+    def _matched(self, poses: Sequence[SinglePose]) -> list[tuple[Integers, Integers]]:
+        """By pose, known points and the detections on which they fall: mutually nearest, and within the gate."""
+        if not poses:
+            return []
+        xy, from_point, from_pose = predict_all(self.camera.lens(), poses, self.known.xyz, self.known.covariance)
+        total = (from_point + from_pose)[:, :, None] + self._covariance()
+        a, b, d = total[..., 0, 0], total[..., 0, 1], total[..., 1, 1]
+        x, y = np.moveaxis(self.spots.xy - xy[:, :, None], -1, 0)
+        with np.errstate(invalid="ignore"):
+            squares = (d * x * x - 2 * b * x * y + a * y * y) / (a * d - b * b)
+        squares = np.where(np.isfinite(squares), squares, np.inf)
+        nearest, back = squares.argmin(axis=2), squares.argmin(axis=1)
+        mutual = np.take_along_axis(back, nearest, axis=1) == np.arange(len(self.known.names))
+        good = mutual & (squares.min(axis=2) < GATE)
+        return [(np.flatnonzero(own), of_pose[own]) for own, of_pose in zip(good, nearest, strict=True)]
 
-    def _weighed(self, pose: SinglePose, points: Integers, hits: Integers) -> Naming | None:
+    def _weighed(self, fitted: SinglePose, points: Integers, hits: Integers) -> Naming | None:
         """The naming with its evidence."""
-        fitted = self._fitted(pose, points, hits)
-        if fitted is None:
-            return None
         xy, from_point, _ = predict(self.camera.lens(), fitted, self.known.xyz, self.known.covariance)
         off = self.spots.xy[hits] - xy[points]
         if not np.isfinite(off).all():

@@ -9,7 +9,9 @@ that scatters by far more (a tree in the wind) keeps its own variance.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,6 +38,7 @@ _BINS = 24  # of the grey values, for the noise model
 _AGREEING = 0.6  # share of the frames that agrees with the median; with fewer all of them make the noise
 _RESTLESS = 4.0  # times the model's variance: from there on a pixel keeps its own
 _ROUNDING = 1 / 12  # variance of grey values that are whole numbers
+_STRIP = 16 << 10  # pixels that are sorted at a time
 _LAPLACIAN = 6.0  # root of the square sum of the elements of the kernel that measures noise in a single image
 
 
@@ -109,25 +112,68 @@ def static_image(camera: str, frames: Sequence[NDArray[np.uint8]]) -> StaticImag
     if n < 3:
         grey = distinct.mean(axis=0, dtype=np.float32)
         return StaticImage(camera, grey, np.full_like(grey, _spatial_noise(distinct[0])), n)
-    median = np.median(distinct, axis=0).astype(np.float32)
-    deviation = np.abs(distinct - median)
+    twice = _twice_median(distinct)
+    median = np.asarray(twice / np.float32(2), np.float32)
+    twice_off = [cv2.absdiff(frame.astype(np.uint16) * 2, twice) for frame in distinct]
+    deviation = np.stack(twice_off).astype(np.uint16, copy=False)  # twice what it is
     factor = _SMALL_SAMPLE[n - 2] if n < 10 else n / (n - 0.8)
-    mad = (_MAD_TO_SIGMA * factor) * np.median(deviation, axis=0)
+    mad = np.asarray(np.float32(_MAD_TO_SIGMA * factor / 4) * _twice_median(deviation), np.float32)
     limit = _CLIP * np.maximum(_model(median, mad**2, quantile=None), np.float32(1.0))
-    agrees = deviation <= limit
-    count = agrees.sum(axis=0, dtype=np.float32)
+    agrees = (deviation <= np.minimum(2 * limit, 2 * 255).astype(np.uint16)).view(np.uint8)
+    count, grey, variance = (np.zeros(median.shape, np.float32) for _ in range(3))
+    for frame, counts in zip(distinct, agrees, strict=True):
+        cv2.accumulate(counts, count)
+        cv2.accumulate(frame, grey, counts)
     count[count < 2] = np.nan  # nothing agrees with the median: the median stands
-    grey = np.where(agrees, distinct, np.float32(0)).sum(axis=0, dtype=np.float32) / count
+    grey /= count
     grey = np.where(np.isnan(grey), median, grey)
-    variance = (np.where(agrees, distinct - grey, np.float32(0)) ** 2).sum(axis=0, dtype=np.float32) / (count - 1)
+    for frame, counts in zip(distinct, agrees, strict=True):
+        cv2.accumulateSquare(cv2.subtract(frame, grey, dtype=cv2.CV_32F), variance, counts)
+    variance /= count - 1
     variance = np.where(np.isfinite(variance), variance, mad**2)
     model = _model(grey, variance, quantile=n - 1) ** 2
     own = np.maximum(variance, mad**2)
     torn = ~(count > _AGREEING * n)
     if torn.any():
-        own[torn] = (deviation[:, torn] ** 2).mean(axis=0)
+        own[torn] = ((deviation[:, torn] / np.float32(2)) ** 2).mean(axis=0)
     noise = np.sqrt(np.where(own > _RESTLESS * model, own, model))
     return StaticImage(camera, grey, noise.astype(np.float32), n)
+
+
+def _twice_median(values: NDArray[np.unsignedinteger[Any]]) -> NDArray[np.uint16]:
+    """Twice the medians of whole numbers (n, rows, columns) over the first axis.
+
+    All pixels of a strip, which stays in the processor's cache, are sorted at once by one network of comparisons.
+    """
+    n, rows, columns = values.shape
+    flat = values.reshape(n, -1)
+    twice = np.empty(rows * columns, np.uint16)
+    for first in range(0, rows * columns, _STRIP):
+        part = slice(first, first + _STRIP)
+        sorted_ = [row.copy() for row in flat[:, part]]
+        spare = np.empty_like(sorted_[0])
+        for low, high in _network(n):
+            np.minimum(sorted_[low], sorted_[high], out=spare)
+            np.maximum(sorted_[low], sorted_[high], out=sorted_[high])
+            sorted_[low], spare = spare, sorted_[low]
+        np.add(sorted_[(n - 1) // 2], sorted_[n // 2], out=twice[part], dtype=np.uint16)
+    return twice.reshape(rows, columns)
+
+
+@cache
+def _network(n: int) -> list[tuple[int, int]]:
+    """Comparisons that sort n values: Batcher's odd-even merge sort (Knuth, vol. 3, 5.2.2, algorithm M)."""
+    found = []
+    p = 1
+    while p < n:
+        k = p
+        while k >= 1:
+            for j in range(k % p, n - k, 2 * k):
+                places = range(j, j + min(k, n - j - k))
+                found += [(i, i + k) for i in places if i // (2 * p) == (i + k) // (2 * p)]
+            k //= 2
+        p *= 2
+    return found
 
 
 def _spread(stored: Sequence[StoredTriplet], count: int) -> dict[str, set[int]]:

@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.cameras.pose_change import FEWEST, Displacements
 from analysis.scene.camera_system import PlacedCamera
@@ -176,7 +176,7 @@ class BallTracker:
     def _turn(self, off: Floats, variance: Floats, sound: Flags) -> tuple[Floats | None, Floats, Flags]:
         """The turn that most balls agree on: without the worst, as long as one is too bad."""
         kept = sound.copy()
-        gate = chi2.isf(_BALL_RISK / max(1, int(sound.sum())), 2)
+        gate = float(chdtri(2, _BALL_RISK / max(1, int(sound.sum()))))
         fewest = max(FEWEST, int(np.ceil((1 - _MOST_LEFT_OUT) * sound.sum())))
         while kept.sum() >= fewest:
             b, w = self.by_turn[kept], 1 / variance[kept]

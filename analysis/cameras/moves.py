@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from rig.arrays import Floats
 
@@ -110,7 +110,7 @@ def _tested(turns: Floats, design: Floats, known: Floats) -> _Test:
     # neighbouring blocks are alike in slow gusts: fewer of them are independent
     alike = np.clip((residual[1:] * residual[:-1]).sum(axis=0) / np.maximum((residual**2).sum(axis=0), 1e-30), 0, 0.8)
     sigma = np.sqrt(variance * (1 + alike) / (1 - alike) / (x @ x))
-    p = 2 * student.sf(np.abs(effect) / sigma, freedom)
+    p = 2 * stdtr(freedom, -np.abs(effect) / sigma)
     return _Test(effect, float(((residual**2).sum(axis=0) / known).sum()) / freedom, float(p.min()))
 
 

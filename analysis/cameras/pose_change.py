@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.rotation import rotation_from_vector, vector_from_rotation
@@ -76,7 +76,7 @@ class PoseChange:
         """
         values, columns = np.concatenate((self.shift, self.turn)), slice(0 if self.has_shift else 3, 6)
         total = (self.covariance + (np.zeros((6, 6)) if more is None else more))[columns, columns]
-        return float(chi2.sf(values[columns] @ np.linalg.solve(total, values[columns]), len(total)))
+        return float(chdtrc(len(total), values[columns] @ np.linalg.solve(total, values[columns])))
 
     def applied(self, placed: PlacedCamera) -> PlacedCamera:
         """The camera after the change."""
@@ -99,7 +99,7 @@ def pose_change(placed: PlacedCamera, seen: Displacements) -> PoseChange | None:
     if kept is not None:
         turned, shifted = (_fitted(placed, seen, kept, parameters) for parameters in (3, 6))
         gain = turned.square_sum - shifted.square_sum
-        if gain > chi2.isf(_SHIFT_RISK, 3) * max(1.0, shifted.factor(kept)) ** 2:
+        if gain > float(chdtri(3, _SHIFT_RISK)) * max(1.0, shifted.factor(kept)) ** 2:
             return _result(shifted, seen, kept, sound)
     kept = _agreeing(placed, seen, sound, 3)
     return None if kept is None else _result(_fitted(placed, seen, kept, 3), seen, kept, sound)
@@ -137,7 +137,7 @@ def _agreeing(placed: PlacedCamera, seen: Displacements, sound: Flags, parameter
     fewest = max(FEWEST, -(-parameters // 2) + 1, int(np.ceil((1 - _MOST_LEFT_OUT) * sound.sum())))
     while kept.sum() >= fewest:
         fit = _fitted(placed, seen, kept, parameters)
-        gate = chi2.isf(_BALL_RISK / max(1, kept.sum()), 2)
+        gate = float(chdtri(2, _BALL_RISK / max(1, int(kept.sum()))))
         inside = np.flatnonzero(kept)
         # without the worst ball: its own residual is then free of its pull
         worst = inside[int(fit.squares[inside].argmax())]

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from analysis.cameras.ball_tracker import BallTracker, FrameTurn
 from analysis.cameras.frames import FrameSource
@@ -274,7 +274,7 @@ def _shake(turns: _Turns, mean: Floats, pulses: Sequence[PulseNumber]) -> dict[P
     squares = sum(
         float(d @ np.linalg.solve(turn.covariance, d)) for d, turn in zip(off - _mean(off), turns.values(), strict=True)
     )
-    if chi2.sf(squares, 3 * (len(turns) - 1)) > _SHAKE_RISK:
+    if chdtrc(3 * (len(turns) - 1), squares) > _SHAKE_RISK:
         return {}
     back = rotation_from_vector(mean).T
     shake = {

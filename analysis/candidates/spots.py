@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.candidates.background import Region
 from analysis.candidates.model import Spots
@@ -33,7 +33,7 @@ _WORST_SIGMA = 0.5  # px
 _SECOND_ANSWER, _SECOND_STRENGTH = 3.0, 4.0  # where a spot is expected, a few places compete, not a whole image
 _USUAL_RADII = (1.0, 1.6, 2.6)  # px; to start from
 _START_SIGMA = 1.0  # px; of a blob's place before the fit
-_GATE = float(chi2.ppf(0.999, 2))
+_GATE = float(chdtri(2, 0.001))
 _NEAR = 2  # px from what is in front
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.comparison.aligned import HEIGHT, VELOCITY, MeasuredJump
 from analysis.comparison.shared_calibration import shared_calibration
@@ -72,7 +72,7 @@ def align(jumps: list[MeasuredJump]) -> Alignment:
     places = np.array([path.place for path in paths])
     weights = np.array([(path.speed * path.sigma_s) ** 2 + path.sigma_way**2 for path in paths]) ** -1.0
     edge = float(places @ weights / weights.sum())
-    if float((places - edge) ** 2 @ weights) > chi2.isf(RISK, max(len(jumps) - 1, 1)):
+    if float((places - edge) ** 2 @ weights) > chdtri(max(len(jumps) - 1, 1), RISK):
         return Alignment(jumps, 0.0, at_one_place=False)
     aligned = [
         replace(jump, shift_s=jump.shift_s + _time(path, edge), takeoff_sigma_s=path.sigma_way / path.speed)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from analysis.comparison.aligned import HEIGHT, Series, common_times, series
 from analysis.comparison.alignment import Alignment
@@ -115,9 +115,9 @@ def difference(alignment: Alignment, draws: int = DRAWS) -> Difference:
     deviation = np.sqrt(covariance.diagonal())
     extremes = _draws(covariance / np.outer(deviation, deviation), draws)
     limit = float(np.quantile(np.abs(extremes).max(axis=1), 1 - LEVEL))
-    independent = float(np.log1p(-LEVEL) / np.log1p(-2 * norm.sf(limit)))
+    independent = float(np.log1p(-LEVEL) / np.log1p(-2 * ndtr(-limit)))
     repeat = _spread(deviation, known, one.values.shape)
-    p = 2 * norm.sf(np.abs(other.values - one.values) / repeat)
+    p = 2 * ndtr(-np.abs(other.values - one.values) / repeat)
     stated = one.variance + other.variance + shared.diagonal().reshape(one.values.shape)
     return Difference(
         times,

@@ -4,7 +4,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from analysis.comparison.aligned import MeasuredJump, series
 from rig.arrays import Floats
@@ -26,7 +26,7 @@ class Scatter:
 
     def p(self, difference: Floats) -> Floats:
         """Probability that two jumps of one athlete differ as much (11, T), one quantity at one time."""
-        return np.asarray(2 * student.sf(np.abs(difference) / (np.sqrt(2) * self.deviation), self.freedom))
+        return np.asarray(2 * stdtr(self.freedom, -np.abs(difference) / (np.sqrt(2) * self.deviation)))
 
 
 def scatter(others: list[MeasuredJump], times: Floats) -> Scatter | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.candidates.model import PulseCandidates, Spots
 from analysis.identification.views import Views, gate
@@ -165,7 +165,7 @@ def _without_one(views: Views, pulses: Sequence[Sequence[Rays]], points: Integer
         return np.asarray(several)
     left_out = []
     misfit = _solve(views, pulses, several[:, 0], several[:, 1:]).misfit
-    doubtful = misfit > chi2.ppf(_DOUBTFUL, 2 * count[count > 2] - 3)
+    doubtful = misfit > chdtri(2 * count[count > 2] - 3, 1 - _DOUBTFUL)
     for k in range(points.shape[1] - 1):
         spot = several[:, [0, k + 1]]
         _, of_spot, uses = np.unique(spot, axis=0, return_inverse=True, return_counts=True)

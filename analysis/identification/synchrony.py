@@ -6,7 +6,7 @@ is measured by the bundle over time.
 """
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from analysis.identification.assignment import well_known
 from analysis.identification.flights import Flight
@@ -105,4 +105,4 @@ def _too_rarely_three(rays: Integers, cameras: int) -> bool:
     """Whether points with three rays are much rarer than chance would have it if markers were missed one by one."""
     two, three = int((rays >= 2).sum()), int((rays > 2).sum())
     shown = rays[rays >= 2].mean() / cameras
-    return bool(three / two < _AGREES * binom.sf(2, cameras, shown) / binom.sf(1, cameras, shown))
+    return bool(three / two < _AGREES * bdtrc(2, cameras, shown) / bdtrc(1, cameras, shown))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.ideal_camera import IdealCamera
@@ -25,7 +25,7 @@ _AXES_PULL = 1e-6  #: keeps the scene's centre finite where all cameras look in 
 @cache
 def gate(degrees_of_freedom: int) -> float:
     """Chi-square below which `GATE` of the true correspondences lie."""
-    return float(chi2.ppf(GATE, degrees_of_freedom))
+    return float(chdtri(degrees_of_freedom, 1 - GATE))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.motion.blocks import Normals, Solution, solve
 from analysis.motion.channels import CHANNELS, MotionFrame
@@ -23,7 +23,7 @@ _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
 _COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is given by definition
 _SETTLED: Final = 0.01  # of a sigma: greatest step of O that ends the iteration
 _FAR: Final = 10.0  # times the median distance from approximate states
-MEDIAN: Final = float(chi2.median(2))  #: of the weighted square sum of a group
+MEDIAN: Final = float(chdtri(2, 0.5))  #: of the weighted square sum of a group
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
 from analysis.motion.bundle import Model, begun, near, root_of, settled
@@ -223,7 +223,7 @@ class CausalFilter:
         pairs = rows.reshape(-1, 2, rows.shape[1])
         spread = pairs @ lively.covariance @ pairs.transpose(0, 2, 1) + np.eye(2)
         distance = np.einsum("ga,gab,gb->g", off, np.linalg.inv(spread), off)
-        return np.asarray(distance < chi2.isf(_GATE_P, 2))
+        return np.asarray(distance < chdtri(2, _GATE_P))
 
     def _result(self, observed: Observations, used: Flags, known: Flags) -> SmoothedState:
         """What both models believe at the pulse of `observed`."""

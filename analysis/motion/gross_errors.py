@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.motion.bundle import MEDIAN, Adjusted, rows_by_shared, settled
 from analysis.motion.channels import CHANNELS
@@ -56,7 +56,7 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
     Errors that last are looked for when single ones are gone; what they take is not taken back.
     """
     seen = adjusted.model.observed.seen
-    limit = float(chi2.isf(FALSE_REMOVAL_P / max(int(seen.sum()), 1), 2))
+    limit = float(chdtri(2, FALSE_REMOVAL_P / max(int(seen.sum()), 1)))
     doubtful = np.zeros(seen.shape, bool)
     for _ in range(most):
         tests = statistics(adjusted).test
@@ -129,7 +129,7 @@ def lasting_errors(adjusted: Adjusted) -> Flags:
     if not windows.middle.size:
         return out
     tests = np.array([windows.test((w,)) for w in range(len(windows.middle))])
-    limit, rival = float(chi2.isf(FALSE_REMOVAL_P / len(tests), 2)), float(chi2.isf(_RIVAL_P, 2))
+    limit, rival = float(chdtri(2, FALSE_REMOVAL_P / len(tests))), float(chdtri(2, _RIVAL_P))
     for w in np.flatnonzero(tests > limit):
         near = np.flatnonzero(np.abs(windows.middle - windows.middle[w]) < _LASTING_S)
         if tests[w] < tests[near].max():

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.motion.bundle import (
@@ -271,7 +271,7 @@ def _removed(adjusted: Adjusted, pulses: list[int]) -> list[RayTest]:
     out = []
     for k, i, group in gone:
         residual = np.linalg.solve(model.observed.whitener[k, i, group], adjusted.equations.v[k, i, group])
-        w = float(norm.isf(max(chi2.sf(tests[k, i, group], 2), 1e-300) / 2))
+        w = -float(ndtri(max(chdtrc(2, tests[k, i, group]), 1e-300) / 2))
         out.append(
             RayTest(pulses[k], model.observed.names[i], GROUPS[group], float(np.linalg.norm(residual)), w, removed=True)
         )

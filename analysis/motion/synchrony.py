@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri
 
 from analysis.result.model import CameraOffset
 from rig.arrays import Flags, Floats
@@ -50,7 +50,7 @@ def judged(
     m = len(names)
     able = np.flatnonzero(took_part).tolist()
     reference = _reference(able, lateness, covariance)
-    limit = float(norm.isf(FALSE_ALARM_P / (2 * m)))
+    limit = -float(ndtri(FALSE_ALARM_P / (2 * m)))
     offsets: dict[str, CameraOffset] = {}
     late, relative = np.zeros(m, bool), np.zeros(m)
     for i in able if len(able) > 1 else []:
@@ -70,7 +70,7 @@ def judged(
 def _reference(able: list[int], lateness: Floats, covariance: Floats) -> list[int]:
     """The cameras that agree: one after the other is left out, each time the one that contradicts most."""
     chosen = able
-    while len(chosen) > 1 and _contradiction(lateness, covariance, chosen) > chi2.isf(FALSE_ALARM_P, len(chosen) - 1):
+    while len(chosen) > 1 and _contradiction(lateness, covariance, chosen) > chdtri(len(chosen) - 1, FALSE_ALARM_P):
         if len(chosen) == 2:
             return chosen[:1]
         rest = [[k for k in chosen if k != i] for i in chosen]

@@ -10,7 +10,7 @@ from math import radians
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.scene.detection import Detections, detect_balls
 from analysis.scene.hypotheses import Approximate
@@ -239,7 +239,7 @@ def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: Known
 def _misfit(orientation: Orientation) -> list[str]:
     """A line if the residuals are larger than their sigmas explain, which gross errors of single balls do not do."""
     a = orientation.outcome.adjustment
-    if a.redundancy < 1 or a.ratio**2 * a.redundancy < chi2.ppf(1 - _MISFIT_RISK, a.redundancy):
+    if a.redundancy < 1 or a.ratio**2 * a.redundancy < chdtri(a.redundancy, _MISFIT_RISK):
         return []
     o = a.network.observations
     squares = (a.image_residuals() / o.sigma) ** 2

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.scene.naming import GATE, MODEL_SIGMA, Spots
 from analysis.scene.single_pose import SinglePose, predict
@@ -21,7 +21,7 @@ from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.network.model import Camera
 from rig.arrays import Floats, Integers
 
-_PAIR_GATE = float(chi2.ppf(0.999, 1))
+_PAIR_GATE = float(chdtri(1, 0.001))
 _ALIKE = 1.5  # ratio of the sizes of one ball in space, as two images measure them
 _LIKE_OTHERS = 1.6  # ratio of a ball's size to that of the others
 _RIVAL = 8.0  # chi-squared by which a rival is worse if it is none
@@ -166,7 +166,7 @@ def _intersected(stations: Sequence[Station], rays: dict[int, int]) -> Tie | Non
     if not point.ok[0]:
         return None
     squares = float((point.residuals[0] ** 2 / sigma[:, None] ** 2).sum())
-    if squares > chi2.ppf(0.999, 2 * len(chosen) - 3):
+    if squares > chdtri(2 * len(chosen) - 3, 0.001):
         return None
     return Tie(point.X[0], point.covariance[0], dict(rays), squares)
 

@@ -167,3 +167,11 @@ def _is_true(state: dict[str, Any], true: dict[str, Any]) -> None:
     for name, value in {**true["angles"], "speed": true["speed"], "height": true["height"]}.items():
         measured = found[name]
         assert measured is None or abs(measured["value"] - value) < AT_MOST * measured["sigma"], (state["pulse"], name)
+
+
+def test_the_analysis_starts_without_scipys_distributions() -> None:
+    heavy = "analysis.procedure.analyze, analysis.worker.live, analysis.comparison.report"
+    # half a second of each start; scipy.special has the functions that are needed
+    check = f"import sys, {heavy}; print([name for name in sys.modules if name.startswith('scipy.stats')])"
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"

@@ -28,8 +28,10 @@ _HOLD_PERIODS: Final = 4
 _HOLD_NS: Final = 130_000_000
 #: A grabber needs less than this from handing a slot over to queueing the record that names it.
 _STRANDED_NS: Final = NS_PER_S
-#: A camera whose link is too slow is told of so often at most.
+#: A camera whose frames come too late is told of so often at most, and when they have for so long: if the computer is
+#: too slow, they come too late from the other cameras too by then.
 _TELL_SLOW_NS: Final = 10 * NS_PER_S
+_SURELY_SLOW_NS: Final = NS_PER_S
 
 
 def hold_ns(period_ns: int) -> int:
@@ -107,6 +109,7 @@ class Assembler:
         self._changes: list[CameraChanged] = []
         self._asked = [False] * len(rings)
         self._slow_told = [HostNs(-_TELL_SLOW_NS)] * len(rings)
+        self._slow_since: dict[int, HostNs] = {}
         self._heard = [False] * len(rings)
         # A recorder that died may have left slots that no record names, which nobody would ever free. A grabber may
         # just be about to queue the record of such a slot, so the slot is freed only if none has come until then.
@@ -310,10 +313,19 @@ class Assembler:
 
     def _tell_slow_cameras(self, now: HostNs) -> None:
         """Say that a camera's frames come after their pulses are decided; people would look at its trigger cable."""
-        for camera in self.pairer.slow(now):
-            if now >= self._slow_told[camera] + _TELL_SLOW_NS:
+        slow = self.pairer.slow(now)
+        self._slow_since = {camera: self._slow_since.get(camera, now) for camera in slow}
+        for camera, since in self._slow_since.items():
+            if now >= max(since + _SURELY_SLOW_NS, self._slow_told[camera] + _TELL_SLOW_NS):
                 self._slow_told[camera] = now
                 late_ms = self.pairer.lag_ms(camera)
+                others = ", ".join(self._names[other] for other in slow if other != camera)
                 text = "its frames come too late, {late_ms:.0f} ms after the usual time: the link is too slow for them"
                 said = phrase("camera_late", text, late_ms=late_ms)
+                if others:
+                    together = (
+                        "its frames come too late, {late_ms:.0f} ms after the usual time, like those of {others}: this "
+                        "computer or the link they share is too slow"
+                    )
+                    said = phrase("camera_late_together", together, late_ms=late_ms, others=others)
                 self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, said=said))

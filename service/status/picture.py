@@ -47,6 +47,7 @@ class Facts:
         health: the recorder's last health record, None if there is none.
         warm: whether whole triplets have come.
         pulses: rate of the pulses.
+        overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
         room: on the disk.
         preroll_s: what is to be held in memory.
         holding_s: for how long the present past has been held, s; the health record may be of before.
@@ -61,6 +62,7 @@ class Facts:
     health: Health | None
     warm: bool
     pulses: PulseRate
+    overloaded: Sequence[int]
     room: Room
     preroll_s: float
     holding_s: float
@@ -80,7 +82,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
     arriving = facts.heard is not None and (pulses.arriving or (facts.warm and not facts.health))
     rate = pulses.rate_hz if arriving else None
     if state is not State.FAULT:
-        statement = about_state(state, rig.cameras, states, arriving, rate)
+        statement = about_state(state, rig.cameras, states, arriving, rate, facts.overloaded)
         if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
             statement = facts.notice
     elif facts.fault is not None:
@@ -133,7 +135,7 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
                 backend=camera.backend,
                 address=camera.address,
                 state=state,
-                statement=about_camera(camera, state, presence.said),
+                statement=about_camera(camera, state, presence.said, overloaded=bool(facts.overloaded)),
                 columns=columns,
                 **({} if report is None else {name: getattr(report, name) for name in _MEASURED}),
             )

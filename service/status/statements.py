@@ -16,6 +16,9 @@ from rig.transport.messages import CameraNews
 from service.processes.rig_processes import CameraPresence
 
 _CAMERA_ADVICE = "check its power and cable; it is connected again by itself"
+_FASTER: Final = (
+    "close other programs on it; if that is not enough, lower trigger.rate_hz or make the cameras' regions smaller"
+)
 _CAMERA_STATES: Final = {
     CameraNews.CONNECTED: CameraState.READY,
     CameraNews.SILENT: CameraState.SILENT,
@@ -35,13 +38,14 @@ def camera_state(trying: bool, heard: CameraPresence) -> CameraState:
     return CameraState.CONNECTING if heard.news is None else _CAMERA_STATES[heard.news]
 
 
-def about_camera(camera: CameraSettings, state: CameraState, said: Phrase) -> Statement:
+def about_camera(camera: CameraSettings, state: CameraState, said: Phrase, *, overloaded: bool) -> Statement:
     """The state of a camera in words.
 
     Args:
         camera: the camera.
         state: its state.
         said: the last news of it, e.g. why it is not there.
+        overloaded: whether the computer is too slow for several cameras: then silence tells nothing of a cable.
     """
     values: dict[str, Value] = {"camera": camera.name, "reason": said}
     match state:
@@ -51,6 +55,9 @@ def about_camera(camera: CameraSettings, state: CameraState, said: Phrase) -> St
             return Statement(code="camera_connecting", text=f"connecting {camera.name}", values=values)
         case CameraState.READY:
             return Statement(level=Level.GOOD, code="camera_ready", text=f"{camera.name} is ready", values=values)
+        case CameraState.SILENT if overloaded:
+            what = f"the frames of {camera.name} come too late: this computer is too slow for the cameras"
+            return Statement(level=Level.WARNING, code="camera_overloaded", text=what, advice=_FASTER, values=values)
         case CameraState.SILENT:
             what = f"{camera.name} sends no frames while the others do"
             advice = "check its trigger cable; it is connected again by itself"
@@ -73,6 +80,7 @@ def about_state(
     states: Sequence[CameraState],
     arriving: bool,
     rate_hz: float | None,
+    overloaded: Sequence[int],
 ) -> Statement:
     """The state of the rig in words; a fault is stated by `no_camera` or `failed`.
 
@@ -82,6 +90,7 @@ def about_state(
         states: the state of each of them.
         arriving: whether pulses arrive.
         rate_hz: pulses per second, None while unknown.
+        overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
     """
     match state:
         case State.IDLE:
@@ -94,12 +103,12 @@ def about_state(
         case State.DISARMING:
             return Statement(code="state_disarming", text="disconnecting the cameras")
         case State.RECORDING:
-            return _working("state_recording", "recording", cameras, states)
+            return _working("state_recording", "recording", cameras, states, overloaded)
         case _ if not arriving:
-            return _working("state_waiting", "armed, waiting for trigger pulses", cameras, states)
+            return _working("state_waiting", "armed, waiting for trigger pulses", cameras, states, overloaded)
         case _:
             pulses = "pulses arrive" if rate_hz is None else f"{rate_hz:.1f} pulses per second"
-            return _working("state_armed", f"armed, {pulses}", cameras, states, rate_hz)
+            return _working("state_armed", f"armed, {pulses}", cameras, states, overloaded, rate_hz)
 
 
 def _working(
@@ -107,15 +116,28 @@ def _working(
     text: str,
     cameras: Sequence[CameraSettings],
     states: Sequence[CameraState],
+    overloaded: Sequence[int],
     rate_hz: float | None = None,
 ) -> Statement:
-    """Armed or recording. If cameras are missing, it works without them, and the statement says so."""
+    """Armed or recording. If cameras are missing, it works without them, and the statement says so.
+
+    A camera that is absent matters more than a slow computer, and a slow computer more than the silence that it causes.
+    """
     missing = [c.name for c, s in zip(cameras, states, strict=True) if s is not CameraState.READY]
     values: dict[str, Value] = {
         "present": len(cameras) - len(missing), "cameras": len(cameras), "missing": ", ".join(missing),
     }  # fmt: skip
     if rate_hz is not None:
         values["rate_hz"] = round(rate_hz, 2)
+    if overloaded and CameraState.ABSENT not in states:
+        late = ", ".join(cameras[index].name for index in overloaded)
+        return Statement(
+            level=Level.WARNING,
+            code=f"{code}_overloaded",
+            text=f"{text}, but this computer is too slow: frames of {late} come too late or get lost",
+            advice=_FASTER,
+            values=values | {"late": late},
+        )
     if not missing:
         return Statement(level=Level.GOOD, code=code, text=text, values=values)
     if len(missing) == len(cameras):

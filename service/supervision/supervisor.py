@@ -18,9 +18,9 @@ from rig.health import Health
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.status import LastJump, State, Status
-from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderOptions, RecorderReport
+from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderHealth, RecorderOptions, RecorderReport
 from service.jumpers.book import JumperBook
-from service.processes.rig_processes import RECORDER, CameraPresence
+from service.processes.rig_processes import ANALYSIS, RECORDER, CameraPresence
 from service.recordings import live_results
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
@@ -30,6 +30,7 @@ from service.status.picture import Facts, picture
 from service.status.statements import FORBIDDEN, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
+from service.supervision.overload import Overload
 from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.state_machine import StateMachine
 from service.supervision.watching import STUCK_S, RecorderWatch, Settling
@@ -110,6 +111,7 @@ class Supervisor:
         self._fault = Fault()
         self._wanted = False
         self._settling, self._watch = Settling(), RecorderWatch()
+        self._overload = Overload(rig.trigger.period_ns)
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
@@ -257,6 +259,7 @@ class Supervisor:
         processes = self._session.processes
         if processes is None or processes.recorder_died:
             self._watch.expect_nothing()
+            self._overload.forget()
         if processes is None:
             select.select([self.commands.bell], [], [], _TURN_S)
             return
@@ -265,6 +268,8 @@ class Supervisor:
                 self._jump_measured(report.jump)
             else:
                 self._hear(report)
+            if isinstance(report, RecorderHealth):
+                self._look_for_overload(report.health, processes.pids)
         if not processes.recorder_died and self._watch.stuck(processes):
             said = phrase("event_recorder_stuck", "no sign of life for {seconds:g} s: it is ended", seconds=STUCK_S)
             self._session.tell(Event.now(Level.FATAL, RECORDER, said))
@@ -276,6 +281,17 @@ class Supervisor:
         if isinstance(report, RecorderFailed) and self.recordings.current is None:
             self._fault.complain(report.error())
         self.recordings.hear(report)
+
+    def _look_for_overload(self, health: Health, pids: dict[str, int]) -> None:
+        """Look whether the computer is too slow, and say so when that begins."""
+        before = self._overload.cameras
+        fetching = {name: pid for name, pid in pids.items() if name != ANALYSIS}
+        self._overload.look(health, fetching, time.monotonic())
+        if self._overload.cameras and not before:
+            late = ", ".join(self.rig.cameras[index].name for index in self._overload.cameras)
+            text = "too slow: frames of {late} come too late or get lost; close other programs"
+            said = phrase("event_too_slow", text, late=late)
+            self._session.tell(Event.now(Level.WARNING, "computer", said))
 
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
@@ -347,6 +363,7 @@ class Supervisor:
             health=self.health,
             warm=processes is not None and processes.warm,
             pulses=self._watch.pulses,
+            overloaded=self._overload.cameras,
             room=room_for(self.rig, free or 0),
             preroll_s=self._recorder.preroll_s,
             holding_s=time.monotonic() - self.recordings.emptied_at,

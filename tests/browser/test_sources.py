@@ -98,7 +98,8 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
         stated |= set(re.findall(r'\bcode="(\w+)"', text))
         stated |= set(re.findall(r'\bcode=.* else "(\w+)"', text))
         stated |= set(re.findall(r'_working\("(\w+)"', text))
-        stated |= {f"{code}_{few}" for code in re.findall(r'_working\("(\w+)"', text) for few in ("partly", "none")}
+        kinds = ("partly", "none", "overloaded")
+        stated |= {f"{code}_{kind}" for code in re.findall(r'_working\("(\w+)"', text) for kind in kinds}
         stated |= set(re.findall(r'_statement\(\s*"(\w+)"', text))
         stated |= set(
             re.findall(r'(?:ProblemError\(|_unauthorized\(|_refuse\(|problem\()\s*(?:[\w.]+, )?"(\w+)"', text)

@@ -20,6 +20,8 @@ export const events = {
   camera_streaming_before: ["sendte bilder allerede før opptaksprosessen ble startet"],
   camera_behind: ["tre pulser bak de andre kameraene; det sees etter det"],
   camera_late: ["bildene kommer for sent, {late_ms} ms etter vanlig tid: forbindelsen er for langsom for dem"],
+  camera_late_together: ["bildene kommer for sent, {late_ms} ms etter vanlig tid, som de fra {others}: denne datamaskinen eller forbindelsen de deler, er for langsom"],
+  event_too_slow: ["for treg: bilder fra {late} kommer for sent eller går tapt; lukk andre programmer"],
   event_overrun: ["puls {pulse}: kameraet så den, men var ennå opptatt med bildet før; gjør eksponeringen kortere eller senk trigger.rate_hz"],
 
   event_started: ["opptaket {recording} begynte"],

@@ -15,6 +15,9 @@ export const statements = {
   state_waiting_none: ["klar, men ingen av de {cameras} kameraene sender bilder", "se på kameraene hva som må gjøres; et opptak ville bli tomt"],
   state_armed_none: ["klar, men ingen av de {cameras} kameraene sender bilder", "se på kameraene hva som må gjøres; et opptak ville bli tomt"],
   state_recording_none: ["tar opp, men ingen av de {cameras} kameraene sender bilder", "se på kameraene hva som må gjøres"],
+  state_waiting_overloaded: ["klar, men denne datamaskinen er for treg: bilder fra {late} kommer for sent eller går tapt", "lukk andre programmer på den; er det ikke nok, senk trigger.rate_hz eller gjør kameraenes utsnitt mindre"],
+  state_armed_overloaded: ["klar, men denne datamaskinen er for treg: bilder fra {late} kommer for sent eller går tapt", "lukk andre programmer på den; er det ikke nok, senk trigger.rate_hz eller gjør kameraenes utsnitt mindre"],
+  state_recording_overloaded: ["tar opp, men denne datamaskinen er for treg: bilder fra {late} kommer for sent eller går tapt", "lukk andre programmer på den; er det ikke nok, senk trigger.rate_hz eller gjør kameraenes utsnitt mindre"],
   state_recording: ["tar opp"],
   state_recording_partly: ["tar opp med {present} av {cameras} kameraer: uten {missing}", "opptaket går likevel; se på kameraet hva som må gjøres"],
 
@@ -31,6 +34,7 @@ export const statements = {
   camera_connecting: ["kobler til {camera}"],
   camera_ready: ["{camera} er klar"],
   camera_silent: ["{camera} sender ingen bilder mens de andre gjør det", "sjekk triggerkabelen; kameraet kobles til på nytt av seg selv"],
+  camera_overloaded: ["bildene fra {camera} kommer for sent: denne datamaskinen er for treg for kameraene", "lukk andre programmer på den; er det ikke nok, senk trigger.rate_hz eller gjør kameraenes utsnitt mindre"],
   camera_absent: ["{camera} er borte", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
   camera_absent_why: ["{camera} er borte: {reason}", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
 

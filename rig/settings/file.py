@@ -31,6 +31,11 @@ def load_rig(path: Path) -> RigSettings:
     if rig.network.curve_key_file is not None:
         keys = (path.parent / rig.network.curve_key_file).resolve()
         absolute["network"] = rig.network.model_copy(update={"curve_key_file": keys})
+    if rig.service.webhook is not None:
+        named = {name: getattr(rig.service.webhook, name) for name in ("url_file", "token_file")}
+        files = {name: (path.parent / file).resolve() for name, file in named.items() if file is not None}
+        webhook = rig.service.webhook.model_copy(update=files)
+        absolute["service"] = rig.service.model_copy(update={"webhook": webhook})
     return rig.model_copy(update=absolute)
 
 

@@ -1,21 +1,20 @@
 """`svev doctor`, `svev schema` and `svev keys`: help with setting up a computer and its rig file."""
 
 from dataclasses import asdict
-from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from recorder.publishing.keys import make_keys
 from rig.settings.file import CONFIG, load_rig, rig_schema
+from service.alarms.delivery import DEADLINE_S
 from svev import console
 from svev.doctor.examination import Probe, firewire_probes, probes, run_probe
-from svev.doctor.finding import Finding, Level, Topic
+from svev.doctor.finding import Finding, Topic
 from svev.doctor.gige_cameras import look_for_cameras
-
-_STYLES: Final = {Level.PASS: "green", Level.WARN: "yellow", Level.FAIL: "bold red"}
-_SOMETHING_FAILS: Final = 3
+from svev.doctor.printing import counts_of, end_with, print_findings
+from svev.doctor.webhook import send_test, target_of
 
 
 def doctor(
@@ -31,6 +30,9 @@ def doctor(
     find: Annotated[
         bool, typer.Option("--find", help="only look for cameras on all networks, and compare them with the rig file")
     ] = False,
+    send: Annotated[
+        bool, typer.Option("--send-test", help="only send a test to the webhook that the rig file names")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Examine computer, network, disk and cameras before a recording: PASS, WARN or FAIL, and what to do.
@@ -45,11 +47,16 @@ def doctor(
     Example: svev doctor --find --rig /etc/svev/rig.toml
 
     Example: svev doctor --bus firewire --rig config/rigs/hill-iidc.toml
+
+    Example: svev doctor --send-test --rig /etc/svev/rig.toml
     """
     usual = "hill-gige.toml" if find else "hill-iidc.toml" if bus else "sim-gige.toml"
     settings = load_rig(rig or CONFIG / "rigs" / usual)
     if find:
         todo = [Probe("discovery", Topic.CAMERAS, lambda: look_for_cameras(settings), limit_s=10.0)]
+    elif send:
+        target = target_of(settings)
+        todo = [Probe("webhook", Topic.NETWORK, lambda: send_test(settings, target), limit_s=3 * DEADLINE_S)]
     else:
         todo = firewire_probes(settings) if bus else probes(settings, out or settings.recorder.directory)
     findings: list[Finding] = []
@@ -57,24 +64,15 @@ def doctor(
         for done, probe in enumerate(todo, start=1):
             findings += run_probe(probe)
             advance(done)
-    counts = {level: sum(finding.level is level for finding in findings) for level in Level}
     if as_json:
-        result = {"rig": settings.name, "findings": [asdict(finding) for finding in findings], "counts": counts}
-        console.print_json(result)
+        counts = counts_of(findings)
+        console.print_json(
+            {"rig": settings.name, "findings": [asdict(finding) for finding in findings], "counts": counts}
+        )
     else:
-        _print(settings.name, findings, counts)
-    if counts[Level.FAIL]:
-        raise typer.Exit(_SOMETHING_FAILS)
-
-
-def _print(rig: str, findings: list[Finding], counts: dict[Level, int]) -> None:
-    console.say(f"examined for: {rig}")
-    for topic, group in groupby(findings, key=lambda finding: finding.topic):
-        console.say(topic)
-        for finding in group:
-            remedy = f" -> {finding.remedy}" if finding.remedy else ""
-            console.say_marked(finding.level, _STYLES[finding.level], finding.what + remedy)
-    console.say(", ".join(f"{count} {level}" for level, count in counts.items()))
+        console.say(f"examined for: {settings.name}")
+        print_findings(findings)
+    end_with(findings)
 
 
 def schema(

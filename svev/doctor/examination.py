@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.settings.model import RigSettings
-from svev.doctor import disk, firewire, gige_cameras, machine, network
+from svev.doctor import disk, firewire, gige_cameras, machine, network, webhook
 from svev.doctor.finding import Finding, Topic, failure
 
 
@@ -42,6 +42,7 @@ def probes(rig: RigSettings, directory: Path) -> list[Probe]:
         Probe("socket buffers", Topic.NETWORK, lambda: network.look_at_socket_buffers(rig)),
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),
         Probe("publication", Topic.NETWORK, lambda: network.look_at_publication(rig)),
+        Probe("webhook", Topic.NETWORK, lambda: webhook.look_at_webhook(rig), limit_s=webhook.LOOK_S + 2),
         Probe("cameras", Topic.CAMERAS, lambda: gige_cameras.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("discovery", Topic.CAMERAS, lambda: gige_cameras.look_for_cameras(rig), limit_s=10.0),

@@ -2,7 +2,8 @@
 
 import logging
 import signal
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,11 @@ from rig.disk import free_bytes
 from rig.events import Event, Level
 from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
-from rig.settings.model import RigSettings
+from rig.settings.model import RigSettings, WebhookSettings
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
+from service.alarms.messenger import Messenger
+from service.alarms.occasions import Occasions
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.jumpers.keeper import Keeper
@@ -89,9 +92,11 @@ def serve(settings: ServiceSettings) -> None:
         exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
         service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, PanelDoctor(rig, data).report)
         server = make_server(create_app(service, settings.access), settings.tls)
-        supervisor.on_turn = _Reporter(
-            supervisor, server, notify, url(listener, "https" if settings.tls else "http")
-        ).report
+        reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
+        supervisor.on_turn = reporter.report
+        if rig.service.webhook is not None:
+            messenger = stack.enter_context(Messenger(rig.service.webhook, hub.tell, service.recording))
+            supervisor.on_turn = _telling(reporter.report, rig.service.webhook, messenger, service)
 
         def end() -> None:
             server.should_exit = True
@@ -120,6 +125,19 @@ def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:
         return supervisor.status.recording is not None
 
     return Exports(data, busy, lambda: usable_bytes(rig, free_bytes(data) or 0))
+
+
+def _telling(
+    report: Callable[[], None], webhook: WebhookSettings, messenger: Messenger, service: Service
+) -> Callable[[], None]:
+    """What the supervisor does at every turn if there is a webhook: report, and tell those who are elsewhere."""
+    occasions = Occasions(webhook.events)
+
+    def turn() -> None:
+        report()
+        messenger.offer(occasions.look(service.status(), time.monotonic()))
+
+    return turn
 
 
 def _tell_of_another_folder(settings: ServiceSettings, rig: RigSettings, hub: EventHub) -> None:

@@ -36,6 +36,12 @@ export const findings = {
   check_fallback_not_writable: ["det kan ikke skrives i {folder} (recorder.fallback_directory): {why}", "rett tilgangen; under systemd tillates det med: sudo systemctl edit svev, [Service] ReadWritePaths="],
   check_fallback_same_disk: ["{folder} (recorder.fallback_directory) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
 
+  check_webhook: ["{host} kan nås for varsler; svev doctor --send-test sender et"],
+  check_webhook_file: ["varsler: {why}", "rett filen; varsler sendes ikke før det er gjort"],
+  check_webhook_away: ["{host} kan ikke nås for varsler ({why})", "se om denne datamaskinen har en vei dit; varslene venter til den kan nås"],
+  check_webhook_test: ["{host} tok imot prøven: se om den viser den"],
+  check_webhook_no_test: ["prøven på et varsel kom ikke fram: {why}", "rett det, og send prøven igjen"],
+
   check_plain_sockets: ["bildene tas imot gjennom vanlige sokler, som passer for langsomme kameraer"],
   check_packet_sockets: ["bildene tas imot gjennom pakkesokler"],
   check_no_packet_sockets: ["ikke lov til pakkesokler (CAP_NET_RAW): mottak koster flere ganger så mye prosessortid", "kjør svev som root, eller med: sudo setpriv --reuid=$USER --regid=$USER --init-groups --inh-caps=+net_raw --ambient-caps=+net_raw \"$(which svev)\" record ..."],

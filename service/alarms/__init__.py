@@ -1,0 +1,1 @@
+"""Tells people who are elsewhere what befalls the rig: notifications by webhook."""

@@ -290,7 +290,11 @@ class Recording(Model):
     deleted: bool = False
     favourite: bool = False
     tags: tuple[str, ...] = ()
+    more: dict[str, str] = Field(
+        {}, description="what the start list had of the jumper beside the session fields: round, club, own columns"
+    )
     continues: str = Field("", description="id of the recording of which this is the next part; empty: of none")
+    continued_by: str = Field("", description="id of the recording that is the next part of this one; empty: none here")
 
 
 class Sorting(StrEnum):

@@ -112,7 +112,7 @@ class Service(Archive):
         """Change session fields, also of the recording in progress."""
         entry = self._catalogue.change_session(recording_id, change.texts())
         note = partial(self._supervisor.recordings.change_session, recording_id, change.fields())
-        return self._supervisor.commands.ask(at_once(note), _SOON_S) or as_recording(entry)
+        return self._supervisor.commands.ask(at_once(note), _SOON_S) or self._with_next_part(entry)
 
     def delete_recording(self, recording_id: str) -> Recording:
         """Put a recording into the trash."""
@@ -123,11 +123,11 @@ class Service(Archive):
 
         if self._supervisor.commands.ask(at_once(in_progress), _SOON_S):
             raise StateForbidsError(f"recording {recording_id} is in progress: stop it before deleting it")
-        return as_recording(self._catalogue.delete(recording_id))
+        return self._with_next_part(self._catalogue.delete(recording_id))
 
     def restore_recording(self, recording_id: str) -> Recording:
         """Take a recording out of the trash."""
-        return as_recording(self._catalogue.restore(recording_id))
+        return self._with_next_part(self._catalogue.restore(recording_id))
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
         """Wait for a triplet of another pulse than `newer_than`; None if none came in time."""

@@ -21,7 +21,7 @@ from rig.start_list import (
 )
 from rig.status import NextJumper, RecordingOrder, SessionFields, Statement
 from service.jumpers import moves
-from service.jumpers.keeper import Keeper
+from service.jumpers.keeper import Change, Keeper
 from service.jumpers.table import Table, read_table
 
 _UNDO_MAX: Final = 30
@@ -53,9 +53,9 @@ class JumperBook:
     def __init__(self, keeper: Keeper | None = None, changed: Callable[[], None] = lambda: None) -> None:
         self._keeper, self._changed = keeper, changed
         self._lock = threading.Lock()
-        self._list = keeper.load() if keeper is not None else StartList()
+        self._list, changes = keeper.load() if keeper is not None else (StartList(), ())
         self.shown = self._list.next
-        self._before: deque[tuple[Statement, StartList]] = deque(maxlen=_UNDO_MAX)
+        self._changes = deque(changes, maxlen=_UNDO_MAX)
         self._taken: _Taken | None = None
 
     def view(self) -> StartList:
@@ -229,9 +229,9 @@ class JumperBook:
                 raise ChangedMeanwhileError(
                     "the start list has changed since: look at it, then undo what is to be undone"
                 )
-            if not self._before:
-                raise StateForbidsError("there is nothing to undo: the start list is as the service found it")
-            _, before = self._before.pop()
+            if not self._changes:
+                raise StateForbidsError("there is nothing to undo: no earlier start list is kept")
+            before = self._changes.pop().before
             number = self._list.next.number + 1
             back = before.model_copy(update={"next": before.next.model_copy(update={"number": number})})
             self._taken = None
@@ -241,14 +241,14 @@ class JumperBook:
     def _put(self, changed: StartList, said: Statement | None = None) -> None:
         """Make a list the present one, and give it to the keeper; `said`: it can be undone."""
         if said is not None:
-            self._before.append((said, self._list))
+            self._changes.append(Change(said=said, before=self._list))
         version = self._list.version + 1
-        undo = self._before[-1][0] if self._before else None
+        undo = self._changes[-1].said if self._changes else None
         update = {"version": version, "undo": undo, "next": changed.next.model_copy(update={"version": version})}
         self._list = changed.model_copy(update=update)
         self.shown = self._list.next
         if self._keeper is not None:
-            self._keeper.keep(self._list)
+            self._keeper.keep(self._list, tuple(self._changes))
 
     def _done(self) -> StartList:
         """Tell of a change that a caller has made, and wait a little until it is kept."""

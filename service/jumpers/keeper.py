@@ -1,4 +1,8 @@
-"""Keeps the start list in a file of the recordings' folder, so that a service that is started again goes on with it."""
+"""Keeps the start list in a file of the recordings' folder, so that a service that is started again goes on with it.
+
+The lists to which the last changes can be undone stand in a file of their own: an older version of the service, after a
+roll-back, reads the list all the same.
+"""
 
 import os
 import threading
@@ -12,8 +16,24 @@ from pydantic import ValidationError
 from rig.events import Event, Level
 from rig.phrase import phrase, plain
 from rig.start_list import StartList
+from rig.status import Model, Statement
 
 NAME: Final = ".svev-start-list.json"
+UNDO_NAME: Final = ".svev-start-list-undo.json"
+
+
+class Change(Model):
+    """A change that can be undone: what it was, and the list before it."""
+
+    said: Statement
+    before: StartList
+
+
+class _Changes(Model):
+    """The changes that led to a version of the start list, oldest first."""
+
+    version: int
+    changes: tuple[Change, ...]
 
 
 class Keeper:
@@ -27,25 +47,37 @@ class Keeper:
     """
 
     def __init__(self, folder: Path, tell: Callable[[Event], None]) -> None:
-        self._path, self._tell = folder / NAME, tell
+        self._path, self._undo_path, self._tell = folder / NAME, folder / UNDO_NAME, tell
         self._changed = threading.Condition()
-        self._waiting: StartList | None = None
+        self._waiting: tuple[StartList, tuple[Change, ...]] | None = None
         self._busy = self._failed = False
 
-    def load(self) -> StartList:
-        """The list that was kept; an empty one if there is none. A file that cannot be read is put aside."""
+    def load(self) -> tuple[StartList, tuple[Change, ...]]:
+        """The list that was kept, with the changes that can be undone; an empty one if there is none.
+
+        A file that cannot be read is put aside.
+        """
         try:
             found = StartList.model_validate_json(self._path.read_bytes())
         except FileNotFoundError:
-            return StartList()
+            return StartList(), ()
         except (OSError, ValidationError) as error:
-            return self._put_aside(error)
-        return found.model_copy(update={"undo": None})
+            return self._put_aside(error), ()
+        changes = self._load_changes(found.version)
+        return found.model_copy(update={"undo": changes[-1].said if changes else None}), changes
 
-    def keep(self, start_list: StartList) -> None:
-        """Begin to write a list."""
+    def _load_changes(self, version: int) -> tuple[Change, ...]:
+        """The changes that led to this version; none if another version of the service has changed the list since."""
+        try:
+            found = _Changes.model_validate_json(self._undo_path.read_bytes())
+        except (OSError, ValidationError):  # the list itself is what matters
+            return ()
+        return found.changes if found.version == version else ()
+
+    def keep(self, start_list: StartList, changes: tuple[Change, ...]) -> None:
+        """Begin to write a list, and the changes that can be undone, oldest first."""
         with self._changed:
-            self._waiting = start_list
+            self._waiting = start_list, changes
             if not self._busy:
                 self._busy = True
                 threading.Thread(target=self._run, name="start list", daemon=True).start()
@@ -61,26 +93,29 @@ class Keeper:
     def _run(self) -> None:
         while True:
             with self._changed:
-                start_list, self._waiting = self._waiting, None
-                if start_list is None:
+                found, self._waiting = self._waiting, None
+                if found is None:
                     self._busy = False
                     self._changed.notify_all()
                     return
             try:
-                self._write(start_list.model_dump_json(indent=1).encode())
+                start_list, changes = found
+                self._write(self._path, start_list.model_dump_json(indent=1).encode())
+                kept = _Changes(version=start_list.version, changes=changes)
+                self._write(self._undo_path, kept.model_dump_json().encode())
             except OSError as error:
                 self._lament(error)
             else:
                 self._failed = False
 
-    def _write(self, content: bytes) -> None:
-        new = self._path.with_suffix(".new")
-        self._path.parent.mkdir(parents=True, exist_ok=True)
+    def _write(self, path: Path, content: bytes) -> None:
+        new = path.with_suffix(".new")
+        path.parent.mkdir(parents=True, exist_ok=True)
         with new.open("wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        new.replace(self._path)
+        new.replace(path)
 
     def _lament(self, error: OSError) -> None:
         """Say once that the list is not kept, until it is again."""

@@ -1,7 +1,7 @@
 """Reads the recordings in the service's folder and describes them for the panel, each with its verdict."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -35,7 +35,7 @@ from rig.tag import TripletTag
 from service.exports.jobs import Exports
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
-from service.recordings.listing import find, is_favourite, tags_of, utc
+from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
 from service.recordings.notes import noted, notes_of
 from service.seam import Download, FoundRecordings
 from triggering.ledger import pauses_in_words
@@ -85,13 +85,20 @@ class Archive(ABC):
         current = self.status().recording
         entries = self._catalogue.entries(deleted=query.deleted)
         found = find(entries, query, lambda entry: self._described(entry).verdict.level)
-        shown = [self._described(entry) for entry in found.entries]
+        following = _following(entries)
+        shown = [_pointing_on(self._described(entry), following) for entry in found.entries]
         return FoundRecordings(found.total, [current if current and each.id == current.id else each for each in shown])
 
     def recording(self, recording_id: str) -> Recording:
         """One recording, in the trash or not."""
         current = self.status().recording
-        return current if current and current.id == recording_id else as_recording(self._catalogue.entry(recording_id))
+        if current and current.id == recording_id:
+            return current
+        return self._with_next_part(self._catalogue.entry(recording_id))
+
+    def _with_next_part(self, entry: Entry) -> Recording:
+        """Describe an entry, with the id of the recording that goes on with it."""
+        return _pointing_on(as_recording(entry), _following(self._catalogue.entries(deleted=entry.deleted)))
 
     def _described(self, entry: Entry) -> Recording:
         """Describe an entry for the panel, unless that was done before: the catalogue gives the same object then."""
@@ -214,8 +221,20 @@ def as_recording(entry: Entry) -> Recording:
         deleted=entry.deleted,
         favourite=is_favourite(entry),
         tags=tags_of(entry),
+        more=more_of(entry.session),
         continues=entry.session.get(CONTINUES, "")[:_LONGEST_SHOWN],
     )
+
+
+def _following(entries: Sequence[Entry]) -> dict[str, str]:
+    """Id of the next part by the id of a recording: only the later log says what it continues."""
+    return {entry.session[CONTINUES]: entry.id for entry in entries if CONTINUES in entry.session}
+
+
+def _pointing_on(recording: Recording, following: Mapping[str, str]) -> Recording:
+    """A recording with the id of its next part, if it has one."""
+    by = following.get(recording.id)
+    return recording if by is None else recording.model_copy(update={"continued_by": by})
 
 
 def _as_trash(contents: TrashContents) -> Trash:

@@ -10,6 +10,7 @@ from rig.errors import SvevError
 from rig.status import Counts, Level, Recording, RecordingState, SessionChange, SessionFields, Statement
 from rig.transport.messages import RecordingFinished, RecordingProgress, RecordingStarted, StartRecording
 from service.recordings.interruption import Interruption
+from service.recordings.listing import more_of
 
 #: How a recording ended: the recorder's report, or the error that ended it.
 Outcome = RecordingFinished | SvevError
@@ -144,4 +145,6 @@ class RecordingInProgress:
             counts=counts,
             session=self.session,
             verdict=verdict,
+            more=more_of(self.order.session),
+            continues=self.ids[-2] if len(self.ids) > 1 else "",
         )

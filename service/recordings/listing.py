@@ -1,17 +1,27 @@
 """Finds and sorts recordings of the catalogue for a list."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import islice
 from typing import Any, Final
 
 from recorder.catalogue.entry import Entry
+from recorder.log.extent import CONTINUES, CONTINUES_AFTER
 from rig.clocks import NS_PER_S, UtcNs
-from rig.status import LONGEST_TAG, Level, RecordingQuery, Sorting
+from rig.start_list import COLUMN_NAME_MAX, COLUMNS_MAX
+from rig.status import LONGEST_LINE, LONGEST_TAG, Level, RecordingQuery, SessionFields, Sorting
+from service.recordings.notes import NOTE_FIELD
 
 #: What a search looks at, beside the id.
 _SEARCHED: Final = ("bib", "athlete", "notes", "gate", "tags")
 _FAR: Final = 1 << 63
+#: Session fields of which the program itself makes something.
+_PROGRAMS: Final = frozenset(
+    {*SessionFields.model_fields, "recording", "session", "tags", "favourite", CONTINUES, CONTINUES_AFTER}
+)
+#: What the start list says of a jumper beside the own columns.
+_BESIDE_COLUMNS: Final = ("round", "club")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +55,19 @@ def find(entries: Iterable[Entry], query: RecordingQuery, level: Callable[[Entry
 def tags_of(entry: Entry) -> tuple[str, ...]:
     """The tags that people gave to a recording."""
     return tuple(filter(None, (tag.strip()[:LONGEST_TAG] for tag in entry.session.get("tags", "").split(","))))
+
+
+def more_of(session: Mapping[str, str]) -> dict[str, str]:
+    """What the start list had of the jumper: the fields of a session that are none of the program's own.
+
+    No more and no longer than a start list can have: a log that somebody else has made may hold anything.
+    """
+    own = (
+        (name, text[:LONGEST_LINE])
+        for name, text in session.items()
+        if name not in _PROGRAMS and not name.startswith(NOTE_FIELD) and len(name) <= COLUMN_NAME_MAX and text
+    )
+    return dict(islice(own, COLUMNS_MAX + len(_BESIDE_COLUMNS)))
 
 
 def is_favourite(entry: Entry) -> bool:

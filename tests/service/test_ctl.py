@@ -47,14 +47,15 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         ended = _json(_ctl(url, "stop", "--json", token=TOKEN))
         assert (ended["id"], ended["state"], ended["session"]["bib"]) == (begun["id"], "finished", "17")
         assert _json(_ctl(url, "session", begun["id"], "--bib", "18", "--json", token=TOKEN))["session"]["bib"] == "18"
-        (tmp_path / "list.csv").write_bytes("bib;navn;klubb\n17;Åse;Lyn\n19;Eva;\n".encode("latin-1"))
+        (tmp_path / "list.csv").write_bytes("bib;navn;klubb;klasse\n17;Åse;Lyn;J18\n19;Eva;;K\n".encode("latin-1"))
         loaded = _ctl(url, "startlist", "load", str(tmp_path / "list.csv"), token=TOKEN).stdout
-        assert loaded.splitlines()[1:] == ["next       17  Åse, Lyn", "waiting    19  Eva"]
+        assert loaded.splitlines()[1:] == ["next       17  Åse, Lyn, J18", "waiting    19  Eva, K"]
         assert _ctl(url, "skip", token=TOKEN).stdout.splitlines()[1].startswith("skipped ")
-        assert _ctl(url, "next", "--gate", "11", token=TOKEN).stdout == "athlete Eva  bib 19  gate 11\n"
+        assert _ctl(url, "next", "--gate", "11", token=TOKEN).stdout == "athlete Eva  bib 19  gate 11  klasse K\n"
         saved = _json(_ctl(url, "save", "--seconds", "1", "--json", token=TOKEN))
         assert 0 < saved["counts"]["pulses"] <= 33
         assert (saved["session"]["athlete"], saved["session"]["gate"]) == ("Eva", "11")
+        assert (saved["more"], begun["more"]) == ({"klasse": "K", "round": "1"}, {})
         listed = _ctl(url, "list", token=TOKEN).stdout
         assert [line.split()[0] for line in listed.splitlines()] == [saved["id"], begun["id"]]
         assert "[18 Ola]" in listed

@@ -28,7 +28,7 @@ def test_a_recording_goes_on_after_the_death_of_its_recorder(
         status = _await_notice(service, "recording_resumed", "recording_resumed_whole")
         assert status["state"] == "recording"
         assert status["recording"]["id"] == f"{recording['id']}-part2"
-        assert status["recording"]["session"]["bib"] == "18"
+        assert (status["recording"]["session"]["bib"], status["recording"]["continues"]) == ("18", recording["id"])
         service.await_pulses(status["recording"]["counts"]["pulses"] + 20)
         ended = service.post(f"/api/recordings/{recording['id']}-part2/stop")
         after = service.await_state("armed")
@@ -36,6 +36,10 @@ def test_a_recording_goes_on_after_the_death_of_its_recorder(
         assert ended["continues"] == recording["id"]
         left = service.get(f"/api/recordings/{recording['id']}")
         assert (left["state"], left["session"]["bib"]) == ("unfinished", "18")
+        assert (left["continued_by"], ended["continued_by"]) == (ended["id"], "")
+        assert service.call("PATCH", f"/api/recordings/{left['id']}", {"gate": "9"})[1]["continued_by"] == ended["id"]
+        listed = {each["id"]: each["continued_by"] for each in service.get("/api/recordings")}
+        assert listed == {recording["id"]: ended["id"], ended["id"]: ""}
     first, second = (tmp_path / "data" / f"{recording['id']}{part}.mcap" for part in ("", "-part2"))
     before, account = verify(first), verify(second)
     assert not before.closed

@@ -89,7 +89,9 @@
  * @property {boolean} deleted
  * @property {boolean} favourite
  * @property {string[]} tags
+ * @property {Record<string, string>} more round, club and own columns of the start list
  * @property {string} continues id of the recording of which this is the next part
+ * @property {string} continued_by id of the recording that is the next part of this one
  *
  * @typedef {object} Trash
  * @property {number} recordings

@@ -2,24 +2,28 @@
 
 Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, `doctor` found a FAIL, or a network is not solvable,
 4 storage failed or an adjustment did not converge, 5 a camera failed, 6 one of our processes died, 130 interrupted.
-`--debug` anywhere on the command line shows the traceback of an error.
+`--debug` anywhere on the command line shows the traceback of an error. With `--json` an error of `svev ctl` is a JSON
+object on standard output, too.
 """
 
 import errno
 import os
+import re
 import resource
 import sys
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import version
 from io import StringIO
 from typing import Annotated, Any, Final
 
 import typer
+from typer._completion_classes import completion_init
 
 from rig.errors import BadInputError, SvevError
 from svev import console
+from svev.commands.completion import COMPLETE_VARIABLE
 
 #: Commands in the order of the help: module in `svev.commands`, function in it, one line of help. Only the module of
 #: the called command is imported, so that `svev ctl` starts at once, and `record` and `serve` load no analysis.
@@ -28,6 +32,7 @@ _COMMANDS: Final = {
     "record": ("record", "record", "Record once with the cameras of a rig file."),
     "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
     "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
+    "completion": ("completion", "completion", "Have the shell complete commands and options."),
     "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
     "cameras": ("cameras", "app", "Find GigE Vision cameras, give them addresses."),
     "keys": ("setup", "keys", "Make keys that protect published images."),
@@ -102,14 +107,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     argv = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in argv
     argv = [argument for argument in argv if argument != "--debug"]
+    as_json = argv[:1] == ["ctl"] and "--json" in argv
     try:
         _allow_open_files()
-        command = command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)
+        if COMPLETE_VARIABLE in os.environ:
+            command = _completed(os.environ)
+        else:
+            command = command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)
         code = command(argv, prog_name="svev", standalone_mode=False)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 1
     except _USAGE_ERROR as error:
-        return _explain_usage(error)
+        return _explain_usage(error, as_json=as_json)
     except BrokenPipeError:
         # The reader of our output has gone: a message would reach nobody.
         sys.stderr.close()
@@ -118,8 +127,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if debug:
             traceback.print_exc()
         console.complain(_one_line(error))
-        return error.exit_code if isinstance(error, SvevError) else 2
+        code = error.exit_code if isinstance(error, SvevError) else 2
+        if as_json:
+            console.print_json_line({"error": _one_line(error), "exit_code": code})
+        return code
     return code if isinstance(code, int) else 0  # a number: --help, or a command that ends with a code of its own
+
+
+def _completed(environment: Mapping[str, str]) -> typer.Typer:
+    """The command line that completes itself for a shell: all names, or one command with its options.
+
+    Args:
+        environment: holds the words until the cursor, in the form of each shell.
+    """
+    completion_init()
+    words = re.split(r"[ \n]", environment.get("COMP_WORDS") or environment.get("_TYPER_COMPLETE_ARGS", ""))
+    if len(words) > 2 and words[1] in _COMMANDS:
+        return command_line(words[1:2])
+    app = typer.Typer(name="svev", add_completion=False)
+    for name, (_, _, short_help) in _COMMANDS.items():
+        app.command(name, short_help=short_help)(_every_command)
+    return app
 
 
 def _allow_open_files() -> None:
@@ -140,7 +168,7 @@ def _allow_open_files() -> None:
         )
 
 
-def _explain_usage(error: Any) -> int:
+def _explain_usage(error: Any, *, as_json: bool) -> int:
     """Print what is wrong with the command line.
 
     Returns:
@@ -151,6 +179,8 @@ def _explain_usage(error: Any) -> int:
     for line in text.getvalue().rstrip("\n").split("\n"):
         console.say(line, aside=True)
     code: int = error.exit_code
+    if as_json:
+        console.print_json_line({"error": error.format_message(), "exit_code": code})
     return code
 
 

@@ -56,6 +56,12 @@ def print_json(result: dict[str, Any]) -> None:
     sys.stdout.flush()
 
 
+def print_json_line(result: dict[str, Any]) -> None:
+    """Print one of many results as a JSON object on one line, at once."""
+    sys.stdout.write(json.dumps(result) + "\n")
+    sys.stdout.flush()
+
+
 def complain(line: str) -> None:
     """Print an error as one line on standard error."""
     _stderr.print(f"svev: {visible(line)}", style="bold red", markup=False)

@@ -2,7 +2,6 @@
 
 import time
 import urllib.parse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -11,15 +10,19 @@ import typer
 from rig.errors import BadInputError, CameraError, SvevError
 from svev import console
 from svev.answers import jumper_lines, recording_lines, recordings_lines, start_list_lines, status_lines
+from svev.calling import AnywhereGroup, Json, call, client_of, path_of, show
+from svev.commands.ctl_watching import doctor, log
 from svev.fetch import fetch
 from svev.rest_client import RestClient, read_token
 
 _POLL_S: Final = 0.2
 
 app = typer.Typer(
+    cls=AnywhereGroup,
     help="Operate a running service (svev serve): arm, record, stop, list.",
     epilog="Exit codes: 0 done, 1 not possible in this state, 2 bad input or token, 4 no room, 5 a camera fault, "
-    "6 the service does not answer. Example: svev ctl arm && svev ctl start --athlete 'Ola Nordmann' --bib 17",
+    "6 the service does not answer; with --json errors are JSON too. --url and --token-file may stand anywhere. "
+    "Example: svev ctl arm && svev ctl start --athlete 'Ola Nordmann' --bib 17",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -32,12 +35,13 @@ start_list_app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(start_list_app, name="startlist")
+app.command()(log)
+app.command()(doctor)
 
 Id = Annotated[str, typer.Argument(help="id of the recording, see svev ctl list")]
 Wait = Annotated[
     float, typer.Option("--wait", min=0, max=600, help="wait at most so long until it is done; 0: not at all")
 ]
-Json = Annotated[bool, typer.Option("--json", help="print the service's answer as one JSON object")]
 Text = Annotated[str | None, typer.Option()]
 
 
@@ -59,7 +63,7 @@ def status(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl status
     """
-    _show(_call(context, "GET", "/api/status"), status_lines, as_json)
+    show(call(context, "GET", "/api/status"), status_lines, as_json)
 
 
 @app.command()
@@ -68,8 +72,8 @@ def arm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -> N
 
     Example: svev ctl arm
     """
-    answer = _call(context, "POST", "/api/arm")
-    _show(_awaited(context, answer, "arming", wait_s), status_lines, as_json)
+    answer = call(context, "POST", "/api/arm")
+    show(_awaited(context, answer, "arming", wait_s), status_lines, as_json)
 
 
 @app.command()
@@ -78,8 +82,8 @@ def disarm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -
 
     Example: svev ctl disarm
     """
-    answer = _call(context, "POST", "/api/disarm")
-    _show(_awaited(context, answer, "disarming", wait_s), status_lines, as_json)
+    answer = call(context, "POST", "/api/disarm")
+    show(_awaited(context, answer, "disarming", wait_s), status_lines, as_json)
 
 
 @app.command()
@@ -105,7 +109,7 @@ def start(
     """
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=preroll, duration_s=seconds)
-    _show(_call(context, "POST", "/api/recordings", order), recording_lines, as_json)
+    show(call(context, "POST", "/api/recordings", order), recording_lines, as_json)
 
 
 @app.command()
@@ -121,11 +125,11 @@ def stop(
     Example: svev ctl stop
     """
     if not recording:
-        current = _call(context, "GET", "/api/status")["recording"]
+        current = call(context, "GET", "/api/status")["recording"]
         if current is None:
             raise SvevError("no recording is in progress: see svev ctl list")
         recording = current["id"]
-    _show(_call(context, "POST", f"{_path(recording)}/stop"), recording_lines, as_json)
+    show(call(context, "POST", f"{path_of(recording)}/stop"), recording_lines, as_json)
 
 
 @app.command()
@@ -148,8 +152,8 @@ def save(
     """
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=seconds, duration_s=0)
-    recording = _call(context, "POST", "/api/recordings", order)
-    _show(_call(context, "POST", f"{_path(recording['id'])}/stop"), recording_lines, as_json)
+    recording = call(context, "POST", "/api/recordings", order)
+    show(call(context, "POST", f"{path_of(recording['id'])}/stop"), recording_lines, as_json)
 
 
 @app.command("list")
@@ -164,8 +168,8 @@ def list_(
     Example: svev ctl list --search "17 nordmann"
     """
     wanted = urllib.parse.urlencode({"deleted": str(deleted).lower(), "search": search})
-    found = _call(context, "GET", f"/api/recordings?{wanted}")
-    _show({"recordings": found}, recordings_lines, as_json)
+    found = call(context, "GET", f"/api/recordings?{wanted}")
+    show({"recordings": found}, recordings_lines, as_json)
 
 
 @app.command()
@@ -185,7 +189,7 @@ def session(
     Example: svev ctl session 2026-02-14T10-15-30Z --bib 18
     """
     change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
-    _show(_call(context, "PATCH", _path(recording), change), recording_lines, as_json)
+    show(call(context, "PATCH", path_of(recording), change), recording_lines, as_json)
 
 
 @app.command("next")
@@ -205,7 +209,7 @@ def next_(
     """
     change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     method, body = ("PATCH", change) if change else ("GET", None)
-    _show(_call(context, method, "/api/next-jumper", body), jumper_lines, as_json)
+    show(call(context, method, "/api/next-jumper", body), jumper_lines, as_json)
 
 
 @app.command()
@@ -214,7 +218,7 @@ def skip(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl skip
     """
-    _show(_call(context, "POST", "/api/next-jumper/skip"), start_list_lines, as_json)
+    show(call(context, "POST", "/api/next-jumper/skip"), start_list_lines, as_json)
 
 
 @start_list_app.command("show")
@@ -223,7 +227,7 @@ def show_start_list(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl startlist show
     """
-    _show(_call(context, "GET", "/api/start-list"), start_list_lines, as_json)
+    show(call(context, "GET", "/api/start-list"), start_list_lines, as_json)
 
 
 @start_list_app.command("load")
@@ -240,7 +244,7 @@ def load_start_list(
         content = table.read_bytes()
     except OSError as error:
         raise BadInputError(f"{table}: cannot be read ({error.strerror}); correct the path") from None
-    _show(_call(context, "PUT", "/api/start-list", content), start_list_lines, as_json)
+    show(call(context, "PUT", "/api/start-list", content), start_list_lines, as_json)
 
 
 @start_list_app.command("undo")
@@ -249,7 +253,7 @@ def undo(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl startlist undo
     """
-    _show(_call(context, "POST", "/api/start-list/undo"), start_list_lines, as_json)
+    show(call(context, "POST", "/api/start-list/undo"), start_list_lines, as_json)
 
 
 @app.command()
@@ -258,7 +262,7 @@ def delete(context: typer.Context, recording: Id, as_json: Json = False) -> None
 
     Example: svev ctl delete 2026-02-14T10-15-30Z
     """
-    _show(_call(context, "DELETE", _path(recording)), recording_lines, as_json)
+    show(call(context, "DELETE", path_of(recording)), recording_lines, as_json)
 
 
 @app.command()
@@ -267,7 +271,7 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
 
     Example: svev ctl restore 2026-02-14T10-15-30Z
     """
-    _show(_call(context, "POST", f"{_path(recording)}/restore"), recording_lines, as_json)
+    show(call(context, "POST", f"{path_of(recording)}/restore"), recording_lines, as_json)
 
 
 @app.command()
@@ -283,15 +287,17 @@ def download(
 
     Example: svev ctl download 2026-02-14T10-15-30Z -o jumps
     """
-    client: RestClient = context.obj
+    client = client_of(context)
     if not folder.is_dir():
         raise BadInputError(f"{folder}: no such folder; make it, or choose another one with -o")
     found = []
     for recording in recordings:
         with console.progress(f"fetching {recording}", 100) as advance:
-            path = fetch(client, f"{_path(recording)}/file", folder, lambda have, of: advance(have * 100 // max(1, of)))
+            path = fetch(
+                client, f"{path_of(recording)}/file", folder, lambda have, of: advance(have * 100 // max(1, of))
+            )
         found.append(str(path))
-    _show({"files": found}, lambda answer: answer["files"], as_json)
+    show({"files": found}, lambda answer: answer["files"], as_json)
 
 
 @app.command()
@@ -308,22 +314,9 @@ def trash(
     if empty and remove:
         raise BadInputError("--empty removes everything, --remove one recording: give one of the two")
     path = f"/api/trash/{urllib.parse.quote(remove, safe='')}" if remove else "/api/trash"
-    answer = _call(context, "DELETE" if empty or remove else "GET", path)
+    answer = call(context, "DELETE" if empty or remove else "GET", path)
     words = "removed for good" if empty or remove else "in the trash"
-    _show(answer, lambda what: [f"{what['recordings']} recordings {words}, {what['bytes'] / 1e9:.2f} GB"], as_json)
-
-
-def _call(context: typer.Context, method: str, path: str, body: dict[str, object] | bytes | None = None) -> Any:
-    client: RestClient = context.obj
-    return client.call(method, path, body)
-
-
-def _show(answer: Any, words: Callable[[Any], list[str]], as_json: bool) -> None:
-    if as_json:
-        console.print_json(answer)
-        return
-    for line in words(answer):
-        console.say(line)
+    show(answer, lambda what: [f"{what['recordings']} recordings {words}, {what['bytes'] / 1e9:.2f} GB"], as_json)
 
 
 def _awaited(context: typer.Context, answer: dict[str, Any], passing: str, wait_s: float) -> dict[str, Any]:
@@ -338,7 +331,7 @@ def _awaited(context: typer.Context, answer: dict[str, Any], passing: str, wait_
         if time.monotonic() > deadline:
             raise SvevError(f"still {passing} after {wait_s:g} s: {answer['statement']['text']}; see svev ctl status")
         time.sleep(_POLL_S)
-        answer = _call(context, "GET", "/api/status")
+        answer = call(context, "GET", "/api/status")
     if answer["state"] == "fault":
         raise CameraError(f"{answer['statement']['text']}; {answer['statement']['advice']}")
     return answer
@@ -346,7 +339,3 @@ def _awaited(context: typer.Context, answer: dict[str, Any], passing: str, wait_
 
 def _given(**fields: object) -> dict[str, object]:
     return {name: value for name, value in fields.items() if value is not None}
-
-
-def _path(recording: str) -> str:
-    return f"/api/recordings/{urllib.parse.quote(recording, safe='')}"

@@ -2,10 +2,14 @@
 
 import json
 import os
+import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from recorder.checking.verify import verify
 from recorder.reading.info import info
@@ -89,3 +93,84 @@ def test_nobody_there_is_said_in_one_line(loopback: Loopback) -> None:
     assert "start it with svev serve" in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert _ctl("ftp://somewhere", "status").returncode == 2
+
+
+def test_what_the_service_tells_is_shown_once_or_followed(tmp_path: Path, loopback: Loopback) -> None:
+    """With the address behind the command, and names that a terminal would obey written out."""
+    rig = write_rig(tmp_path, "sim", loopback)
+    evil = tmp_path / "\x1b[31mred"
+    with serving(tmp_path, rig, loopback, data=evil) as service:
+        service.arm()
+        at = ("--url", service.url)
+        shown = _ctl("http://nowhere.invalid", "log", "--once", *at)
+        assert shown.returncode == 0, shown.stderr
+        assert re.search(r"^\d\d:\d\d:\d\d info    service: arming -> armed$", shown.stdout, re.MULTILINE)
+        assert "\x1b" not in shown.stdout
+        command = [sys.executable, "-m", "svev", "ctl", "log", f"--url={service.url}", "--json"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as following:
+            assert following.stdout is not None
+            before = [json.loads(following.stdout.readline())["message"] for _ in range(2)]
+            recording = service.post("/api/recordings")["id"]
+            service.post(f"/api/recordings/{recording}/stop", {"confirm": True})
+            after = []
+            while f"recording {recording} started" not in after:
+                after.append(json.loads(following.stdout.readline())["message"])
+            service.signal(signal.SIGTERM)
+            assert service.exit_code() == 0
+            assert following.wait(60) == 6
+            assert following.stderr is not None
+            assert "start it with svev serve" in following.stderr.read()
+        assert before
+
+
+def test_the_service_examines_and_errors_are_json_too(tmp_path: Path, loopback: Loopback) -> None:
+    rig = write_rig(tmp_path, "sim", loopback)
+    with serving(tmp_path, rig, loopback) as service:
+        examined = _ctl(service.url, "doctor", "--json")
+        found = json.loads(examined.stdout)
+        assert examined.returncode == (3 if found["worst"] == "FAIL" else 0), examined.stderr
+        shown = _ctl(service.url, "doctor")
+        assert shown.returncode == examined.returncode
+        assert " PASS, " in shown.stdout.splitlines()[-1]
+        refused = _ctl(service.url, "start", "--json")
+        assert json.loads(refused.stdout) == {
+            "error": "the rig is not armed: arm it, then start recording", "exit_code": 1,
+        }  # fmt: skip
+        assert refused.returncode == 1
+    gone = _ctl(service.url, "status", "--json")
+    assert (gone.returncode, json.loads(gone.stdout)["exit_code"]) == (6, 6)
+    wrong = _ctl(service.url, "stop", "--jsno", "--json")
+    assert (wrong.returncode, "--jsno" in json.loads(wrong.stdout)["error"]) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("svev ctl dow", {"download"}),
+        ("svev rec", {"record", "recover"}),
+        ("svev ctl save --b", {"--bib"}),
+        ("svev ctl startlist ", {"load", "show", "undo"}),
+    ],
+)
+def test_bash_completes_commands_and_options(tmp_path: Path, line: str, offered: set[str]) -> None:
+    """In a real bash, by the script that svev prints."""
+    (tmp_path / "svev").write_text(f'#!/bin/sh\nexec {sys.executable} -m svev "$@"\n')
+    (tmp_path / "svev").chmod(0o755)
+    script = """
+        eval "$(svev completion bash)"
+        read -ra COMP_WORDS <<< "$1"
+        [[ "$1" == *" " ]] && COMP_WORDS+=("")
+        COMP_CWORD=$(( ${#COMP_WORDS[@]} - 1 ))
+        _svev_completion svev
+        printf '%s\\n' "${COMPREPLY[@]}"
+    """
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        ["/bin/bash", "-c", script, "bash", line],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env=environment,
+    )
+    assert (set(done.stdout.split()), done.stderr) == (offered, "")

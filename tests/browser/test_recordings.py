@@ -216,3 +216,17 @@ def test_two_jumps_stand_side_by_side_aligned_at_their_take_offs(
     expect(page.locator("#other-frames")).to_have_class(re.compile("single"))
     page.locator("#compare").select_option("")
     expect(page.locator("#other")).to_be_hidden()
+
+
+def test_a_jump_shows_what_the_start_list_had_and_where_it_goes_on(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    folder = service.catalogue.directory
+    session = {"athlete": "Anna Berg", "bib": "17", "round": "2", "club": "Lyn", "klasse": "J18", "recording": "one"}
+    write_recording(folder, "one", (ALL_OK,) * 3, session)
+    write_recording(folder, "one-part2", (ALL_OK,) * 3, session | {"continues": "one", "continues_after": "3"})
+    page = open_page(f"{panel.url}/#/recordings/one", locale="nb-NO")
+    facts = page.locator("#recording-facts")
+    expect(facts).to_have_text(re.compile("Omgang2KlubbLynklasseJ18.*Navnone.*Fortsetter ione-part2$"))
+    page.goto(f"{panel.url}/#/recordings/one-part2")
+    expect(facts).to_have_text(re.compile("Navnone-part2.*Fortsetterone$"))

@@ -16,6 +16,9 @@ import { loadExports } from "./exports.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 
+/** What the start list says of a jumper beside own columns, whose names are not ours to translate. @type {Record<string, string>} */
+const OF_THE_LIST = { round: "recording.round", club: "recording.club" };
+
 /** @type {Recording|null} */
 let recording = null;
 /** Whether the triplets of the recording are shown, or are being loaded. */
@@ -135,15 +138,21 @@ export function draw() {
 }
 
 /** @param {Recording} shown */
-function drawFacts({ id, started, duration_s, bytes, counts }) {
+function drawFacts({ id, started, duration_s, bytes, counts, more, continues, continued_by }) {
   const causes = Object.entries(counts.causes).filter(([, count]) => count > 0).map(([cause, count]) => `${count} ${t(`status.${cause}`)}`);
+  /** @type {[string, string][]} */
+  const listed = Object.entries(more).map(([column, text]) => [column in OF_THE_LIST ? t(OF_THE_LIST[column]) : column, text]);
+  /** @type {[string, string][]} */
+  const parts = [[t("recording.continues"), continues], [t("recording.continued_by"), continued_by]];
   fillList($("recording-facts"), [
+    ...listed,
     [t("recording.started"), started ? `${day(started)}, ${timeOfDay(started)}` : "–"],
     [t("recording.duration"), clock(duration_s)],
     [t("recording.pulses"), t("recording.complete_of", { complete: number(counts.complete), pulses: number(counts.pulses) })],
     [t("recording.causes"), causes.join(", ") || t("recording.no_causes")],
     [t("recording.size"), size(bytes)],
     [t("recording.id"), id],
+    ...parts.filter(([, part]) => part),
   ]);
 }
 

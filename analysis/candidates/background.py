@@ -28,6 +28,7 @@ _MAD_TO_SIGMA = 1.4826
 _STRIP = 32 << 10  # pixels that are compared at a time
 _FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
 _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
+_SHORTEST_BORDER = 2 * _SMALLEST - 2  # px around something of that size that is a pixel thick
 _THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
 _JOIN = 9  # px: what is nearer to each other belongs together
 _MARGIN = 10  # px around what moves
@@ -216,11 +217,14 @@ def _usual(grey: GreyImage, noise: GreyImage) -> GreyImage:
 
 def _boxes(front: NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
     """Boxes around what moves: columns and rows of the first and behind the last pixel, the largest first."""
-    contours, hierarchy = cv2.findContours(front, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    contours, hierarchy = cv2.findContours(front, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    outside = () if hierarchy is None else (hierarchy[0, :, 3] < 0).tolist()
     boxes = []
-    for contour, (_, _, _, inside) in zip(contours, () if hierarchy is None else hierarchy[0].tolist(), strict=True):
+    for contour, outer in zip(contours, outside, strict=True):
+        if len(contour) < _SHORTEST_BORDER or not outer:  # most are specks
+            continue
         x, y, w, h = cv2.boundingRect(contour)
-        if inside < 0 and max(w, h) >= _SMALLEST and min(w, h) >= _THINNEST:
+        if max(w, h) >= _SMALLEST and min(w, h) >= _THINNEST:
             area = _area(front[y : y + h, x : x + w], contour[0, 0] - (x, y))
             boxes.append((x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area))
     rows, columns = front.shape

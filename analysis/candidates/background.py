@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.candidates.median import median
 from analysis.scene.static_image import GreyImage, StaticImage
 from rig.arrays import Floats, Integers
 
@@ -177,7 +178,7 @@ class Background:
             normal += np.diag(1e-9 * np.diag(normal) + 1e-12)
             unknown = np.asarray(np.linalg.solve(normal, kept @ values), float)
             v = np.abs(values - unknown @ rows)
-            keep = (v < _CLIP * max(1e-3, _MAD_TO_SIGMA * float(np.median(v)))).astype(float)
+            keep = (v < _CLIP * max(1e-3, _MAD_TO_SIGMA * median(v))).astype(float)
         grey = unknown @ self._design
         gain, offset, right, down = unknown.tolist()
         return _Moment(gain, offset, right, down, *self._noise(grey, np.abs(sample - grey)))
@@ -187,11 +188,11 @@ class Background:
         if not self._bins:
             return np.float32(np.median(self._weight) ** -2), np.float32(0)
         at = np.array([grey[part].mean() for part in self._bins])
-        level = np.array([np.median(off[part]) for part in self._bins])
+        level = np.array([median(off[part]) for part in self._bins])
         level = (_MAD_TO_SIGMA * level) ** 2
         from_mean = at - at.mean()
         slope = max(0.0, float(from_mean @ level / (from_mean @ from_mean))) if np.ptp(at) > 1 else 0.0
-        read = max(float(_ROUNDING), float(np.median(level - slope * at)))
+        read = max(float(_ROUNDING), median(level - slope * at))
         return np.float32(read), np.float32(slope)
 
 

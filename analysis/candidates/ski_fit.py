@@ -24,6 +24,7 @@ from analysis.candidates.bar_model import (
     modelled,
     pixels_around,
 )
+from analysis.candidates.median import median
 from rig.arrays import Flags, Floats, Integers
 
 _BLUR, _BLUR_SPREAD = 0.65, 0.4  # px; weak prior of log s: of lens and pixels
@@ -110,11 +111,11 @@ class _Fit:
 
     def __init__(self, pixels: Pixels, bars: Sequence[Bar]) -> None:
         self._pixels, self._bars, self.count = pixels, bars, len(bars)
-        width = float(np.median([bar.width for bar in bars]))
+        width = median(np.array([bar.width for bar in bars]))
         lines = [bar.line(pixels.origin) for bar in bars]
         start = np.concatenate(([pixels.brightness, np.log(max(width, 0.8) / 2), np.log(_BLUR)], *lines))
         spread = np.full(len(start), np.inf)
-        spread[0] = _BRIGHTNESS_SPREAD * (1 + abs(pixels.brightness - float(np.median(pixels.behind))))
+        spread[0] = _BRIGHTNESS_SPREAD * (1 + abs(pixels.brightness - median(pixels.behind)))
         spread[1:SHARED] = _WIDTH_SPREAD, _BLUR_SPREAD
         lines_of(spread)[:, 2:] = _END_SPREAD
         self._expected, self._prior = start, spread**-2.0
@@ -254,7 +255,7 @@ class _Fit:
             return None
         t, shift, sigma = t[fine], shift[fine], np.hypot(max(1.0, self.misfit) * sigma[fine], _POINT * bar.width)
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
-        contrast = float(np.median(theta[0] - pixels.behind))
+        contrast = median(theta[0] - pixels.behind)
         common = float(np.linalg.norm((self._common(k, t, sigma), doubt, _AXIS)))
         return FittedBar(bar, xy, sigma, common, float(theta[0]), contrast, self.misfit)
 

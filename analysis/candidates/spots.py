@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.candidates.background import Region
+from analysis.candidates.median import median
 from analysis.candidates.model import Spots
 from analysis.candidates.soft_discs import SoftDiscs, fit_soft_discs
 from analysis.scene.static_image import GreyImage
@@ -182,7 +183,7 @@ def _blobs(region: Region, answer: float = _ANSWER) -> tuple[Floats, Floats]:
     largest = max(rows, columns) / _LARGEST
     scales = [float(scale) for scale in _SCALES if scale <= max(_SCALES[2], largest / np.sqrt(2) * 1.4)]
     grey = region.grey
-    noise = float(np.median(region.noise))
+    noise = median(region.noise)
     smooth = [np.asarray(cv2.GaussianBlur(grey, (0, 0), scale), np.float32) for scale in scales]
     answers = np.stack([scale**2 * cv2.Laplacian(s, cv2.CV_32F) for scale, s in zip(scales, smooth, strict=True)])
     strength = np.abs(answers)

@@ -15,6 +15,7 @@ import numpy as np
 from analysis.candidates.background import Region
 from analysis.candidates.bar_model import Bar
 from analysis.candidates.bars import Bars, find_bars
+from analysis.candidates.median import median
 from analysis.candidates.model import Trace
 from analysis.candidates.ski_fit import FittedBar, fit_bars
 from rig.arrays import Flags, Floats, Integers
@@ -80,7 +81,7 @@ class _Middles:
 
 def find_traces(region: Region) -> tuple[Trace, ...]:
     """Traces of a region, in px of the image, the longest first."""
-    noise = float(np.median(region.noise))
+    noise = median(region.noise)
     widest = max(region.grey.shape) / _LARGEST_WIDTH
     found: list[_Line] = []
     for steep in (False, True):
@@ -211,7 +212,7 @@ def _lines(bars: Bars, rows: int) -> list[_Line]:
 def _single_width(widths: Floats) -> float:
     """Width of one ski among the widths of bars of which some may be two skis: the narrowest tenth, median."""
     narrow = np.sort(widths)[: max(5, len(widths) // 5)]
-    return float(np.median(narrow))
+    return median(narrow)
 
 
 def _split(bars: Bars, width: float) -> _Middles:
@@ -275,7 +276,7 @@ def _line(on: _Middles, offset: float, slope: float) -> _Line | None:
     if len(on.column) < _SHORTEST:
         return None
     first, last = float(on.column[0]), float(on.column[-1])
-    width = float(np.median(on.width)) / np.hypot(1, slope)
+    width = median(on.width) / np.hypot(1, slope)
     length = (last - first + 1) * np.hypot(1, slope)
     filled = (1 + np.count_nonzero(np.diff(on.column))) / (last - first + 1)
     if length < _SLENDER * width or filled < _FILLED:

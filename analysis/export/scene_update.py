@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
-from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -37,6 +36,8 @@ _SKIS: Final = (("right", "P3", _RED), ("left", "P4", _GREEN))
 
 #: Signs that turn the axes of our cameras (y up, z backward) into those of an image (y down, z forward).
 _OPTICAL: Final = np.array((1.0, -1.0, -1.0))
+#: Quaternion, x, y, z, w, of what is not turned.
+_UPRIGHT: Final = np.array((0.0, 0.0, 0.0, 1.0))
 
 _Colour = tuple[float, float, float]
 
@@ -54,7 +55,7 @@ def scene_update(scene: OrientedScene, state: SmoothedState, time: UtcNs) -> byt
     for placed in scene.system.cameras.values():
         _strip(hill, _pyramid(placed.position, placed.rotation, placed.size / placed.camera.interior[0]), _BLUE)
     for ball in scene.balls.values():
-        _ellipsoid(hill, ball.xyz, np.eye(3), np.full(3, _BALL_M), _WHITE)
+        _ellipsoid(hill, ball.xyz, _UPRIGHT, np.full(3, _BALL_M), _WHITE)
     jumper = _entity(update, "jumper", time)
     points = {name: point for name, point in state.points.items() if point is not None}
     for one, other in _BODY:
@@ -67,8 +68,8 @@ def scene_update(scene: OrientedScene, state: SmoothedState, time: UtcNs) -> byt
             _strip(jumper, ends, colour)
     for point in points.values():
         values, axes = np.linalg.eigh(point.covariance)
-        axes = axes * np.sign(np.linalg.det(axes))
-        _ellipsoid(jumper, point.xyz, axes, np.maximum(2 * _SIGMAS * np.sqrt(np.maximum(values, 0)), _LEAST_M), _RED)
+        turn = Rotation.from_matrix(axes * np.sign(np.linalg.det(axes))).as_quat()
+        _ellipsoid(jumper, point.xyz, turn, np.maximum(2 * _SIGMAS * np.sqrt(np.maximum(values, 0)), _LEAST_M), _RED)
     return bytes(update.SerializeToString())
 
 
@@ -112,17 +113,13 @@ def _strip(entity: SceneEntity, places: Floats, colour: _Colour) -> None:
         point.x, point.y, point.z = x, y, z
 
 
-def _ellipsoid(entity: SceneEntity, centre: Floats, axes: Floats, size: Floats, colour: _Colour) -> None:
-    """An ellipsoid with these axes (columns) and whole lengths along them."""
+def _ellipsoid(entity: SceneEntity, centre: Floats, turn: Floats, size: Floats, colour: _Colour) -> None:
+    """An ellipsoid with axes turned by a quaternion (4,), x, y, z, w, and whole lengths along them."""
     sphere = entity.spheres.add()
-    _set_pose(sphere.pose, centre, axes)
+    _set(sphere.pose.position, centre)
+    _set(sphere.pose.orientation, turn)
     sphere.size.x, sphere.size.y, sphere.size.z = (float(length) for length in size)
     _set_colour(sphere, colour)
-
-
-def _set_pose(pose: Pose, centre: Floats, axes: Floats) -> None:
-    _set(pose.position, centre)
-    _set(pose.orientation, Rotation.from_matrix(axes).as_quat())
 
 
 def _set_colour(primitive: object, colour: _Colour) -> None:

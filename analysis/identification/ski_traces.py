@@ -192,11 +192,11 @@ class SeenSkis:
 
     def __init__(self, views: Views, k: int, values: Floats) -> None:
         place, direction = values[:, :3], values[:, 3:]
-        low, high = (views.see(k, place + s * direction) for s in (-_HALF_M, _HALF_M))
-        self._xy = np.stack((low.xy, high.xy), axis=1)
-        self._by_point = np.stack((low.by_point, high.by_point), axis=1)
-        self._pose = (low.pose + high.pose) / 2
-        self.inside: Flags = views.see(k, place).inside
+        ends = views.see(k, np.concatenate((place - _HALF_M * direction, place + _HALF_M * direction)))
+        self._xy = ends.xy.reshape(2, -1, 2).swapaxes(0, 1)
+        self._by_point = ends.by_point.reshape(2, -1, 2, 3).swapaxes(0, 1)
+        self._pose = ends.pose.reshape(2, -1, 2, 2).mean(axis=0)
+        self.inside: Flags = views.inside(k, place)
 
     def equations(self, skis: Integers, lines: Lines) -> Equations:
         """What n traces say about a ski (n,) each."""

@@ -59,7 +59,7 @@ def _met(views: Views, window: Window, markers: Markers, k: int, expected: Flags
     moved = np.stack(
         [[np.interp(time_s + offset, time_s, path[:, i, j]) for j in range(3)] for i in range(path.shape[1])]
     ).transpose(2, 0, 1)
-    xy = views.see(k, moved.reshape(-1, 3)).xy.reshape(*expected.shape, 2)
+    xy = views.placed[k].project(moved.reshape(-1, 3)).reshape(*expected.shape, 2)
     near = _NEAR_M * views.scale[k]
     met = 0
     for t in np.flatnonzero(expected.any(axis=1)).tolist():
@@ -74,7 +74,7 @@ def _off_a_little(views: Views, window: Window, markers: Markers, flight: Flight
     """The camera that is so little late that every two cameras agree, but no three: when would three agree?"""
     late = np.zeros(len(views))
     rays = (markers.assigned.rays >= 0).sum(axis=2)
-    seen = np.sum([views.see(k, flight.place(window.time_s)).inside for k in range(len(views))], axis=0)
+    seen = np.sum([views.inside(k, flight.place(window.time_s)) for k in range(len(views))], axis=0)
     able = (seen >= _LEAST_CAMERAS) & (rays >= 2).any(axis=1)
     if not able.any() or not _too_rarely_three(rays[able], int(np.median(seen[able]))):
         return late

@@ -90,9 +90,17 @@ class Views:
             pose = self.system.covariance[np.ix_(placed.columns, placed.columns)]
             by_point[there] = by_there
             noise[there] = by_parameters @ pose @ by_parameters.transpose(0, 2, 1)
-        with np.errstate(invalid="ignore"):
-            inside = ((xy > -0.5) & (xy < placed.size - 0.5)).all(axis=1)
-        return Sight(xy, by_point, noise, np.asarray(inside))
+        return Sight(xy, by_point, noise, _inside(placed, xy))
+
+    def inside(self, k: int, xyz: Floats) -> Flags:
+        """Whether object points (n, 3) lie in the image of camera k: what `see` says, faster."""
+        return _inside(self.placed[k], self.placed[k].project(xyz))
+
+
+def _inside(placed: PlacedCamera, xy: Floats) -> Flags:
+    """Whether image points (n, 2), px, lie in the image; NaN does not."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((xy > -0.5) & (xy < placed.size - 0.5)).all(axis=1))
 
 
 def _looked_at(cameras: Sequence[IdealCamera]) -> Floats:

@@ -130,7 +130,7 @@ class Follower:
             return True
         state = self._predicted(time)
         xyz = np.array([_known(point).xyz for point in state.points.values()])
-        seeing = sum(bool(self._views.see(k, xyz).inside.any()) for k in range(len(self._views)))
+        seeing = sum(bool(self._views.inside(k, xyz).any()) for k in range(len(self._views)))
         return seeing < _FEWEST_CAMERAS
 
     def _predicted(self, time: UtcNs) -> SmoothedState:

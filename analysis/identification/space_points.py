@@ -94,33 +94,38 @@ class Appearance:
 
 
 def rays_of(
-    views: Views, candidates: PulseCandidates, appearance: Appearance | None = None, shift: Floats | None = None
-) -> list[Rays]:
-    """The spots of a pulse by camera; none where a camera has no image.
+    views: Views, pulses: Sequence[PulseCandidates], appearance: Appearance | None = None, shift: Floats | None = None
+) -> list[list[Rays]]:
+    """The spots of each pulse by camera; none where a camera has no image.
 
     Args:
         views: the cameras.
-        candidates: of the pulse.
+        pulses: candidates of t pulses.
         appearance: of the jumper's markers, where it is known.
-        shift: (m, 2) px, what takes spots of the jumper in each image back to the time of the pulse.
+        shift: (t, m, 2) px, what takes spots of the jumper in each image back to the time of the pulse.
     """
-    rays = []
+    rays: list[list[Rays]] = [[] for _ in pulses]
+    if not rays:
+        return rays
     for k, name in enumerate(views.names):
-        image = candidates.images.get(name)
-        spots = Spots.none() if image is None else image.spots
-        xy = spots.xy if shift is None else spots.xy + shift[k]
+        images = [candidates.images.get(name) for candidates in pulses]
+        of_pulse = [Spots.none() if image is None else image.spots for image in images]
+        count = [len(spots) for spots in of_pulse]
+        spots = Spots.joined(of_pulse)
+        xy = spots.xy if shift is None else spots.xy + np.repeat(shift[:, k], count, axis=0)
         reduced = views.placed[k].reduced(xy)
         usable = np.asarray(np.isfinite(reduced).all(axis=1))
         variance = np.trace(spots.covariance, axis1=1, axis2=2) / 2 + views.noise[k]
-        rays.append(
-            Rays(
-                xy,
-                spots.covariance,
-                np.where(usable[:, None], reduced, 0.0),
-                np.where(usable, variance, np.inf),
-                np.zeros(len(spots)) if appearance is None else appearance.odd(spots, float(views.scale[k])),
-            )
+        parts = (
+            xy,
+            spots.covariance,
+            np.where(usable[:, None], reduced, 0.0),
+            np.where(usable, variance, np.inf),
+            np.zeros(len(spots)) if appearance is None else appearance.odd(spots, float(views.scale[k])),
         )
+        ends = np.cumsum(count)[:-1]
+        for own, split in zip(rays, zip(*(np.split(part, ends) for part in parts), strict=True), strict=True):
+            own.append(Rays(*split))
     return rays
 
 

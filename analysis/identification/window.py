@@ -60,24 +60,25 @@ class Window:
                 moved = np.einsum("tij,tj->ti", sight.by_point, flight.velocity(self.time_s)) * late[k]
                 self.shift[:, k] = -np.nan_to_num(moved)
                 self._path[:, k] = sight.xy
-        self.rays = [self._rays(t) for t in range(len(self.candidates))]
+        self.rays = self._rays(range(len(self.candidates)))
         self.points = find_space_points(views, self.rays)
         self.delivered: Flags = np.array([[name in c.images for name in views.names] for c in candidates], bool)
 
-    def _rays(self, t: int) -> list[Rays]:
-        """The spots of a pulse; those that no body reaches, or too many to compare, are there but of no use."""
-        rays = rays_of(self._views, self.candidates[t], self._appearance, self.shift[t])
-        for k, (name, of_camera) in enumerate(zip(self._views.names, rays, strict=True)):
-            if self._flight is not None:
-                reach = _REACH * REACH_M * self._views.scale[k]
-                useless = ~(np.linalg.norm(of_camera.xy - self._path[t, k], axis=1) < reach)
-            elif len(of_camera.xy) > _MOST_SPOTS:
-                strength = self.candidates[t].images[name].spots.strength
-                useless = strength < np.sort(strength)[-_MOST_SPOTS]
-            else:
-                continue
-            of_camera.variance[useless] = np.inf
-        return rays
+    def _rays(self, order: Sequence[int]) -> list[list[Rays]]:
+        """The spots of some pulses; those that no body reaches, or too many to compare, are there but of no use."""
+        found = rays_of(self._views, [self.candidates[t] for t in order], self._appearance, self.shift[list(order)])
+        for t, rays in zip(order, found, strict=True):
+            for k, (name, of_camera) in enumerate(zip(self._views.names, rays, strict=True)):
+                if self._flight is not None:
+                    reach = _REACH * REACH_M * self._views.scale[k]
+                    useless = ~(np.linalg.norm(of_camera.xy - self._path[t, k], axis=1) < reach)
+                elif len(of_camera.xy) > _MOST_SPOTS:
+                    strength = self.candidates[t].images[name].spots.strength
+                    useless = strength < np.sort(strength)[-_MOST_SPOTS]
+                else:
+                    continue
+                of_camera.variance[useless] = np.inf
+        return found
 
     def part(self, chosen: Integers) -> Callable[[Floats], "Window"]:
         """Makes windows of some of its pulses with other times of the cameras, (m,) s as in the constructor."""
@@ -108,8 +109,8 @@ class Window:
 
     def renew(self, order: Sequence[int]) -> None:
         """Make rays and points in space of the spots of some pulses."""
-        for t in order:
-            self.rays[t] = self._rays(t)
+        for t, rays in zip(order, self._rays(order), strict=True):
+            self.rays[t] = rays
         for t, points in zip(order, find_space_points(self._views, [self.rays[t] for t in order]), strict=True):
             self.points[t] = points
 

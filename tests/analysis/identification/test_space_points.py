@@ -21,7 +21,7 @@ def test_what_hides_a_marker_does_not_take_its_other_rays() -> None:
     images = {name: _image(system[name].project(both)) for name in ("K1", "K2")}
     images["K3"] = _image(system["K3"].project(near[None]) + 0.3)
     views = Views(system)
-    (points,) = find_space_points(views, [rays_of(views, PulseCandidates(PulseNumber(1), UtcNs(0), images))])
+    (points,) = find_space_points(views, rays_of(views, [PulseCandidates(PulseNumber(1), UtcNs(0), images)]))
     found = {tuple(rays) for rays in points.rays.tolist()}
     assert {(0, 0, 0), (1, 1, -1)} <= found
     exact = points.xyz[points.rays.tolist().index([1, 1, -1])]

@@ -1,7 +1,8 @@
 """What people look for in a recording: the moment at which it begins to matter, and notes at single pulses."""
 
+from datetime import datetime
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import Field
 
@@ -9,6 +10,9 @@ from rig.status import Model
 
 #: All notes of a recording fit into the file of its session fields with room to spare.
 NOTE_MAX = 120
+#: Some eight minutes of speech as the page records it.
+VOICE_BYTES_MAX: Final = 2 << 20
+VOICES_MAX: Final = 30
 NoteText = Annotated[str, Field(min_length=1, max_length=NOTE_MAX, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
@@ -38,3 +42,12 @@ class Note(Model):
 
     pulse: int
     text: str
+
+
+class VoiceNote(Model):
+    """A spoken note at a pulse of a recording."""
+
+    number: int = Field(description="counts the spoken notes of the recording")
+    pulse: int
+    recorded: datetime = Field(description="when it was stored, UTC")
+    bytes: int

@@ -11,7 +11,7 @@ from prometheus_client.metrics_core import Metric
 
 from rig.export import ExportJob, ExportOrder
 from rig.frame import FrameStatus
-from rig.looking import Moment, Note
+from rig.looking import Moment, Note, VoiceNote
 from rig.phrase import Phrase
 from rig.pulse import RigPulse
 from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
@@ -274,6 +274,22 @@ class RigService(Protocol):
 
     def note(self, recording_id: str, pulse: int, text: str) -> list[Note]:
         """Set the note of a pulse; no text: remove it. StateForbidsError: there are too many."""
+        ...
+
+    def voice_notes(self, recording_id: str) -> list[VoiceNote]:
+        """The spoken notes, in the order in which they were spoken."""
+        ...
+
+    def voice_file(self, recording_id: str, number: int) -> Download:
+        """A spoken note as a file. UnknownRecordingError: there is none of this number."""
+        ...
+
+    def add_voice_note(self, recording_id: str, pulse: int, data: bytes) -> list[VoiceNote]:
+        """Keep a spoken note (WebM) about a pulse. StateForbidsError: there are too many."""
+        ...
+
+    def remove_voice_note(self, recording_id: str, number: int) -> list[VoiceNote]:
+        """Remove a spoken note for good; if there is none of this number, nothing changes."""
         ...
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:

@@ -28,6 +28,7 @@ from recorder.catalogue.trash import (
     trash_of,
     trashed_logs,
 )
+from recorder.catalogue.voice_notes import StoredVoice, add_voice_note, check_voice, voice_notes
 from recorder.log.session_changes import session_changes, write_session_changes
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
@@ -137,6 +138,40 @@ class Catalogue:
             path = self._path(recording)
             write_session_changes(path, {**session_changes(path), **changes})
         return self.entry(recording)
+
+    def voice_notes(self, recording: str) -> list[StoredVoice]:
+        """The spoken notes of a recording, in the order in which they were spoken.
+
+        Raises:
+            UnknownRecordingError: no recording has this id.
+            StorageError: the disk refuses.
+        """
+        with self._change():
+            return voice_notes(self._path(recording))
+
+    def add_voice_note(self, recording: str, pulse: int, data: bytes) -> None:
+        """Store a spoken note, a WebM file, beside the log of a recording.
+
+        Raises:
+            UnknownRecordingError: no recording has this id.
+            BadInputError: it is no WebM file.
+            StorageError: the disk refuses.
+        """
+        check_voice(data)
+        with self._change():
+            add_voice_note(self._path(recording), pulse, data)
+
+    def remove_voice_note(self, recording: str, number: int) -> None:
+        """Remove a spoken note for good; if there is none of this number, nothing changes.
+
+        Raises:
+            UnknownRecordingError: no recording has this id.
+            StorageError: the disk refuses.
+        """
+        with self._change():
+            for note in voice_notes(self._path(recording)):
+                if note.number == number:
+                    note.path.unlink(missing_ok=True)
 
     def delete(self, recording: str) -> Entry:
         """Move a recording into the trash. If the trash holds one of that id already, the id gets a number.

@@ -1,6 +1,7 @@
 """The trash of a folder of recordings: what lies in it, how much room it takes, what is removed from it for good."""
 
 import os
+import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from stat import S_ISDIR
 from typing import Final
 
 from recorder.catalogue.entry import SUFFIX
+from recorder.catalogue.voice_notes import voice_folder
 from recorder.log.jumper_path import jumper_path
 from recorder.log.session_changes import session_path
 from recorder.log.truth_path import truth_path
@@ -82,7 +84,10 @@ def remove_for_good(log: TrashedLog) -> None:
     """
     log.path.unlink(missing_ok=True)
     for path in beside(log.path):
-        path.unlink(missing_ok=True)
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[TrashedLog]:
@@ -95,8 +100,8 @@ def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[Tr
 
 
 def beside(log: Path) -> tuple[Path, ...]:
-    """The files that belong to a log, whether they are there or not."""
-    return session_path(log), truth_path(log), jumper_path(log)
+    """The files and folders that belong to a log, whether they are there or not."""
+    return session_path(log), truth_path(log), jumper_path(log), voice_folder(log)
 
 
 def _trashed(path: Path) -> TrashedLog | None:
@@ -112,9 +117,11 @@ def _trashed(path: Path) -> TrashedLog | None:
 
 
 def _freed(path: Path) -> int:
-    """Room that the removal of a file gives; none if it has another name elsewhere."""
+    """Room that the removal of a file or folder gives; none for a file that has another name elsewhere."""
     try:
         stat = path.lstat()
+        if S_ISDIR(stat.st_mode):
+            return stat.st_blocks * _BLOCK + sum(map(_freed, path.iterdir()))
     except OSError:
         return 0
     return stat.st_blocks * _BLOCK if stat.st_nlink == 1 else 0

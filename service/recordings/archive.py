@@ -15,7 +15,7 @@ from recorder.log.extent import CONTINUES
 from rig.clocks import NS_PER_S
 from rig.errors import StateForbidsError, StillRecordingError
 from rig.export import ExportJob, ExportOrder
-from rig.looking import Moment, MomentKind, Note
+from rig.looking import Moment, MomentKind, Note, VoiceNote
 from rig.pulse import Pause
 from rig.status import (
     Causes,
@@ -36,7 +36,7 @@ from service.exports.jobs import Exports
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
-from service.recordings.notes import noted, notes_of
+from service.recordings.notes import check_voices, noted, notes_of, spoken, voice_file
 from service.seam import Download, FoundRecordings
 from triggering.ledger import pauses_in_words
 
@@ -164,8 +164,11 @@ class Archive(ABC):
         return self._checksums.get(download.tag, "")
 
     def zipped(self, recording_ids: Sequence[str]) -> tuple[int, Iterator[bytes]]:
-        """Several recordings as one archive: its size, and its bytes piece by piece."""
-        downloads = [self.download(recording_id) for recording_id in dict.fromkeys(recording_ids)]
+        """Several recordings with their spoken notes as one archive: its size, and its bytes piece by piece."""
+        downloads: list[Download] = []
+        for recording_id in dict.fromkeys(recording_ids):
+            downloads.append(self.download(recording_id))
+            downloads += [self.voice_file(recording_id, note.number) for note in self.voice_notes(recording_id)]
         return zipped_size(downloads), zipped(downloads)
 
     def pulses(self, recording_id: str) -> Pulses:
@@ -202,6 +205,35 @@ class Archive(ABC):
         if changes := noted(session, pulse, text):
             session = self._catalogue.change_session(recording_id, changes).session
         return notes_of(session)
+
+    def voice_notes(self, recording_id: str) -> list[VoiceNote]:
+        """The spoken notes, in the order in which they were spoken."""
+        return spoken(self._catalogue.voice_notes(recording_id))
+
+    def voice_file(self, recording_id: str, number: int) -> Download:
+        """A spoken note as a file.
+
+        Raises:
+            UnknownRecordingError: there is none of this number.
+        """
+        stored, entry = self._catalogue.voice_notes(recording_id), self._catalogue.entry(recording_id)
+        return voice_file(stored, number, file_name(recording_id, entry.session, ""))
+
+    def add_voice_note(self, recording_id: str, pulse: int, data: bytes) -> list[VoiceNote]:
+        """Keep a spoken note (WebM) about a pulse.
+
+        Raises:
+            BadInputError: it is no WebM file.
+            StateForbidsError: there are too many.
+        """
+        check_voices(self._catalogue.voice_notes(recording_id))
+        self._catalogue.add_voice_note(recording_id, pulse, data)
+        return self.voice_notes(recording_id)
+
+    def remove_voice_note(self, recording_id: str, number: int) -> list[VoiceNote]:
+        """Remove a spoken note for good; if there is none of this number, nothing changes."""
+        self._catalogue.remove_voice_note(recording_id, number)
+        return self.voice_notes(recording_id)
 
 
 def as_recording(entry: Entry) -> Recording:

@@ -1,10 +1,13 @@
-"""Notes at single pulses of a recording: fields `note.PULSE` of its session, in the file beside the log."""
+"""Notes at single pulses of a recording: written ones are fields `note.PULSE` of its session; and spoken ones."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Final
 
-from rig.errors import StateForbidsError
-from rig.looking import Note
+from recorder.catalogue.voice_notes import StoredVoice
+from rig.errors import StateForbidsError, UnknownRecordingError
+from rig.looking import VOICES_MAX, Note, VoiceNote
+from service.seam import Download
 
 #: How the names of fields with notes begin.
 NOTE_FIELD: Final = "note."
@@ -35,3 +38,42 @@ def noted(session: Mapping[str, str], pulse: int, text: str) -> dict[str, str]:
     if text and name not in fields and (len(notes_of(session)) >= _NOTES_MAX or len(fields) >= _FIELDS_MAX):
         raise StateForbidsError(f"a recording has at most {_NOTES_MAX} notes: remove some, or use its field for notes")
     return {name: text} if text or name in fields else {}
+
+
+def spoken(stored: Iterable[StoredVoice]) -> list[VoiceNote]:
+    """Spoken notes as the panel shows them."""
+    return [
+        VoiceNote(
+            number=note.number, pulse=note.pulse, recorded=datetime.fromtimestamp(note.recorded, UTC), bytes=note.bytes
+        )
+        for note in stored
+    ]
+
+
+def check_voices(stored: Sequence[StoredVoice]) -> None:
+    """Check that there is room for another spoken note.
+
+    Raises:
+        StateForbidsError: there are too many.
+    """
+    if len(stored) >= VOICES_MAX:
+        raise StateForbidsError(f"a recording has at most {VOICES_MAX} spoken notes: remove some")
+
+
+def voice_file(stored: Iterable[StoredVoice], number: int, name: str) -> Download:
+    """A spoken note as a file to take away.
+
+    Args:
+        stored: the spoken notes of the recording.
+        number: of the note.
+        name: of the recording's file, without an ending.
+
+    Raises:
+        UnknownRecordingError: there is none of this number.
+    """
+    note = next((each for each in stored if each.number == number), None)
+    if note is None:
+        raise UnknownRecordingError(f"the recording has no spoken note {number}: see the list of its notes")
+    file, path = f"{name}_note-{number}_pulse-{note.pulse}.webm", note.path
+    tag = f"{note.recorded}-{note.bytes}-{number}"
+    return Download(file, note.bytes, note.recorded, tag, corrected=False, open=lambda: path.open("rb"))

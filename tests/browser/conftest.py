@@ -17,6 +17,9 @@ PATIENCE_MS = 40_000
 #: What the browser itself says of answers that the page handles: refusals, and a service that is gone on purpose.
 _HANDLED = ("Failed to load resource", "net::ERR_")
 
+#: A microphone that beeps, and nobody who has to be asked for it.
+_MICROPHONE = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream")
+
 expect.set_options(timeout=PATIENCE_MS)
 
 Open = Callable[..., Page]
@@ -28,7 +31,7 @@ def browser() -> Iterator[Browser]:
     path = shutil.which("chromium")
     if path is None:
         pytest.skip("chromium is not installed (Debian package chromium): the page cannot be tried")
-    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    arguments = [*_MICROPHONE, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=arguments, timeout=PATIENCE_MS)
         yield chromium

@@ -5,6 +5,7 @@ import re
 import zipfile
 from pathlib import Path
 
+import av
 import httpx
 import pytest
 from playwright.sync_api import expect
@@ -13,6 +14,7 @@ from recorder.reading.corrected_log import corrected_log
 from rig.frame import FrameStatus
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK
+from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel
 
@@ -230,3 +232,48 @@ def test_a_jump_shows_what_the_start_list_had_and_where_it_goes_on(
     expect(facts).to_have_text(re.compile("Omgang2KlubbLynklasseJ18.*Navnone.*Fortsetter ione-part2$"))
     page.goto(f"{panel.url}/#/recordings/one-part2")
     expect(facts).to_have_text(re.compile("Navnone-part2.*Fortsetterone$"))
+
+
+def test_a_note_is_spoken_listened_to_and_removed(
+    panel: Panel, service: MemoryService, client: httpx.Client, open_page: Open
+) -> None:
+    write_recording(service.catalogue.directory, "jump", (ALL_OK,) * 30)
+    page = open_page(f"{panel.url}/#/recordings/jump", width=360, height=780)
+    expect(page.locator("#frame-where")).to_have_text(re.compile("/ 30"))
+    for _ in range(4):
+        page.locator("#frame-on").click()
+    page.get_by_role("button", name="Voice note").click()
+    expect(page.locator("#voice")).to_have_text(re.compile(r"Stop \([1-9] s\)"))
+    page.locator("#voice").click()
+    spoken = page.locator("#voices li")
+    expect(spoken).to_have_count(1)
+    expect(spoken.locator("b")).to_have_text("5")
+    expect(page.locator("#voice")).to_have_text("Voice note")
+    sound = spoken.locator("audio")
+    sound.evaluate("audio => { void audio.play(); }")
+    client.put("/api/recordings/jump/notes/3", json={"text": "somebody else's"}).raise_for_status()
+    expect(page.locator("#notes li")).to_have_count(1)  # what others do does not end the listening
+    wait_until(lambda: sound.evaluate("audio => audio.currentTime") > 0.2, "it can be heard", 40)
+    (note,) = service.voice_notes("jump")
+    with av.open(str(service.catalogue.voice_notes("jump")[0].path)) as opened:
+        assert opened.streams.audio[0].codec_context.name == "opus"
+    assert note.pulse == 5
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    page.get_by_role("button", name="Remove the spoken note at pulse 5").click()
+    expect(spoken).to_have_count(0)
+    assert service.voice_notes("jump") == []
+
+
+def test_without_https_the_button_says_what_the_microphone_needs(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    write_recording(service.catalogue.directory, "jump", (ALL_OK,) * 30)
+    page = open_page("about:blank")
+    page.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false });")
+    page.goto(f"{panel.url}/#/recordings/jump")
+    expect(page.locator("#frame-where")).to_have_text(re.compile("/ 30"))
+    page.get_by_role("button", name="Voice note (needs HTTPS)").click()
+    expect(page.locator("#snacks")).to_contain_text("svev certificate")
+    with page.expect_popup() as opened:
+        page.get_by_role("button", name="How to do it").click()
+    expect(opened.value.locator("body")).to_contain_text("svev certificate --name NAME")

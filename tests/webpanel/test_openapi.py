@@ -30,6 +30,10 @@ CALLS = {
     "GET /api/recordings/{recording_id}/pulses/{pulse}.png", "GET /api/recordings/{recording_id}/moment",
     "GET /api/recordings/{recording_id}/notes", "PUT /api/recordings/{recording_id}/notes/{pulse}",
     "DELETE /api/recordings/{recording_id}/notes/{pulse}",
+    "GET /api/recordings/{recording_id}/voice-notes",
+    "POST /api/recordings/{recording_id}/voice-notes",
+    "GET /api/recordings/{recording_id}/voice-notes/{number}/sound.webm",
+    "DELETE /api/recordings/{recording_id}/voice-notes/{number}",
     "POST /api/recordings/{recording_id}/exports", "GET /api/exports", "GET /api/exports/{export_id}",
     "DELETE /api/exports/{export_id}", "GET /api/exports/{export_id}/file",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
@@ -132,7 +136,7 @@ def test_chapters_and_server_are_described(schema: dict[str, Any]) -> None:
 def test_head_answers_wherever_get_does(panel: Panel, service: MemoryService) -> None:
     service.arm()
     write_recording(service.catalogue.directory, "jump")
-    values = {"recording_id": "jump", "pulse": "1", "export_id": "1", "line": "1"}
+    values = {"recording_id": "jump", "pulse": "1", "export_id": "1", "line": "1", "number": "1"}
     with panel.client() as client:
         for name, _ in operations(client.get("/openapi.json").json()):
             path = name.partition(" ")[2].format(**values)

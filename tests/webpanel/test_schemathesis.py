@@ -17,8 +17,8 @@ from tests.webpanel.serving import Panel
 K2_LOST = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
 #: These answers have no end; they are tested on their own.
 ENDLESS = ("/api/events", "/api/preview.mjpg")
-#: No schema says which tables are right.
-TABLE = "import_start_list"
+#: No schema says which tables are right, and which bytes are sound.
+UNDESCRIBED = ("import_start_list", "add_voice_note")
 
 
 def schemathesis(url: str, folder: Path, *options: str) -> str:
@@ -27,7 +27,7 @@ def schemathesis(url: str, folder: Path, *options: str) -> str:
     command = [
         str(Path(sys.executable).with_name("st")), "run", f"{url}/openapi.json",
         "--seed=1", "--request-timeout=20", "--continue-on-failure", "--generation-database=none", *excluded,
-        f"--exclude-operation-id={TABLE}", *options,
+        *(f"--exclude-operation-id={name}" for name in UNDESCRIBED), *options,
     ]  # fmt: skip
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=170, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr
@@ -42,7 +42,7 @@ def test_the_api_is_as_it_is_described(
         write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
     service.arm()
     said = schemathesis(panel.url, tmp_path, "--phases=coverage,fuzzing", "--max-examples=8")
-    assert "48 selected / 51 total" in said
+    assert "51 selected / 55 total" in said
     assert service.healthy()
 
 

@@ -1,6 +1,8 @@
 """Checks every request before a route sees it: size, Host, Origin, token, body; puts security headers on answers."""
 
+import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Final
 from urllib.parse import urlsplit
@@ -11,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from rig.looking import VOICE_BYTES_MAX
 from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access
 from webpanel.door.logins import Caller, Door, check_role
@@ -20,12 +23,32 @@ from webpanel.problems import SECURITY_HEADERS, ProblemError
 BODY_MAX: Final = 64 * 1024
 HEAD_MAX: Final = 16 * 1024
 _HEADER_COST: Final = 32  # bytes that a header counts beside its text (RFC 9113, 6.5.2)
-_TOO_LARGE: Final = f"the request's body is too large: no call needs more than {BODY_MAX // 1024} KiB"
 #: Paths that need the token. The page's files do not: the page has to ask for the token.
 PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
 OPEN: Final = frozenset({"/api/login", "/api/logout"})
-#: Paths where a body may be something else than JSON; their routes look which call takes what.
-_OTHER_BODIES: Final = {"/api/start-list": "text/csv"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Body:
+    """What a body may be.
+
+    Attributes:
+        path: pattern of the paths that take it.
+        media_type: what it is.
+        most: so many bytes at most.
+    """
+
+    path: re.Pattern[str]
+    media_type: str
+    most: int = BODY_MAX
+
+
+_JSON: Final = _Body(re.compile(".*"), "application/json")
+#: Bodies that are something else than JSON; the routes look which call takes what.
+_OTHERS: Final = (
+    _Body(re.compile("/api/start-list"), "text/csv"),
+    _Body(re.compile("/api/recordings/[^/]+/voice-notes"), "audio/webm", VOICE_BYTES_MAX),
+)
 
 
 class Guard:
@@ -71,7 +94,7 @@ class Guard:
             await error.answer()(scope, receive, send_guarded)
         else:
             scope.setdefault("state", {})["caller"] = caller
-            await self._app(scope, _bounded(scope, receive), send_guarded)
+            await self._app(scope, _bounded(scope, receive, _body_of(scope)), send_guarded)
 
     def _check(self, request: HTTPConnection) -> Caller | None:
         """Who calls, None where nobody needs a token; raise ProblemError if the request is to be refused."""
@@ -84,7 +107,7 @@ class Guard:
         if path.startswith(PROTECTED) and path not in OPEN:
             caller = self._door.admit(request)
             check_role(caller, request.scope["method"], path)
-        _check_body(headers, _OTHER_BODIES.get(path), reading=reading)
+        _check_body(headers, _body_of(request.scope), reading=reading)
         return caller
 
 
@@ -126,18 +149,31 @@ def _authority(origin: str) -> str:
     return parts.netloc.lower() if parts.scheme in {"http", "https"} else ""
 
 
-def _check_body(headers: Headers, other: str | None, *, reading: bool) -> None:
+def _body_of(scope: Scope) -> _Body:
+    """What the body of a request may be, by its path and by what it says that it is."""
+    kind, path = _media_type(Headers(scope=scope)), scope["path"]
+    return next((body for body in _OTHERS if body.media_type == kind and body.path.fullmatch(path)), _JSON)
+
+
+def _media_type(headers: Headers) -> str:
+    return headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+def _too_large(body: _Body) -> str:
+    return f"the request's body is too large: no call needs more than {body.most // 1024} KiB"
+
+
+def _check_body(headers: Headers, body: _Body, *, reading: bool) -> None:
     length = headers.get("content-length", "0")
-    if length.isdecimal() and int(length[:20]) > BODY_MAX:
-        raise ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "request_entity_too_large", _TOO_LARGE)
+    if length.isdecimal() and int(length[:20]) > body.most:
+        raise ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "request_entity_too_large", _too_large(body))
     has_body = length != "0" or "transfer-encoding" in headers
-    media_type = headers.get("content-type", "").partition(";")[0].strip().lower()
-    if has_body and not reading and media_type not in {"application/json", other}:
+    if has_body and not reading and _media_type(headers) != body.media_type:
         text = "the body must be JSON: send Content-Type: application/json"
         raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
 
 
-def _bounded(scope: Scope, receive: Receive) -> Receive:
+def _bounded(scope: Scope, receive: Receive, body: _Body) -> Receive:
     """The size limit for a body whose length is not announced; a body of GET, HEAD and OPTIONS is dropped."""
     reading = scope["method"] in READING
     received = 0
@@ -148,9 +184,9 @@ def _bounded(scope: Scope, receive: Receive) -> Receive:
         received += len(message.get("body", b""))
         if reading:
             return {**message, "body": b""}
-        if received > BODY_MAX:
+        if received > body.most:
             # The framework passes on no other error while it reads a body.
-            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _TOO_LARGE)
+            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _too_large(body))
         return message
 
     return receive_bounded

@@ -63,6 +63,16 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         lambda recording: phrase("act_note_removed", "removed a note of recording {recording}", recording=recording),
     ),
     (
+        r"POST /api/recordings/([^/]+)/voice-notes",
+        lambda recording: phrase("act_spoke", "spoke a note about recording {recording}", recording=recording),
+    ),
+    (
+        r"DELETE /api/recordings/([^/]+)/voice-notes/.*",
+        lambda recording: phrase(
+            "act_voice_removed", "removed a spoken note of recording {recording}", recording=recording
+        ),
+    ),
+    (
         r"POST /api/recordings/([^/]+)/exports?",
         lambda recording: phrase("act_exported", "asked for an export of recording {recording}", recording=recording),
     ),

@@ -26,6 +26,7 @@ import * as rig from "./system/rig.js";
 import { drawChoices, startComparing } from "./viewing/comparing.js";
 import { drawNotes, startNotes } from "./viewing/notes.js";
 import * as scrubber from "./viewing/scrubber.js";
+import { drawVoices, startVoice } from "./viewing/voice.js";
 
 /** Draw every part anew, after the language was changed. */
 function redraw() {
@@ -33,6 +34,7 @@ function redraw() {
   for (const part of [recordings, recording, doctor, rig]) part.draw();
   scrubber.drawWords();
   drawNotes();
+  drawVoices();
   drawChoices();
   drawExports();
   drawKeys();
@@ -50,7 +52,7 @@ function entered({ view, id }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startExports]) start();
+for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

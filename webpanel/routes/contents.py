@@ -1,16 +1,16 @@
-"""Routes that look into a recording: its pulses, its images."""
+"""Routes that look into a recording: its pulses, its images, notes about them, written and spoken."""
 
 from http import HTTPStatus
-from typing import Annotated
+from typing import Annotated, Final
 
 import anyio
 import cv2
 import numpy as np
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from numpy.typing import NDArray
 
-from rig.looking import Moment, NewNote, Note
+from rig.looking import Moment, NewNote, Note, VoiceNote
 from rig.status import Pulses, RecordingState
 from service.seam import RigService
 from webpanel.problems import ProblemError
@@ -27,8 +27,13 @@ _KEPT = {"Cache-Control": "private, max-age=31536000, immutable"}
 #: Threads that read and encode images. They are few, so that looking through a recording never slows down recording.
 _READERS = 2
 Pulse = Annotated[int, Path(ge=1, le=2**53, description="number of the pulse", examples=[1])]
+NotedPulse = Annotated[int, Query(ge=1, le=10**15, description="number of the pulse", examples=[1])]
+VoiceNumber = Annotated[int, Path(ge=1, le=999_999, description="number of the note", examples=[1])]
 OneCamera = Annotated[str | None, Query(max_length=100, description="only this camera", examples=["K2"])]
 OfferAsFile = Annotated[bool, Query(description="offer it as a file to keep")]
+_WEBM: Final = "audio/webm"
+_SOUND: Final = {_WEBM: {"schema": {"type": "string", "format": "binary"}}}
+_HEARD: Responses = {200: {"description": "The sound.", "content": _SOUND}}
 _PNG: Responses = {
     200: {
         "description": "The triplet, or one camera's part of it.",
@@ -101,6 +106,8 @@ def contents_router(service: RigService, changes: Changes) -> APIRouter:
         changes.recordings_changed()
         return notes
 
+    _add_voice_notes(router, service, changes)
+
     @router.get(
         "/recordings/{recording_id}/thumbnail.jpg",
         response_class=Response,
@@ -120,6 +127,51 @@ def contents_router(service: RigService, changes: Changes) -> APIRouter:
         return Response(jpeg, media_type="image/jpeg", headers=_KEPT if final else None)
 
     return router
+
+
+def _add_voice_notes(router: APIRouter, service: RigService, changes: Changes) -> None:
+    @router.get("/recordings/{recording_id}/voice-notes", responses=refusals(404))
+    def list_voice_notes(recording_id: RecordingId) -> list[VoiceNote]:
+        """The spoken notes, in the order in which they were spoken."""
+        return service.voice_notes(recording_id)
+
+    @router.post(
+        "/recordings/{recording_id}/voice-notes",
+        status_code=HTTPStatus.CREATED,
+        responses=CHANGING | refusals(404),
+        openapi_extra={"requestBody": {"required": True, "content": _SOUND}},
+    )
+    async def add_voice_note(recording_id: RecordingId, pulse: NotedPulse, request: Request) -> list[VoiceNote]:
+        """Keep a spoken note about a pulse: a WebM file of at most 2 MiB, in a folder beside the log.
+
+        It goes to the trash and back with the recording, and stands in archives of recordings.
+        """
+        if not request.headers.get("content-type", "").startswith(_WEBM):
+            text = f"the body must be sound: send Content-Type: {_WEBM}"
+            raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
+        notes = await run_sync(service.add_voice_note, recording_id, pulse, await request.body())
+        changes.recordings_changed()
+        return notes
+
+    @router.get(
+        "/recordings/{recording_id}/voice-notes/{number}/sound.webm",
+        response_class=Response,
+        responses=_HEARD | refusals(404),
+    )
+    def get_voice_note(recording_id: RecordingId, number: VoiceNumber, download: OfferAsFile = False) -> Response:
+        """A spoken note, to listen to."""
+        file = service.voice_file(recording_id, number)
+        with file.open() as opened:
+            sound = opened.read()
+        offered = {"Content-Disposition": attachment(file.name)} if download else {}
+        return Response(sound, media_type=_WEBM, headers=offered)
+
+    @router.delete("/recordings/{recording_id}/voice-notes/{number}", responses=CHANGING | refusals(404))
+    def remove_voice_note(recording_id: RecordingId, number: VoiceNumber) -> list[VoiceNote]:
+        """Remove a spoken note for good; if there is none of this number, nothing changes."""
+        notes = service.remove_voice_note(recording_id, number)
+        changes.recordings_changed()
+        return notes
 
 
 def _jpeg(service: RigService, recording_id: str, pulse: int, camera: str | None, width: int | None) -> bytes:

@@ -1,6 +1,9 @@
 """What people look for in a recording: where it begins to matter, notes at single pulses, pictures without loss."""
 
+import hashlib
+import io
 import json
+import zipfile
 from pathlib import Path
 
 import cv2
@@ -9,11 +12,16 @@ import numpy as np
 import pytest
 
 from recorder.reading.info import info
+from rig.looking import VOICE_BYTES_MAX, VOICES_MAX
 from tests.recorder.logs import ALL_OK, make_image, make_tag
 from tests.webpanel.memory_service import SHAPE, MemoryService, write_recording
 from tests.webpanel.serving import refused
 
 NOTES = "/api/recordings/jump/notes"
+VOICES = "/api/recordings/jump/voice-notes"
+#: The head of a WebM file, as a browser begins one.
+WEBM = bytes.fromhex("1a45dfa39f4286810142f7810142f2810442f381084282847765626d42878104428581021853806701ffffffffffffff")
+SOUND = {"Content-Type": "audio/webm"}
 
 
 @pytest.fixture(autouse=True)
@@ -67,3 +75,58 @@ def test_notes_never_outgrow_their_file(client: httpx.Client) -> None:
     assert len(client.get(NOTES).json()) == 60
     refused(client.put(f"{NOTES}/1", json={"text": "x" * 121}), 422)
     refused(client.put(f"{NOTES}/1", json={"text": ""}), 422)
+
+
+def speak(client: httpx.Client, pulse: int, content: bytes) -> httpx.Response:
+    """Send a spoken note."""
+    return client.post(VOICES, params={"pulse": pulse}, content=content, headers=SOUND)
+
+
+def test_spoken_notes_stand_beside_the_log_and_go_where_the_recording_goes(
+    client: httpx.Client, service: MemoryService, log: Path
+) -> None:
+    content, first, second = log.read_bytes(), WEBM + b"first", WEBM + b"second" * 30_000
+    client.patch("/api/recordings/jump", json={"bib": "17", "athlete": "Åse"}).raise_for_status()
+    assert client.get(VOICES).json() == []
+    assert speak(client, 30, first).status_code == 201
+    notes = speak(client, 7, second).json()
+    assert [(note["number"], note["pulse"], note["bytes"]) for note in notes] == [
+        (1, 30, len(first)),
+        (2, 7, len(second)),
+    ]
+    heard = client.get(f"{VOICES}/2/sound.webm?download=true")
+    assert (heard.content, heard.headers["content-type"]) == (second, "audio/webm")
+    assert "17_Ase_jump_note-2_pulse-7.webm" in heard.headers["content-disposition"]
+    archive = client.get("/api/recordings.zip?ids=jump")
+    assert int(archive.headers["content-length"]) == len(archive.content)
+    with zipfile.ZipFile(io.BytesIO(archive.content)) as opened:
+        assert opened.read("17_Åse_jump_note-2_pulse-7.webm") == second
+        assert hashlib.sha256(first).hexdigest() in opened.read("SHA256SUMS").decode()
+    assert log.read_bytes() == content
+    client.delete("/api/recordings/jump").raise_for_status()
+    assert client.get(VOICES).json() == notes
+    assert client.get("/api/trash").json()["bytes"] > len(content) + len(second)
+    client.post("/api/recordings/jump/restore").raise_for_status()
+    assert [note["number"] for note in client.delete(f"{VOICES}/1").json()] == [2]
+    refused(client.get(f"{VOICES}/1/sound.webm"), 404)
+    client.delete("/api/recordings/jump").raise_for_status()
+    client.delete("/api/trash").raise_for_status()
+    assert list(log.parent.rglob("*voice*")) == []
+
+
+def test_what_is_no_spoken_note_is_refused(client: httpx.Client, log: Path) -> None:
+    refused(speak(client, 1, b"RIFF"), 422)
+    refused(speak(client, 1, b""), 422)
+    refused(speak(client, 1, WEBM + bytes(VOICE_BYTES_MAX)), 413)
+    refused(speak(client, 0, WEBM), 422)
+    refused(client.post(VOICES, params={"pulse": 1}, json={}), 415)
+    refused(client.post("/api/recordings/nobody/voice-notes", params={"pulse": 1}, content=WEBM, headers=SOUND), 404)
+    refused(client.post("/api/arm", content=WEBM, headers=SOUND), 415)
+    for pulse in range(1, VOICES_MAX + 1):
+        assert speak(client, pulse, WEBM).status_code == 201
+    refused(speak(client, 1, WEBM), 409)
+    elsewhere = log.with_name("elsewhere")
+    log.with_suffix(".voice").rename(elsewhere)
+    log.with_suffix(".voice").symlink_to(elsewhere)
+    assert client.get(VOICES).json() == []
+    refused(speak(client, 1, WEBM), 422)

@@ -89,6 +89,8 @@ export const events = {
   act_removed: ["fjernet opptaket {recording} for godt"],
   act_noted: ["noterte noe i opptaket {recording}"],
   act_note_removed: ["fjernet et notat i opptaket {recording}"],
+  act_spoke: ["leste inn et notat om opptaket {recording}"],
+  act_voice_removed: ["fjernet et talenotat i opptaket {recording}"],
   act_exported: ["ba om en eksport av opptaket {recording}"],
   act_export_ended: ["avbrøt eller fjernet en eksport"],
   act_next_jumper: ["endret neste hopper"],

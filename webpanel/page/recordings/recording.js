@@ -11,6 +11,7 @@ import { attempt, clearSnacks, tell } from "../shared/snacks.js";
 import { offer } from "../viewing/comparing.js";
 import { loadNotes } from "../viewing/notes.js";
 import { clearScrubber, scrub, setMoment } from "../viewing/scrubber.js";
+import { loadVoices } from "../viewing/voice.js";
 import { remove, restore, watchCatalogue } from "./catalogue.js";
 import { loadExports } from "./exports.js";
 
@@ -88,7 +89,10 @@ async function load(id) {
   if (loaded.state === "recording" && recording && !isRunning()) return; // an answer that was overtaken
   recording = loaded;
   draw();
-  if (!isRunning()) void attempt(() => loadNotes(id));
+  if (!isRunning()) {
+    void attempt(() => loadNotes(id));
+    void attempt(() => loadVoices(id));
+  }
   if (isRunning() || scrubbing || !recording.counts.pulses) return;
   scrubbing = true;
   try {

@@ -234,6 +234,46 @@ def test_a_jump_shows_what_the_start_list_had_and_where_it_goes_on(
     expect(facts).to_have_text(re.compile("Navnone-part2.*Fortsetterone$"))
 
 
+def test_a_stretch_that_is_marked_is_exported(
+    panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path
+) -> None:
+    write_recording(service.catalogue.directory, "jump", (ALL_OK,) * 30)
+    page = open_page(f"{panel.url}/#/recordings/jump", width=360, height=780)
+    where, mark = page.locator("#frame-where"), page.locator("#frame-strip em")
+    expect(where).to_have_text(re.compile("^1 / 30"))
+    expect(mark).to_be_hidden()
+    for _ in range(4):
+        page.locator("#frame-on").click()
+    page.locator("#mark-first").click()
+    for _ in range(3):
+        page.locator("#frame-on").click()
+    page.locator("#mark-last").click()
+    expect(page.locator("#export-first")).to_have_value("5")
+    expect(page.locator("#export-last")).to_have_value("8")
+    strip, marked = page.locator(".strip-lines").bounding_box(), mark.bounding_box()
+    assert strip is not None
+    assert marked is not None
+    assert marked["x"] - strip["x"] == pytest.approx(strip["width"] * 4 / 30, abs=1)
+    assert marked["width"] == pytest.approx(strip["width"] * 4 / 30, abs=1)
+    page.locator("#export-last").fill("7")
+    page.locator("#export-last").press("Tab")
+    page.locator("#export-kind").select_option("csv")
+    page.locator("#export-form button[type=submit]").click()
+    with page.expect_download() as got:
+        page.locator("#exports a").click()
+    got.value.save_as(tmp_path / "tags.csv")
+    rows = (tmp_path / "tags.csv").read_text().splitlines()
+    assert [row.partition(",")[0] for row in rows[1:]] == ["5", "6", "7"]
+    for _ in range(5):
+        page.locator("#frame-back").click()
+    page.locator("#mark-last").click()
+    expect(page.locator("#export-last")).to_have_value("3")
+    expect(page.locator("#export-first")).to_have_value("")
+    page.locator("#mark-last").click()
+    expect(mark).to_be_hidden()
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+
+
 def test_a_note_is_spoken_listened_to_and_removed(
     panel: Panel, service: MemoryService, client: httpx.Client, open_page: Open
 ) -> None:

@@ -6,6 +6,7 @@ import { $, icon, make } from "../shared/dom.js";
 import { number, size } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt } from "../shared/snacks.js";
+import { beginMarking, mark, marked, startMarking } from "../viewing/marking.js";
 
 /** @typedef {{ id: string, recording: string, state: string, done: number, pulses: number, name: string, bytes: number, problem: string }} ExportJob */
 
@@ -27,6 +28,10 @@ let timer;
 
 export function startExports() {
   drawExports();
+  startMarking(drawStretch);
+  for (const end of /** @type {const} */ (["first", "last"])) {
+    $(`export-${end}`).addEventListener("change", () => mark(end, $(`export-${end}`).valueAsNumber || null));
+  }
   $("export-kind").addEventListener("change", drawFitting);
   $("export-form").addEventListener("submit", (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
@@ -38,11 +43,12 @@ export function startExports() {
  * Show the exports of a recording.
  *
  * @param {string} id
- * @param {string[]} names of its cameras
+ * @param {import("../shared/types.js").Pulses} shown its pulses
  */
-export async function loadExports(id, names) {
+export async function loadExports(id, shown) {
   if (recording !== id) jobs = [];
-  [recording, cameras] = [id, names];
+  [recording, cameras] = [id, shown.cameras];
+  beginMarking(shown.pulses.map(({ pulse }) => pulse));
   drawExports();
   await attempt(look);
 }
@@ -65,10 +71,16 @@ function drawFitting() {
   $("export-camera").disabled = kind === "contact_sheet";
 }
 
+/** Show the pulses that are marked in the fields, too. */
+function drawStretch() {
+  const { first, last } = marked();
+  [$("export-first").value, $("export-last").value] = [first ?? "", last ?? ""];
+}
+
 async function ask() {
   const [kind, camera] = [$("export-kind").value, $("export-camera").value];
   const order = {
-    kind, cameras: camera && kind !== "contact_sheet" ? [camera] : [], quality: $("export-quality").value,
+    kind, cameras: camera && kind !== "contact_sheet" ? [camera] : [], ...marked(), quality: $("export-quality").value,
     slow: VIDEOS.includes(kind) ? Number($("export-slow").value) : 1, burn_in: VIDEOS.includes(kind) && $("export-burn").checked,
   };
   await attempt(async () => {

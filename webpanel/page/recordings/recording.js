@@ -99,7 +99,7 @@ async function load(id) {
     const pulses = await call("GET", recordingPath(id, "/pulses"));
     if (recording?.id !== id || place().id !== id) return;
     scrub(pulses);
-    void loadExports(id, pulses.cameras);
+    void loadExports(id, pulses);
     void attempt(() => offer(loaded));
     const { pulse, kind } = await call("GET", recordingPath(id, "/moment"));
     if (recording?.id === id && place().id === id) setMoment(pulse, kind);

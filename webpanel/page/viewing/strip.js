@@ -17,7 +17,7 @@ const STATUSES = ["ok", "missed", "lost", "damaged", "absent"];
  * @param {(index: number) => void} sought called with the index of the pulse that is pointed at
  */
 export function makeStrip(strip, sought) {
-  const lines = make("div", { class: "strip-lines" }, document.createElementNS(SVG, "svg"), make("i"));
+  const lines = make("div", { class: "strip-lines" }, document.createElementNS(SVG, "svg"), make("em", { hidden: true }), make("i"));
   strip.append(make("div", { class: "strip-names" }), lines, make("ul", { class: "strip-key" }));
   /** @param {PointerEvent} event */
   const seek = (event) => {
@@ -45,6 +45,21 @@ export function drawStrip(strip, { cameras, pulses }) {
   drawing.setAttribute("viewBox", `0 0 ${pulses.length || 1} ${cameras.length * LINE_PX}`);
   drawing.setAttribute("preserveAspectRatio", "none");
   drawing.replaceChildren(...cameras.flatMap((_, camera) => drawLine(pulses.map(({ statuses }) => statuses[camera]), (camera + 0.5) * LINE_PX)));
+}
+
+/**
+ * Show a stretch of pulses as marked, both ends included; null: there is none.
+ *
+ * @param {HTMLElement} strip
+ * @param {{ first: number, last: number }|null} stretch indices of pulses
+ */
+export function markStretch(strip, stretch) {
+  const mark = /** @type {HTMLElement} */ (strip.querySelector("em"));
+  mark.hidden = stretch === null;
+  if (!stretch) return;
+  const share = 100 / Number(strip.dataset.pulses);
+  mark.style.left = `${stretch.first * share}%`;
+  mark.style.width = `${(stretch.last - stretch.first + 1) * share}%`;
 }
 
 /**

@@ -391,6 +391,13 @@ class TapGuard(Model):
     confirm_s: float = Field(description="so long from now the recording is stopped with `confirm` only")
 
 
+class AutomaticStatus(Model):
+    """Whether recordings begin by themselves when something moves."""
+
+    on: bool = Field(description="whether they do at present")
+    camera: str = Field(description="whose images are watched")
+
+
 class Status(Model):
     """Everything about the running service at one moment."""
 
@@ -409,6 +416,7 @@ class Status(Model):
     last_recording: str | None = Field(description="id of the recording that ended last")
     last_jump: LastJump | None = Field(None, description="the jump that the analysis measured last")
     next_jumper: NextJumper = Field(NextJumper(), description="whom the next recording is of")
+    automatic: AutomaticStatus | None = Field(None, description="null: the rig file has no [automatic.motion]")
     processes: tuple[ProcessStatus, ...]
 
 

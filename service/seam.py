@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from prometheus_client.metrics_core import Metric
 
+from rig.automatic import AutomaticChange, Mark, Marked
 from rig.export import ExportJob, ExportOrder
 from rig.frame import FrameStatus
 from rig.looking import Moment, Note, VoiceNote
@@ -184,6 +185,14 @@ class RigService(Protocol):
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         """Start a recording of the next jumper; returns when its log is open. Only while armed."""
+        ...
+
+    def mark(self, mark: Mark) -> Marked:
+        """Begin a recording that reaches back to before a mark, or note the mark in the one that runs."""
+        ...
+
+    def change_automatic(self, change: AutomaticChange) -> Status:
+        """Let motion begin recordings, or not. StateForbidsError: nothing is watched for motion."""
         ...
 
     def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:

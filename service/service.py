@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from contextlib import suppress
+from datetime import UTC, datetime
 from functools import partial
 from typing import Final, Literal
 
@@ -12,11 +13,25 @@ from prometheus_client.metrics_core import Metric
 
 from recorder.catalogue.folder import Catalogue
 from rig import events
-from rig.errors import StateForbidsError, UnknownRecordingError
-from rig.phrase import Phrase
+from rig.automatic import AutomaticChange, Mark, Marked
+from rig.clocks import NS_PER_S, HostNs, UtcAnchor
+from rig.errors import BadInputError, StateForbidsError, SvevError, UnknownRecordingError
+from rig.phrase import Phrase, phrase
 from rig.pulse import RigPulse
-from rig.status import DoctorReport, Event, Recording, RecordingOrder, RigView, SessionChange, State, Status, StopOrder
+from rig.status import (
+    AutomaticStatus,
+    DoctorReport,
+    Event,
+    Recording,
+    RecordingOrder,
+    RigView,
+    SessionChange,
+    State,
+    Status,
+    StopOrder,
+)
 from rig.transport.preview import PreviewSlot
+from service.automatic.watch import MotionWatch
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
@@ -34,6 +49,9 @@ _CLOSE_S: Final = 60.0
 #: After each request for a preview the recorder goes on copying images for this time.
 _LEASE_S: Final = 3.0
 _POLL_S: Final = 0.02
+#: A mark may be so old, and so far in the future, because clocks differ.
+_MARK_S: Final = 60.0
+_CLOCKS_S: Final = 1.0
 
 
 class Service(Archive):
@@ -62,6 +80,10 @@ class Service(Archive):
         super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
         self._slot, self._examine = slot, examine
+        self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
+        self._watch = None
+        if motion is not None:
+            self._watch = MotionWatch(supervisor.rig, motion, slot, lambda: supervisor.status.state, self._moved)
         self._closing = threading.Event()
 
     def status(self) -> Status:
@@ -69,6 +91,10 @@ class Service(Archive):
         status, shown = self._supervisor.status, self._jumpers.shown
         if shown.version > status.next_jumper.version:  # somebody has just edited him
             status = status.model_copy(update={"next_jumper": shown})
+        motion = self._automatic.motion
+        if self._watch is not None and motion is not None:
+            automatic = AutomaticStatus(on=self._watch.on, camera=motion.camera)
+            status = status.model_copy(update={"automatic": automatic})
         return self._keeper.counted_in(status)
 
     @property
@@ -95,6 +121,50 @@ class Service(Archive):
             supervisor.recordings.start(order, opened)
 
         return supervisor.commands.ask(start, _OPEN_S)
+
+    def mark(self, mark: Mark) -> Marked:
+        """Begin a recording at the mark, with the seconds before; one that runs already only gets the mark."""
+        age_s = _age_s(mark)
+        source, age = mark.source or "?", f"{age_s:.1f}"
+        said = phrase("event_marked", "a jump is marked by {source}, {age} s ago", source=source, age=age)
+        note = partial(self._supervisor.note, events.Event.now(events.Level.INFO, "mark", said))
+        self._supervisor.commands.ask(at_once(note), _SOON_S)
+        if (running := self.status().recording) is not None:
+            return Marked(started=False, recording=running)
+        settings = self._automatic
+        order = RecordingOrder(preroll_s=settings.before_s + age_s, duration_s=max(0.0, settings.after_s - age_s))
+        try:
+            return Marked(started=True, recording=self.start_recording(order))
+        except StateForbidsError:  # another mark came at the same time
+            if (running := self.status().recording) is None:
+                raise
+            return Marked(started=False, recording=running)
+
+    def change_automatic(self, change: AutomaticChange) -> Status:
+        """Let motion begin recordings, or not."""
+        if self._watch is None:
+            raise StateForbidsError("nothing is watched for motion: add [automatic.motion] to the rig file")
+        if self._watch.on != change.on:
+            self._watch.on = change.on
+            on = phrase("event_motion_on", "recordings begin by themselves when something moves")
+            off = phrase("event_motion_off", "recordings do not begin by themselves any more")
+            self.tell("info", "motion", on if change.on else off)
+        self._supervisor.hub.wake()
+        return self.status()
+
+    def watch(self) -> None:
+        """Begin to watch for motion, if the rig file says so; `close` ends it."""
+        if self._watch is not None:
+            self._watch.start()
+
+    def _moved(self, time_: HostNs) -> None:
+        """Begin a recording, because something moves in an image; the thread that watches goes on whatever happens."""
+        mark = Mark(source="motion", time=datetime.fromtimestamp(UtcAnchor.take().utc(time_) / NS_PER_S, UTC))
+        try:
+            self.mark(mark)
+        except SvevError as error:
+            text = "something moved, but no recording could begin: {why}"
+            self.tell("warning", "motion", phrase("event_motion_unrecorded", text, why=str(error)))
 
     def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:
         """Stop, and return when the log is closed."""
@@ -171,5 +241,24 @@ class Service(Archive):
         return self._supervisor.answering
 
     def close(self) -> None:
-        """End the waiting of all threads that wait for a preview."""
+        """End the waiting of all threads that wait for a preview, and the watching."""
         self._closing.set()
+        if self._watch is not None:
+            self._watch.close()
+
+
+def _age_s(mark: Mark) -> float:
+    """How long ago it happened, s.
+
+    Raises:
+        BadInputError: in the future, or too long ago.
+    """
+    if mark.time is None:
+        return 0.0
+    age_s = (datetime.now(UTC) - mark.time).total_seconds()
+    if not -_CLOCKS_S < age_s < _MARK_S:
+        raise BadInputError(
+            f"the mark is {age_s:.1f} s old: give a time of the last {_MARK_S:g} s, by a clock that agrees with this "
+            "computer's to a second, or none"
+        )
+    return max(0.0, age_s)

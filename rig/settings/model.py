@@ -220,6 +220,27 @@ class ServiceSettings(StrictModel):
     webhook: WebhookSettings | None = None
 
 
+class MotionSettings(StrictModel):
+    """Where a jumper who comes into sight is noticed."""
+
+    camera: str = Field(min_length=1, max_length=40, description="name of the camera whose images are watched")
+    region: Region | None = Field(
+        None,
+        description="part of its image, in px of the frames, e.g. where the jumper leaves the table; left out: all",
+    )
+    least_share: float = Field(
+        0.004, gt=0, le=0.5, description="share of the region that a jumper covers at least; snow flakes are smaller"
+    )
+
+
+class AutomaticSettings(StrictModel):
+    """Recordings that begin by themselves: at a mark (POST /api/mark), or when something moves."""
+
+    before_s: float = Field(4.0, ge=0, le=600, description="seconds before the mark, as far as they are held in memory")
+    after_s: float = Field(8.0, gt=0, le=3600, description="seconds after it")
+    motion: MotionSettings | None = Field(None, description="watch a camera's images for the jumper")
+
+
 class AnalysisSettings(StrictModel):
     """The analysis that measures the jumper while recordings run; it needs either the survey or the poses."""
 
@@ -253,6 +274,7 @@ class RigSettings(StrictModel):
     network: NetworkSettings = NetworkSettings()
     service: ServiceSettings = ServiceSettings()
     analysis: AnalysisSettings | None = None
+    automatic: AutomaticSettings = AutomaticSettings()
     simulation: SimulationSettings | None = None
     calibration: Path | None = Field(
         None,
@@ -275,6 +297,23 @@ class RigSettings(StrictModel):
             raise ValueError("cameras differ in region.height: frames stand side by side, so make the heights equal")
         if self.simulation is None and any(camera.backend == "sim" for camera in self.cameras):
             raise ValueError('backend "sim" needs a [simulation] table: add scenario = "../scenarios/training.toml"')
+        return self
+
+    @model_validator(mode="after")
+    def _motion_is_watched_in_an_image(self) -> "RigSettings":
+        motion = self.automatic.motion
+        if motion is None:
+            return self
+        camera = next((camera for camera in self.cameras if camera.name == motion.camera), None)
+        if camera is None:
+            names = ", ".join(camera.name for camera in self.cameras)
+            raise ValueError(f'automatic.motion watches camera "{motion.camera}", which the rig does not have: {names}')
+        part, whole = motion.region, camera.region
+        if part is not None and (part.x + part.width > whole.width or part.y + part.height > whole.height):
+            raise ValueError(
+                f"automatic.motion.region reaches beyond the frames of {camera.name}, {whole.width} x {whole.height} "
+                "px: its x and y count from the frame's first column and row"
+            )
         return self
 
     @model_validator(mode="after")

@@ -167,6 +167,10 @@ class Supervisor:
             self._reconcile()
         return self._refresh()
 
+    def note(self, event: Event) -> None:
+        """Command: tell an event, also to the log of a recording that runs or begins soon."""
+        self._session.tell(event)
+
     def look(self) -> WarmUp:
         """Command: say how far the rig has come since it was armed."""
         processes = self._session.processes

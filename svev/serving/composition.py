@@ -108,6 +108,7 @@ def serve(settings: ServiceSettings) -> None:
                 _tell_of_another_folder(settings, rig, hub)
                 if settings.access.tokens.warning:
                     hub.tell(Event.now(Level.WARNING, "access", plain(settings.access.tokens.warning)))
+                service.watch()
                 if rig.service.arm_at_start:
                     service.arm()
                 server.run(sockets=[listener])

@@ -15,7 +15,17 @@ from playwright.sync_api import Page, Route, expect
 from rig.errors import StateForbidsError, StorageError
 from rig.frame import FrameStatus
 from rig.phrase import phrase, plain
-from rig.status import LastJump, Level, MeasuredValue, Recording, RecordingOrder, State, Statement, Status
+from rig.status import (
+    AutomaticStatus,
+    LastJump,
+    Level,
+    MeasuredValue,
+    Recording,
+    RecordingOrder,
+    State,
+    Statement,
+    Status,
+)
 from service.status.statements import recording_ended
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK
@@ -322,6 +332,23 @@ def test_a_long_press_stops_at_any_time_wherever_the_button_goes_and_its_end_is_
     expect(page.locator("#state-word")).to_have_text("Recording")
     expect(page.locator("#action-reason")).to_be_hidden()
     assert len(service.catalogue.entries()) == 2
+
+
+def test_a_switch_says_whether_recordings_begin_by_themselves(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page(panel.url, width=360, height=780)
+    expect(page.locator("#next-step")).to_be_enabled()
+    expect(page.locator("#automatic")).to_be_hidden()
+    service.automatic = AutomaticStatus(on=True, camera="K1")
+    page.reload()
+    switch = page.get_by_label("Records by itself when somebody comes into sight (K1)")
+    expect(switch).to_be_checked()
+    switch.uncheck()
+    wait_until(lambda: service.automatic == AutomaticStatus(on=False, camera="K1"), "the service is told")
+    expect(switch).not_to_be_checked()
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
 
 
 def test_no_camera_is_not_green_and_old_news_hides_nothing_new(

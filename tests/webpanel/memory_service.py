@@ -14,12 +14,14 @@ from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamil
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
+from rig.automatic import AutomaticChange, Mark, Marked
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
 from rig.status import (  # fmt: skip
+    AutomaticStatus,
     CameraState,
     CameraStatus,
     Counts,
@@ -68,6 +70,7 @@ class MemoryService(Archive):
         broken: raised by `status`, if set.
         last_jump: what the analysis measured last, set by tests.
         notice: what befell the last recording, set by tests.
+        automatic: whether recordings begin by themselves, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -79,6 +82,7 @@ class MemoryService(Archive):
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None
         self.notice: Statement | None = None
+        self.automatic: AutomaticStatus | None = None
         self.preview_calls = 0
         self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
@@ -119,6 +123,7 @@ class MemoryService(Archive):
                 last_recording=self._last,
                 last_jump=self.last_jump,
                 notice=self.notice,
+                automatic=self.automatic,
                 processes=(ProcessStatus(name="recorder", pid=1),),
             )
 
@@ -153,6 +158,19 @@ class MemoryService(Archive):
             started = self._recording
             self._become(State.RECORDING)
         return started if order.duration_s is None else self.stop_recording(started.id)
+
+    def mark(self, mark: Mark) -> Marked:
+        del mark
+        if (running := self._recording) is not None:
+            return Marked(started=False, recording=running)
+        return Marked(started=True, recording=self.start_recording(RecordingOrder()))
+
+    def change_automatic(self, change: AutomaticChange) -> Status:
+        if self.automatic is None:
+            raise StateForbidsError("nothing is watched for motion: add [automatic.motion] to the rig file")
+        self.automatic = self.automatic.model_copy(update={"on": change.on})
+        self._wake()
+        return self.status()
 
     def stop_recording(self, recording_id: str, order: StopOrder | None = None) -> Recording:
         with self._lock:

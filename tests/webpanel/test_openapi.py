@@ -15,6 +15,7 @@ from webpanel.door.access import Access
 
 #: The calls of the contract, and those that the page needs beyond it.
 CALLS = {
+    "POST /api/mark", "PUT /api/automatic",
     "GET /api/status", "POST /api/arm", "POST /api/disarm", "GET /api/rig", "GET /api/doctor", "GET /api/events",
     "GET /api/preview.jpg", "GET /api/preview.mjpg", "GET /api/recordings", "POST /api/recordings",
     "GET /api/recordings/{recording_id}", "PATCH /api/recordings/{recording_id}",

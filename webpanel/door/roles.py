@@ -33,6 +33,8 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     (r"POST /api/arm", lambda: phrase("act_armed", "armed the rig")),
     (r"POST /api/disarm", lambda: phrase("act_disarmed", "disarmed the rig")),
     (r"POST /api/recordings", lambda: phrase("act_started", "started a recording")),
+    (r"POST /api/mark", lambda: phrase("act_marked", "marked a jump")),
+    (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),
     (
         r"POST /api/recordings/([^/]+)/stop",
         lambda recording: phrase("act_stopped", "stopped recording {recording}", recording=recording),

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Body, Depends, Query, Request, Response
 from isal import igzip as gzip
 from pydantic import AwareDatetime, BeforeValidator, TypeAdapter
 
+from rig.automatic import AutomaticChange, Mark, Marked
 from rig.status import (
     LONGEST_LINE,
     LONGEST_TAG,
@@ -17,6 +18,7 @@ from rig.status import (
     RecordingQuery,
     SessionChange,
     Sorting,
+    Status,
     StopOrder,
 )
 from service.seam import RigService
@@ -99,6 +101,20 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         recording = service.start_recording(order)
         response.headers["Location"] = f"/api/recordings/{recording.id}"
         return recording
+
+    @router.post("/mark", responses=CHANGING | refusals(422))
+    def mark(mark: Mark | None = None) -> Marked:
+        """A jump begins, says a light barrier or a timing system: record it, with the seconds before.
+
+        How many seconds before and after is said by `[automatic]` in the rig file. While a recording runs, the mark is
+        written into its log, and nothing else happens: a barrier that a ski breaks twice begins one recording.
+        """
+        return service.mark(mark or Mark())
+
+    @router.put("/automatic", responses=CHANGING)
+    def change_automatic(change: AutomaticChange) -> Status:
+        """Let recordings begin by themselves when something moves (`[automatic.motion]` in the rig file), or not."""
+        return service.change_automatic(change)
 
     @router.post("/recordings/{recording_id}/stop", responses=CHANGING | refusals(404))
     def stop_recording(recording_id: RecordingId, order: StopOrder | None = None) -> Recording:

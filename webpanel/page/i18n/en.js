@@ -54,6 +54,7 @@ export const en = {
   "actions.wait": "in {seconds} s",
   "actions.no_connection": "No connection to the service: nothing can be started or stopped from here.",
   "actions.nothing_held": "Nothing to save yet: no pulses have come.",
+  "actions.automatic": "Records by itself when somebody comes into sight ({camera})",
 
   "preview.label": "What the cameras see",
   "preview.alt": "Live picture of the cameras {cameras}, side by side",

@@ -68,6 +68,11 @@ export const events = {
   event_list_unreadable: ["{path}: kan verken leses ({why}) eller legges til side ({refusal}); sjekk tilgangen"],
   why_other_version: ["den er ikke fra denne versjonen av svev"],
 
+  event_marked: ["et hopp er markert av {source}, for {age} s siden"],
+  event_motion_on: ["opptak starter av seg selv når noe beveger seg"],
+  event_motion_off: ["opptak starter ikke lenger av seg selv"],
+  event_motion_unrecorded: ["noe beveget seg, men ikke noe opptak kunne starte: {why}"],
+
   event_jump: ["hopp {jump} i {recording}: {verdict}"],
   event_no_analysis: ["ingen hopp måles før dette er rettet: {why}"],
   event_not_oriented: ["kameraene er ikke orientert, det prøves igjen: {why}"],
@@ -81,6 +86,8 @@ export const events = {
   act_armed: ["gjorde riggen klar"],
   act_disarmed: ["slo av riggen"],
   act_started: ["startet et opptak"],
+  act_marked: ["markerte et hopp"],
+  act_automatic: ["endret om opptak starter av seg selv"],
   act_stopped: ["stoppet opptaket {recording}"],
   act_edited: ["endret opptaket {recording}"],
   act_deleted: ["slettet opptaket {recording}"],

@@ -54,6 +54,7 @@ export const nb = {
   "actions.wait": "om {seconds} s",
   "actions.no_connection": "Ingen forbindelse med tjenesten: herfra kan ingenting startes eller stoppes.",
   "actions.nothing_held": "Ingenting å lagre ennå: det har ikke kommet pulser.",
+  "actions.automatic": "Tar opp av seg selv når noen kommer til syne ({camera})",
 
   "preview.label": "Det kameraene ser",
   "preview.alt": "Direktebilde fra kameraene {cameras}, side om side",

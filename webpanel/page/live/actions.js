@@ -44,6 +44,7 @@ export function startActions() {
   $("next-step").addEventListener("click", nextStep);
   $("save-last").addEventListener("click", saveLast);
   $("disarm").addEventListener("click", disarm);
+  $("automatic-on").addEventListener("change", () => void changeAutomatic($("automatic-on").checked));
   onLongPress($("next-step"), () => known.status?.state === "recording" && possible(), () => void perform("actions.stopping", () => stop(true)));
   startTaps(draw);
   watch(draw);
@@ -158,10 +159,31 @@ function draw() {
   const nothingHeld = held() < LEAST_PREROLL_S;
   drawButton($("save-last"), "save", t("actions.save_last"), quantity(held(), 1, "s"));
   $("save-last").disabled = !possible() || nothingHeld || waits() > 0;
+  drawAutomatic();
   $("disarm").hidden = !mayDisarm();
   $("disarm").disabled = !possible();
   setText($("disarm"), t(state === "arming" ? "actions.cancel" : "actions.disarm"));
   drawReason(state === "armed" && nothingHeld && !known.status?.pulses.arriving);
+}
+
+/** Whether recordings begin by themselves, if the rig file lets a camera be watched for that. */
+function drawAutomatic() {
+  const automatic = known.status?.automatic;
+  $("automatic").hidden = !automatic;
+  if (!automatic) return;
+  $("automatic-on").checked = automatic.on;
+  $("automatic-on").disabled = !known.connected || known.role === "watch";
+  setText($("automatic").querySelector("span"), t("actions.automatic", { camera: automatic.camera }));
+}
+
+/** @param {boolean} on */
+async function changeAutomatic(on) {
+  try {
+    update({ status: await call("PUT", "automatic", { on }), heard: Date.now() });
+  } catch (error) {
+    tellProblem(error);
+    drawAutomatic();
+  }
 }
 
 /**

@@ -184,6 +184,7 @@
  * @property {string|null} last_recording
  * @property {LastJump|null} last_jump
  * @property {NextJumper} next_jumper
+ * @property {{ on: boolean, camera: string }|null} automatic
  * @property {ProcessStatus[]} processes
  *
  * @typedef {object} Finding

@@ -1,0 +1,1 @@
+"""Recordings that begin by themselves."""

@@ -47,7 +47,7 @@ def fate(case: Hill, adjusting: Adjusting) -> Fate:
         named = {culprit for culprit in culprits if culprit.split()[0] in _words(str(error))}
         return Fate(0, len(named), len(culprits - named), 0, True, 0.0)
     # what cannot be told apart may be taken out together
-    together = [{_name(one.network, o) for o in _accused(one.blunder)} for one in outcome.removed]
+    together = [{_name(one.network, o) for o in _accused(one.blunder)} for one in (*outcome.removed, *outcome.aside)]
     gone = set().union(*together)
     innocents = sum(not names & culprits for names in together)
     network = outcome.adjustment.network

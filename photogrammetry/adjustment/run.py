@@ -23,12 +23,20 @@ class Outcome:
         blunders: suspected gross errors, the largest test value first.
         components: variance components; None where they do not settle.
         removed: the observations that snooping took out, in that order.
+        aside: groups of which one is wrong, nobody knows which, and that the adjustment does without.
     """
 
     adjustment: Adjustment
     blunders: tuple[Blunder, ...]
     components: tuple[Component, ...] | None
     removed: tuple[Removed, ...] = ()
+    aside: tuple[Removed, ...] = ()
+
+    @property
+    def suspected(self) -> tuple[Removed, ...]:
+        """All suspected gross errors with their networks, the largest test value first, used or not."""
+        used = (Removed(blunder, self.adjustment.network) for blunder in self.blunders)
+        return tuple(sorted((*used, *self.aside), key=lambda one: -abs(one.blunder.w)))
 
 
 def adjust(

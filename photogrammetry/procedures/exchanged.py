@@ -9,6 +9,7 @@ from scipy import special
 from photogrammetry.adjustment.gross_errors.suspicion import SINGLE_RISK
 from photogrammetry.adjustment.solution.global_test import ABSURD
 from photogrammetry.network.model import Point
+from photogrammetry.procedures.consensus import FEWEST_AGREEING
 from photogrammetry.procedures.reference_estimate import ReferencePoint
 from photogrammetry.procedures.reference_fit import ReferenceFit, fit_reference
 from rig.arrays import Floats
@@ -109,4 +110,5 @@ def is_mirrored(reference: Sequence[ReferencePoint], covariance: Floats, family_
         fit = fit_reference(turned, covariance, family_risk)
     except BadInputError:
         return False
-    return not fit.too_many and fit.estimate.ratio <= ABSURD
+    # three points always fit both ways
+    return fit.count >= FEWEST_AGREEING and not fit.too_many and fit.estimate.ratio <= ABSURD

@@ -20,6 +20,7 @@ from rig.arrays import Floats
 
 _ITERATIONS: Final = 20
 _SETTLED: Final = 1e-10
+_DIVERGED: Final = 1e-4
 _PARAMETERS: Final = 7
 _RANK: Final = 1e-9
 _ROUNDING: Final = 1e-9
@@ -133,13 +134,14 @@ class ReferenceEstimate:
 
         Raises:
             BadInputError: they lie on a line.
-            LinAlgError: their numbers lie too many orders of magnitude apart.
+            LinAlgError: there is no optimum, or their numbers lie too many orders of magnitude apart.
         """
         points, rows = [everything[i] for i in used], _rows(used)
         block = np.array([p.block for p in points])
         surveyed = np.array([p.surveyed for p in points])
         survey, free = np.diag(np.concatenate([p.sigma for p in points]) ** 2), covariance[np.ix_(rows, rows)]
         transform = fit_similarity(block, surveyed) if at is None else at
+        moved = 0.0
         for _ in range(_ITERATIONS):
             placed = transform.apply(block)
             slopes = _slopes(placed)
@@ -152,8 +154,12 @@ class ReferenceEstimate:
                 break
             step = -np.linalg.solve(normals, half.T @ (placed - surveyed).ravel())
             transform = _moved(transform, step, placed.mean(axis=0))
-            if np.abs(slopes @ step).max() <= _SETTLED * np.ptp(surveyed, axis=0).max():
+            moved = float(np.abs(slopes @ step).max() / np.ptp(surveyed, axis=0).max())
+            if moved <= _SETTLED:
                 break
+        # the block's covariance grows with the scale, so that gross errors can drive the scale to infinity
+        if at is None and not moved <= _DIVERGED:
+            raise np.linalg.LinAlgError("no optimum")
         projected = np.asarray(weights - half @ np.linalg.solve(normals, half.T), dtype=float)
         v = (transform.apply(block) - surveyed).ravel()
         controlled = np.einsum("ij,ji->i", misclosures, projected).reshape(-1, 3)

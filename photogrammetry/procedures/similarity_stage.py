@@ -13,7 +13,7 @@ from photogrammetry.adjustment.gross_errors.blunders import (
 )
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
-from photogrammetry.adjustment.solution.global_test import ABSURD
+from photogrammetry.adjustment.solution.global_test import ABSURD, TOLERABLE
 from photogrammetry.network.diagnosis import RefusedError
 from photogrammetry.network.model import Network, Point
 from photogrammetry.network.selection import (
@@ -47,6 +47,7 @@ def similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | No
     try:
         fit = fit_reference(reference, covariance, STAGE_RISK)
     except BadInputError as error:
+        _refuse_mirrored(reference, covariance)
         return None, [], Stage(StageName.SIMILARITY, f"left out: {error}")
     order = [*surveyed, *(i for i in given if i not in surveyed)]
     survey = {network.points[i].name: network.points[i] for i in order}
@@ -81,14 +82,10 @@ def _refuse_fit(
         RefusedError: says what is wrong as far as it is known.
     """
     # of fewer points none is a majority: which of them is wrong is asked, not whether
-    absurd = not fit.estimate.ratio <= ABSURD and fit.count > FEWEST_AGREEING
+    absurd = not fit.estimate.ratio <= ABSURD and fit.count > FEWEST_AGREEING and _is_gross(fit, reference)
     if not (absurd or fit.too_many):
         return
-    if is_mirrored(reference, covariance, STAGE_RISK):
-        raise RefusedError(
-            "the survey is mirrored: it fits the images once an axis is turned round; X, Y, Z must be right-handed, so "
-            "exchange two axes or the sign of one"
-        )
+    _refuse_mirrored(reference, covariance)
     words = told_of([exchange.words for exchange in exchanges])
     if fit.too_many:
         raise RefusedError(too_many([names[suspect.index] for suspect in fit.removed], len(reference)) + words)
@@ -97,6 +94,20 @@ def _refuse_fit(
         f"sigma0 {fit.estimate.ratio:.3g} (a priori 1); check names, units and sigmas of the survey, the interior "
         f"orientations, and whether two cameras are exchanged{words}"
     )
+
+
+def _refuse_mirrored(reference: Sequence[ReferencePoint], covariance: Floats) -> None:
+    if is_mirrored(reference, covariance, STAGE_RISK):
+        raise RefusedError(
+            "the survey is mirrored: it fits the images once an axis is turned round; X, Y, Z must be right-handed, so "
+            "exchange two axes or the sign of one"
+        )
+
+
+def _is_gross(fit: ReferenceFit, reference: Sequence[ReferencePoint]) -> bool:
+    """Whether the residuals (rms of the coordinates) exceed what a result may have."""
+    extent = float(np.ptp([point.surveyed for point in reference], axis=0).max())
+    return not np.sqrt(np.mean(fit.estimate.v**2)) <= TOLERABLE * extent
 
 
 def _unseen(network: Network, exchange: Exchange, wrong: Sequence[Removed]) -> Removed:

@@ -10,11 +10,14 @@ An observation that a stage takes out stays out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
+from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.equations.unknowns import State, state_of
 from photogrammetry.adjustment.gross_errors.blunders import (
+    Blunder,
     BlunderKind,
     Removed,
     describe,
@@ -22,9 +25,9 @@ from photogrammetry.adjustment.gross_errors.blunders import (
 )
 from photogrammetry.adjustment.gross_errors.snooping import BENT
 from photogrammetry.adjustment.run import Outcome, adjust
-from photogrammetry.adjustment.solution.adjustment import adjust_once
-from photogrammetry.adjustment.solution.global_test import ABSURD, GlobalTest, Verdict
-from photogrammetry.geometry.similarity import Similarity
+from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
+from photogrammetry.adjustment.solution.global_test import ABSURD, TOLERABLE, GlobalTest, Verdict
+from photogrammetry.geometry.similarity import Similarity, fit_similarity
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from photogrammetry.network.model import Network, Role
 from photogrammetry.network.selection import (
@@ -41,7 +44,10 @@ from photogrammetry.procedures.findings import STAGE_RISK, SURVEYED, Finding, St
 from photogrammetry.procedures.similarity_stage import similarity_stage
 from photogrammetry.procedures.single_rays import contradicted_rays
 from photogrammetry.start_values.search import complete
+from rig.arrays import Floats
 from rig.errors import BadInputError
+
+_OF_POINTS: Final = (BlunderKind.IMAGE, BlunderKind.CONTROL)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,10 +82,11 @@ def search_block(network: Network) -> Search:
     if free is None:
         nothing = Stage(StageName.SIMILARITY, "left out: there is no free block")
         return Search(cleaned, None, (), (stage, nothing))
-    fit, wrong, second = similarity_stage(cleaned, _without_suspects(free))
+    block = _without_suspects(free)
+    fit, wrong, second = similarity_stage(cleaned, block)
     removed = (*gone, *wrong)
     cleaned = _cleaned(network, removed)
-    start = None if fit is None else _carried(cleaned, free, fit.estimate.transform)
+    start = None if fit is None else _carried(cleaned, block, free, fit.estimate.transform)
     return Search(cleaned, start, removed, (stage, second))
 
 
@@ -90,17 +97,50 @@ def constrained_stage(search: Search) -> tuple[Outcome, Stage]:
         RefusedError: the outcome is absurd.
         NotSolvableError, NotConvergedError: of the adjustment.
     """
-    network, start, lonely = search.network, search.start, []
+    network, start, aside = search.network, search.start, list[Removed]()
     if start is not None:
-        lonely = contradicted_rays(network, start)
-        network, start = _cleaned(network, lonely), _without_points(start, lonely)
+        aside = contradicted_rays(network, start)
+        cleaned = _cleaned(network, aside)
+        network, start = cleaned, _state_in(cleaned, network, start)
     start = state_of(complete(network)) if start is None else start
     outcome = adjust(network, start, snoop=True, family_risk=STAGE_RISK)
-    outcome = replace(outcome, removed=(*lonely, *outcome.removed))
-    stage = Stage(StageName.CONSTRAINED, _adjusted_words(outcome), _findings(outcome))
-    outcome = replace(outcome, removed=(*search.removed, *outcome.removed))
+    outcome, more = _without_doubtful_points(outcome)
+    aside += more
+    findings = (*(Finding(_aside_words(one), removed=False) for one in aside), *_findings(outcome))
+    stage = Stage(StageName.CONSTRAINED, _adjusted_words(outcome), findings)
+    outcome = replace(outcome, removed=(*search.removed, *outcome.removed), aside=tuple(aside))
     refuse_absurd(outcome, [finding.message for part in (*search.stages, stage) for finding in part.findings])
     return outcome, stage
+
+
+def _without_doubtful_points(outcome: Outcome) -> tuple[Outcome, list[Removed]]:
+    """Leave out observations of a point of which one is wrong, nobody knows which; so the result is free of its error.
+
+    Groups of several points stay: they may be all that holds the network.
+    """
+    aside: list[Removed] = []
+    while doubtful := [b for b in outcome.blunders if len(_points_of(outcome.adjustment.network, b)) == 1]:
+        network, state = outcome.adjustment.network, outcome.adjustment.state
+        gone = Removed(doubtful[0], network)
+        cleaned = _cleaned(network, [gone])
+        try:
+            again = adjust(cleaned, _state_in(cleaned, network, state), snoop=True, family_risk=STAGE_RISK)
+        except (BadInputError, NotSolvableError, NotConvergedError):
+            break  # the network needs them
+        outcome = replace(again, removed=(*outcome.removed, *again.removed))
+        aside.append(gone)
+    return outcome, aside
+
+
+def _points_of(network: Network, blunder: Blunder) -> set[str]:
+    """The points of a group that cannot be told apart; none if it is not such a group, or not of points alone."""
+    if len(blunder.candidates) < 2 or any(one.kind not in _OF_POINTS for one in blunder.candidates):
+        return set()
+    return {observation_to_json(network, one)["point"] for one in blunder.candidates}
+
+
+def _aside_words(gone: Removed) -> str:
+    return f"{describe(gone.network, gone.blunder)}; the result does not use them"
 
 
 def snoop_network(network: Network) -> Outcome:
@@ -121,9 +161,9 @@ def snoop_network(network: Network) -> Outcome:
     if surveyed and all(image.estimate for image in network.images):
         try:
             whole = adjust_once(network, start)
-        except NotConvergedError:
-            return constrained_stage(search_block(network))[0]
-        if whole.ratio > BENT:
+        except (NotConvergedError, NotSolvableError):
+            whole = None  # wrong names lead the start values astray
+        if whole is None or whole.ratio > BENT:
             outcome, _ = constrained_stage(search_block(network))
             refuse_contradicted(network, outcome.adjustment)
             return outcome
@@ -145,7 +185,7 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
     """
     a = outcome.adjustment
     test = GlobalTest(a.ratio, a.redundancy)
-    if test.verdict is Verdict.ABSURD:
+    if test.verdict is Verdict.ABSURD and _is_gross(a):
         raise RefusedError(f"sigma0 is {test.words}{told_of(findings)}")
     gone = [
         g.network.points[g.blunder.suspect.index].name
@@ -155,6 +195,19 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
     left = sum(point.role in SURVEYED for point in a.network.points)
     if 3 * len(gone) > len(gone) + left:
         raise RefusedError(too_many(gone, len(gone) + left) + told_of(findings))
+
+
+def _is_gross(a: Adjustment) -> bool:
+    """Whether residuals of images or survey (rms of the coordinates) exceed what a result may have."""
+    network, columns = a.network, a.problem.image
+    c = np.array([a.state.interior[image.camera, 0] for image in network.images])
+    angles = a.image_residuals() / c[columns][:, None]
+    survey = a.relation_residuals()[a.problem.relations.rows(Kind.CONTROL)]
+    extent = float(np.ptp(a.state.xyz, axis=0).max(initial=0.0))
+    return bool(
+        (len(angles) and not np.sqrt(np.mean(angles**2)) <= TOLERABLE)
+        or (len(survey) and not np.sqrt(np.mean(survey**2)) <= TOLERABLE * extent)
+    )
 
 
 def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]:
@@ -196,39 +249,52 @@ def _without_suspects(free: Outcome) -> Outcome:
 
 def _cleaned(network: Network, removed: Sequence[Removed]) -> Network:
     """The network without the removed observations, matched by name because indices differ from stage to stage."""
-    named = [observation_to_json(gone.network, gone.blunder.suspect) for gone in removed]
+    named = [
+        observation_to_json(gone.network, one)
+        for gone in removed
+        for one in gone.blunder.candidates or (gone.blunder.suspect,)
+    ]
     rows = {(n["image"], n["point"]) for n in named if n["kind"] == BlunderKind.IMAGE}
     points = {n["point"] for n in named if n["kind"] == BlunderKind.CONTROL}
-    left = without_observations(network, rows)
-    lonely = np.array([p.name in points and n < RAYS for p, n in zip(left.points, rays(left), strict=True)], dtype=bool)
-    # without its survey nothing determines a point that one image shows
-    return as_check_points(only_points(left, ~lonely) if lonely.any() else left, points)
+    left = as_check_points(without_observations(network, rows), points)
+    # nothing determines a point that one image shows, without its survey
+    touched = {n["point"] for n in named if n["kind"] in _OF_POINTS}
+    lonely = np.array(
+        [
+            p.name in touched and p.role not in SURVEYED and n < RAYS
+            for p, n in zip(left.points, rays(left), strict=True)
+        ],
+        dtype=bool,
+    )
+    return only_points(left, ~lonely) if lonely.any() else left
 
 
-def _carried(network: Network, free: Outcome, transform: Similarity) -> State | None:
-    """Start values from the free block; None if it lacks a tie point."""
-    state, place = free.adjustment.state, {p.name: i for i, p in enumerate(free.adjustment.network.points)}
-    xyz = [transform.apply(state.xyz[place[p.name]]) if p.name in place else p.xyz for p in network.points]
+def _carried(network: Network, block: Outcome, free: Outcome, transform: Similarity) -> State | None:
+    """Start values from the block; None if a tie point is in neither it nor the free adjustment with all points."""
+    state, places = block.adjustment.state, _places(block)
+    whole = _places(free)
+    if any(point.name in whole and point.name not in places for point in network.points):
+        common = list(places)
+        onto = fit_similarity([whole[name] for name in common], [places[name] for name in common])
+        places = {name: onto.apply(xyz) for name, xyz in whole.items()} | places
+    xyz = [transform.apply(places[p.name]) if p.name in places else p.xyz for p in network.points]
     if any(known is None for known in xyz):
         return None
-    return State(
-        state.interior,
-        transform.apply(state.position),
-        transform.turn(state.rotation),
-        np.array(
-            [
-                point.xyz if point.role is Role.FIXED else known
-                for point, known in zip(network.points, xyz, strict=True)
-            ],
-            dtype=float,
-        ),
-    )
+    fixed = [p.xyz if p.role is Role.FIXED else known for p, known in zip(network.points, xyz, strict=True)]
+    turned = transform.turn(state.rotation)
+    return State(state.interior, transform.apply(state.position), turned, np.array(fixed, dtype=float))
 
 
-def _without_points(state: State, gone: Sequence[Removed]) -> State:
-    """The state of a network after points with a single ray were taken out."""
-    indices = [removed.blunder.suspect.index for removed in gone]
-    return replace(state, xyz=np.delete(state.xyz, indices, axis=0))
+def _places(outcome: Outcome) -> dict[str, Floats]:
+    """Coordinates of the points by name."""
+    a = outcome.adjustment
+    return {point.name: xyz for point, xyz in zip(a.network.points, a.state.xyz, strict=True)}
+
+
+def _state_in(network: Network, before: Network, state: State) -> State:
+    """The state of a network after some of its points were taken out."""
+    place = {point.name: i for i, point in enumerate(before.points)}
+    return replace(state, xyz=state.xyz[[place[point.name] for point in network.points]])
 
 
 def _adjusted_words(outcome: Outcome) -> str:

@@ -80,7 +80,7 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "distances": _relations(a, Kind.DISTANCE),
         "differences": _relations(a, Kind.DIFFERENCE),
         "weighted_parameters": _weighted_parameters(a),
-        "gross_errors": [blunder_to_json(network, blunder) for blunder in outcome.blunders],
+        "gross_errors": [blunder_to_json(one.network, one.blunder) for one in outcome.suspected],
         "variance_components": {
             part.group: {"factor": part.factor, "sigma": part.sigma, "redundancy": part.redundancy}
             for part in outcome.components or ()

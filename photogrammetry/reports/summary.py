@@ -24,10 +24,10 @@ def summarise(outcome: Outcome) -> list[str]:
         lines.append(f"taken out ({len(outcome.removed)}):")
         lines += [f"  {describe(gone.network, gone.blunder)}" for gone in outcome.removed[:_SHOWN]]
         lines += _more(len(outcome.removed))
-    if outcome.blunders:
-        lines.append(f"suspected gross errors ({len(outcome.blunders)}), the first is the suspect:")
-        lines += [f"  {describe(a.network, blunder)}" for blunder in outcome.blunders[:_SHOWN]]
-        lines += _more(len(outcome.blunders))
+    if suspected := outcome.suspected:
+        lines.append(f"suspected gross errors ({len(suspected)}), the first is the suspect:")
+        lines += [f"  {describe(one.network, one.blunder)}" for one in suspected[:_SHOWN]]
+        lines += _more(len(suspected))
     elif a.redundancy and GlobalTest(a.ratio, a.redundancy).verdict in (Verdict.AGREES, Verdict.SMALLER):
         lines.append("no gross error is suspected")
     elif a.redundancy:

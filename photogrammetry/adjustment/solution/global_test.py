@@ -11,6 +11,9 @@ GLOBAL_RISK: Final = 0.01
 #: Estimated over a-priori sigma0. Guessed sigmas are wrong by a factor of two or five; nobody misjudges his instruments
 #: by an order of magnitude, so beyond it observations do not belong to each other, and the result is no estimate.
 ABSURD: Final = 10.0
+#: Residuals, as part of the distance or of the field's extent, that a result may have however small its sigmas are: the
+#: accuracy that the paper asks for (section 0, 1:1000 of a flight of 20 m).
+TOLERABLE: Final = 1e-3
 
 
 class Verdict(StrEnum):
@@ -87,6 +90,6 @@ class GlobalTest:
                 )
             case _:
                 return (
-                    f"{self.ratio:.3g} times the a priori one, which is impossible (by chance up to {high:.2f}); "
-                    "names, units or interior orientations are wrong: correct them and do not use this result"
+                    f"{self.ratio:.3g} times the a priori one, neither by chance (up to {high:.2f}) nor by misjudged "
+                    "sigmas; names, units or interior orientations are wrong: correct them, do not use this result"
                 )

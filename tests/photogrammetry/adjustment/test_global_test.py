@@ -1,8 +1,15 @@
 """The global test: chance, misjudged sigmas and nonsense are told apart."""
 
+import json
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
 from photogrammetry.adjustment.solution.global_test import GLOBAL_RISK, GlobalTest, Verdict
+from photogrammetry.network.file_writer import write_network
+from svev.cli import main
+from tests.photogrammetry.synthetic import hill
 
 
 @pytest.mark.parametrize(
@@ -27,3 +34,24 @@ def test_verdict(ratio: float, redundancy: int, verdict: Verdict) -> None:
 def test_limits_are_those_of_the_risk() -> None:
     for limit in GlobalTest(1.0, 20).limits:
         assert GlobalTest(limit, 20).chance == pytest.approx(GLOBAL_RISK)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words", "verdict"),
+    [
+        (1.0, "agree with their sigmas", "agrees"),
+        (0.25, "times less accurate than their sigmas say, which is not chance", "larger"),
+        (0.02, "do not use this result", "absurd"),
+    ],
+)
+def test_the_sentence_depends_on_it(
+    factor: float, words: str, verdict: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    network = hill(1).network
+    o = network.observations
+    points = tuple(p if p.sigma is None else replace(p, sigma=p.sigma * factor) for p in network.points)
+    network = replace(network, observations=replace(o, sigma=o.sigma * factor), points=points)
+    write_network(network, tmp_path / "hill.json")
+    assert main(["adjust", str(tmp_path / "hill.json"), "-o", str(tmp_path / "result.json")]) == 0
+    assert words in capsys.readouterr().out
+    assert json.loads((tmp_path / "result.json").read_text())["global_test"]["verdict"] == verdict

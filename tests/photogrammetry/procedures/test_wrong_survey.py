@@ -89,6 +89,20 @@ def test_a_survey_that_contradicts_the_images_is_refused(spoil: Spoil, poses: bo
         orient(case.network)
 
 
+def test_a_point_that_cannot_be_judged_does_not_bend_the_result() -> None:
+    """Of the third wrong point either the survey or one image point is wrong: both are named, neither is used."""
+    rng = np.random.default_rng([46, 7])
+    case = wrong_survey(3)(hill(rng), rng)
+    orientation = orient(case.network)
+    assert _removed(orientation) == set(case.culprits) - {"B8"}
+    (aside,) = orientation.outcome.aside
+    assert not aside.blunder.locatable
+    assert _off(case, orientation) < 4.5
+    words = orientation.stages[2].findings[0].message
+    assert "control point B8; point B8 in image hill-1" in words
+    assert words.endswith("the result does not use them")
+
+
 def test_snooping_of_a_whole_network_isolates_exchanged_names_too() -> None:
     case = _spoilt(exchanged_names(2), 7)
     outcome = snoop_network(case.network)

@@ -24,6 +24,7 @@ from bench.results import write_results
 from bench.service.api import run_api
 from bench.service.catalogue import run_catalogue
 from bench.service.listing import run_listing
+from bench.triggering.pairing import pairing_table, run_pairing
 from recorder.publishing.subscriber import free_address
 
 Suite = Callable[[float, Path], dict[str, Any]]
@@ -128,6 +129,12 @@ def _faults(_seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
+def _pairing(pulses: int, directory: Path) -> dict[str, Any]:
+    cases = run_pairing(pulses)
+    path = write_results("pairing", cases, directory)
+    return {"cases": cases, "file": str(path), "table": pairing_table(cases)}
+
+
 def _smoothing(draws: int, directory: Path) -> dict[str, Any]:
     cases = run_smoothing(draws)
     path = write_results("smoothing", cases, directory)
@@ -169,3 +176,5 @@ SUITES: dict[str, Suite] = {
 }
 #: Suites that draw jumps or networks and the errors of their measurements.
 DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "gross-errors": _gross_errors}
+#: Suites that fire a number of simulated pulses.
+FIRED: dict[str, DrawnSuite] = {"pairing": _pairing}

@@ -10,6 +10,7 @@ import select
 from collections.abc import Callable
 from typing import Final
 
+from capture.clock_reading import ClockReading
 from capture.seam import Arrival, Camera, OpenCamera
 from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
@@ -17,7 +18,6 @@ from rig.frame import NO_SLOT, Record, RecordKind
 from rig.transport.ring import CameraRing
 
 _LATCHES_AT_START: Final = 16
-_LATCH_EVERY_NS: Final = NS_PER_S // 4
 _COUNT_EVERY_NS: Final = NS_PER_S
 _QUIET_NS: Final = NS_PER_S
 _RECEIVE_S: Final = 0.05
@@ -80,7 +80,8 @@ class Grabber:
         for _ in range(_LATCHES_AT_START):
             self._put_latch(camera.latch())
         camera.start()
-        next_latch = next_count = last_arrival = host_now()
+        reading = ClockReading()
+        next_count = last_arrival = host_now()
         while not self._stopping():
             requests = self._ring.reconnect_requests()
             wanted = requests != asked
@@ -97,14 +98,16 @@ class Grabber:
                 requests = asked  # its frame is on the way, slowly: look again
             asked = requests
             # Clock and counters are read just after a frame: the next one is farthest away, and the camera is sure to
-            # answer (a dead one blocks for seconds). Without pulses they are read after a second of quiet.
+            # answer (a dead one blocks for seconds). Without pulses they are read after a second of quiet, or when the
+            # last frame came out of turn.
             now = host_now()
             last_arrival = now if arrival is not None else last_arrival
-            if arrival is None and now < last_arrival + _QUIET_NS:
+            if arrival is None and now < last_arrival + _QUIET_NS and not reading.wanted:
                 continue
-            if now >= next_latch:
+            taken = arrival.device_time if arrival is not None and arrival.whole else None
+            if reading.is_due(now, taken):
                 self._put_latch(camera.latch())
-                next_latch = HostNs(now + _LATCH_EVERY_NS)
+                reading.done(now)
             elif now >= next_count:
                 self._count(camera)
                 next_count = HostNs(now + _COUNT_EVERY_NS)

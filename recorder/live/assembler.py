@@ -134,10 +134,12 @@ class Assembler:
         self._serve_waiting()
         for camera in range(len(self._rings)):
             self._read(camera)
+        self._place_released()
         # A camera whose frame waits for a buffer has unread records. The pairer must not see a later time than that
         # frame's, or it would take the unread frames for missing ones.
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
         self._decided.extend(self.pairer.advance(min(waiting, default=now)))
+        self._place_released()
         self._ask_silent_cameras(now)
         self._tell_slow_cameras(now)
         self._free_stranded_slots(now)
@@ -221,8 +223,16 @@ class Assembler:
                 self._note(camera, record)
                 continue
             self._stranded[camera].discard(record.slot)
-            if (pulse := self.pairer.frame(camera, record)) is None:
+            if (pulse := self.pairer.frame(camera, record)) is not None:
+                self._place(camera, record, pulse)
+            elif not self.pairer.holds(camera, record):
                 ring.release(record.slot)
+
+    def _place_released(self) -> None:
+        """Copy or drop the frames that have waited in their rings until their trigger times could be believed."""
+        for camera, record, pulse in self.pairer.released():
+            if pulse is None:
+                self._rings[camera].release(record.slot)
             else:
                 self._place(camera, record, pulse)
 

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from bench.suites import DRAWN, SUITES
+from bench.suites import DRAWN, FIRED, SUITES
 from rig.errors import BadInputError
 from svev import console
 
-_NAMES = (*SUITES, *DRAWN)
+_NAMES = (*SUITES, *DRAWN, *FIRED)
 
 
 def bench(
@@ -21,6 +21,7 @@ def bench(
             min=1, max=10_000, help="number of jumps that smoothing draws, of networks of each kind for gross-errors"
         ),
     ] = 18,
+    pulses: Annotated[int, typer.Option(min=100, max=10_000_000, help="pulses of each case of pairing")] = 5000,
     out: Annotated[Path, typer.Option(help="folder for the results, and for logs that are removed again")] = Path(
         "bench/results"
     ),
@@ -40,6 +41,7 @@ def bench(
     worker tells the state of each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all
     measurements and with a marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with
     exchanged names, wrong survey, wrong image points or wrong units: what the search for gross errors makes of them.
+    pairing: triplets mixed, not found and invented under clocks that are set and rates that the rig file does not name.
 
     Example: svev bench saturated --seconds 10
     """
@@ -49,7 +51,10 @@ def bench(
     results = {}
     for name in suites or _NAMES:
         console.say(f"{name} ...", aside=True)
-        results[name] = DRAWN[name](draws, out) if name in DRAWN else SUITES[name](seconds, out)
+        if name in SUITES:
+            results[name] = SUITES[name](seconds, out)
+        else:
+            results[name] = DRAWN[name](draws, out) if name in DRAWN else FIRED[name](pulses, out)
     if as_json:
         console.print_json(results)
     else:

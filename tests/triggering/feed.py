@@ -1,5 +1,6 @@
 """Passes hand-made records to a pairer: cameras on one clock at 30 Hz."""
 
+from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import Record, RecordKind
 from tests.triggering.simulation import MS, US
@@ -11,11 +12,19 @@ START = HostNs(1_000 * NS_PER_S)
 
 
 class Feed:
-    """A pairer and its decisions; times are given in pulses, and may be fractions."""
+    """A pairer and its decisions; times are given in pulses, and may be fractions.
 
-    def __init__(self, cameras: int = 3, *, latches: bool = True, hold_ns: int = HOLD) -> None:
+    Args:
+        cameras: how many.
+        latches: whether each clock is read at the start.
+        reads: whether it is read after frames as well, as a grabber does.
+        hold_ns: see `Pairer`.
+    """
+
+    def __init__(self, cameras: int = 3, *, latches: bool = True, reads: bool = False, hold_ns: int = HOLD) -> None:
         self.pairer = Pairer(cameras, PERIOD, hold_ns=hold_ns)
         self.closed: list[ClosedPulse] = []
+        self.readings = [ClockReading() if reads else None for _ in range(cameras)]
         for camera in range(cameras):
             self.pairer.connected(camera, 1, START)
             if latches:
@@ -36,7 +45,12 @@ class Feed:
         record = Record(
             RecordKind.FRAME, epoch, HostNs(time + after), 0, frame_id, 65535, DeviceNs(time - START + clock), triggers
         )
-        return self.pairer.frame(camera, record) is not None
+        placed = self.pairer.frame(camera, record) is not None
+        reading = self.readings[camera]
+        if reading is not None and reading.is_due(record.host_time, record.device_time):
+            self.latch(camera, record.host_time, clock)
+            reading.done(record.host_time)
+        return placed or any(frame.record is record and frame.pulse for frame in self.pairer.released())
 
     def all_cameras(self, pulse: float, ids: list[int | None], triggers: list[int] | None = None) -> None:
         for camera, frame_id in enumerate(ids):

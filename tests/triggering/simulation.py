@@ -7,6 +7,7 @@ import random
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record, RecordKind
 from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
@@ -53,7 +54,9 @@ class Scenario:
     modulus: int = 65535
     latency_ns: tuple[int, int] = (5 * MS, 45 * MS)
     retention_ns: int = 25 * MS
-    latch_every_s: float = 2.0
+    latch_every_s: float | None = (
+        2.0  # beside the readings after frames that come out of turn; None: no readings at all
+    )
     loaded_latches: float = 0.3
     trigger_counts: bool = False
     damage_tells_time: bool = False  # as on FireWire: a damaged frame has an approximate trigger time
@@ -115,6 +118,7 @@ class _Camera:
         self.hill, self.camera, self.rng = hill, camera, rng
         self.scenario = hill.scenario
         self.rate = 1 + self.scenario.drift_ppm[camera % len(self.scenario.drift_ppm)] * 1e-6
+        self.link_rng = random.Random(self.scenario.seed + camera)  # readings after frames change nothing else
         self.epoch = 0
         self.records: list[tuple[HostNs, int, Record]] = []
 
@@ -141,8 +145,9 @@ class _Camera:
         self.next_id = self.scenario.first_id if self.epoch == 1 else 1
         self.triggers = 0
         self.put(host, Record(RecordKind.CONNECTED, self.epoch, host))
-        self.latch_burst(HostNs(host + MS), 16)
-        self.next_burst = host + self.scenario.latch_every_s * NS_PER_S
+        self.latch_burst(HostNs(host + MS), 16, self.rng)
+        self.next_burst = host + (self.scenario.latch_every_s or 1e9) * NS_PER_S
+        self.reading = ClockReading()
 
     def back(self, outage: Outage) -> None:
         if outage.told_after_s is None:
@@ -160,12 +165,12 @@ class _Camera:
     def device(self, host: float) -> DeviceNs:
         return DeviceNs(self.offset + round((host - self.zero) * self.rate))
 
-    def latch_burst(self, host: HostNs, count: int) -> None:
+    def latch_burst(self, host: HostNs, count: int, rng: random.Random) -> None:
         for index in range(count):
-            loaded = index > 0 and self.rng.random() < self.scenario.loaded_latches
-            round_trip = self.rng.randrange(1 * MS, 10 * MS) if loaded else self.rng.randrange(50 * US, 200 * US)
+            loaded = index > 0 and rng.random() < self.scenario.loaded_latches
+            round_trip = rng.randrange(1 * MS, 10 * MS) if loaded else rng.randrange(50 * US, 200 * US)
             time = HostNs(host + index * 100 * US)
-            read_at = time + self.rng.uniform(-0.5, 0.5) * round_trip
+            read_at = time + rng.uniform(-0.5, 0.5) * round_trip
             device = self.device(read_at)
             self.put(time, Record(RecordKind.LATCH, self.epoch, time, device_time=device, value=round_trip))
 
@@ -175,8 +180,8 @@ class _Camera:
             fates[self.camera] = FrameStatus.MISSED if outage.told_after_s is None else FrameStatus.ABSENT
             return
         while time > self.next_burst:
-            self.latch_burst(HostNs(round(self.next_burst)), 8)
-            self.next_burst += self.scenario.latch_every_s * NS_PER_S
+            self.latch_burst(HostNs(round(self.next_burst)), 8, self.rng)
+            self.next_burst += (self.scenario.latch_every_s or 1e9) * NS_PER_S
         fate = fates[self.camera] = self.fate(pulse)
         if fate is FrameStatus.MISSED:
             return
@@ -205,6 +210,11 @@ class _Camera:
                 RecordKind.FRAME, self.epoch, arrival, slot, frame_id, self.scenario.modulus, device, count
             )  # fmt: skip
         self.put(arrival, record)
+        taken = record.device_time if record.kind is RecordKind.FRAME else None
+        if self.scenario.latch_every_s is not None and (self.reading.is_due(arrival, taken) or self.reading.wanted):
+            read = max(arrival, self.reading.earliest)
+            self.latch_burst(read, 1, self.link_rng)
+            self.reading.done(read)
 
     def fate(self, pulse: int) -> FrameStatus:
         scenario = self.scenario
@@ -254,10 +264,8 @@ class Run:
         match record.kind:
             case RecordKind.FRAME:
                 pulse = self.pairer.frame(camera, record)
-                if pulse is None:
-                    self.unplaced.append(record.slot)
-                else:
-                    _load(pulse, record)
+                if pulse is not None or not self.pairer.holds(camera, record):
+                    self.place(record, pulse)
             case RecordKind.DAMAGED:
                 self.pairer.damaged(camera, record)
             case RecordKind.LATCH:
@@ -267,12 +275,24 @@ class Run:
             case RecordKind.DISCONNECTED:
                 self.pairer.disconnected(camera, record.host_time)
 
+    def place(self, record: Record, pulse: OpenPulse | None) -> None:
+        if pulse is None:
+            self.unplaced.append(record.slot)
+        else:
+            _load(pulse, record)
+
+    def place_released(self) -> None:
+        for frame in self.pairer.released():
+            self.place(frame.record, frame.pulse)
+
     def pass_deadlines(self, until: HostNs | None) -> None:
         while (deadline := self.pairer.next_deadline()) is not None and (until is None or deadline < until):
             self.advance(deadline)
 
     def advance(self, now: HostNs) -> None:
+        self.place_released()
         self.closed += self.pairer.advance(now)
+        self.place_released()
         self.silent |= set(self.pairer.silent())
         self.overdue |= set(self.pairer.overdue(now))
 

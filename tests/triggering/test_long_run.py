@@ -4,6 +4,7 @@ import pickle
 import random
 from collections import Counter
 
+from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record, RecordKind
 from triggering.pairing.pairer import ClosedPulse, Pairer
@@ -23,6 +24,7 @@ class Hours:
         for camera in range(3):
             self.pairer.connected(camera, 1, HostNs(0))
         self.ids = [0, 0, 0]
+        self.readings = [ClockReading() for _ in range(3)]
         self.truth, self.decided = Counter[FrameStatus](), Counter[FrameStatus]()
         self.number, self.last_pulse = 0, -1
 
@@ -30,9 +32,10 @@ class Hours:
         """One pulse, its frames, and what is decided then."""
         time = NS_PER_S + pulse * (PERIOD + 1000)  # the generator is 30 ppm slow
         for camera in (1, 2, 0):
-            if pulse % 60 == 0:
+            if pulse == 0:
                 self.latch(camera, time - 7 * MS)
             self.see(camera, pulse, time)
+        self.pairer.released()
         for tag in self.pairer.advance(HostNs(time + 35 * MS)):
             self.check(tag)
 
@@ -47,6 +50,9 @@ class Hours:
             device = device_time(camera, time + int(self.rng.random() * 60_000))
             host = HostNs(time + 35 * MS)
             self.pairer.frame(camera, Record(RecordKind.FRAME, 1, host, pulse, self.ids[camera], 65535, device))
+            if self.readings[camera].is_due(host, device):
+                self.latch(camera, host)
+                self.readings[camera].done(host)
 
     def latch(self, camera: int, host: int) -> None:
         round_trip = self.rng.randrange(50_000, 300_000)

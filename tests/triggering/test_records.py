@@ -15,7 +15,7 @@ from triggering.pairing.pairer import Pairer
 
 def running_train(pulses: int = 10) -> Feed:
     """A feed with some complete pulses, so that their rhythm is known."""
-    feed = Feed()
+    feed = Feed(reads=True)
     for pulse in range(pulses):
         feed.all_cameras(pulse, [pulse + 1] * 3)
     return feed
@@ -332,16 +332,17 @@ def test_one_camera_alone() -> None:
     assert [tag.outcomes[0].status for tag in feed.closed] == [OK, OK, OK, LOST, OK]
 
 
-def test_clocks_that_drift_apart_raise_the_alarm_long_before_pulses_mix() -> None:
+def test_cameras_that_always_differ_find_each_other_and_raise_the_alarm() -> None:
+    """How far the frames of one pulse lie apart is learned: the cameras may have different delays."""
     feed = Feed()
-    for pulse in range(10):
+    for pulse in range(60):
         for camera in range(3):
             feed.frame(camera, pulse, pulse + 1, clock=9 * MS if camera == 2 else 0, after=20 * MS)
         feed.advance(feed.time_of(pulse) + 21 * MS)
     health = feed.pairer.health()
     assert health.alarm
     assert health.spread_max_us > 8000
-    assert all(tag.complete for tag in feed.closed)
+    assert all(tag.complete for tag in feed.closed[-15:])
 
 
 def test_frames_that_no_longer_find_each_other_raise_the_alarm() -> None:

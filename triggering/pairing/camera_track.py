@@ -13,6 +13,7 @@ from typing import Final
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record
 from rig.health import CameraCounters
+from triggering.pairing.belief import Witness
 from triggering.pairing.gaps import DamageMatcher, Gap
 from triggering.pairing.outcomes import NO_FRAME, Outcome
 from triggering.timeline.device_clock import DeviceClock
@@ -37,7 +38,6 @@ class CameraTrack:
 
     Args:
         train: the rhythm of the pulses.
-        tolerance_ns: frames whose trigger times are this close are of one pulse.
 
     Attributes:
         clock: the camera's clock in this epoch.
@@ -51,7 +51,7 @@ class CameraTrack:
         lag_ns: how much later than usual it came.
     """
 
-    def __init__(self, train: PulseTrain, tolerance_ns: int) -> None:
+    def __init__(self, train: PulseTrain) -> None:
         self.clock = DeviceClock()
         self.counters = CameraCounters()
         self.epoch = 0
@@ -61,7 +61,8 @@ class CameraTrack:
         self.alive = self.heard = HostNs(0)
         self.lag_ns = 0.0
         self._late_run = 0  # whole frames in a row whose pulses were decided already
-        self._train, self._tolerance_ns = train, tolerance_ns
+        self._train, self._witness = train, Witness(train)
+        self._unsettled_until = HostNs(0)  # frames that come before may have the time of a clock that is no more
         self._matcher = DamageMatcher(train.period_ns, self.counters)
         self._gaps: deque[Gap] = deque()
         self._since = HostNs(0)
@@ -116,16 +117,22 @@ class CameraTrack:
         self.connected = self.silent = False
         self._damaged = []
 
-    def latch(self, latch: ClockLatch) -> None:
-        """Enter a reading of the camera's clock."""
+    def latch(self, latch: ClockLatch) -> bool:
+        """Enter a reading of the camera's clock.
+
+        Returns:
+            Whether the clock still goes as it did, so that the times of all frames that came before are right.
+        """
         steps = self.clock.steps
-        self.clock.latch(latch)
+        agrees = self.clock.latch(latch)
         self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
         if self.clock.steps != steps:
             # Times before and after the step cannot be compared: the next frame counts as a first one.
             self.counters.clock_steps += 1
             self._last = None
             self._broken = True
+            self._unsettled_until = HostNs(latch.host + round(self._witness.longest_ns))
+        return agrees and latch.round_trip_ns < self._train.shortest_ns
 
     def damaged(self, host: HostNs, device: DeviceNs | None = None) -> None:
         """Enter a damaged arrival.
@@ -142,22 +149,46 @@ class CameraTrack:
         self._damaged.append(host)
         self.alive = max(self.alive, HostNs(round(self._matcher.trigger_of(host))))
         self._seen = max(self._seen, self.alive)
-        self.unanswered = 0
-        if self.silent:
-            self.silent, self._broken = False, True
+        self._stirs()
+
+    def note_damage(self, record: Record) -> None:
+        """Enter the record of a damaged arrival, of which only the times are used."""
+        self.damaged(record.host_time, record.device_time if record.value == 1 else None)
 
     def anchor(self, record: Record) -> HostNs | None:
         """Trigger time of a whole frame on the common time line, None if the clock cannot tell."""
         clock, first = self.clock, self._last is None
-        if not clock.known or (first and clock.uncertainty_at(record.device_time) > self._tolerance_ns / 2):
+        if not clock.known or (first and clock.uncertainty_at(record.device_time) > self._train.widest_ns / 2):
             self.counters.unanchored += 1
             self._broken = self._broken or first  # the ids of later frames no longer count from the beginning
             return None
         time = clock.to_host(record.device_time)
-        if time > record.host_time + self._tolerance_ns:
-            self._implausible(record)
+        if time > record.host_time + self._train.widest_ns or record.host_time <= self._unsettled_until:
+            self.refuse(record)
             return None
         return time
+
+    def believes(self, record: Record, time: HostNs) -> bool:
+        """Whether a whole frame, triggered at `time` as the camera's clock says, is to be believed at once."""
+        if self._last is None:
+            return self._witness.believes(None, 0)
+        last, last_time = self._last
+        if time <= last_time:
+            return True  # it is not newer than the last one, and `follow` will refuse it
+        steps = record.frame_id - last.frame_id
+        if steps != 1:
+            steps = id_step(last.frame_id, record.frame_id, record.id_modulus)
+        return self._witness.believes(time - last_time, steps)
+
+    def waits(self, record: Record) -> None:
+        """Note that a whole frame has come that is not to be believed yet: the camera is neither silent nor overdue."""
+        self.heard = record.host_time
+        self._stirs()
+
+    def refuse(self, record: Record) -> None:
+        """Treat a whole frame as damaged: its trigger time is not known."""
+        self.counters.implausible += 1
+        self.damaged(record.host_time)
 
     def follow(self, record: Record, time: HostNs) -> bool:
         """Enter a whole frame, triggered at `time`: its id tells what happened since the last one.
@@ -166,7 +197,7 @@ class CameraTrack:
             False if the frame is not newer than the last one; it belongs to no pulse then.
         """
         if self.silent:
-            self.silent, self._broken = False, True
+            self._stirs()
         if self._last is None:
             taken = self._taken_at_first(record, time)
             self._gaps.append(self._end_running_gap(self._since, time, taken, anchored=False))
@@ -176,7 +207,7 @@ class CameraTrack:
                 if record.frame_id == last.frame_id:
                     self.counters.duplicate += 1
                 else:
-                    self._implausible(record)
+                    self.refuse(record)
                 return False
             taken = self._taken_since(last, last_time, record, time)
             gap = self._end_running_gap(last_time, time, taken, anchored=not self._broken)
@@ -202,7 +233,7 @@ class CameraTrack:
 
     def may_deliver(self, time: HostNs) -> bool:
         """Whether a whole frame of a pulse at `time` may still come."""
-        expected = time >= self._since - self._tolerance_ns and time >= self._known_until
+        expected = time >= self._since - self._train.tolerance_ns and time >= self._known_until
         return expected and self.connected and not self.silent
 
     def settle(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
@@ -243,7 +274,7 @@ class CameraTrack:
             return time > self._left
         if self.silent:  # that it answers proves nothing: it does so while pulses come
             return time > self.alive
-        return time < (self._since + FIRST_NS if self._first is None else self._first - self._tolerance_ns)
+        return time < (self._since + FIRST_NS if self._first is None else self._first - self._train.tolerance_ns)
 
     def settle_unwatched(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
         """Decide what became of a pulse at which the camera was away: absent, unless a damaged arrival is left of it.
@@ -278,15 +309,17 @@ class CameraTrack:
     def _note_arrival(self, host: HostNs, time: HostNs) -> None:
         """Note how late a whole frame came, by its arrival and its trigger time; late ones do not become the usual."""
         self.heard, self.lag_ns = host, host - time - self.latency_ns
-        decided = self._train.last is not None and time <= self._train.last + self._tolerance_ns
+        decided = self._train.last is not None and time <= self._train.last + self._train.tolerance_ns
         self._late_run = self._late_run + 1 if decided else 0
         if not decided:
             self._matcher.whole(host - time)
+            self._witness.saw(host - time)
 
-    def _implausible(self, record: Record) -> None:
-        """Treat a frame from the future, or one older than the last, as damaged: its trigger time is not known."""
-        self.counters.implausible += 1
-        self.damaged(record.host_time)
+    def _stirs(self) -> None:
+        """Note that the camera sends something."""
+        self.unanswered = 0
+        if self.silent:
+            self.silent, self._broken = False, True
 
     def _begin_running_gap(self) -> None:
         self._damaged = []
@@ -296,8 +329,10 @@ class CameraTrack:
     def _end_running_gap(self, start: HostNs, end: HostNs, taken: int, *, anchored: bool) -> Gap:
         """The running gap, ended by the frame at `end`, with `taken` frames in it; a new gap begins there."""
         # Frames may come so late that later pulses are decided already; those lie in the gap that begins now.
-        unseen = sum(pulse < end - self._tolerance_ns for pulse in self._unseen)
-        later = [pulse for pulse in self._unseen if pulse > end + self._tolerance_ns]
+        unseen, later = 0, []
+        if self._unseen:
+            unseen = sum(pulse < end - self._train.tolerance_ns for pulse in self._unseen)
+            later = [pulse for pulse in self._unseen if pulse > end + self._train.tolerance_ns]
         left = taken - self._settled_damaged - unseen
         # Damaged arrivals are certain; pulses decided as lost without proof are not.
         least = max(0, min(len(self._damaged), taken - self._settled_damaged))

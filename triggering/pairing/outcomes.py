@@ -18,11 +18,12 @@ class OpenPulse:
         frames: one per camera, None where no whole frame has come.
         times: the frames' trigger times, likewise.
         missing: how many frames have not come.
+        delivered: the cameras whose frames have come, one bit each.
         proven_by_ids: no camera delivered a frame, but the frame ids prove that the pulse fired.
         unwatched: no camera was there; the rhythm of the train tells that the pulse was due.
     """
 
-    __slots__ = ("cargo", "frames", "missing", "proven_by_ids", "time", "times", "unwatched")
+    __slots__ = ("cargo", "delivered", "frames", "missing", "proven_by_ids", "time", "times", "unwatched")
 
     def __init__(self, cameras: int, time: HostNs, *, proven_by_ids: bool = False, unwatched: bool = False) -> None:
         self.cargo: object | None = None
@@ -30,6 +31,7 @@ class OpenPulse:
         self.frames: list[Record | None] = [None] * cameras
         self.times: list[HostNs | None] = [None] * cameras
         self.missing = cameras
+        self.delivered = 0
         self.proven_by_ids = proven_by_ids
         self.unwatched = unwatched
 
@@ -38,7 +40,11 @@ class OpenPulse:
         self.frames[camera] = record
         self.times[camera] = time
         self.missing -= 1
-        times = sorted(known for known in self.times if known is not None)
+        self.delivered |= 1 << camera
+        if self.missing == len(self.times) - 1:
+            self.time = time
+            return
+        times = sorted([known for known in self.times if known is not None])
         middle = len(times) // 2
         self.time = times[middle] if len(times) % 2 else HostNs((times[middle - 1] + times[middle]) // 2)
 

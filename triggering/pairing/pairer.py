@@ -2,10 +2,11 @@
 
 Frames are paired by their trigger times alone, on the common time line to which each camera's clock is converted: never
 by the order of arrival, by equal ids, or by counting from a first frame. The ids then tell why a frame did not come.
-The class is pure: records and times go in, decisions come out.
+A trigger time is believed only if nothing contradicts it (`belief`); other frames wait until their camera's clock has
+been read again. The class is pure: records and times go in, decisions come out.
 """
 
-from bisect import bisect_left
+from bisect import bisect_left, insort
 from collections.abc import Iterable
 from operator import attrgetter
 from typing import Final
@@ -14,21 +15,23 @@ import msgspec
 
 from rig.clocks import NS_PER_S, ClockLatch, DecimalNs, HostNs
 from rig.errors import BadInputError
-from rig.frame import FrameStatus, Record
+from rig.frame import FrameStatus, Record, RecordKind
 from rig.health import CameraCounters, CameraPairing, PairingHealth
 from rig.pulse import RigPulse
-from triggering.pairing.camera_track import FIRST_NS, HELD_BACK_NS, CameraTrack
+from triggering.pairing.camera_track import CameraTrack
+from triggering.pairing.held import HeldFrames, Released
 from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
+from triggering.pairing.silence import SILENT_PERIODS, Silence
 from triggering.pairing.undelivered import undelivered_times
 from triggering.pairing.unwatched import unwatched_time
 from triggering.timeline.pulse_train import PulseTrain
 
 __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 
-_TOLERANCE_PERIODS: Final = 0.3
-_SILENT_PERIODS: Final = 3
 #: Where the pulses have no rhythm, one that lacks a frame waits this long for later pulses, which tell why.
 _PATIENCE_NS: Final = 30 * NS_PER_S
+#: Pulses this much slower than the rig file says get more time, so that later ones can still tell of their frames.
+_SLOWER: Final = 1.25
 _TIME: Final = attrgetter("time")
 
 
@@ -39,82 +42,101 @@ class Pairer:
 
     Args:
         cameras: how many cameras there are.
-        period_ns: nominal period of the pulses; the true one is tracked and may be some per cent off.
+        period_ns: nominal period of the pulses; the true one is measured.
         hold_ns: how long after a pulse its frames may come: exposure, transport, retention of damaged frames, and some
             periods, so that the camera's next frame can tell what became of a missing one.
-        tolerance_ns: frames whose trigger times are this close are of one pulse; 0.3 periods if left out.
+        tolerance_ns: frames whose trigger times are further apart are never of one pulse; 0.3 periods if left out.
 
     Raises:
         BadInputError: an argument makes no sense.
     """
 
     def __init__(self, cameras: int, period_ns: int, *, hold_ns: int, tolerance_ns: int | None = None) -> None:
-        tolerance = round(_TOLERANCE_PERIODS * period_ns) if tolerance_ns is None else tolerance_ns
-        if cameras < 1 or period_ns <= 0 or not 0 < tolerance < period_ns / 2 or hold_ns < tolerance:
+        tolerance = 1 if tolerance_ns is None else tolerance_ns
+        if (
+            cameras < 1
+            or period_ns <= 0
+            or not 0 < tolerance < period_ns / 2
+            or hold_ns < max(tolerance, period_ns / 2)
+        ):
             raise BadInputError(
-                f"pairing of {cameras} cameras, period {period_ns} ns, tolerance {tolerance} ns, hold {hold_ns} ns "
+                f"pairing of {cameras} cameras, period {period_ns} ns, tolerance {tolerance_ns} ns, hold {hold_ns} ns "
                 "cannot work: give at least one camera, a tolerance under half the period and a longer hold"
             )
-        self._hold_ns, self._tolerance_ns = hold_ns, tolerance
-        self._train = PulseTrain(period_ns)
-        self._tracks = [CameraTrack(self._train, tolerance) for _ in range(cameras)]
+        self._least_hold_ns, self._nominal_ns = hold_ns, period_ns
+        self._train = PulseTrain(period_ns, tolerance_ns)
+        self._tracks = [CameraTrack(self._train) for _ in range(cameras)]
+        self._held = HeldFrames(cameras)
+        self._silence = Silence(self._tracks, self._held, self._train)
         self._open: list[OpenPulse] = []
         self._examined: OpenPulse | None = None
         self._hurry_until = HostNs(0)
-        self._open_most = max(_SILENT_PERIODS, hold_ns // period_ns)
+        self._open_most = max(SILENT_PERIODS, hold_ns // period_ns)
         self._closed = 0
         self._proven_by_ids = self._unwatched = 0
 
     # -- records in ----------------------------------------------------------------------------------------------
 
     def frame(self, camera: int, record: Record) -> OpenPulse | None:
-        """Assign a whole frame to its pulse.
+        """Assign a whole frame to its pulse, or hold it until its trigger time can be believed.
 
         Returns:
-            The pulse, or None if the frame belongs to no open one: the camera's clock is not known yet, the pulse is
-            decided already, or the frame came twice. `counters` tells which.
+            The pulse, or None: the frame is held (`holds`), or it belongs to no open pulse: the camera's clock is not
+            known yet, the pulse is decided already, or the frame came twice. `counters` tells which.
         """
         track = self._tracks[camera]
         if not self._is_current(track, record):
             return None
         time = track.anchor(record)
-        # A frame that was still queued when its camera was disconnected is used, but its id proves nothing.
-        if time is None or (track.connected and not track.follow(record, time)):
+        if time is None:
             return None
-        last = self._train.last
-        if last is not None and time <= last + self._tolerance_ns:
-            track.counters.late += 1
+        if len(self._tracks) > 1 and not self._believes(camera, record, time):
+            if track.connected:
+                track.waits(record)
+                self._held.hold(camera, record)
+            else:
+                track.counters.stale += 1
             return None
-        pulse = self._pulse_at(time)
-        if pulse.frames[camera] is not None:
-            track.counters.duplicate += 1
-            return None
-        if pulse.missing < len(self._tracks):
-            # At once, not when the pulse is decided: in a backlog the same error would be corrected many times.
-            track.clock.correct(record.device_time, pulse.time - time)
-        pulse.add(camera, record, time)
-        return pulse
+        return self._place(camera, record, time)
+
+    def holds(self, camera: int, record: Record) -> bool:
+        """Whether a frame for which `frame` has returned no pulse waits; `released` will tell what became of it."""
+        return self._held.count > 0 and self._held.has(camera, record)
+
+    def released(self) -> list[Released]:
+        """The frames that no longer wait, since the last call: to be asked before every `advance`, and after it."""
+        return self._held.released()
 
     def damaged(self, camera: int, record: Record) -> None:
         """Enter a damaged arrival; only the times of the record are used."""
         track = self._tracks[camera]
         if not self._is_current(track, record):
             return
-        if track.connected:
-            track.damaged(record.host_time, record.device_time if record.value == 1 else None)
-        else:
+        if not track.connected:
             track.counters.stale += 1
+        elif self._held.first(camera) is not None:
+            self._held.hold(camera, record)
+        else:
+            track.note_damage(record)
 
     def latch(self, camera: int, latch: ClockLatch) -> None:
         """Enter a reading of the camera's clock; those of an epoch come after its `connected`."""
-        self._tracks[camera].latch(latch)
+        track = self._tracks[camera]
+        steps = track.clock.steps
+        agrees = track.latch(latch)
+        if track.clock.steps != steps:
+            self._refuse_held(camera)
+        while agrees and self._held.is_read(camera, latch):
+            self._release(camera)
 
     def connected(self, camera: int, epoch: int, host: HostNs) -> None:
         """Begin an epoch of a camera: pulses from now on wait for its frames."""
+        self._refuse_held(camera)
         self._tracks[camera].connect(epoch, host)
 
     def disconnected(self, camera: int, host: HostNs) -> None:
         """End the epoch of a camera: no pulse waits for it any more."""
+        self._refuse_held(camera)
         self._tracks[camera].disconnect(host)
 
     # -- decisions out -------------------------------------------------------------------------------------------
@@ -126,6 +148,9 @@ class Pairer:
             The pulses decided now, in the order of time.
         """
         closed: list[ClosedPulse] = []
+        if self._held.count:
+            for camera in self._held.ended(now):
+                self._refuse_held(camera)
         while True:
             due = bool(self._open) and self._is_due(self._open[0], now)
             if due:
@@ -138,7 +163,10 @@ class Pairer:
 
     def next_deadline(self) -> HostNs | None:
         """When `advance` must be called at the latest although nothing arrives; None if there is no open pulse."""
-        return self._deadline() if self._open else None
+        deadline = self._deadline() if self._open else None
+        if self._held.count and (end := self._held.next_end()) is not None:
+            return end if deadline is None else min(deadline, end)
+        return deadline
 
     @property
     def oldest(self) -> HostNs | None:
@@ -146,7 +174,7 @@ class Pairer:
         return self._open[0].time if self._open else None
 
     def hurry(self, until: HostNs) -> None:
-        """Let no pulse up to a time wait longer than the hold for what later pulses may tell: a recording ends."""
+        """Let no pulse up to a time wait longer than the hold for what later ones may tell: a recording ends."""
         self._hurry_until = max(self._hurry_until, until)
 
     def silent(self) -> tuple[int, ...]:
@@ -159,17 +187,7 @@ class Pairer:
         This comes sooner than `silent` and is only a suspicion: pulses wait for their frames all the same, up to the
         deadline. Frames that are on their way, or held back behind a damaged one, cause no suspicion.
         """
-        overdue: list[int] = []
-        if len(self._open) < _SILENT_PERIODS:
-            return ()
-        for camera, track in enumerate(self._tracks):
-            since = track.alive if track.delivers else track.alive + FIRST_NS
-            since = max(since, HostNs(now - self._hold_ns))
-            behind = [pulse.time for pulse in self._open if pulse.frames[camera] is None and pulse.time > since]
-            late = len(behind) >= _SILENT_PERIODS and now > behind[0] + track.latency_ns + HELD_BACK_NS
-            if late and track.connected and not track.is_slow(now):
-                overdue.append(camera)
-        return tuple(overdue)
+        return tuple(self._silence.overdue(self._open, now, self._hold_ns))
 
     def slow(self, now: HostNs) -> tuple[int, ...]:
         """The cameras whose frames come so late, at host time `now`, that their pulses are decided already."""
@@ -206,21 +224,78 @@ class Pairer:
         if record.epoch == track.epoch:
             return True
         if track.epoch == 0:
-            track.connect(record.epoch, HostNs(record.host_time - self._hold_ns))
+            track.connect(record.epoch, HostNs(record.host_time - self._least_hold_ns))
             return True
         track.counters.stale += 1
         return False
 
-    def _pulse_at(self, time: HostNs) -> OpenPulse:
-        """The open pulse nearest to a trigger time, a new one if there is none within the tolerance."""
+    @property
+    def _hold_ns(self) -> int:
+        """How long after a pulse its frames may come; longer where the pulses are far slower than the rig file says."""
+        times = self._train.period_ns / self._nominal_ns
+        return round(self._least_hold_ns * times) if times > _SLOWER else self._least_hold_ns
+
+    def _believes(self, camera: int, record: Record, time: HostNs) -> bool:
+        """Whether a frame goes on from the last believed one, and so do those before it that wait."""
+        track = self._tracks[camera]
+        if self._held.count:
+            while (first := self._held.first(camera)) is not None:
+                if not track.believes(first, track.clock.to_host(first.device_time)):
+                    return False
+                self._release(camera)
+        return track.believes(record, time)
+
+    def _release(self, camera: int) -> None:
+        """Place the first frame of a camera that waits, and enter the damaged arrivals behind it."""
+        track, record = self._tracks[camera], self._held.take(camera)
+        time = track.clock.to_host(record.device_time)
+        self._held.release(camera, record, self._place(camera, record, time))
+        while (behind := self._held.first(camera)) is not None and behind.kind is RecordKind.DAMAGED:
+            track.note_damage(self._held.take(camera))
+
+    def _refuse_held(self, camera: int) -> None:
+        """Refuse all frames of a camera that wait: they cannot be believed."""
+        track = self._tracks[camera]
+        while self._held.first(camera) is not None:
+            record = self._held.take(camera)
+            if record.kind is RecordKind.FRAME:
+                track.refuse(record)
+                self._held.release(camera, record, None)
+            else:
+                track.note_damage(record)
+
+    def _place(self, camera: int, record: Record, time: HostNs) -> OpenPulse | None:
+        """Assign a frame, triggered at `time`, to its pulse; None if there is no open one."""
+        track = self._tracks[camera]
+        # A frame that was still queued when its camera was disconnected is used, but its id proves nothing.
+        if track.connected and not track.follow(record, time):
+            return None
+        train = self._train
+        if train.last is not None and time <= train.last + train.tolerance_ns:
+            track.counters.late += 1
+            return None
+        pulse = self._nearest(time, train.tolerance_ns)
+        if pulse is None and (tolerance := 2 * track.clock.uncertainty_since(time)) > train.tolerance_ns:
+            pulse = self._nearest(time, min(tolerance, train.widest_ns))  # its clock has not been read for long
+        if pulse is None:
+            pulse = OpenPulse(len(self._tracks), time)
+            insort(self._open, pulse, key=_TIME)
+        elif pulse.frames[camera] is not None:
+            track.counters.duplicate += 1
+            return None
+        else:
+            # At once, not when the pulse is decided: in a backlog the same error would be corrected many times.
+            track.clock.correct(record.device_time, pulse.time - time)
+        pulse.add(camera, record, time)
+        return pulse
+
+    def _nearest(self, time: HostNs, tolerance: float) -> OpenPulse | None:
+        """The open pulse nearest to a trigger time, None if there is none within the tolerance."""
         position = bisect_left(self._open, time, key=_TIME)
-        nearest, least = None, self._tolerance_ns
+        nearest, least = None, tolerance
         for pulse in self._open[max(0, position - 1) : position + 1]:
             if abs(pulse.time - time) <= least:
                 nearest, least = pulse, abs(pulse.time - time)
-        if nearest is None:
-            nearest = OpenPulse(len(self._tracks), time)
-            self._open.insert(position, nearest)
         return nearest
 
     def _is_due(self, pulse: OpenPulse, now: HostNs) -> bool:
@@ -228,7 +303,7 @@ class Pairer:
         if pulse.missing == 0 or pulse.proven_by_ids or pulse.unwatched:
             return True
         if now >= self._deadline():
-            self._notice_silence(pulse, now)
+            self._silence.decide(pulse, self._open, now)
             return True
         return not any(track.may_deliver(pulse.time) for track in self._lacking(pulse))
 
@@ -241,6 +316,8 @@ class Pairer:
         """
         pulse = self._open[0]
         hold = HostNs(pulse.time + self._hold_ns)
+        if self._held.count:
+            hold = max(hold, self._held.last_end(pulse))
         if pulse.time <= self._hurry_until or self._train.rhythm_ns is not None:
             return hold
         if not any(track.will_tell and track.may_deliver(pulse.time) for track in self._lacking(pulse)):
@@ -253,30 +330,13 @@ class Pairer:
     def _lacking(self, pulse: OpenPulse) -> Iterable[CameraTrack]:
         return (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)
 
-    def _notice_silence(self, pulse: OpenPulse, now: HostNs) -> None:
-        """At the deadline of a pulse, find which of the cameras that it lacks are silent."""
-        for track in self._lacking(pulse):
-            if not track.may_deliver(pulse.time) or track.alive > pulse.time:
-                continue
-            if track.is_slow(now) or track.heard > pulse.time + track.latency_ns + HELD_BACK_NS:
-                continue  # its frames are still coming
-            periods, before = track.unanswered, pulse.time
-            for other in self._open:
-                # Frames of younger pulses may be on their way. Pulses that no camera delivered count too.
-                if other.time - pulse.time < (_SILENT_PERIODS - 0.5) * self._train.period_ns:
-                    periods += 1 + self._train.room(other.time - before)
-                    before = other.time
-            if periods >= _SILENT_PERIODS:
-                track.silent = True
-                track.counters.silences += 1
-
     def _insert_undelivered(self) -> None:
         """Insert the pulses that no camera delivered before the one that is about to be decided."""
         pulse = self._open[0]
         if pulse.proven_by_ids or pulse is self._examined:
             return
         self._examined = pulse
-        times = undelivered_times(self._open, self._tracks, self._train, self._tolerance_ns)
+        times = undelivered_times(self._open, self._tracks, self._train)
         self._open[:0] = [OpenPulse(len(self._tracks), time, proven_by_ids=True) for time in times]
 
     def _insert_unwatched(self, now: HostNs, *, due: bool) -> None:
@@ -305,7 +365,7 @@ class Pairer:
         if pulse.unwatched:
             self._train.go_on(pulse.time)
         else:
-            self._train.advance(pulse.time, pulse.spread_ns)
+            self._train.advance(pulse.time, pulse.spread_ns, pulse.delivered)
         self._closed += 1
         self._proven_by_ids += pulse.proven_by_ids
         self._unwatched += pulse.unwatched

@@ -1,9 +1,9 @@
 """Finds the pulses of which no camera delivered a frame, where the frame ids prove that they fired.
 
 If a camera's ids say that it took more frames between two whole ones than there are known pulses in between, it exposed
-a frame at an unknown pulse. That pulse fired and gets its tag. In a gap of a few whole periods the train surely ran on:
-there it is enough that a camera *may* have taken a frame at such a pulse. Where the ids of all cameras go on without a
-hole no pulse is added: the train paused, or no camera saw the pulse.
+a frame at an unknown pulse. That pulse fired and gets its tag. In a gap of a few whole periods of a measured rhythm the
+train surely ran on: there it is enough that a camera *may* have taken a frame at such a pulse. Where the ids of all
+cameras go on without a hole no pulse is added: the train paused, or no camera saw the pulse.
 """
 
 from collections.abc import Sequence
@@ -25,16 +25,13 @@ _SHORT_ROOM: Final = 4
 _WHOLE: Final = 0.25
 
 
-def undelivered_times(
-    waiting: Sequence[OpenPulse], tracks: Sequence[CameraTrack], train: PulseTrain, tolerance_ns: int
-) -> list[HostNs]:
+def undelivered_times(waiting: Sequence[OpenPulse], tracks: Sequence[CameraTrack], train: PulseTrain) -> list[HostNs]:
     """Times of the undelivered pulses between the last decided pulse and the next one.
 
     Args:
         waiting: the undecided pulses in the order of time; the first is about to be decided.
         tracks: the cameras.
         train: the rhythm of the pulses.
-        tolerance_ns: frames this close in time are of one pulse.
     """
     if train.last is None or waiting[0].time - train.last <= _GAP_PERIODS * train.period_ns:
         return []
@@ -42,12 +39,12 @@ def undelivered_times(
     witnesses = [
         (camera, gap)
         for camera, track in enumerate(tracks)
-        if (gap := _gap_across(track, start, tolerance_ns)) is not None
+        if (gap := _gap_across(track, start, train.tolerance_ns)) is not None
     ]
     if not any(gap.holes for _, gap in witnesses):
         return []
     room = max(1, train.room(span))
-    if room <= _SHORT_ROOM and abs(span / train.period_ns - (room + 1)) <= _WHOLE:
+    if train.steady and room <= _SHORT_ROOM and abs(span / train.period_ns - (room + 1)) <= _WHOLE:
         return _spaced(start, span, room, train.period_ns)
     proven = sorted(gap.taken - _room_later(waiting, camera, gap, train) for camera, gap in witnesses)
     count = proven[-1]
@@ -56,7 +53,7 @@ def undelivered_times(
     return _spaced(start, span, min(count, room), train.period_ns)
 
 
-def _gap_across(track: CameraTrack, time: HostNs, tolerance_ns: int) -> Gap | None:
+def _gap_across(track: CameraTrack, time: HostNs, tolerance_ns: float) -> Gap | None:
     """The gap of a camera that reaches beyond `time`, if ids and times can prove anything in it."""
     gap = track.gap_after(time)
     return gap if gap is not None and gap.anchored and gap.start <= time + tolerance_ns else None

@@ -71,20 +71,30 @@ class DeviceClock:
         """`uncertainty_ns` at a device time: it grows with the time since the newest latch."""
         return self.uncertainty_ns + self._slope_uncertainty * max(0, device - self._reference) / NS_PER_S
 
-    def latch(self, latch: ClockLatch) -> None:
-        """Enter a reading of both clocks; readings come in the order of time."""
+    def uncertainty_since(self, host: HostNs) -> float:
+        """`uncertainty_at`, by the time on the common time line."""
+        since = max(0, host - self._reference - self.offset_ns)
+        return self.uncertainty_ns + self._slope_uncertainty * since / NS_PER_S
+
+    def latch(self, latch: ClockLatch) -> bool:
+        """Enter a reading of both clocks; readings come in the order of time.
+
+        Returns:
+            Whether it agrees with those before, or is the first.
+        """
         if not self.known:
             self._keep(latch)
             self._fit()
-            return
+            return True
         if self._is_stray(latch):
             self._start_anew_if_agreed(latch)
-            return
+            return False
         self._stray = None
         self._keep(latch)
         self._fit()
         self._trim *= _TRIM_KEPT  # it corrected the old line
         self._limit_trim(latch.device)
+        return True
 
     def correct(self, device: DeviceNs, error_ns: int) -> None:
         """Correct the line by a set of frames of one pulse.

@@ -1,4 +1,7 @@
-"""Tracks the period of the pulses, and how far the trigger times of the frames of one pulse lie apart."""
+"""Learns the rhythm of the pulses, and how far the trigger times of the frames of one pulse lie apart.
+
+Nothing of it is believed from the rig file: its rate only serves until enough pulses have been measured.
+"""
 
 from collections import deque
 from statistics import median_low
@@ -7,31 +10,58 @@ from typing import Final
 from rig.clocks import HostNs
 
 _RECENT: Final = 256
-#: The interval of two neighbouring pulses differs from the period by less than this share; other intervals are gaps,
-#: pauses or disturbances.
-_NEIGHBOUR: Final = 0.3
 _PERIOD_GAIN: Final = 0.02
 #: The rhythm is known if, of so many intervals, at least half agree with their median to this share of it.
 _RHYTHM: Final = 64
 _RHYTHM_LEAST: Final = 4
 _AGREE: Final = 0.05
+#: A rhythm is measured, or has changed, if so many intervals in a row agree with one another.
+_CHANGE: Final = 4
+#: Two pulses that are closer than this share of the period, and that no camera saw both of, may have been one.
+_SPLIT: Final = 0.7
 #: With a larger spread, as a share of the period, frames may soon be paired with the wrong pulse.
 _ALARM: Final = 0.25
+#: Frames whose times differ by more than this share of the period are never of one pulse.
+_WIDEST: Final = 0.3
+#: Clocks that are read four times a second agree to this, ns: half a round trip, drift in between, and the same again
+#: by which frames may have trimmed them.
+_CLOCKS_NS: Final = 500_000
+#: Spread of the trigger that is allowed for until it is known, ns.
+_SPREAD_NS: Final = 2_500_000
+#: Afterwards: so many times the spread that this share of the pulses keeps. The spread of trigger times that are even
+#: over an interval has its 90 % point at 0.8 of it for three cameras, at 0.68 for two; the rest is for few pulses.
+_USUAL: Final = 0.9
+_SPREADS: Final = 3.0
+#: The spread is learned from so many pulses, and anew after as many.
+_LEARN_EVERY: Final = 24
 
 
 class PulseTrain:
-    """Period and spreads, estimated from the decided pulses.
+    """Period and spreads, measured from the decided pulses.
+
+    Args:
+        period_ns: nominal period, until one is measured.
+        widest_ns: frames further apart are never of one pulse, whatever is learned; None: a share of the period.
 
     Attributes:
-        period_ns: present estimate of the period; begins with the nominal one.
+        period_ns: present estimate of the period.
+        steady: the period is measured, and the last pulses came in it.
+        tolerance_ns: frames whose trigger times are this close are of one pulse.
+        widest_ns: frames whose trigger times differ by more are never of one pulse.
         last: time of the last decided pulse.
     """
 
-    def __init__(self, period_ns: int) -> None:
-        self.period_ns = float(period_ns)
+    def __init__(self, period_ns: int, widest_ns: int | None = None) -> None:
+        self.period_ns, self._nominal_ns = float(period_ns), period_ns
+        self.steady = False
         self.last: HostNs | None = None
+        self._limit_ns = self.widest_ns = _WIDEST * period_ns if widest_ns is None else float(widest_ns)
+        self.tolerance_ns = min(_SPREAD_NS, self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
         self._intervals: deque[int] = deque(maxlen=_RHYTHM)
+        self._delivered = 0
+        self._beat: HostNs | None = None  # the last pulse that was not the second half of one
+        self._learn_in = _LEARN_EVERY
 
     @property
     def rhythm_ns(self) -> float | None:
@@ -45,33 +75,74 @@ class PulseTrain:
         agreeing = [interval for interval in self._intervals if abs(interval - usual) < _AGREE * usual]
         return sum(agreeing) / len(agreeing) if 2 * len(agreeing) >= len(self._intervals) else None
 
+    @property
+    def shortest_ns(self) -> float:
+        """The shortest time between two of the recent pulses; the period if there are none."""
+        return min(self._intervals, default=self.period_ns)
+
     def go_on(self, time: HostNs) -> None:
         """Enter a pulse that no camera could see; its time follows from the rhythm, so it tells nothing of it."""
-        self.last = time
+        self.last, self._beat, self._delivered = time, time, 0
 
     def room(self, span_ns: int) -> int:
         """How many pulses of an unbroken train lie between two that are `span_ns` apart."""
         return max(0, round(span_ns / self.period_ns) - 1)
 
-    def advance(self, time: HostNs, spread_ns: int) -> None:
+    def advance(self, time: HostNs, spread_ns: int, delivered: int) -> None:
         """Enter the next decided pulse.
 
         Args:
             time: time of the pulse.
             spread_ns: latest minus earliest trigger time of its frames, 0 if there are fewer than two.
+            delivered: the cameras of which it has a frame, one bit each; 0: none.
         """
-        if self.last is not None:
-            interval = time - self.last
-            self._intervals.append(interval)
-            deviation = interval - self.period_ns
-            if abs(deviation) < _NEIGHBOUR * self.period_ns:
-                self.period_ns += _PERIOD_GAIN * deviation
-            elif deviation < 0:
-                # Too soon for another pulse: the frames of one pulse were taken for two. The interval counts as spread.
+        last, self.last = self.last, time
+        if last is not None:
+            interval = time - last
+            if self._is_split(interval, delivered):
+                # The frames of one pulse were taken for two, or there were two for one: the interval counts as spread.
                 spread_ns = max(spread_ns, interval)
-        self.last = time
+            else:
+                interval = time - (self._beat or last)
+                self._intervals.append(interval)
+                self._follow(interval)
+                self._beat = time
+        self._delivered = delivered
         if spread_ns > 0:
             self._spreads.append(spread_ns)
+            self._learn_in -= 1
+            if self._learn_in <= 0:
+                self._learn_in = _LEARN_EVERY
+                self._learn_tolerance()
+
+    def _is_split(self, interval: int, delivered: int) -> bool:
+        """Whether this pulse and the last one may have been one: close together, and no camera saw both."""
+        apart = delivered & self._delivered == 0 and delivered != 0 and self._delivered != 0
+        return apart and interval < _SPLIT * self.period_ns
+
+    def _follow(self, interval: int) -> None:
+        """Follow the rhythm slowly while it goes on, and take the new one where it has changed."""
+        deviation = interval - self.period_ns
+        if self.steady and abs(deviation) < _AGREE * self.period_ns:
+            self.period_ns += _PERIOD_GAIN * deviation
+            return
+        recent = list(self._intervals)[-_CHANGE:]
+        if len(recent) == _CHANGE and max(recent) - min(recent) < _AGREE * min(recent):
+            if abs(min(recent) - self.period_ns) > _AGREE * self.period_ns:
+                self._intervals = deque(recent, maxlen=_RHYTHM)  # those before are of another rhythm
+            self._measured(sum(recent) / _CHANGE)
+            return
+        if self.steady and self.rhythm_ns is None:
+            self.steady, self.period_ns = False, float(self._nominal_ns)
+
+    def _measured(self, period_ns: float) -> None:
+        self.period_ns, self.steady = period_ns, True
+        self.widest_ns = min(self._limit_ns, _WIDEST * period_ns)
+        self.tolerance_ns = min(self.tolerance_ns, self.widest_ns)
+
+    def _learn_tolerance(self) -> None:
+        usual = sorted(self._spreads)[int(_USUAL * (len(self._spreads) - 1))]
+        self.tolerance_ns = min(max(_CLOCKS_NS, _SPREADS * usual), self.widest_ns)
 
     @property
     def spread_median_ns(self) -> int:

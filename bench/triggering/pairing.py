@@ -1,0 +1,62 @@
+"""Benchmark of the pairing: triplets mixed, not found and invented under clocks and rates that nobody told it of."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any, Final
+
+from bench.triggering.hill import Case, Hill
+
+_STEPS: Final = (25.0, -25.0, 40.0, -50.0, 75.0, -100.0, 100.0, math.inf, -math.inf)
+#: All cases; each camera misses one pulse in a hundred, and loses one frame in a hundred, if the name does not deny it.
+CASES: Final = (
+    Case("nothing wrong", missed=0.0, lost=0.0),
+    Case("missed and lost, 1 % each"),
+    Case("drift of 200 ppm", drift_ppm=(200.0, -200.0, 0.0)),
+    Case("wander of 30 ppm", wander_ppm=30.0),
+    Case("jitter of 2 ms", jitter_ms=2.0),
+    Case("pauses", pauses=True),
+    Case("random intervals", random_intervals=True),
+    Case("clocks step by 25 to 100 ms", steps_ms=_STEPS[:7]),
+    Case("clocks step by one period", steps_ms=_STEPS[7:]),
+    Case("clocks step by 37 s", steps_ms=(37_000.0, -37_000.0)),
+    Case("clocks step, arrivals spread", steps_ms=_STEPS, latency_ms=(5.0, 45.0)),
+    *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (99.0, 101.0, 105.0, 110.0)),
+    *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (70.0, 95.0, 120.0)),
+    *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (15.0, 7.5)),
+    Case("30, then 50, then 120 Hz", rates_hz=(30.0, 50.0, 120.0)),
+    Case("double pulses, 1 ms apart", doubled=0.02, double_ms=1.0),
+    Case("double pulses, 5 ms apart", doubled=0.02, double_ms=5.0),
+    Case("cameras restart unannounced", reboots=True),
+    Case("the computer is suspended", suspended=True),
+)
+
+
+def run_case(case: Case, pulses: int) -> dict[str, Any]:
+    """Run one case.
+
+    Returns:
+        Its name, the counts of `Result`, and the processor time, µs per pulse, of the simulation and the pairing.
+    """
+    before = time.process_time()
+    result = Hill(replace(case), pulses).run()
+    spent = (time.process_time() - before) / pulses
+    return {
+        "name": case.name, **asdict(result), "not_found": result.not_found, "us_per_pulse": round(1e6 * spent, 1),
+    }  # fmt: skip
+
+
+def run_pairing(pulses: int, cases: Sequence[Case] = CASES) -> list[dict[str, Any]]:
+    """Run all cases with so many pulses each."""
+    return [run_case(case, pulses) for case in cases]
+
+
+def pairing_table(results: Sequence[dict[str, Any]]) -> list[str]:
+    """The results for people."""
+    head = f"{'case':34}{'pulses':>8}{'possible':>9}{'mixed':>7}{'not found':>10}{'invented':>9}  alarm"
+    return [head] + [
+        f"{of['name']:34}{of['pulses']:8}{of['possible']:9}{of['mixed']:7}{of['not_found']:10}{of['invented']:9}  "
+        f"{'yes' if of['alarm'] else 'no'}"
+        for of in results
+    ]

@@ -1,0 +1,90 @@
+"""Keeps the frames whose trigger time cannot be believed yet, in each camera's order, until something decides.
+
+Their pixels stay in the cameras' rings meanwhile. Damaged arrivals behind them wait too, so that the order stays.
+"""
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from rig.clocks import NS_PER_S, ClockLatch, HostNs
+from rig.frame import Record
+from triggering.pairing.outcomes import OpenPulse
+
+#: The clock is read right after a frame that comes out of turn, and four times a second; a camera that does not answer
+#: for this long has no clock to be believed.
+_LONGEST_NS: Final = NS_PER_S
+
+
+class Released(NamedTuple):
+    """A frame that was held, and its pulse; None: it belongs to none."""
+
+    camera: int
+    record: Record
+    pulse: OpenPulse | None
+
+
+class HeldFrames:
+    """The frames that wait, and those that have waited.
+
+    Args:
+        cameras: how many cameras there are.
+    """
+
+    def __init__(self, cameras: int) -> None:
+        self._queues: list[deque[Record]] = [deque() for _ in range(cameras)]
+        self._released: list[Released] = []
+        self.count = 0
+
+    def hold(self, camera: int, record: Record) -> None:
+        """Let a frame wait behind those of its camera that wait already."""
+        self._queues[camera].append(record)
+        self.count += 1
+
+    def first(self, camera: int) -> Record | None:
+        """The frame of a camera that waits the longest; None: none waits."""
+        queue = self._queues[camera]
+        return queue[0] if queue else None
+
+    def ended(self, now: HostNs) -> list[int]:
+        """The cameras whose frames have waited for as long as they may."""
+        return [camera for camera, end in self._ends() if now >= end]
+
+    def last_end(self, pulse: OpenPulse) -> HostNs:
+        """Until when frames that a pulse lacks may wait."""
+        return max((end for camera, end in self._ends() if pulse.frames[camera] is None), default=HostNs(0))
+
+    def _ends(self) -> Iterator[tuple[int, HostNs]]:
+        for camera, queue in enumerate(self._queues):
+            if queue:
+                yield camera, HostNs(queue[0].host_time + _LONGEST_NS)
+
+    def is_read(self, camera: int, latch: ClockLatch) -> bool:
+        """Whether a camera's first frame that waits came before its clock was read."""
+        queue = self._queues[camera]
+        return bool(queue) and queue[0].host_time <= latch.host and queue[0].device_time <= latch.device
+
+    def has(self, camera: int, record: Record) -> bool:
+        """Whether a frame is the last one of its camera that waits."""
+        queue = self._queues[camera]
+        return bool(queue) and queue[-1] is record
+
+    def next_end(self) -> HostNs | None:
+        """When the first of all has waited for as long as it may; None: none waits."""
+        return min((end for _, end in self._ends()), default=None)
+
+    def take(self, camera: int) -> Record:
+        """Take a camera's first frame out."""
+        self.count -= 1
+        return self._queues[camera].popleft()
+
+    def release(self, camera: int, record: Record, pulse: OpenPulse | None) -> None:
+        """Note what became of a frame that was taken out."""
+        self._released.append(Released(camera, record, pulse))
+
+    def released(self) -> list[Released]:
+        """The frames that have been released since the last call."""
+        released = self._released
+        if released:
+            self._released = []
+        return released

@@ -42,6 +42,12 @@ class PulsesPausedError(SvevError):
     exit_code = 5
 
 
+class PairingAlarmError(SvevError):
+    """A recording is whole, but something was wrong with clocks, trigger or rate while it was made."""
+
+    exit_code = 5
+
+
 class StorageError(SvevError):
     """The log cannot be written any further (disk full, device gone). What is written stays readable."""
 

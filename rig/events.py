@@ -2,12 +2,16 @@
 
 import time
 from enum import StrEnum
+from typing import Final
 
 import msgspec
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from rig.clocks import UtcNs
 from rig.phrase import Phrase, Value
+
+#: Name of events that say what is wrong with clocks, trigger or rate.
+PAIRING: Final = "pairing"
 
 
 class Level(StrEnum):

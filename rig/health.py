@@ -77,6 +77,7 @@ class CameraPairing(CameraCounters, kw_only=True):
     clock_drift_ppm: Annotated[float, Meta(description="how much faster than the host the device clock runs")]
     clock_uncertainty_us: float | None
     latency_ms: Annotated[float, Meta(description="from the trigger to the frame in memory")]
+    clock_set: Annotated[bool, Meta(description="the device clock was set in the last ten seconds")] = False
 
 
 class PairingHealth(msgspec.Struct, frozen=True):
@@ -95,6 +96,11 @@ class PairingHealth(msgspec.Struct, frozen=True):
     spread_max_us: Annotated[float, Meta(description="likewise, the largest of late")]
     alarm: Annotated[bool, Meta(description="whether the spread is larger than the pairing allows for")]
     cameras: tuple[CameraPairing, ...]
+    rate_hz: Annotated[float | None, Meta(description="measured; null where the pulses have no rhythm")] = None
+    split_us: Annotated[
+        float | None,
+        Meta(description="distance of two pulses of the last ten seconds of which no camera has both; null: none"),
+    ] = None
 
     @property
     def seen(self) -> int:

@@ -23,7 +23,7 @@ from types import TracebackType
 from typing import Any, Final, Self, TypeVar
 
 from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, StorageError, UnknownRecordingError
-from rig.events import Event
+from rig.events import PAIRING, Event
 from rig.settings.model import RigSettings
 from rig.status import Counts, Recording, SessionFields, State
 from rig.transport import wire
@@ -63,6 +63,8 @@ class HeadlessRig:
         self, rig: RigSettings, rig_toml: str, on_event: Callable[[str], None], hill: StartHill | None = None
     ) -> None:
         def tell(event: Event) -> None:
+            if event.name == PAIRING:
+                self._alarms[event.code or event.message] = event.message
             if event.name != "service":
                 on_event(f"{event.name} {event.message}")
 
@@ -72,6 +74,7 @@ class HeadlessRig:
         options = RecorderOptions(directory=rig.recorder.directory)
         self._supervisor = Supervisor(rig, rig_toml, EventHub(tell), options, hill=hill, enduring=False)
         self._path: Path | None = None
+        self._alarms: dict[str, str] = {}
         self._ended: Future[Outcome] = Future()
 
     def __enter__(self) -> Self:
@@ -92,6 +95,11 @@ class HeadlessRig:
     def pids(self) -> dict[str, int]:
         """Process ids by row of the process table."""
         return {row.name: row.pid for row in self._supervisor.status.processes if row.pid is not None}
+
+    @property
+    def alarms(self) -> list[str]:
+        """What has been wrong with clocks, trigger or rate, in words, since the cameras were first connected."""
+        return list(self._alarms.values())
 
     def wait_until_warm(self, settle_s: float, *, allow_absent: bool) -> None:
         """Wait until all cameras together have delivered a few complete triplets.
@@ -254,6 +262,7 @@ def record(
         "log": str(report.path),
         **report.counts.model_dump(),
         "pauses": [wire.to_builtins(pause) for pause in report.pauses],
+        "alarms": running.alarms,
         "bytes": report.bytes,
         "unpublished": report.unpublished,
         "stopped_early": early,

@@ -18,7 +18,8 @@ from recorder.publishing.keys import check_publication, load_keys
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
-from rig.events import Event, Level
+from rig.events import PAIRING, Event, Level
+from rig.health import PairingHealth
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
@@ -41,6 +42,7 @@ from rig.transport.messages import (
 )
 from rig.transport.preview import PreviewSlot
 from rig.transport.ring import CameraRing
+from triggering.pairing.alarms import alarms
 
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000
@@ -76,6 +78,7 @@ class RecorderLoop:
         )
         self._quit = False
         self._warm = self._unreported = 0
+        self._alarmed: set[tuple[str, object]] = set()
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -173,8 +176,20 @@ class RecorderLoop:
             recording=self._recordings.statistics(),
         )
         self._tell(RecorderHealth(health=health))
+        self._tell_alarms(health.pairing)
         self._own_up()
         self._recordings.health(wire.encode(health))
+
+    def _tell_alarms(self, health: PairingHealth) -> None:
+        """Tell of what has become wrong with clocks, trigger or rate; again when it comes back."""
+        names = [camera.name for camera in self._rig.cameras]
+        present = {}
+        for said in alarms(health, names, self._rig.trigger.rate_hz):
+            present[said.code, said.values.get("camera")] = said
+        for key, said in present.items():
+            if key not in self._alarmed:
+                self._warn(PAIRING, said)
+        self._alarmed = set(present)
 
     def _own_up(self) -> None:
         """Tell of reports that were dropped because the service does not read, and of refused subscribers."""

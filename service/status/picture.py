@@ -23,10 +23,11 @@ from rig.status import (
 )
 from service.processes.rig_processes import CameraPresence
 from service.recordings.storage import Room
-from service.status.statements import about_camera, about_state, camera_state, process_restarted
+from service.status.statements import about_camera, about_state, camera_state, pairing_alarm, process_restarted
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import tap_guard
 from service.supervision.watching import PulseRate
+from triggering.pairing.alarms import alarms
 
 #: What the status of a camera takes from its health record.
 _MEASURED: Final = (
@@ -85,6 +86,8 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         statement = about_state(state, rig.cameras, states, arriving, rate, facts.overloaded)
         if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
             statement = facts.notice
+        if statement.level is Level.GOOD and (alarm := _pairing_alarm(rig, facts)) is not None:
+            statement = alarm
     elif facts.fault is not None:
         statement = facts.fault
     else:
@@ -120,6 +123,15 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         next_jumper=facts.next_jumper,
         processes=tuple(_process(name, pid, facts.restarts.get(name, 0)) for name, pid in facts.pids.items()),
     )
+
+
+def _pairing_alarm(rig: RigSettings, facts: Facts) -> Statement | None:
+    """What is wrong with clocks, trigger or rate; None: nothing."""
+    if facts.health is None:
+        return None
+    names = [camera.name for camera in rig.cameras]
+    said = next(alarms(facts.health.pairing, names, rig.trigger.rate_hz), None)
+    return None if said is None else pairing_alarm(said)
 
 
 def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:

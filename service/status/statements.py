@@ -268,6 +268,17 @@ def recording_resumed(before: str, recording: str, gap: Pause | None) -> Stateme
     )
 
 
+def pairing_alarm(said: Phrase) -> Statement:
+    """Something is wrong with clocks, trigger or rate.
+
+    Args:
+        said: what is wrong, as `triggering.pairing.alarms` says it; what to do stands behind its colon.
+    """
+    text, _, advice = said.text.partition(": ")
+    values = {name: value for name, value in said.values.items() if not isinstance(value, Phrase)}
+    return Statement(level=Level.WARNING, code=said.code, text=text, advice=advice, values=values)
+
+
 def process_restarted(name: str, restarts: int) -> Statement:
     """A process died, and the supervisor started it again."""
     return Statement(

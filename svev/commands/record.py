@@ -8,7 +8,7 @@ import typer
 from pydantic import TypeAdapter, ValidationError
 
 from recorder.publishing.keys import check_publication
-from rig.errors import BadInputError, PulsesPausedError
+from rig.errors import BadInputError, PairingAlarmError, PulsesPausedError
 from rig.pulse import Pause
 from rig.settings.file import load_rig
 from rig.status import LONGEST_LINE, Line
@@ -34,8 +34,8 @@ def record(
 
     Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, or a camera does not answer,
     4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but no pulses come, or none
-    came for a while (the log is whole, and "pauses" says when), 6 the recorder died; the log is readable up to that
-    moment.
+    came for a while (the log is whole, and "pauses" says when), or clocks, trigger or rate were wrong (the log is
+    whole, and "alarms" says what), 6 the recorder died; the log is readable up to that moment.
 
     Example: svev record --rig config/rigs/hill-gige.toml --seconds 10 --out recordings
     """
@@ -64,6 +64,8 @@ def record(
             f"{result['log']}: {first}{f', and {more} more pauses' if more else ''}; look at the trigger, or at what "
             "the log says of the cameras at that time: svev verify"
         )
+    if result["alarms"]:
+        raise PairingAlarmError(f"{result['log']}: {'; '.join(result['alarms'])}")
 
 
 def _check_session(session: str) -> None:

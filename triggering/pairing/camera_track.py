@@ -49,6 +49,7 @@ class CameraTrack:
         alive: host time of the last sign of life: a trigger time or the connection.
         heard: host time at which the last whole frame came.
         lag_ns: how much later than usual it came.
+        set_at: when its clock was last found to have been set; None: never.
     """
 
     def __init__(self, train: PulseTrain) -> None:
@@ -60,6 +61,7 @@ class CameraTrack:
         self.unanswered = 0
         self.alive = self.heard = HostNs(0)
         self.lag_ns = 0.0
+        self.set_at: HostNs | None = None
         self._late_run = 0  # whole frames in a row whose pulses were decided already
         self._train, self._witness = train, Witness(train)
         self._unsettled_until = HostNs(0)  # frames that come before may have the time of a clock that is no more
@@ -129,6 +131,7 @@ class CameraTrack:
         if self.clock.steps != steps:
             # Times before and after the step cannot be compared: the next frame counts as a first one.
             self.counters.clock_steps += 1
+            self.set_at = latch.host
             self._last = None
             self._broken = True
             self._unsettled_until = HostNs(latch.host + round(self._witness.longest_ns))

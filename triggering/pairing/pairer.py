@@ -11,13 +11,12 @@ from collections.abc import Iterable
 from operator import attrgetter
 from typing import Final
 
-import msgspec
-
-from rig.clocks import NS_PER_S, ClockLatch, DecimalNs, HostNs
+from rig.clocks import NS_PER_S, ClockLatch, HostNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus, Record, RecordKind
-from rig.health import CameraCounters, CameraPairing, PairingHealth
+from rig.health import CameraCounters, PairingHealth
 from rig.pulse import RigPulse
+from triggering.pairing.camera_health import camera_health, is_recent
 from triggering.pairing.camera_track import CameraTrack
 from triggering.pairing.held import HeldFrames, Released
 from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
@@ -204,7 +203,7 @@ class Pairer:
 
     def health(self) -> PairingHealth:
         """Rhythm, spread and each camera's clock and totals."""
-        train = self._train
+        train, split = self._train, self._train.split
         return PairingHealth(
             pulses=self._closed,
             proven_by_ids=self._proven_by_ids,
@@ -214,7 +213,9 @@ class Pairer:
             spread_median_us=train.spread_median_ns / 1000,
             spread_max_us=train.spread_max_ns / 1000,
             alarm=train.alarm,
-            cameras=tuple(_camera_health(track) for track in self._tracks),
+            cameras=tuple(camera_health(track, train.last) for track in self._tracks),
+            rate_hz=NS_PER_S / train.period_ns if train.steady else None,
+            split_us=None if split is None or not is_recent(split[0], train.last) else split[1] / 1000,
         )
 
     # -- details -------------------------------------------------------------------------------------------------
@@ -380,17 +381,3 @@ class Pairer:
                     break
                 times.append(pulse.time)
         return times
-
-
-def _camera_health(track: CameraTrack) -> CameraPairing:
-    clock = track.clock
-    return CameraPairing(
-        connected=track.connected,
-        silent=track.silent,
-        clock_known=clock.known,
-        clock_offset_ns=DecimalNs(clock.offset_ns),
-        clock_drift_ppm=round(clock.drift_ppm, 3),
-        clock_uncertainty_us=round(clock.uncertainty_ns / 1000, 3) if clock.known else None,
-        latency_ms=round(track.latency_ns / 1e6, 3),
-        **msgspec.structs.asdict(track.counters),
-    )

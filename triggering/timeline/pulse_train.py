@@ -49,12 +49,14 @@ class PulseTrain:
         tolerance_ns: frames whose trigger times are this close are of one pulse.
         widest_ns: frames whose trigger times differ by more are never of one pulse.
         last: time of the last decided pulse.
+        split: time of the last pulse that may have been one with that before it, and its distance; None: there is none.
     """
 
     def __init__(self, period_ns: int, widest_ns: int | None = None) -> None:
         self.period_ns, self._nominal_ns = float(period_ns), period_ns
         self.steady = False
         self.last: HostNs | None = None
+        self.split: tuple[HostNs, int] | None = None
         self._limit_ns = self.widest_ns = _WIDEST * period_ns if widest_ns is None else float(widest_ns)
         self.tolerance_ns = min(_SPREAD_NS, self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
@@ -102,6 +104,7 @@ class PulseTrain:
             if self._is_split(interval, delivered):
                 # The frames of one pulse were taken for two, or there were two for one: the interval counts as spread.
                 spread_ns = max(spread_ns, interval)
+                self.split = time, interval
             else:
                 interval = time - (self._beat or last)
                 self._intervals.append(interval)

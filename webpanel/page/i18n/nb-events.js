@@ -141,4 +141,9 @@ export const events = {
   why_deleted: ["{path}: ble slettet under opptaket; la mappen med opptakene være i fred så lenge"],
   why_moved_away: ["{path}: ble flyttet under opptaket; la mappen med opptakene være i fred så lenge"],
   why_writing_broke: ["{path}: skrivingen tok slutt med {kind}: {error}; det som er skrevet hittil, kan leses; meld fra om dette"],
+
+  pairing_rate: ["pulsene kommer med {measured} Hz, riggfilen sier rate_hz = {rate_hz}", "rett [trigger] rate_hz i riggfilen"],
+  pairing_clock: ["klokken i {camera} ble stilt mens pulsene kom, og noen av bildene brukes ikke", "la PTP låse før opptak"],
+  pairing_spread: ["bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "sjekk triggerkabler og forsinkelser i kameraene"],
+  pairing_double: ["to pulser kom med {apart_ms} ms mellomrom, og ingen av kameraene har begge", "sjekk om triggersignalet preller"],
 };

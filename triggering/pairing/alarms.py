@@ -1,0 +1,38 @@
+"""The alarms of the pairing: what of clocks, trigger and rate is wrong, in words for people, from the health record."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from rig.health import PairingHealth
+from rig.phrase import Phrase, phrase
+
+#: A rate that differs from the rig file's by more than this share contradicts it.
+_RATE: Final = 0.02
+
+
+def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float) -> Iterator[Phrase]:
+    """What is wrong at present, the most important first, each with what to do about it.
+
+    Args:
+        health: state of the pairing.
+        names: of the cameras.
+        rate_hz: rate of the pulses that the rig file names.
+    """
+    measured = health.rate_hz
+    if measured is not None and abs(measured / rate_hz - 1) > _RATE:
+        text = "pulses come at {measured} Hz, the rig file says rate_hz = {rate_hz:g}: correct [trigger] rate_hz"
+        yield phrase("pairing_rate", text, measured=round(measured, 1), rate_hz=rate_hz)
+    for name, camera in zip(names, health.cameras, strict=True):
+        if camera.clock_set:
+            text = (
+                "the clock of {camera} was set while pulses came, some of its frames are not used: let PTP lock first"
+            )
+            yield phrase("pairing_clock", text, camera=name)
+    if health.alarm:
+        text = (
+            "the frames of one pulse lie up to {spread_ms} ms apart: check the trigger cables and the cameras' delays"
+        )
+        yield phrase("pairing_spread", text, spread_ms=round(health.spread_max_us / 1000, 1))
+    elif health.split_us is not None:
+        text = "two pulses came {apart_ms} ms apart, and no camera has both: check the trigger signal for bounces"
+        yield phrase("pairing_double", text, apart_ms=round(health.split_us / 1000, 1))

@@ -221,8 +221,8 @@ export const en = {
   "scrub.strip": "{gaps} of {pulses} pulses lack a frame",
   "mark.first": "From here",
   "mark.last": "To here",
-  "mark.first_label": "Export from this pulse on",
-  "mark.last_label": "Export up to this pulse",
+  "mark.first_label": "From here: export from this pulse on",
+  "mark.last_label": "To here: export up to this pulse",
 
   "compare.with": "Compare with",
   "compare.none": "no other jump",

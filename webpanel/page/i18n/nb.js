@@ -221,8 +221,8 @@ export const nb = {
   "scrub.strip": "{gaps} av {pulses} pulser mangler et bilde",
   "mark.first": "Fra her",
   "mark.last": "Til hit",
-  "mark.first_label": "Eksporter fra denne pulsen",
-  "mark.last_label": "Eksporter til og med denne pulsen",
+  "mark.first_label": "Fra her: eksporter fra denne pulsen",
+  "mark.last_label": "Til hit: eksporter til og med denne pulsen",
 
   "compare.with": "Sammenlign med",
   "compare.none": "ikke noe annet hopp",

@@ -94,7 +94,7 @@ def test_an_upgrade_disturbs_nothing(bundle: Path, prefix: Path, tmp_path: Path,
     )  # fmt: skip
     with start() as service:
         service.arm()
-        recording = service.post("/api/recordings", {"athlete": "Ola"})["id"]
+        recording = service.post("/api/recordings", {"athlete": "Ola", "duration_s": 900})["id"]
         service.await_pulses(10)
         with _asking(service, paths) as counts:
             _damage(bundle, "numpy")

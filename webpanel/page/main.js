@@ -57,6 +57,6 @@ for (const start of [recording.startRecording, rig.startRig, startKeys]) start()
 startRole();
 startSignals();
 startLogin(() => location.reload());
-startRouter(entered);
+startRouter(entered, recordings.leaveRecordings);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));
 connect();

@@ -24,6 +24,8 @@ const lists = { jumps: { recordings: null, total: 0, scrolled: 0 }, trash: { rec
 /** Counts what was asked for: an answer that was overtaken is dropped. */
 let asked = 0;
 let loadingMore = false;
+/** @type {List|null} The list that is shown, null in other views. */
+let entered = null;
 
 export function startRecordings() {
   startFilters(() => { list().scrolled = 0; void load(PAGE); });
@@ -33,7 +35,6 @@ export function startRecordings() {
   $("recordings-more").addEventListener("click", () => void loadMore());
   $("trash-empty").addEventListener("click", () => void emptyTrash());
   new IntersectionObserver((seen) => { if (seen.some(({ isIntersecting }) => isIntersecting)) void loadMore(); }, { rootMargin: "600px" }).observe($("recordings-more"));
-  addEventListener("scroll", () => { if (place().view === "recordings") list().scrolled = scrollY; }, { passive: true });
 }
 
 /** Load the list anew, if it is shown, as far as it was shown. */
@@ -44,10 +45,17 @@ export async function reload() {
 
 /** Enter the view: the list stands where it was left, and is brought up to date. */
 export function enterRecordings() {
+  entered = list();
   endSelection();
   draw();
-  scrollTo(0, list().scrolled);
+  scrollTo(0, entered.scrolled);
   void reload();
+}
+
+/** Leave the view, if it is shown: the list remembers where it stands. */
+export function leaveRecordings() {
+  if (entered) entered.scrolled = scrollY;
+  entered = null;
 }
 
 /** Draw the list. */

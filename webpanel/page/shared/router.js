@@ -24,8 +24,10 @@ export function go(path) {
  * Show the view of the address, now and whenever it changes.
  *
  * @param {(place: Place) => void} entered
+ * @param {() => void} leaving called while the view before is still shown and scrolled as it was
  */
-export function startRouter(entered) {
+export function startRouter(entered, leaving) {
+  history.scrollRestoration = "manual"; // a view that keeps its place scrolls by itself
   const show = () => {
     const now = place();
     for (const name of VIEWS) $(name).hidden = name !== now.view;
@@ -38,6 +40,6 @@ export function startRouter(entered) {
     update({ view: now.view });
     entered(now);
   };
-  addEventListener("hashchange", () => { show(); $("main").focus({ preventScroll: true }); });
+  addEventListener("hashchange", () => { leaving(); show(); $("main").focus({ preventScroll: true }); });
   show();
 }

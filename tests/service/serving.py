@@ -95,6 +95,21 @@ class Serving:
         status: dict[str, Any] = self.get("/api/status")
         return status
 
+    def await_statement(self, code: str) -> dict[str, Any]:
+        """Wait for a statement: on a busy machine a camera may seem silent at first, which matters more.
+
+        Returns:
+            The statement.
+        """
+        seen: dict[str, Any] = {}
+
+        def said() -> bool:
+            seen.update(self.get("/api/status")["statement"])
+            return bool(seen["code"] == code)
+
+        wait_until(said, f"statement {code}", PATIENCE_S, 0.05)
+        return seen
+
     def arm(self) -> dict[str, Any]:
         """Arm, and wait until that is done."""
         self.post("/api/arm")

@@ -116,8 +116,8 @@ def test_after_a_failed_write_the_service_says_so_and_the_next_recording_is_whol
         first = service.post("/api/recordings", {"preroll_s": 0})
         service.await_pulses(20)
         disk.fail(errno.ENOSPC, most=SMALL)
-        statement = service.await_state("armed")["statement"]
-        assert statement["code"] == "recording_ended"
+        service.await_state("armed")
+        statement = service.await_statement("recording_ended")
         assert "the disk is full" in statement["text"]
         disk.heal()
         second = service.post("/api/recordings", {"preroll_s": 0})

@@ -24,7 +24,7 @@ from analysis.measurements.model import (
     PulseMeasurements,
     SkiMeasurement,
 )
-from photogrammetry.network.file import read_json
+from photogrammetry.network.strict_text import read_json
 from rig.clocks import NS_PER_S, UtcNs
 from rig.pulse import PulseNumber
 from rig.settings.strict_toml import validate

@@ -1,4 +1,4 @@
-"""Reads the survey of the balls: a `svev-network/1` file without observations."""
+"""Reads the survey of the balls: a `svev-network/1` file, JSON or TOML, without observations."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from photogrammetry.network.file import network_from_json, read_json
+from photogrammetry.network.file import network_from_json
 from photogrammetry.network.model import Camera, Image, ImageFrame, Network, Role
+from photogrammetry.network.strict_text import read_object
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
@@ -87,7 +88,7 @@ def read_survey(path: Path) -> Survey:
         BadInputError: no network file, observations in it, metric image frame, several images of a camera, or fewer
             than four surveyed balls.
     """
-    data = read_json(path)
+    data = read_object(path, "survey")
     if data.get("observations"):
         raise BadInputError(
             f'{path}: has "observations", so it is a measured network and no survey; remove them, or use svev orient'

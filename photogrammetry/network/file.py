@@ -1,7 +1,7 @@
-"""Reads `svev-network/1` files; every error names file, key and remedy."""
+"""Reads `svev-network/1` files; one message names everything that is wrong in a file, with place and remedy."""
 
-import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,6 +20,7 @@ from photogrammetry.network.entries import (
     NetworkEntry,
     PointEntry,
 )
+from photogrammetry.network.faults import Faults, WrongEntryError
 from photogrammetry.network.model import (
     AXES,
     RESERVED_GROUPS,
@@ -36,76 +37,27 @@ from photogrammetry.network.model import (
     Reweight,
     Role,
 )
+from photogrammetry.network.strict_text import read_object
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.settings.strict_toml import StrictModel, read_text, validate
+from rig.settings.strict_toml import StrictModel, examine
 
 _Entry = TypeVar("_Entry", bound=StrictModel)
 
 #: From `reweight` in the file to `Network.reweight`.
 REWEIGHT = {False: Reweight.NONE, True: Reweight.HELMERT, "paper": Reweight.PAPER}
-_DIGITS = 30  # of a whole number, at most
 
 
 def read_network(path: Path) -> Network:
-    """Read a network file.
+    """Read a network file, JSON or TOML.
 
     Raises:
-        BadInputError: missing, unreadable, not JSON, or no network; one line with file, key and remedy.
+        BadInputError: missing, unreadable, neither JSON nor TOML, or no network; one line with file, keys and remedies.
     """
-    return network_from_json(read_json(path), str(path))
-
-
-def read_json(path: Path, kind: str = "network file") -> dict[str, Any]:
-    """Read one JSON object, strictly: no key twice, no NaN or Infinity.
-
-    Args:
-        path: of the file.
-        kind: what the file should be, for messages.
-
-    Raises:
-        BadInputError: missing, unreadable, not UTF-8, not JSON, not an object.
-    """
-    try:
-        data = json.loads(
-            read_text(path, "JSON", f"an existing {kind}"),
-            object_pairs_hook=_no_key_twice,
-            parse_constant=_no_constant,
-            parse_int=_whole_number,
-        )
-        json.dumps(data, ensure_ascii=False).encode("utf-8")  # refuses escapes of half a surrogate pair
-    except UnicodeEncodeError as error:
-        raise BadInputError(f"{path}: half a character ({error.object[error.start]!r}); write it whole") from None
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise BadInputError(f"{path}: not valid JSON: {error}; correct it there") from None
-    except _RefusedError as error:
-        raise BadInputError(f"{path}: {error}") from None
-    if not isinstance(data, dict):
-        raise BadInputError(f"{path}: is no JSON object; a {kind} starts with {{")
-    return data
-
-
-class _RefusedError(Exception):
-    """Valid JSON that a network file must not contain."""
-
-
-def _no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    table = dict(pairs)
-    if len(table) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise _RefusedError(f'key "{twice}" stands twice in one object; remove or rename one')
-    return table
-
-
-def _no_constant(text: str) -> float:
-    raise _RefusedError(f"{text} is no number; write a finite one or null")
-
-
-def _whole_number(text: str) -> int:
-    if len(text) > _DIGITS:
-        raise _RefusedError(f"{text[:_DIGITS]}... has too many digits; write it as a decimal number")
-    return int(text)
+    data = read_object(path)
+    if "format" not in data and ("balls" in data or "rods" in data):
+        raise BadInputError(f"{path}: is a plan; svev plan {path} --simulate NETWORK.json makes a network of it")
+    return network_from_json(data, str(path))
 
 
 def network_from_json(data: Mapping[str, Any], source: str) -> Network:
@@ -116,27 +68,34 @@ def network_from_json(data: Mapping[str, Any], source: str) -> Network:
         source: named in error messages.
 
     Raises:
-        BadInputError: something is missing, unknown, or of the wrong kind.
+        BadInputError: something is missing, unknown, or of the wrong kind; the message names all of it.
     """
-    entry = validate(NetworkEntry, dict(data), source)
+    faults = Faults(source)
+    entry = _whole(data, faults)
     frame = ImageFrame(entry.image_frame)
-    cameras = tuple(_camera(name, body, frame, f"{source}: cameras.{name}") for name, body in entry.cameras.items())
-    camera_index = {camera.name: i for i, camera in enumerate(cameras)}
-    images = tuple(_image(name, body, camera_index, f"{source}: images.{name}") for name, body in entry.images.items())
-    points = tuple(_point(name, body, f"{source}: points.{name}") for name, body in entry.points.items())
-    point_index = {point.name: i for i, point in enumerate(points)}
+    cameras = faults.each(entry.cameras.items(), lambda name, body: _camera(name, body, frame, f"cameras.{name}"))
+    camera_index = {name: i for i, name in enumerate(entry.cameras)}
+    images = faults.each(entry.images.items(), lambda name, body: _image(name, body, camera_index, f"images.{name}"))
+    image_index = {name: i for i, name in enumerate(entry.images)}
+    points = faults.each(entry.points.items(), lambda name, body: _point(name, body, f"points.{name}"))
+    point_index = {name: i for i, name in enumerate(entry.points)}
+    rows = _Rows(image_index, point_index)
+    observed = faults.each(enumerate(entry.observations), lambda i, row: rows.read(row, f"observations.{i}", i))
+    distances = faults.each(enumerate(entry.distances), lambda i, body: _distance(body, point_index, f"distances.{i}"))
+    differences = faults.each(
+        enumerate(entry.differences), lambda i, body: _difference(body, point_index, f"differences.{i}")
+    )
+    (datum,) = faults.each([("datum", entry.datum)], lambda name, body: _datum(body, point_index, name)) or (Datum(),)
+    faults.raise_any()
+    _refuse_fixed(datum, points, f"{source}: datum")
     return Network(
         cameras=cameras,
         images=images,
         points=points,
-        observations=_observations(entry.observations, cameras, images, point_index, frame, source),
-        distances=tuple(
-            _distance(body, point_index, f"{source}: distances.{i}") for i, body in enumerate(entry.distances)
-        ),
-        differences=tuple(
-            _difference(body, point_index, f"{source}: differences.{i}") for i, body in enumerate(entry.differences)
-        ),
-        datum=_datum(entry.datum, point_index, points, f"{source}: datum"),
+        observations=_observations(observed, tuple(rows.groups), cameras, images, frame),
+        distances=distances,
+        differences=differences,
+        datum=datum,
         length_unit=entry.length_unit,
         image_frame=frame,
         sigma0=entry.sigma0,
@@ -144,11 +103,28 @@ def network_from_json(data: Mapping[str, Any], source: str) -> Network:
     )
 
 
+def _whole(data: Mapping[str, Any], faults: Faults) -> NetworkEntry:
+    """The file's keys; where single values are wrong, the search for faults goes on without them."""
+    entry, wrong = examine(NetworkEntry, dict(data))
+    faults.add(fault.words for fault in wrong)
+    if entry is None:
+        bad = {fault.place[0] for fault in wrong if fault.place}
+        rest = {key: value for key, value in data.items() if key not in bad}
+        entry, _ = examine(NetworkEntry, {"format": "svev-network/1", "image_frame": "metric"} | rest)
+    if entry is None:
+        faults.raise_any()
+        raise AssertionError("an entry without a fault")
+    return entry
+
+
 def _entry(model: type[_Entry], body: Any, source: str) -> _Entry:
     """One entry of the file, validated."""
     if not isinstance(body, dict):
-        raise BadInputError(f"{source}: is no object; write it as {{...}}")
-    return validate(model, body, source)
+        raise WrongEntryError(f"{source}: is no object; write it as {{...}}")
+    entry, faults = examine(model, body)
+    if entry is None:
+        raise WrongEntryError(*(f"{source}: {fault.words}" for fault in faults))
+    return entry
 
 
 def _array(values: Sequence[Any] | None) -> Floats | None:
@@ -158,7 +134,7 @@ def _array(values: Sequence[Any] | None) -> Floats | None:
 def _camera(name: str, body: Any, frame: ImageFrame, source: str) -> Camera:
     entry = _entry(CameraEntry, body, source)
     if frame is ImageFrame.PIXEL and entry.size is None:
-        raise BadInputError(f'{source}: key "size" is missing; the pixel frame needs [width, height]')
+        raise WrongEntryError(f'{source}: key "size" is missing; the pixel frame needs [width, height]')
     return Camera(
         name=name,
         interior=np.array([getattr(entry, parameter) for parameter in INTERIOR], dtype=float),
@@ -191,60 +167,73 @@ def _point(name: str, body: Any, source: str) -> Point:
 
 def _known(name: Any, names: Mapping[str, int], what: str, source: str) -> int:
     if not isinstance(name, str) or name not in names:
-        raise BadInputError(
+        raise WrongEntryError(
             f'{source}: {what} {name!r} is not listed under "{what}s"; add it there or correct the name'
         )
     return names[name]
 
 
-def _observations(
-    rows: Sequence[Any],
-    cameras: Sequence[Camera],
-    images: Sequence[Image],
-    points: Mapping[str, int],
-    frame: ImageFrame,
-    source: str,
-) -> ImageObservations:
-    image_index = {image.name: i for i, image in enumerate(images)}
-    groups: dict[str, int] = {}
-    index = np.empty((len(rows), 3), dtype=np.intp)
-    values = np.empty((len(rows), 4))
-    seen: dict[tuple[int, int], int] = {}
-    for i, row in enumerate(rows):
-        place = f"{source}: observations.{i}"
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One observation: indices of image, point and group; x, y and their sigmas."""
+
+    index: tuple[int, int, int]
+    values: tuple[float, float, float, float]
+
+
+class _Rows:
+    """Reads observations one by one; knows which image has which point, and the groups."""
+
+    def __init__(self, images: Mapping[str, int], points: Mapping[str, int]) -> None:
+        self._images, self._points = images, points
+        self._seen: dict[tuple[int, int], int] = {}
+        self.groups: dict[str, int] = {}
+
+    def read(self, row: Any, place: str, number: int) -> _Row:
+        """Read the observation with this number."""
         numbers, group = _numbers(row, place)
-        image = _known(row[0], image_index, "image", place)
-        point = _known(row[1], points, "point", place)
-        first = seen.setdefault((image, point), i)
-        if first != i:
-            raise BadInputError(
+        image = _known(row[0], self._images, "image", place)
+        point = _known(row[1], self._points, "point", place)
+        first = self._seen.setdefault((image, point), number)
+        if first != number:
+            raise WrongEntryError(
                 f"{place}: point {row[1]!r} is observed twice in image {row[0]!r} (first in observations.{first}); "
                 "keep one of them or their mean"
             )
-        index[i] = image, point, groups.setdefault(group, len(groups))
-        values[i] = numbers if len(numbers) == 4 else (*numbers, numbers[2])
+        x, y, sigma_x, sigma_y = numbers if len(numbers) == 4 else (*numbers, numbers[2])
+        return _Row((image, point, self.groups.setdefault(group, len(self.groups))), (x, y, sigma_x, sigma_y))
+
+
+def _observations(
+    rows: Sequence[_Row],
+    groups: tuple[str, ...],
+    cameras: Sequence[Camera],
+    images: Sequence[Image],
+    frame: ImageFrame,
+) -> ImageObservations:
+    index = np.array([row.index for row in rows], dtype=np.intp).reshape(-1, 3)
+    values = np.array([row.values for row in rows], dtype=float).reshape(-1, 4)
     if frame is ImageFrame.PIXEL and len(rows):
         size = np.array([cameras[images[image].camera].size for image in index[:, 0]], dtype=float)
         values[:, :2] = pixel_to_metric(values[:, :2], size)
-    names = tuple(groups) or ("image",)
-    return ImageObservations(index[:, 0], index[:, 1], values[:, :2], values[:, 2:], index[:, 2], names)
+    return ImageObservations(index[:, 0], index[:, 1], values[:, :2], values[:, 2:], index[:, 2], groups or ("image",))
 
 
 def _numbers(row: Any, place: str) -> tuple[list[float], str]:
     """The numbers of an observation and its group."""
     if not isinstance(row, list) or len(row) < 5:
-        raise BadInputError(f"{place}: {row!r} is no observation; write [image, point, x, y, sigma]")
+        raise WrongEntryError(f"{place}: {row!r} is no observation; write [image, point, x, y, sigma]")
     group = row[-1] if isinstance(row[-1], str) else "image"
     numbers = row[2:-1] if isinstance(row[-1], str) else row[2:]
     if len(numbers) not in (3, 4):
-        raise BadInputError(f"{place}: has {len(numbers)} numbers; write x, y, sigma or x, y, sigma_x, sigma_y")
+        raise WrongEntryError(f"{place}: has {len(numbers)} numbers; write x, y, sigma or x, y, sigma_x, sigma_y")
     for number in numbers:
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not abs(number) <= LARGEST:
-            raise BadInputError(f"{place}: {number!r} is no number in range; correct it")
+            raise WrongEntryError(f"{place}: {number!r} is no number in range; correct it")
     if min(numbers[2:]) < SMALLEST:
-        raise BadInputError(f"{place}: sigma {min(numbers[2:])!r} is not positive; correct it")
+        raise WrongEntryError(f"{place}: sigma {min(numbers[2:])!r} is not positive; correct it")
     if group in RESERVED_GROUPS:
-        raise BadInputError(f'{place}: group "{group}" is the name of another kind of observation; choose another')
+        raise WrongEntryError(f'{place}: group "{group}" is the name of another kind of observation; choose another')
     return numbers, group
 
 
@@ -264,7 +253,7 @@ def pixel_to_metric(xy: Floats, size: Floats) -> Floats:
 
 def _ends(start: str, end: str, points: Mapping[str, int], source: str) -> tuple[int, int]:
     if start == end:
-        raise BadInputError(f"{source}: goes from {start!r} to itself; name two points")
+        raise WrongEntryError(f"{source}: goes from {start!r} to itself; name two points")
     return _known(start, points, "point", source), _known(end, points, "point", source)
 
 
@@ -279,14 +268,17 @@ def _difference(body: Any, points: Mapping[str, int], source: str) -> Difference
     return Difference(*ends, AXES.index(entry.axis), entry.value, entry.sigma)
 
 
-def _datum(body: Any, index: Mapping[str, int], points: Sequence[Point], source: str) -> Datum:
+def _datum(body: Any, index: Mapping[str, int], source: str) -> Datum:
     entry = _entry(DatumEntry, body, source)
     if entry.points is None:
         return Datum(DatumType(entry.type))
     if entry.type == "control":
-        raise BadInputError(f'{source}: "points" belong to an inner datum; set "type": "inner" or drop them')
-    chosen = tuple(dict.fromkeys(_known(name, index, "point", source) for name in entry.points))
-    for i in chosen:
+        raise WrongEntryError(f'{source}: "points" belong to an inner datum; set "type": "inner" or drop them')
+    return Datum(DatumType.INNER, tuple(dict.fromkeys(_known(name, index, "point", source) for name in entry.points)))
+
+
+def _refuse_fixed(datum: Datum, points: Sequence[Point], source: str) -> None:
+    """Raise BadInputError if a datum point of a free network is fixed."""
+    for i in datum.points or ():
         if points[i].role is Role.FIXED:
             raise BadInputError(f"{source}: point {points[i].name!r} is fixed; inner constraints need unknown points")
-    return Datum(DatumType.INNER, chosen)

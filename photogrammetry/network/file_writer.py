@@ -1,6 +1,7 @@
 """Writes `svev-network/1` files."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,27 @@ from photogrammetry.network.file import REWEIGHT
 from photogrammetry.network.model import AXES, Camera, Image, ImageFrame, Network, Point
 from rig.arrays import Floats
 
+_DIGITS = 12  # of pixel coordinates: hides the rounding errors of the change of frames, 1e-13 px
+
 
 def write_network(network: Network, path: Path) -> None:
-    """Write a network file, in the network's image frame."""
-    path.write_text(json.dumps(network_to_json(network)) + "\n", encoding="utf-8")
+    """Write a network file, in the network's image frame; each camera, image, point and observation on its own line."""
+    path.write_text(laid_out(network_to_json(network)), encoding="utf-8")
+
+
+def laid_out(data: Mapping[str, Any]) -> str:
+    """A JSON object as text: the entries of its lists and tables each on a line, for people who read or edit it."""
+    return "{\n" + ",\n".join(f"  {json.dumps(key)}: {_entries(value)}" for key, value in data.items()) + "\n}\n"
+
+
+def _entries(value: Any) -> str:
+    """One value of the file's object; lists and tables of entries have several lines."""
+    if isinstance(value, dict) and value and all(isinstance(entry, dict) for entry in value.values()):
+        lines = [f"    {json.dumps(name)}: {json.dumps(entry)}" for name, entry in value.items()]
+        return "{\n" + ",\n".join(lines) + "\n  }"
+    if isinstance(value, list) and value:
+        return "[\n" + ",\n".join(f"    {json.dumps(entry)}" for entry in value) + "\n  ]"
+    return json.dumps(value)
 
 
 def metric_to_pixel(xy: Floats, size: Floats) -> Floats:
@@ -86,7 +104,7 @@ def _observations_to_json(network: Network) -> list[list[Any]]:
     xy = observed.xy
     if network.image_frame is ImageFrame.PIXEL and len(xy):
         sizes = [network.cameras[network.images[i].camera].size for i in observed.image]
-        xy = metric_to_pixel(xy, np.array(sizes, dtype=float))
+        xy = np.round(metric_to_pixel(xy, np.array(sizes, dtype=float)), _DIGITS)
     rows: list[list[Any]] = []
     for i in range(len(xy)):
         sigma = observed.sigma[i].tolist()

@@ -1,4 +1,4 @@
-"""Reads the planner's network files: strict TOML; every error names file, key and remedy."""
+"""Reads the planner's network files: strict TOML or JSON; every error names file, key and remedy."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -7,7 +7,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from photogrammetry.network.entries import Finite, Name, Pixels, Positive, Triple
-from rig.settings.strict_toml import StrictModel, read_toml, validate
+from photogrammetry.network.strict_text import read_object
+from rig.errors import BadInputError
+from rig.settings.strict_toml import StrictModel, validate
 
 Parameter = Literal["c", "x0", "y0", "a1", "a2", "a3", "b1", "b2", "c1", "c2"]
 
@@ -162,4 +164,7 @@ def read_description(path: Path) -> Description:
     Raises:
         BadInputError: one line with file, key and remedy.
     """
-    return validate(Description, read_toml(path), path)
+    data = read_object(path, "plan")
+    if "format" in data:
+        raise BadInputError(f'{path}: has a "format", so it is no plan; svev adjust takes networks')
+    return validate(Description, data, path)

@@ -10,8 +10,8 @@ from pydantic import BaseModel, Field
 
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
 from photogrammetry.network.entries import Finite, Positive
-from photogrammetry.network.file import read_json
 from photogrammetry.network.model import Network
+from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
 from rig.settings.strict_toml import validate
 

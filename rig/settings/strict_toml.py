@@ -4,6 +4,7 @@ import difflib
 import reprlib
 import tomllib
 import unicodedata
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -14,6 +15,7 @@ from rig.errors import BadInputError
 
 Model = TypeVar("Model", bound=BaseModel)
 
+_RIG_FILE: Final = "rig file"
 _MOST_BYTES: Final = 1_000_000
 _DEEPEST: Final = 20
 _LONGEST_TEXT: Final = 4096  # as long as a path may be
@@ -54,8 +56,13 @@ def read_text(path: Path, format_name: str, existing: str) -> str:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, *, kind: str = _RIG_FILE, most_bytes: int = _MOST_BYTES) -> dict[str, Any]:
     """Read a TOML file.
+
+    Args:
+        path: of the file.
+        kind: what the file should be, for messages.
+        most_bytes: a larger file is refused.
 
     Raises:
         BadInputError: the file is missing, unreadable, not UTF-8, too large or not TOML, and then the message names
@@ -63,10 +70,12 @@ def read_toml(path: Path) -> dict[str, Any]:
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise BadInputError(f"{path}: is no file, but a device or a pipe; name a TOML file")
-    if path.is_file() and path.stat().st_size > _MOST_BYTES:
-        raise BadInputError(f"{path}: is larger than 1 MB, which no rig file is; name another file")
+    if path.is_file() and path.stat().st_size > most_bytes:
+        most = most_bytes // 1_000_000
+        raise BadInputError(f"{path}: is larger than {most} MB, which no {kind} is; name another file")
+    existing = "an existing one, e.g. config/rigs/sim.toml" if kind == _RIG_FILE else f"an existing {kind}"
     try:
-        data = tomllib.loads(read_text(path, "TOML", "an existing one, e.g. config/rigs/sim.toml"))
+        data = tomllib.loads(read_text(path, "TOML", existing))
     except RecursionError:
         raise BadInputError(f"{path}: not valid TOML: nested too deeply; correct it there") from None
     except ValueError as error:  # TOMLDecodeError, or a number with too many digits
@@ -103,6 +112,36 @@ def _cannot_be_seen(character: str) -> bool:
     return unicodedata.category(character) in _UNSEEN and character not in _LAYOUT
 
 
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong in a file.
+
+    Attributes:
+        place: keys that lead to it, from the outermost one.
+        words: the key, what is wrong, what to do.
+    """
+
+    place: tuple[int | str, ...]
+    words: str
+
+
+def examine(model: type[Model], data: dict[str, Any]) -> tuple[Model | None, tuple[Fault, ...]]:
+    """Make a model of `data`, or say everything that is wrong.
+
+    Args:
+        model: class of the model.
+        data: content of the file.
+
+    Returns:
+        The model, None if something is wrong; and what is wrong.
+    """
+    try:
+        return model.model_validate(data), ()
+    except ValidationError as error:
+        errors = error.errors(include_url=False)
+        return None, tuple(Fault(each["loc"], _word(model, each)) for each in errors)
+
+
 def validate(model: type[Model], data: dict[str, Any], source: Path | str) -> Model:
     """Make a model of `data`.
 
@@ -114,12 +153,11 @@ def validate(model: type[Model], data: dict[str, Any], source: Path | str) -> Mo
     Raises:
         BadInputError: a key is wrong; the message names the first one, what to do, and how many more are wrong.
     """
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        errors = error.errors(include_url=False)
-        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-        raise BadInputError(f"{source}: {_word(model, errors[0])}{more}") from None
+    made, faults = examine(model, data)
+    if made is None:
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        raise BadInputError(f"{source}: {faults[0].words}{more}")
+    return made
 
 
 def _word(model: type[BaseModel], error: ErrorDetails) -> str:

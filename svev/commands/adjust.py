@@ -24,6 +24,7 @@ from svev.commands.delivery import (
     ReportOption,
     ReweightOption,
     deliver,
+    refuse_overwriting,
     with_weights,
     written,
 )
@@ -59,6 +60,7 @@ def adjust(
 
     Example: svev adjust network.json -o result.json
     """
+    refuse_overwriting(output, network)
     given = with_weights(read_network(network), reweight=reweight, paper=paper)
     named_points(given, datum or (), "--datum")  # before anything is computed
     named_points(given, covariance or (), "--covariance")

@@ -9,7 +9,7 @@ from photogrammetry.network.file import read_network
 from photogrammetry.network.model import Network
 from photogrammetry.procedures.calibration import calibrate as calibrate_network
 from photogrammetry.reports.procedures import calibration_lines, calibration_report, calibration_to_json
-from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver, written
+from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver, refuse_overwriting, written
 
 
 def calibrate(
@@ -25,6 +25,7 @@ def calibrate(
 
     Example: svev calibrate frame.json -o cameras.json --report calibration
     """
+    refuse_overwriting(output, network)
     given = read_network(network)
     deliver(lambda: _calibrated(given, report), output, as_json=as_json)
 

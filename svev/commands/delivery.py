@@ -78,6 +78,17 @@ def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Pat
         raise typer.Exit(code)
 
 
+def refuse_overwriting(output: Path, *inputs: Path | None) -> None:
+    """Refuse to write a result over what it is computed from, also by another name of the same file.
+
+    Raises:
+        BadInputError: the output is one of the inputs.
+    """
+    for path in inputs:
+        if path is not None and output.exists() and path.exists() and output.samefile(path):
+            raise BadInputError(f"{output}: is an input and would be overwritten; name another file to write")
+
+
 def with_weights(network: Network, *, reweight: bool, paper: bool) -> Network:
     """The network with the weights that the options ask for; without options those that its file asks for.
 

@@ -17,6 +17,7 @@ from svev.commands.delivery import (
     ReportOption,
     ReweightOption,
     deliver,
+    refuse_overwriting,
     with_weights,
     written,
 )
@@ -59,6 +60,7 @@ def orient(
 
     Example: svev orient hill.json --calibration cameras.json -o poses.json --report orientation
     """
+    refuse_overwriting(output, network, calibration)
     given = read_network(network)
     if calibration is not None:
         given = with_calibration(given, read_calibration(calibration))

@@ -6,14 +6,16 @@ from typing import Annotated, Final
 import typer
 
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from photogrammetry.network.file_writer import write_network
 from photogrammetry.planning.description import read_description
 from photogrammetry.planning.monte_carlo import SAMPLES, simulate
-from photogrammetry.planning.plan import plan_from
+from photogrammetry.planning.plan import Plan, plan_from
 from photogrammetry.planning.prediction import adjusted_plan, predict
+from photogrammetry.planning.simulated import simulated_network
 from photogrammetry.reports.document import as_text
 from photogrammetry.reports.plan import plan_report, plan_to_json
 from svev import console
-from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE, written
+from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE, refuse_overwriting, written
 
 _SEED: Final = 2009
 
@@ -26,6 +28,15 @@ def plan(
     report: Annotated[
         Path | None, typer.Option("--report", help="folder for the report, as text and as a page with drawings")
     ] = None,
+    simulated_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--simulate",
+            metavar="NETWORK.json",
+            help="instead of predicting, write a network with errors (svev-network/1), as it would be measured",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="of the random errors")] = _SEED,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object instead of the tables")] = False,
 ) -> None:
     """Predict the accuracy of cameras, jumper points, skis and body angles, by covariance and by Monte Carlo.
@@ -35,11 +46,15 @@ def plan(
     Example: svev plan config/networks/hill-2.toml --report plan
     """
     planned = plan_from(read_description(network))
+    if simulated_file is not None:
+        refuse_overwriting(simulated_file, network)
+        _simulate(planned, seed, simulated_file, as_json=as_json)
+        return
     try:
         adjusted = adjusted_plan(planned)
         predicted = predict(planned, adjusted)
         with console.progress("samples", samples) as done:
-            simulated = simulate(planned, adjusted, samples=samples, seed=_SEED, done=done)
+            simulated = simulate(planned, adjusted, samples=samples, seed=seed, done=done)
     except NotSolvableError as error:
         console.complain(f"not solvable: {error}")
         raise typer.Exit(NOT_SOLVABLE) from None
@@ -53,3 +68,14 @@ def plan(
         console.say_text(as_text(tables))
     for line in written(lambda: tables, report):
         console.say(line, aside=as_json)
+
+
+def _simulate(planned: Plan, seed: int, path: Path, *, as_json: bool) -> None:
+    """Write the network as it would be measured, and say what it holds."""
+    made = simulated_network(planned, seed)
+    write_network(made, path)
+    counts = {"images": len(made.images), "points": len(made.points), "observations": len(made.observations.xy)}
+    if as_json:
+        console.print_json({"network": str(path), "seed": seed, **counts})
+        return
+    console.say(f"network with errors in {path}: " + ", ".join(f"{n} {what}" for what, n in counts.items()))

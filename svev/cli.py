@@ -49,6 +49,7 @@ _COMMANDS: Final = {
     "orient": ("orient", "orient", "Estimate the poses of the cameras on the hill."),
     "analyze": ("analyze", "analyze_command", "Measure the jumps of a recording."),
     "compare": ("compare", "compare", "Compare two measured jumps."),
+    "network": ("network", "app", "Make a network out of files of other programs."),
     "plan": ("plan", "plan", "Predict the accuracy of planned cameras."),
     "bench": ("bench", "bench", "Measure how fast this computer records."),
 }

@@ -21,16 +21,17 @@ from rig.settings.strict_toml import StrictModel
 from svev.cli import main
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "network-file.md").read_text()
+TRY_IT = PAGE.split("## Try it", 1)[1].split("\n## ", 1)[0]
 PLANS = {"laboratory": "laboratory", "hill": "hill-2", "rods": "rods"}
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder in which every command of the page has run."""
+    """A folder in which every command of the first part has run."""
     here = tmp_path_factory.mktemp("page")
     (here / "config").symlink_to(CONFIG)
     commands = [
-        line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines() if line
+        line for block in re.findall(r"```sh\n(.*?)```", TRY_IT, re.DOTALL) for line in block.splitlines() if line
     ]
     assert len(commands) > 5
     with pytest.MonkeyPatch.context() as patch:

@@ -70,6 +70,12 @@ class LogDamagedError(SvevError):
     exit_code = 3
 
 
+class LedgerDiffersError(SvevError):
+    """The tags of a log say other things of its pulses than frame numbers, clocks and counts in the same log."""
+
+    exit_code = 7
+
+
 class NoJumpError(SvevError):
     """Nobody jumps in a log."""
 

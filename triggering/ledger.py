@@ -205,6 +205,21 @@ class Ledger:
         if (pause := pause_of_margin(begin, end, after, before, period)) is not None:
             yield pause
 
+    def states(self, names: Iterable[str]) -> dict[str, dict[str, int]]:
+        """How many pulses have which of the five states, by name of the camera.
+
+        Args:
+            names: of the cameras, in the order wanted.
+        """
+        failures = {name: self.failures.get(name, Counter[FrameStatus]()) for name in names}
+        return {
+            name: {
+                status.value: self.pulses - failed.total() if status is FrameStatus.OK else failed[status]
+                for status in FrameStatus
+            }
+            for name, failed in failures.items()
+        }
+
     def counts(self) -> Counts:
         """Pulses, complete, partial and causes, as every command reports them; causes count frames, not pulses."""
         failures = [status for status in FrameStatus if status is not FrameStatus.OK]

@@ -22,6 +22,7 @@ from rig.jumper import JumperState
 from rig.tag import TripletTag
 from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
 from triggering.ledger import Ledger
+from triggering.recount import Recount
 
 _EVENTS_MAX = 1000
 
@@ -39,12 +40,13 @@ class PulseCheck:
         report: called with each finding.
 
     Attributes:
-        ledger: what became of every pulse.
+        ledger: what became of every pulse, as the tags say.
+        recount: the same, recomputed.
         events: the events, the first thousand.
     """
 
     def __init__(self, report: Callable[[str], None]) -> None:
-        self.ledger = Ledger()
+        self.ledger, self.recount = Ledger(), Recount()
         self.events: list[Event] = []
         self._report = report
         self._cameras: tuple[tuple[str, tuple[int, int]], ...] | None = None
@@ -88,6 +90,7 @@ class PulseCheck:
         if flaw := self._tag_flaw(tag, message, says_complete):
             self._report(f"pulse {tag.pulse}: {flaw}")
         self.ledger.add(tag)
+        self.recount.add(tag)
         self._without_image[tag.pulse] = tag
 
     def _tag_flaw(self, tag: TripletTag, message: Message, says_complete: object) -> str:
@@ -137,7 +140,9 @@ class PulseCheck:
         event = event_of(message)
         if event is None:
             self._report(f"event {message.sequence}: cannot be read")
-        elif len(self.events) < _EVENTS_MAX:
+            return
+        self.recount.happened(event)
+        if len(self.events) < _EVENTS_MAX:
             self.events.append(event)
 
     def _health(self, message: Message) -> None:

@@ -16,6 +16,7 @@ from recorder.reading.records import Damage
 from rig.events import Event
 from rig.transport import wire
 from triggering.ledger import Ledger, numbers
+from triggering.recount import Recounted
 
 _PULSES_MAX = 10_000
 _FINDINGS_MAX = 500
@@ -64,7 +65,8 @@ class VerifyReport:
         bytes: size of the file.
         closed: the log was closed properly.
         truncated: the log ends in the middle of a record.
-        ledger: what became of every pulse.
+        ledger: what became of every pulse, as the tags say.
+        recounted: the same, recomputed from numbers and times of the frames.
         findings: what is wrong with the log itself, one sentence each.
         events: events in the log, the first thousand.
         every_byte: the log holds checksums over every byte of it; logs of earlier versions hold them over images, tags
@@ -77,6 +79,7 @@ class VerifyReport:
     closed: bool
     truncated: bool
     ledger: Ledger
+    recounted: Recounted
     findings: tuple[str, ...]
     events: tuple[Event, ...]
     every_byte: bool
@@ -139,8 +142,9 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         if not reader.closed:
             findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
         return VerifyReport(
-            path, reader.size, reader.closed, reader.truncated, pulses.ledger, findings.lines(), tuple(pulses.events),
-            structure.data_checksum and structure.summary_checksum, known_lost(reader),
+            path, reader.size, reader.closed, reader.truncated, pulses.ledger, pulses.recount.finish(),
+            findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
+            known_lost(reader),
         )  # fmt: skip
 
 

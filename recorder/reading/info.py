@@ -83,6 +83,7 @@ class LogInfo:
             "truncated": self.truncated,
             "damaged_bytes": self.damaged_bytes,
             **ledger.counts().model_dump(),
+            "ledger": ledger.states(self.cameras),
             "missing_pulses": self.missing_pulses,
             "pauses": [wire.to_builtins(pause) for pause in ledger.pauses()],
             "bytes": self.bytes,

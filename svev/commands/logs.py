@@ -11,9 +11,10 @@ from recorder.checking.verify import VerifyReport, verify
 from recorder.reading.info import LogInfo, info
 from recorder.recovering.recover import RecoverReport, recover
 from rig.clocks import NS_PER_S
-from rig.errors import LogDamagedError, LogTruncatedError
+from rig.errors import LedgerDiffersError, LogDamagedError, LogTruncatedError
 from service.recordings import live_results
 from svev import console
+from triggering.recount import Recounted
 
 _LINES_MAX = 60
 
@@ -23,7 +24,7 @@ AlsoJson = Annotated[bool, typer.Option("--json", help="end with one JSON object
 
 
 def info_command(log: LogPath, as_json: AsJson = False) -> None:
-    """Say what a log holds: pulses, causes of missing frames, rate, spread of the triggers, session, rig.
+    """Say what a log holds: pulses, ledger of each camera, rate, spread of the triggers, session, rig.
 
     Tells of the jumps too that were measured while it was recorded. Reads tags only and so takes a moment even for a
     long log; `svev verify` checks every byte.
@@ -47,7 +48,13 @@ def info_command(log: LogPath, as_json: AsJson = False) -> None:
         raise LogDamagedError(f"{log}: {found.damaged_bytes} bytes are damaged; see which pulses with `svev verify`")
 
 
-def verify_command(log: LogPath, as_json: AsJson = False) -> None:
+def verify_command(
+    log: LogPath,
+    with_ledger: Annotated[
+        bool, typer.Option("--ledger", help="recompute what became of every pulse, and compare with the tags")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
     """Check every byte of a log and say, pulse by pulse, what is missing.
 
     Checks checksums, message indexes, summary and statistics, compares tags with images, and looks for pulses without
@@ -55,21 +62,34 @@ def verify_command(log: LogPath, as_json: AsJson = False) -> None:
     log is sound; its tags say which frames are missing and why, and the times of its pulses where there is a pause) or
     "damaged" (not closed, unreadable in part, or inconsistent).
 
+    With --ledger it also recomputes from frame numbers, clocks, arrivals and trigger counts what became of every pulse
+    in every camera, and names each pulse whose tag says something else.
+
     Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
-    was killed leaves a log that is not closed). What can be read is printed in any case.
+    was killed leaves a log that is not closed); 7 with --ledger: sound, but a tag is contradicted. What can be read is
+    printed in any case.
 
     Example: svev verify recordings/jump.mcap
     """
     with console.progress("checking", _size(log)) as done:
         report = verify(log, done)
     if as_json:
-        console.print_json(report.to_json())
+        recounted = {"ledger": report.recounted.to_json()} if with_ledger else {}
+        console.print_json(report.to_json() | recounted)
     else:
         _print_verified(report)
+        if with_ledger:
+            _print_recounted(report.recounted)
     if report.truncated:
         raise truncated(log)
     if report.damaged:
         raise LogDamagedError(f"{log}: damaged: {_first_flaw(report)}; the pulses counted above are readable")
+    if with_ledger and not report.recounted.agrees:
+        first = report.recounted.differences[0].in_words()
+        raise LedgerDiffersError(
+            f"{log}: its ledger does not agree with its tags: {first}; measure nothing at the pulses that are named, "
+            "and look at the events of that time"
+        )
 
 
 def recover_command(
@@ -122,6 +142,8 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
     rate = "" if ledger.rate_hz is None else f", {ledger.rate_hz:.3f} Hz"
     yield "duration", f"{ledger.duration_s:.3f} s{rate}"
     yield "pulses", ledger.summary_line()
+    for camera, states in ledger.states(found.cameras).items():
+        yield "ledger", f"{camera} " + ", ".join(f"{count} {state}" for state, count in states.items())
     if found.missing_pulses:
         yield "no tag", f"{found.missing_pulses} pulses"
     if found.trouble:
@@ -150,6 +172,14 @@ def _print_verified(report: VerifyReport) -> None:
         console.say(f"  and {len(lines) - _LINES_MAX} more; see all with --json")
     for event in report.events[:_LINES_MAX]:
         console.say(f"  {event.level.value}: {event.name}: {event.message}")
+
+
+def _print_recounted(recounted: Recounted) -> None:
+    console.say(recounted.summary_line())
+    for difference in recounted.differences[:_LINES_MAX]:
+        console.say(f"  {difference.in_words()}")
+    if recounted.disagreements > _LINES_MAX:
+        console.say(f"  and {recounted.disagreements - _LINES_MAX} more; see them with --json")
 
 
 def _first_flaw(report: VerifyReport) -> str:

@@ -13,6 +13,7 @@ import zmq
 
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
+from rig.frame import FrameStatus
 from svev.cli import main
 from tests.recorder.logs import ALL_OK, LOST, OK, write_log
 from tests.support.loopback import Loopback
@@ -61,6 +62,34 @@ def test_verify_tells_people_what_is_missing_and_a_partial_log_is_no_error(log: 
     assert done.stdout.startswith(f"{log}: partial\n")
     assert "pulse 2: K2 lost" in done.stdout
     assert "info: recorder: recording started" in done.stdout
+
+
+def test_info_prints_the_ledger_of_each_camera(log: Path, svev: Svev) -> None:
+    assert "ledger     K2 2 ok, 1 lost, 0 missed, 0 damaged, 0 absent" in svev("info", log).stdout
+    found = json.loads(svev("info", log, "--json").stdout)
+    assert found["ledger"]["K1"] == {"ok": 3, "lost": 0, "missed": 0, "damaged": 0, "absent": 0}
+
+
+def test_a_recomputed_ledger_that_agrees_is_one_line(log: Path, svev: Svev) -> None:
+    done = svev("verify", "--ledger", log)
+    assert (done.returncode, done.stderr) == (0, "")
+    line = (
+        "the recomputed ledger agrees with the tags: 3 pulses, 3 cameras: 8 ok, 1 lost, 0 missed, 0 damaged, 0 absent"
+    )
+    assert done.stdout.splitlines()[-1] == line
+
+
+def test_a_tag_that_the_frame_numbers_contradict_is_named(tmp_path: Path, svev: Svev) -> None:
+    """The frame numbers of the log go on with the pulses: K2 took the frame that is said to be missed."""
+    path = tmp_path / "log.mcap"
+    write_log(path, (ALL_OK, (OK, FrameStatus.MISSED, OK), ALL_OK))
+    assert svev("verify", path).returncode == 0
+    done = svev("verify", "--ledger", path)
+    assert done.returncode == 7
+    assert "\n  pulse 2: K2 is tagged missed and was lost: its frame numbers say" in done.stdout
+    assert "its ledger does not agree with its tags: pulse 2: K2" in done.stderr
+    (difference,) = json.loads(svev("verify", path, "--ledger", "--json").stdout)["ledger"]["differences"]
+    assert (difference["pulse"], difference["camera"], difference["found"]) == (2, "K2", "lost")
 
 
 @pytest.mark.parametrize("command", ["info", "verify"])

@@ -1,0 +1,150 @@
+"""The ledger recomputed from a log's tags and events: it agrees with what is true, and names every tag that is not."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+import msgspec
+import pytest
+
+from rig.clocks import NS_PER_S, DeviceNs, UtcNs
+from rig.events import Event, Level
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+from rig.tag import CameraTag, TripletTag
+from tests.triggering.simulation import Hill, Outage, Run, Scenario
+from triggering.recount import Recount, Recounted
+
+LOST, MISSED, DAMAGED, ABSENT, OK = (
+    FrameStatus.LOST, FrameStatus.MISSED, FrameStatus.DAMAGED, FrameStatus.ABSENT, FrameStatus.OK,
+)  # fmt: skip
+#: What becomes of single frames, (pulse, camera); all others come.
+FAULTS = {(100, 1): LOST, (120, 1): MISSED, (140, 1): DAMAGED, (160, 0): LOST, (160, 2): MISSED}
+
+
+def tags_of(run: Run) -> list[TripletTag]:
+    """The tags that the recorder would write."""
+    return [
+        TripletTag(
+            PulseNumber(pulse.number), UtcNs(pulse.time), "", "r", (48, 64 * len(pulse.outcomes)),
+            tuple(
+                CameraTag(f"K{place + 1}", (64 * place, 64 * place + 64), outcome.status) if outcome.record is None
+                else CameraTag(
+                    f"K{place + 1}", (64 * place, 64 * place + 64), OK, outcome.record.frame_id,
+                    None if outcome.record.trigger_count < 0 else outcome.record.trigger_count,
+                    outcome.record.device_time, UtcNs(outcome.record.host_time), 0.0,
+                )
+                for place, outcome in enumerate(pulse.outcomes)
+            ),
+        )
+        for pulse in run.closed
+    ]  # fmt: skip
+
+
+def recount(tags: Iterable[TripletTag], events: Iterable[Event] = ()) -> Recounted:
+    account = Recount()
+    for event in events:
+        account.happened(event)
+    for tag in tags:
+        account.add(tag)
+    return account.finish()
+
+
+def changed(tags: Sequence[TripletTag], pulse: int, change: Callable[[CameraTag], CameraTag]) -> list[TripletTag]:
+    """The tags, with K2's part of one pulse changed."""
+    found = list(tags)
+    at = next(place for place, tag in enumerate(found) if tag.pulse == pulse)
+    first, middle, *rest = found[at].cameras
+    found[at] = msgspec.structs.replace(found[at], cameras=(first, change(middle), *rest))
+    return found
+
+
+@pytest.fixture(scope="module")
+def tags() -> list[TripletTag]:
+    run = Run(Hill(Scenario(seed=1, pulses=240, faults=FAULTS)))
+    found = tags_of(run)
+    assert {(tag.pulse - 1, place) for tag in found for place, c in enumerate(tag.cameras) if c.status is not OK} == {
+        *FAULTS
+    }
+    return found
+
+
+@pytest.mark.parametrize("trigger_counts", [False, True])
+@pytest.mark.parametrize("modulus", [0, 65_535])
+def test_it_agrees_with_the_truth_whatever_was_lost_or_missed(trigger_counts: bool, modulus: int) -> None:
+    """The frame numbers wrap in the middle; the clocks drift by 200 ppm."""
+    scenario = Scenario(
+        seed=5, pulses=1500, missed=0.02, lost=0.02, damaged=0.01, first_id=65_000, modulus=modulus,
+        drift_ppm=(0.0, 200.0, -200.0), trigger_counts=trigger_counts,
+    )  # fmt: skip
+    run = Run(Hill(scenario))
+    assert not run.silent
+    found = recount(tags_of(run))
+    assert found.agrees, found.differences
+    assert found.pulses == 1500
+    truth = [Counter(fates[camera] for fates in run.hill.fates) for camera in range(3)]
+    assert found.unproven <= 3 * 2, "only what lies before the first and after the last frame of a camera"
+    wrong = sum((states - true).total() for states, true in zip(found.states.values(), truth, strict=True))
+    assert wrong <= found.unproven
+
+
+@pytest.mark.parametrize(
+    ("pulse", "tagged", "found"),
+    [(101, MISSED, LOST), (101, ABSENT, LOST), (121, LOST, MISSED), (121, ABSENT, MISSED), (141, MISSED, LOST)],
+)
+def test_a_false_tag_is_named(tags: list[TripletTag], pulse: int, tagged: FrameStatus, found: FrameStatus) -> None:
+    lie = changed(tags, pulse, lambda part: msgspec.structs.replace(part, status=tagged))
+    (difference,) = recount(lie).differences
+    assert (difference.pulse, difference.camera, difference.tagged, difference.found) == (pulse, "K2", tagged, found)
+    assert difference.in_words().startswith(f"pulse {pulse}: K2 is tagged {tagged} and was {found}: its frame numbers")
+
+
+def test_frames_under_the_wrong_pulse_are_named_one_by_one(tags: list[TripletTag]) -> None:
+    """From pulse 40 to 59 K2's frames are those of the next pulse."""
+    mixed = list(tags)
+    for pulse in range(40, 60):
+        other = tags[pulse].cameras[1]
+        mixed = changed(mixed, pulse, lambda _, other=other: other)  # type: ignore[misc]
+    mixed = changed(mixed, 60, lambda part: CameraTag(part.name, part.columns, LOST))
+    found = recount(mixed)
+    assert [each.pulse for each in found.differences if each.found is None] == list(range(40, 60))
+    assert all("33.3 ms after this pulse" in each.why for each in found.differences[:20])
+
+
+def test_a_pulse_without_any_tag_is_noticed(tags: list[TripletTag]) -> None:
+    rest = [tag for tag in tags if tag.pulse != 50]
+    assert recount(rest).agrees, "its number is missing, which `verify` says"
+    renumbered = [msgspec.structs.replace(tag, pulse=PulseNumber(tag.pulse - (tag.pulse > 50))) for tag in rest]
+    found = recount(renumbered)
+    assert {(each.pulse, each.camera) for each in found.differences} == {(49, "K1"), (49, "K2"), (49, "K3")}
+    assert "its frame numbers tell of 1 frames until pulse 50 that have no pulse" in found.differences[0].why
+
+
+@pytest.mark.parametrize("step_s", [37.0, -37.0, 0.033, -0.05])
+def test_a_clock_that_is_set_accuses_nobody(tags: list[TripletTag], step_s: float) -> None:
+    def stepped(part: CameraTag) -> CameraTag:
+        if part.device_time is None:
+            return part
+        return msgspec.structs.replace(part, device_time=DeviceNs(part.device_time + round(step_s * NS_PER_S)))
+
+    after = list(tags)
+    for tag in tags[79:]:
+        after = changed(after, tag.pulse, stepped)
+    for pulse in (80, 81, 82):
+        after = changed(after, pulse, lambda part: CameraTag(part.name, part.columns, DAMAGED))
+    found = recount(after)
+    assert found.agrees, found.differences
+    assert found.unproven == 3
+
+
+def test_absent_needs_an_event_that_says_so() -> None:
+    """K2 is frozen for a second; its clock and its numbers go on as if nothing had happened."""
+    run = Run(Hill(Scenario(seed=2, pulses=200, outages=(Outage(1, 2.0, 3.0, None),))))
+    assert run.silent == {1}
+    frozen = tags_of(run)
+    away = [tag for tag in frozen if tag.cameras[1].status is ABSENT]
+    assert len(away) > 20
+    silent = Event(UtcNs(away[2].time), Level.WARNING, "K2", "silent: three pulses behind the other cameras")
+    assert recount(frozen, [silent]).agrees
+    assert {each.tagged for each in recount(frozen).differences} == {ABSENT}
+    elsewhere = msgspec.structs.replace(silent, name="K3")
+    assert not recount(frozen, [elsewhere]).agrees

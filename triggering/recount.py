@@ -1,0 +1,342 @@
+"""Recomputes what became of every pulse in every camera from what a log holds of its frames, and compares the tags.
+
+The pairing decided while frames were still coming. Afterwards everything is there, and for two whole frames of a camera
+that follow each other, the log says by itself what must have become of the pulses between them: the frame numbers say
+how many frames the camera took, its trigger count how many pulses it saw, its clock whether the second frame belongs to
+the pulse that it is filed under. Of all that the pairing found out, only the tags are used, to be compared.
+
+What cannot be proved is left to the tags and counted: pulses before the first and after the last frame of a camera, and
+those at which it was gone or silent (the log's events tell) or its clock was set.
+"""
+
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from rig.clocks import NS_PER_S, UtcNs
+from rig.events import Event
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+from rig.tag import CameraTag, TripletTag
+from rig.transport.messages import CameraNews
+
+#: News after which numbers and clock of a camera prove nothing about the frames before it.
+_BREAKS: Final = frozenset({CameraNews.CONNECTED.value, CameraNews.SILENT.value, CameraNews.GONE.value})
+#: 16-bit block ids run from 1 to this and skip 0.
+_IDS_16_BIT: Final = 65535
+#: The rate of a camera's clock is known from frames that are at least so far apart.
+_BASE_NS: Final = NS_PER_S
+#: Disagreements that are kept one by one; the counts go on.
+_KEPT: Final = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A pulse and camera in which the tag and the recomputed ledger differ.
+
+    Attributes:
+        pulse: the pulse; where frames have no pulse, the one before them.
+        camera: name of the camera.
+        tagged: what the tag says.
+        found: what follows from the log; None: no state of this pulse says it.
+        why: the evidence, in words.
+    """
+
+    pulse: PulseNumber
+    camera: str
+    tagged: FrameStatus
+    found: FrameStatus | None
+    why: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The difference as JSON."""
+        found = None if self.found is None else self.found.value
+        return {
+            "pulse": self.pulse, "camera": self.camera, "tagged": self.tagged.value, "found": found, "why": self.why,
+        }  # fmt: skip
+
+    def in_words(self) -> str:
+        """The difference as one line, e.g. "pulse 61: K2 is tagged lost and was missed: (why)"."""
+        found = "" if self.found is None else f" and was {self.found.value}"
+        return f"pulse {self.pulse}: {self.camera} is tagged {self.tagged.value}{found}: {self.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class Recounted:
+    """The recomputed ledger, beside the tags.
+
+    Attributes:
+        pulses: tags that were compared.
+        states: recomputed, by camera: how many pulses have which state.
+        unproven: missing frames whose state rests on the tag alone.
+        differences: where tag and evidence differ, the first ten thousand.
+        disagreements: how many there are.
+    """
+
+    pulses: int
+    states: dict[str, Counter[FrameStatus]]
+    unproven: int
+    differences: tuple[Difference, ...]
+    disagreements: int
+
+    @property
+    def agrees(self) -> bool:
+        """Whether no tag is contradicted."""
+        return self.disagreements == 0
+
+    def to_json(self) -> dict[str, Any]:
+        """The recomputed ledger as JSON."""
+        return {
+            "agrees": self.agrees,
+            "states": {name: states_json(states) for name, states in self.states.items()},
+            "unproven": self.unproven,
+            "disagreements": self.disagreements,
+            "differences": [difference.to_json() for difference in self.differences],
+        }
+
+    def summary_line(self) -> str:
+        """Agreement or not with the counts, one line."""
+        total: Counter[FrameStatus] = Counter()
+        for states in self.states.values():
+            total.update(states)
+        counts = ", ".join(f"{total[status]} {status.value}" for status in FrameStatus)
+        verdict = "agrees with the tags" if self.agrees else f"differs from the tags at {self.disagreements} places"
+        alone = f"; {self.unproven} of them by the tag alone" if self.unproven else ""
+        return f"the recomputed ledger {verdict}: {self.pulses} pulses, {len(self.states)} cameras: {counts}{alone}"
+
+
+def states_json(states: Counter[FrameStatus]) -> dict[str, int]:
+    """How many pulses have which of the five states, as JSON."""
+    return {status.value: states[status] for status in FrameStatus}
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A whole frame as its tag describes it; times in ns."""
+
+    pulse: PulseNumber
+    time: UtcNs
+    frame_id: int
+    triggers: int | None
+    device: int
+    host: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Gap:
+    """What lies between two whole frames of a camera; one of them is missing at the ends of the log.
+
+    Attributes:
+        before, after: the frames.
+        tagged: the pulses between them that have tags, with their states.
+        cut: the clock or the numbers do not go on from one to the other.
+    """
+
+    before: _Frame | None
+    after: _Frame | None
+    tagged: tuple[tuple[PulseNumber, FrameStatus], ...]
+    cut: bool
+
+
+@dataclass(slots=True)
+class _Camera:
+    """What is known of a camera so far."""
+
+    name: str
+    states: Counter[FrameStatus] = field(default_factory=Counter)
+    last: _Frame | None = None
+    first: _Frame | None = None  #: since which the clock has been going on
+    between: list[tuple[PulseNumber, FrameStatus]] = field(default_factory=list)
+    gaps: list[_Gap] = field(default_factory=list)
+    breaks: list[UtcNs] = field(default_factory=list)
+
+    def gain(self) -> float:
+        """How much faster than the pulses' clock the camera's runs, as a factor."""
+        if self.first is None or self.last is None or self.last.time - self.first.time < _BASE_NS:
+            return 1.0
+        return (self.last.device - self.first.device) / (self.last.time - self.first.time)
+
+
+class Recount:
+    """Takes tags and events of a log in their order; memory grows with the missing frames only."""
+
+    def __init__(self) -> None:
+        self._cameras: dict[str, _Camera] = {}
+        self._pulses = 0
+        self._earlier: TripletTag | None = None
+        self._held: TripletTag | None = None
+        self._differences: list[Difference] = []
+        self._disagreements = self._unproven = 0
+
+    def add(self, tag: TripletTag) -> None:
+        """Take the next tag; one that comes twice or too late is left out."""
+        if self._held is not None:
+            if tag.pulse <= self._held.pulse:
+                return
+            self._take(self._held, tag)
+        self._earlier, self._held = self._held, tag
+
+    def happened(self, event: Event) -> None:
+        """Take an event: numbers and clock of a camera prove nothing across its coming, going and falling silent."""
+        if event.message.partition(":")[0] in _BREAKS:
+            self._camera(event.name).breaks.append(event.time)
+
+    def finish(self) -> Recounted:
+        """Judge everything; for use once, at the end of the log."""
+        if self._held is not None:
+            self._take(self._held, None)
+        for camera in self._cameras.values():
+            camera.breaks.sort()
+            if camera.between:
+                camera.gaps.append(_Gap(camera.last, None, tuple(camera.between), cut=True))
+            for gap in camera.gaps:
+                self._judge(camera, gap)
+        seen = {name: camera.states for name, camera in self._cameras.items() if camera.states}
+        return Recounted(self._pulses, seen, self._unproven, tuple(self._differences), self._disagreements)
+
+    def _camera(self, name: str) -> _Camera:
+        return self._cameras.setdefault(name, _Camera(name))
+
+    def _take(self, tag: TripletTag, later: TripletTag | None) -> None:
+        """Take a tag whose neighbours are known."""
+        self._pulses += 1
+        times = [other.time for other in (self._earlier, later) if other is not None]
+        nearest = min((abs(tag.time - time) for time in times), default=NS_PER_S)
+        for part in tag.cameras:
+            camera = self._camera(part.name)
+            if part.status is not FrameStatus.OK:
+                camera.between.append((tag.pulse, part.status))
+            elif (frame := _frame(tag, part)) is not None:
+                self._whole(camera, frame, nearest)
+            else:  # a tag that names no number or time: nothing can be proved across it
+                camera.states[FrameStatus.OK] += 1
+                camera.gaps.append(_Gap(camera.last, None, tuple(camera.between), cut=True))
+                camera.between.clear()
+                camera.last = None
+
+    def _whole(self, camera: _Camera, frame: _Frame, nearest: int) -> None:
+        """Take a whole frame; `nearest` is the time from its pulse to the nearest other one, ns."""
+        last = camera.last
+        if last is None:
+            cut, camera.first = True, frame
+        else:
+            by_clock = (frame.device - last.device) / camera.gain()
+            by_pulse = frame.time - last.time
+            cut = abs(by_clock - by_pulse) >= nearest / 2
+            if cut and _is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
+                off = (by_clock - by_pulse) / 1e6
+                why = f"clock, number and arrival say that it was triggered {abs(off):.1f} ms "
+                why += "after this pulse" if off > 0 else "before this pulse"
+                self._differs(Difference(frame.pulse, camera.name, FrameStatus.OK, None, why))
+                return
+        camera.states[FrameStatus.OK] += 1
+        steps = 0 if last is None else frame.pulse - last.pulse
+        if cut or camera.between or not _goes_on(last, frame, steps):
+            camera.gaps.append(_Gap(last, frame, tuple(camera.between), cut))
+            camera.between.clear()
+        camera.last = frame
+        if cut:
+            camera.first = frame
+
+    def _judge(self, camera: _Camera, gap: _Gap) -> None:
+        before, after = gap.before, gap.after
+        if gap.cut or before is None or after is None or _broken(camera, before, after):
+            self._believe(camera, gap)
+            return
+        step = _id_step(before.frame_id, after.frame_id)
+        if step <= 0:
+            self._believe(camera, gap)
+            return
+        pulses = after.pulse - before.pulse - 1
+        taken, untagged = step - 1, pulses - len(gap.tagged)
+        if taken > pulses:
+            why = f"its frame numbers tell of {taken - pulses} frames until pulse {after.pulse} that have no pulse"
+            self._differs(Difference(before.pulse, camera.name, FrameStatus.OK, None, why))
+            taken = pulses
+        seen = None
+        if before.triggers is not None and after.triggers is not None:
+            seen = after.triggers - before.triggers - 1
+            if seen > pulses:
+                why = f"it counted {seen - pulses} triggers until pulse {after.pulse} that have no pulse"
+                self._differs(Difference(before.pulse, camera.name, FrameStatus.OK, None, why))
+        for pulse, tagged, found in _recomputed(gap.tagged, taken, untagged):
+            camera.states[found] += 1
+            if found is not tagged:
+                why = f"its frame numbers say that it took {taken} of the {pulses} frames between pulses "
+                why += f"{before.pulse} and {after.pulse}"
+                self._differs(Difference(pulse, camera.name, tagged, found, why))
+
+    def _believe(self, camera: _Camera, gap: _Gap) -> None:
+        """Count the pulses of a gap as they are tagged, for want of evidence."""
+        self._unproven += len(gap.tagged)
+        camera.states.update(status for _, status in gap.tagged)
+
+    def _differs(self, difference: Difference) -> None:
+        self._disagreements += 1
+        if len(self._differences) < _KEPT:
+            self._differences.append(difference)
+
+
+def _frame(tag: TripletTag, part: CameraTag) -> _Frame | None:
+    """The frame of a camera's part of a tag; None if that says too little of it."""
+    if part.frame_id is None or part.device_time is None or part.host_time is None:
+        return None
+    return _Frame(tag.pulse, tag.time, part.frame_id, part.trigger_count, part.device_time, part.host_time)
+
+
+def _goes_on(last: _Frame | None, frame: _Frame, steps: int) -> bool:
+    """Whether numbers and triggers of a frame go on from the last one as the pulses do."""
+    if last is None or _id_step(last.frame_id, frame.frame_id) != steps:
+        return False
+    return last.triggers is None or frame.triggers is None or frame.triggers - last.triggers == steps
+
+
+def _is_of_another_pulse(last: _Frame, frame: _Frame, by_clock: float, nearest: int, *, certain: bool) -> bool:
+    """Whether a frame is filed under a wrong pulse, where its clock says so and its number bears the clock out.
+
+    Otherwise the clock was set: then it stands alone. A camera that missed a pulse while its clock was set back by just
+    one period looks alike; there, the arrival decides. `certain`: no pulse between the two is said to be missing.
+    """
+    step = _id_step(last.frame_id, frame.frame_id)
+    if abs(by_clock - step * nearest) >= nearest / 2:
+        return False
+    return certain or step > frame.pulse - last.pulse or abs(by_clock - (frame.host - last.host)) < nearest / 2
+
+
+def _broken(camera: _Camera, before: _Frame, after: _Frame) -> bool:
+    """Whether the camera came, went or fell silent between two frames."""
+    place = bisect_left(camera.breaks, before.time)
+    return place < len(camera.breaks) and camera.breaks[place] <= after.host
+
+
+def _recomputed(
+    tagged: tuple[tuple[PulseNumber, FrameStatus], ...], taken: int, untagged: int
+) -> Iterator[tuple[PulseNumber, FrameStatus, FrameStatus]]:
+    """Pulse, tagged and recomputed state in a gap in which the camera took `taken` frames.
+
+    The numbers tell how many, not at which pulses; as many tags as possible are left as they are. `untagged` pulses of
+    the gap have no tag: any of them may have had one of the frames.
+    """
+    is_taken = {FrameStatus.LOST, FrameStatus.DAMAGED}
+    claimed = sum(status in is_taken for _, status in tagged)
+    too_few, too_many = max(0, taken - untagged - claimed), max(0, claimed - taken)
+    # Damage was seen to arrive; "lost" was concluded, and so it is revised first.
+    spare = sum(status is FrameStatus.LOST for _, status in tagged)
+    for pulse, status in tagged:
+        found = status
+        if status in is_taken and too_many > 0 and (status is FrameStatus.LOST or too_many > spare):
+            found, too_many = FrameStatus.MISSED, too_many - 1
+        elif status not in is_taken:
+            found = FrameStatus.LOST if too_few > 0 else FrameStatus.MISSED
+            too_few -= found is FrameStatus.LOST
+        spare -= status is FrameStatus.LOST
+        yield pulse, status, found
+
+
+def _id_step(before: int, after: int) -> int:
+    """Frames taken from one frame number to another; a log does not say whether numbers wrap, but they do at 65535."""
+    step = after - before
+    wraps = step < 0 and before <= _IDS_16_BIT and step < -_IDS_16_BIT // 2
+    return step + _IDS_16_BIT if wraps else step

@@ -2,7 +2,7 @@
 
 ```
 with HeadlessRig(rig, rig_toml, on_event) as running:
-    running.wait_until_warm(settle_s, allow_absent=False)
+    running.wait_until_warm()
     running.start_recording(path, session, pulses, seconds)
     result = running.wait_until_finished(on_progress, stop)
 ```
@@ -101,19 +101,19 @@ class HeadlessRig:
         """What has been wrong with clocks, trigger or rate, in words, since the cameras were first connected."""
         return list(self._alarms.values())
 
-    def wait_until_warm(self, settle_s: float, *, allow_absent: bool) -> None:
+    def wait_until_warm(self) -> None:
         """Wait until all cameras together have delivered a few complete triplets.
 
-        Args:
-            settle_s: longest wait for a camera that failed to answer, and for pulses once all cameras are connected, s.
-            allow_absent: be content with some of the cameras.
+        A camera that failed to answer gets `trigger.settle_s`, and so do the pulses once all cameras are connected.
+        Then it goes on without those that are missing, if `trigger.min_cameras` allows it.
 
         Raises:
-            CameraNotFoundError: a camera does not answer in time.
+            CameraNotFoundError: too few cameras answer in time.
             CameraError: all cameras are connected, but no complete triplet came.
             SvevError: the rig cannot be set up.
         """
         began = complete_since = time.monotonic()
+        settle_s = self._rig.trigger.settle_s
         while True:
             seen = self._ask(at_once(self._supervisor.look))
             if seen.warm and seen.state is State.ARMED:
@@ -131,7 +131,7 @@ class HeadlessRig:
                 continue
             # A camera that failed to answer gets `settle_s`; one whose process is still starting gets longer.
             elif now > began + (settle_s if all(camera.tried for camera in seen.cameras) else _ANSWER_S):
-                if not (allow_absent and any(camera.present for camera in seen.cameras)):
+                if sum(camera.present for camera in seen.cameras) < self._rig.least_cameras:
                     self._raise_absent(seen)
                 if seen.state is State.ARMED:
                     return
@@ -219,7 +219,9 @@ class HeadlessRig:
             for camera, heard in zip(self._rig.cameras, seen.cameras or (), strict=True)
             if not heard.present
         )
-        raise CameraNotFoundError(reasons)
+        present = sum(heard.present for heard in seen.cameras or ())
+        without = f"; to record without, set min_cameras = {present} under [trigger] in the rig file" if present else ""
+        raise CameraNotFoundError(reasons + without)
 
 
 def record(
@@ -228,7 +230,6 @@ def record(
     path: Path,
     seconds: float,
     *,
-    allow_absent: bool,
     session: Mapping[str, str],
     progress: Progress,
 ) -> tuple[dict[str, Any], StorageError | None]:
@@ -239,7 +240,6 @@ def record(
         rig: the rig.
         path: the log to make.
         seconds: length of the recording.
-        allow_absent: record even if some cameras do not answer.
         session: session fields for the log.
         progress: shows how many pulses are recorded.
 
@@ -251,7 +251,7 @@ def record(
         SvevError: the disk has no room, a camera does not answer, the log cannot be made, the recorder died.
     """
     check_room_for(rig, path.parent, seconds)
-    running.wait_until_warm(rig.trigger.settle_s, allow_absent=allow_absent)
+    running.wait_until_warm()
     pulses = max(1, round(seconds * rig.trigger.rate_hz))
     with _stop_signals() as stop, progress(f"recording {path.name}", pulses) as advance:
         running.start_recording(path, session=session, pulses=pulses, seconds=seconds)

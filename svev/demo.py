@@ -53,12 +53,10 @@ def run_demo(
     path = new_log_path(out)
     say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
     with HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running:
-        running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+        running.wait_until_warm()
         with subscriber(rig.network.publish) as count_received:
             session = {"session": "demo", "athlete": "simulated jumper"}
-            result, disk_error = record(
-                running, rig, path, seconds, allow_absent=False, session=session, progress=console.progress
-            )
+            result, disk_error = record(running, rig, path, seconds, session=session, progress=console.progress)
             counted = count_received()
     if disk_error is not None:
         raise disk_error

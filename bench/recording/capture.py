@@ -48,7 +48,7 @@ def _record(
     pulses = round(seconds * load.rate_hz)
     try:
         with HeadlessRig(rig, "", lambda _: None, lambda _: nullcontext({})) as running, ExitStack() as stack:
-            running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+            running.wait_until_warm()
             if subscribed_hill is not None:
                 count_received = stack.enter_context(subscriber(publish, arrivals=True))
             before, began = cpu_seconds(running.pids.values()), time.monotonic()

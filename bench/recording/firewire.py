@@ -48,7 +48,7 @@ def _record(rig: RigSettings, seconds: float, directory: Path) -> dict[str, floa
         hill = stack.enter_context(simulated_hill(rig, host_now()))
         assert hill is not None  # noqa: S101  (for the type checker: these rigs have simulated cameras)
         running = stack.enter_context(HeadlessRig(rig, "", _ignore, lambda _: nullcontext(hill.environment)))
-        running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+        running.wait_until_warm()
         cameras = [camera.name for camera in rig.cameras]
         # Processes, and how many cameras share their time: the FireWire cameras are one process.
         groups = {

@@ -96,6 +96,9 @@ class TriggerSettings(StrictModel):
     source: Literal["external"] = Field("external", description="who makes the pulses; external: not svev")
     rate_hz: float = Field(30.0, ge=0.1, le=1000, description="pulses per second")
     settle_s: float = Field(5.0, gt=0, le=120, description="wait at most this long for the first pulses")
+    min_cameras: int | None = Field(
+        None, ge=1, le=8, description="with fewer cameras than this the rig is not armed; left out: all of them"
+    )
 
     @property
     def period_ns(self) -> int:
@@ -300,6 +303,16 @@ class RigSettings(StrictModel):
         return self
 
     @model_validator(mode="after")
+    def _so_many_cameras_exist(self) -> "RigSettings":
+        least, cameras = self.trigger.min_cameras, len(self.cameras)
+        if least is not None and least > cameras:
+            raise ValueError(
+                f"trigger.min_cameras = {least}, but the rig has {cameras} cameras: make it {cameras} or less, or "
+                "leave it out"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _motion_is_watched_in_an_image(self) -> "RigSettings":
         motion = self.automatic.motion
         if motion is None:
@@ -341,6 +354,15 @@ class RigSettings(StrictModel):
                 "give all cameras the same address"
             )
         return self
+
+    @property
+    def least_cameras(self) -> int:
+        """With fewer cameras than this the rig is not armed."""
+        return len(self.cameras) if self.trigger.min_cameras is None else self.trigger.min_cameras
+
+    def without_absent(self) -> "RigSettings":
+        """The same rig, content with any camera that answers."""
+        return self.model_copy(update={"trigger": self.trigger.model_copy(update={"min_cameras": 1})})
 
     @property
     def triplet_shape(self) -> tuple[int, int]:

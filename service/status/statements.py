@@ -186,6 +186,28 @@ def no_camera() -> Statement:
     )
 
 
+def too_few_cameras(cameras: Sequence[CameraSettings], heard: Sequence[CameraPresence], least: int) -> Statement:
+    """The fault that fewer cameras answer than the rig file asks for.
+
+    Args:
+        cameras: the rig's cameras.
+        heard: the last news of each of them.
+        least: so many have to answer (`trigger.min_cameras`).
+    """
+    missing = [camera.name for camera, news in zip(cameras, heard, strict=True) if not news.present]
+    present, names = len(cameras) - len(missing), ", ".join(missing)
+    if not present:
+        return no_camera()
+    return Statement(
+        level=Level.ERROR,
+        code="fault_too_few",
+        text=f"{present} of {len(cameras)} cameras answer, {least} are needed: without {names}",
+        advice="check power and cables; the rig is armed by itself as soon as enough of them answer; to record "
+        f"without, set min_cameras = {present} under [trigger] in the rig file",
+        values={"present": present, "cameras": len(cameras), "least": least, "missing": names},
+    )
+
+
 def failed(error: SvevError, again_in_s: float) -> Statement:
     """The fault that arming failed or a process died.
 

@@ -6,7 +6,7 @@ from rig.errors import SvevError
 from rig.phrase import Phrase, phrase
 from rig.status import Statement
 from rig.transport.process_table import BackOff
-from service.status.statements import failed, no_camera
+from service.status.statements import failed
 
 
 class Fault:
@@ -60,9 +60,9 @@ class Fault:
             return phrase("event_starting_at_once", "{why}; starting again at once", why=why)
         return phrase("event_starting_again", "{why}; starting again in {seconds:g} s", why=why, seconds=wait_s)
 
-    def lack_cameras(self) -> None:
-        """Note that no camera answers; the grabbers go on trying."""
-        self.statement = no_camera()
+    def lack_cameras(self, statement: Statement) -> None:
+        """Note that too few cameras answer, as `statement` says; the grabbers go on trying."""
+        self.statement = statement
 
     def clear(self) -> None:
         """Forget the fault: it is over, or the supervisor tries again."""

@@ -7,7 +7,7 @@ never waits for anything but the next report or command.
 import select
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -27,7 +27,7 @@ from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.picture import Facts, picture
-from service.status.statements import FORBIDDEN, moved
+from service.status.statements import FORBIDDEN, moved, too_few_cameras
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.overload import Overload
@@ -309,19 +309,20 @@ class Supervisor:
         processes, state = self._session.processes, self._machine.state
         if processes is None or not self._wanted or self.recordings.current is not None:
             return
-        present = any(camera.present for camera in processes.cameras)
+        present = sum(camera.present for camera in processes.cameras)
+        enough = present >= self.rig.least_cameras
         match state:
             case State.ARMING if self._settling.settled(processes):
                 self.recordings.armed_at = self.recordings.emptied_at = time.monotonic()
-                self._machine.move(State.ARMED) if present else self._lack_cameras()
+                self._machine.move(State.ARMED) if enough else self._lack_cameras(processes.cameras)
             case State.ARMED if not present:
-                self._lack_cameras()
-            case State.FAULT if present:
+                self._lack_cameras(processes.cameras)
+            case State.FAULT if enough:
                 self._fault.clear()
                 self._machine.move(State.ARMED)
 
-    def _lack_cameras(self) -> None:
-        self._fault.lack_cameras()
+    def _lack_cameras(self, heard: Sequence[CameraPresence]) -> None:
+        self._fault.lack_cameras(too_few_cameras(self.rig.cameras, heard, self.rig.least_cameras))
         self._machine.move(State.FAULT)
 
     def _rig_failed(self, error: SvevError) -> None:

@@ -22,7 +22,9 @@ def record(
     rig: Annotated[Path, typer.Option(help="rig file, e.g. config/rigs/sim.toml")],
     seconds: Annotated[float, typer.Option(min=0.1, max=86400, help="length of the recording, seconds")],
     out: Annotated[Path, typer.Option(help="folder for the log; made if missing")],
-    allow_absent: Annotated[bool, typer.Option(help="record even if some cameras do not answer")] = False,
+    allow_absent: Annotated[
+        bool, typer.Option(help="record with any camera that answers, whatever trigger.min_cameras says")
+    ] = False,
     session: Annotated[str, typer.Option(help="name of the session, kept in the log")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
@@ -40,12 +42,13 @@ def record(
     Example: svev record --rig config/rigs/hill-gige.toml --seconds 10 --out recordings
     """
     settings = load_rig(rig)
+    settings = settings.without_absent() if allow_absent else settings
     _check_session(session)
     check_publication(settings.network)
     path = new_log_path(out)
     with HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running:
         result, disk_error = record_with(
-            running, settings, path, seconds, allow_absent=allow_absent, session={"session": session},
+            running, settings, path, seconds, session={"session": session},
             progress=console.progress,
         )  # fmt: skip
     if as_json:

@@ -99,6 +99,11 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(CAMERA, 'key "name" is missing; add it', id="missing key"),
         pytest.param(HEAD, 'key "cameras" is missing; add it', id="no camera"),
+        pytest.param(
+            HEAD + "[trigger]\nmin_cameras = 2\n" + CAMERA,
+            "trigger.min_cameras = 2, but the rig has 1 cameras: make it 1 or less, or leave it out",
+            id="more cameras wanted than there are",
+        ),
         pytest.param(HEAD + CAMERA + CAMERA, "camera name K1 is used twice: give each camera its own", id="same name"),
         pytest.param(
             HEAD + CAMERA + CAMERA.replace("K1", "K2"),

@@ -125,13 +125,20 @@ def _running(directory: Path) -> Iterator[tuple[SimulatedHill, HeadlessRig, RigS
     with simulated_hill(rig, epoch) as hill:
         assert hill is not None
         with HeadlessRig(rig, "", _ignore, lambda _: nullcontext(hill.environment)) as running:
-            running.wait_until_warm(60, allow_absent=False)
+            running.wait_until_warm()
             yield hill, running, rig
 
 
 def _rig(directory: Path, cameras: int) -> RigSettings:
     scenario = CONFIG / "scenarios" / "training.toml"
-    lines = ['name = "fault matrix"', "[trigger]", f"rate_hz = {RATE_HZ}", "[simulation]", f'scenario = "{scenario}"']
+    lines = [
+        'name = "fault matrix"',
+        "[trigger]",
+        f"rate_hz = {RATE_HZ}",
+        "settle_s = 60",
+        "[simulation]",
+        f'scenario = "{scenario}"',
+    ]
     lines += ["[network]", f'publish = "{free_address()}"']
     for number in range(1, cameras + 1):
         lines += ["[[cameras]]", f'name = "K{number}"', 'backend = "iidc"', f'address = "000a4701011b{number:04x}"']

@@ -15,9 +15,12 @@ from tests.support.reliability import FaultTable
 
 
 @contextmanager
-def _hill_and_service(folder: Path, loopback: Loopback, *absent: str) -> Iterator[tuple[SimulatedHill, Serving]]:
+def _hill_and_service(
+    folder: Path, loopback: Loopback, *absent: str, least: int
+) -> Iterator[tuple[SimulatedHill, Serving]]:
     """Simulated cameras that the test can unplug, and a service that treats them as real ones."""
     rig = write_rig(folder, "aravis", loopback)
+    rig.write_text(rig.read_text().replace("[trigger]\n", f"[trigger]\nmin_cameras = {least}\n"))
     with simulated_hill(load_rig(rig), host_now()) as hill:
         assert isinstance(hill, SimulatedHill)
         for name in absent:
@@ -30,7 +33,7 @@ def _hill_and_service(folder: Path, loopback: Loopback, *absent: str) -> Iterato
 def test_two_of_three_cameras_record_and_the_third_joins_in(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:
-    with _hill_and_service(tmp_path, loopback, "K2") as (hill, service):
+    with _hill_and_service(tmp_path, loopback, "K2", least=2) as (hill, service):
         service.arm()
         status = service.await_cameras("ready", "absent", "ready")
         assert status["statement"]["code"] in {"state_armed_partly", "state_waiting_partly"}
@@ -53,18 +56,29 @@ def test_two_of_three_cameras_record_and_the_third_joins_in(
     )
 
 
-def test_a_rig_that_loses_all_cameras_is_armed_again_when_one_is_back(
+def test_a_rig_that_loses_all_cameras_is_armed_again_when_enough_are_back(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:
-    with _hill_and_service(tmp_path, loopback, "K3") as (hill, service):
+    with _hill_and_service(tmp_path, loopback, "K3", least=2) as (hill, service):
         service.arm()
         hill.kill("K1")
         hill.kill("K2")
         fault = service.await_state("fault")["statement"]
         assert fault["code"] == "fault_no_camera"
         hill.restart("K2")
+        status = service.await_cameras("absent", "ready", "absent")
+        assert status["state"] == "fault"
+        service.post("/api/arm")
+        status = service.await_state("fault")
+        assert status["statement"]["text"] == "1 of 3 cameras answer, 2 are needed: without K1, K3"
+        assert "set min_cameras = 1 under [trigger]" in status["statement"]["advice"]
+        assert service.call("POST", "/api/recordings")[0] == 409
+        hill.restart("K1")
         status = service.await_state("armed")
-        assert [camera["state"] for camera in status["cameras"]] == ["absent", "ready", "absent"]
+        assert status["statement"]["code"] in {"state_armed_partly", "state_waiting_partly"}
+        hill.kill("K1")
+        status = service.await_cameras("absent", "ready", "absent")
+        assert status["state"] == "armed", "what is armed stays so while a camera is left"
         hill.kill("K2")
         service.await_state("fault")
         service.post("/api/arm")

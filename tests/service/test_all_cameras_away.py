@@ -49,7 +49,7 @@ def test_pulses_without_any_camera_are_tagged_absent(
 
         killed: list[int] = []
         with HeadlessRig(rig, "", on_event, lambda _: nullcontext({})) as running:
-            running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+            running.wait_until_warm()
             running.start_recording(path, session={}, pulses=420, seconds=14)
             ended = running.wait_until_finished(on_progress, lambda: False)
     report = verify(path)

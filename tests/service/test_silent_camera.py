@@ -45,7 +45,7 @@ def test_a_camera_that_falls_silent_is_noticed_and_comes_back(
 
         gone: list[int] = []
         with HeadlessRig(rig, "", on_event, lambda _: nullcontext({})) as running:
-            running.wait_until_warm(rig.trigger.settle_s, allow_absent=False)
+            running.wait_until_warm()
             running.start_recording(path, session={}, pulses=420, seconds=14)
             running.wait_until_finished(on_progress, lambda: False)
     tags = [tag for tag, _ in triplets(path)]

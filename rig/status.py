@@ -255,6 +255,18 @@ class RecordingOrder(SessionFields):
     seen: WholeNumber | None = Field(None, description=_SEEN, examples=[None])
 
 
+class ArmOrder(Model):
+    """How the rig is to be armed."""
+
+    min_cameras: WholeNumber | None = Field(
+        None,
+        ge=1,
+        le=8,
+        description="so many cameras are enough this time, until the rig is disarmed; left out: as the rig file says",
+        examples=[None],
+    )
+
+
 class StopOrder(Model):
     """How a recording is to be stopped."""
 

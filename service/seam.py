@@ -17,6 +17,7 @@ from rig.phrase import Phrase
 from rig.pulse import RigPulse
 from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from rig.status import (
+    ArmOrder,
     DoctorReport,
     Event,
     Pulses,
@@ -175,8 +176,8 @@ class RigService(Protocol):
         """The present status; cheap."""
         ...
 
-    def arm(self) -> Status:
-        """Begin to arm. While arming or armed, nothing changes; while disarming, StateForbidsError."""
+    def arm(self, order: ArmOrder) -> Status:
+        """Begin to arm. While arming or armed, nothing else changes; while disarming, StateForbidsError."""
         ...
 
     def disarm(self) -> Status:

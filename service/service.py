@@ -19,6 +19,7 @@ from rig.errors import BadInputError, StateForbidsError, SvevError, UnknownRecor
 from rig.phrase import Phrase, phrase
 from rig.pulse import RigPulse
 from rig.status import (
+    ArmOrder,
     AutomaticStatus,
     DoctorReport,
     Event,
@@ -102,9 +103,9 @@ class Service(Archive):
         """The start list and the next jumper."""
         return self._jumpers
 
-    def arm(self) -> Status:
+    def arm(self, order: ArmOrder) -> Status:
         """Begin to arm."""
-        return self._supervisor.commands.ask(at_once(self._supervisor.arm), _SOON_S)
+        return self._supervisor.commands.ask(at_once(partial(self._supervisor.arm, order.min_cameras)), _SOON_S)
 
     def disarm(self) -> Status:
         """Begin to disarm."""

@@ -110,6 +110,7 @@ class Supervisor:
         )
         self._fault = Fault()
         self._wanted = False
+        self._least = rig.least_cameras
         self._settling, self._watch = Settling(), RecorderWatch()
         self._overload = Overload(rig.trigger.period_ns)
         self._ending_by: float | None = None
@@ -153,12 +154,21 @@ class Supervisor:
         turns = self._thread.is_alive() and time.monotonic() < self._turned + _TURNS_S
         return turns and not self._watch.late
 
-    def arm(self) -> Status:
-        """Command: begin to arm; after a fault, try again at once."""
+    def arm(self, min_cameras: int | None = None) -> Status:
+        """Command: begin to arm; after a fault, try again at once.
+
+        Args:
+            min_cameras: so many cameras are enough until the rig is disarmed; None: as many as before, or as the rig
+                file says.
+        """
         state = self._machine.state
         if state is State.DISARMING:
             raise StateForbidsError(FORBIDDEN["arm", state])
-        if state in {State.IDLE, State.FAULT}:
+        if min_cameras is not None:
+            self._least = min(min_cameras, len(self.rig.cameras))
+        if state is State.FAULT and self._enough():
+            self._judge()
+        elif state in {State.IDLE, State.FAULT}:
             self._wanted = True
             self._fault.hurry()
             self._machine.move(State.ARMING)
@@ -181,7 +191,7 @@ class Supervisor:
         """Command: begin to disarm."""
         if self._machine.state is State.RECORDING or self.recordings.current is not None:
             raise StateForbidsError(FORBIDDEN["disarm", State.RECORDING])
-        self._wanted = False
+        self._wanted, self._least = False, self.rig.least_cameras
         self._reconcile()
         return self._refresh()
 
@@ -309,20 +319,24 @@ class Supervisor:
         processes, state = self._session.processes, self._machine.state
         if processes is None or not self._wanted or self.recordings.current is not None:
             return
-        present = sum(camera.present for camera in processes.cameras)
-        enough = present >= self.rig.least_cameras
+        enough = self._enough()
         match state:
             case State.ARMING if self._settling.settled(processes):
                 self.recordings.armed_at = self.recordings.emptied_at = time.monotonic()
                 self._machine.move(State.ARMED) if enough else self._lack_cameras(processes.cameras)
-            case State.ARMED if not present:
+            case State.ARMED if not any(camera.present for camera in processes.cameras):
                 self._lack_cameras(processes.cameras)
             case State.FAULT if enough:
                 self._fault.clear()
                 self._machine.move(State.ARMED)
 
+    def _enough(self) -> bool:
+        """Whether so many cameras answer that the rig can be armed."""
+        processes = self._session.processes
+        return processes is not None and sum(camera.present for camera in processes.cameras) >= self._least
+
     def _lack_cameras(self, heard: Sequence[CameraPresence]) -> None:
-        self._fault.lack_cameras(too_few_cameras(self.rig.cameras, heard, self.rig.least_cameras))
+        self._fault.lack_cameras(too_few_cameras(self.rig.cameras, heard, self._least))
         self._machine.move(State.FAULT)
 
     def _rig_failed(self, error: SvevError) -> None:

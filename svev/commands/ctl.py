@@ -67,12 +67,19 @@ def status(context: typer.Context, as_json: Json = False) -> None:
 
 
 @app.command()
-def arm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -> None:
+def arm(
+    context: typer.Context,
+    min_cameras: Annotated[
+        int | None, typer.Option(min=1, max=8, help="so many are enough this time; as the rig file says if left out")
+    ] = None,
+    wait_s: Wait = 60.0,
+    as_json: Json = False,
+) -> None:
     """Connect the cameras, and wait until that is done.
 
     Example: svev ctl arm
     """
-    answer = call(context, "POST", "/api/arm")
+    answer = call(context, "POST", "/api/arm", {"min_cameras": min_cameras})
     show(_awaited(context, answer, "arming", wait_s), status_lines, as_json)
 
 

@@ -16,6 +16,7 @@ from rig.events import Event, Level
 from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings, WebhookSettings
+from rig.status import ArmOrder
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
 from service.alarms.messenger import Messenger
@@ -110,7 +111,7 @@ def serve(settings: ServiceSettings) -> None:
                     hub.tell(Event.now(Level.WARNING, "access", plain(settings.access.tokens.warning)))
                 service.watch()
                 if rig.service.arm_at_start:
-                    service.arm()
+                    service.arm(ArmOrder())
                 server.run(sockets=[listener])
             finally:
                 service.close()

@@ -372,6 +372,23 @@ def test_no_camera_is_not_green_and_old_news_hides_nothing_new(
     assert page.locator("#state").evaluate(colour) == "rgb(255, 179, 0)", "the colour of a fault"
 
 
+def test_one_tap_arms_without_the_cameras_that_do_not_answer(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.fault = Statement(
+        level=Level.ERROR,
+        code="fault_too_few",
+        text="2 of 3 cameras answer, 3 are needed: without K2",
+        values={"present": 2, "cameras": 3, "least": 3, "missing": "K2"},
+    )
+    service.state = State.FAULT
+    page = open_page(panel.url, width=360, height=780, locale="nb-NO")
+    expect(page.locator("#state-text")).to_contain_text("2 av 3 kameraer svarer, 3 må til: uten K2")
+    page.get_by_role("button", name="Gjør klar uten K2").click()
+    wait_until(lambda: service.state is State.ARMED, "armed")
+    expect(page.locator("#arm-without")).to_be_hidden()
+
+
 def test_the_preview_runs_only_while_it_is_looked_at(panel: Panel, service: MemoryService, open_page: Open) -> None:
     service.arm()
     page = open_page(panel.url)

@@ -21,6 +21,7 @@ from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
 from rig.status import (  # fmt: skip
+    ArmOrder,
     AutomaticStatus,
     CameraState,
     CameraStatus,
@@ -70,6 +71,7 @@ class MemoryService(Archive):
         broken: raised by `status`, if set.
         last_jump: what the analysis measured last, set by tests.
         notice: what befell the last recording, set by tests.
+        fault: what it says in a fault, set by tests.
         automatic: whether recordings begin by themselves, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
@@ -82,6 +84,7 @@ class MemoryService(Archive):
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None
         self.notice: Statement | None = None
+        self.fault: Statement | None = None
         self.automatic: AutomaticStatus | None = None
         self.preview_calls = 0
         self._phase = Phase.now(State.IDLE, 1)
@@ -110,7 +113,8 @@ class MemoryService(Archive):
                 since=self._phase.since,
                 guard=tap_guard(self._phase),
                 next_jumper=self.jumpers.view().next,
-                statement=Statement(code=f"state_{self.state.value}", text=f"The rig is {self.state.value}"),
+                statement=(self.fault if self.state is State.FAULT else None)
+                or Statement(code=f"state_{self.state.value}", text=f"The rig is {self.state.value}"),
                 rig="memory",
                 version="0",
                 cameras=tuple(self._camera(name, block, armed) for name, block in zip(CAMERAS, COLUMNS, strict=True)),
@@ -127,8 +131,8 @@ class MemoryService(Archive):
                 processes=(ProcessStatus(name="recorder", pid=1),),
             )
 
-    def arm(self) -> Status:
-        if self.state is State.IDLE:
+    def arm(self, order: ArmOrder | None = None) -> Status:
+        if self.state is State.IDLE or (order is not None and order.min_cameras):
             self._armed_at = time.monotonic()
             self._become(State.ARMED)
         return self.status()

@@ -6,7 +6,7 @@ import anyio
 from anyio.to_thread import run_sync
 from fastapi import APIRouter
 
-from rig.status import DoctorReport, RigView, Status
+from rig.status import ArmOrder, DoctorReport, RigView, Status
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 
@@ -23,9 +23,12 @@ def rig_router(service: RigService) -> APIRouter:
         return service.status()
 
     @router.post("/arm", status_code=HTTPStatus.OK, responses=CHANGING)
-    def arm(_: NoFields = None) -> Status:
-        """Begin to arm: connect the cameras and keep the last seconds from then on. While armed it changes nothing."""
-        return service.arm()
+    def arm(order: ArmOrder | None = None) -> Status:
+        """Begin to arm: connect the cameras and keep the last seconds from then on. While armed it changes nothing.
+
+        In a fault because too few cameras answer, `min_cameras` arms without the others, until the rig is disarmed.
+        """
+        return service.arm(order or ArmOrder())
 
     @router.post("/disarm", status_code=HTTPStatus.OK, responses=CHANGING)
     def disarm(_: NoFields = None) -> Status:

@@ -34,6 +34,7 @@ export const en = {
   "actions.label": "What comes next",
   "actions.arm": "Arm",
   "actions.arm_again": "Arm again",
+  "actions.arm_without": "Arm without {missing}",
   "actions.record": "Record",
   "actions.stop": "Stop",
   "actions.save_last": "Save last jump",

@@ -34,6 +34,7 @@ export const nb = {
   "actions.label": "Neste steg",
   "actions.arm": "Gjør klar",
   "actions.arm_again": "Gjør klar igjen",
+  "actions.arm_without": "Gjør klar uten {missing}",
   "actions.record": "Ta opp",
   "actions.stop": "Stopp",
   "actions.save_last": "Lagre siste hopp",

@@ -43,6 +43,7 @@ const NEXT = {
 export function startActions() {
   $("next-step").addEventListener("click", nextStep);
   $("save-last").addEventListener("click", saveLast);
+  $("arm-without").addEventListener("click", armWithout);
   $("disarm").addEventListener("click", disarm);
   $("automatic-on").addEventListener("change", () => void changeAutomatic($("automatic-on").checked));
   onLongPress($("next-step"), () => known.status?.state === "recording" && possible(), () => void perform("actions.stopping", () => stop(true)));
@@ -65,6 +66,12 @@ export function nextStep() {
 /** Record the seconds that are held in memory. */
 export function saveLast() {
   if (known.status?.state === "armed" && possible() && !waits() && held() >= LEAST_PREROLL_S) void perform("actions.saving", save);
+}
+
+/** Arm with the cameras that answer. */
+function armWithout() {
+  const lacking = lackingCameras();
+  if (lacking && possible()) void perform("actions.arming", async () => { await call("POST", "arm", { min_cameras: lacking.present }); });
 }
 
 /** Close the cameras. */
@@ -160,10 +167,25 @@ function draw() {
   drawButton($("save-last"), "save", t("actions.save_last"), quantity(held(), 1, "s"));
   $("save-last").disabled = !possible() || nothingHeld || waits() > 0;
   drawAutomatic();
+  drawArmWithout();
   $("disarm").hidden = !mayDisarm();
   $("disarm").disabled = !possible();
   setText($("disarm"), t(state === "arming" ? "actions.cancel" : "actions.disarm"));
   drawReason(state === "armed" && nothingHeld && !known.status?.pulses.arriving);
+}
+
+/** In a fault because some cameras do not answer: arm without them. */
+function drawArmWithout() {
+  const lacking = lackingCameras();
+  $("arm-without").hidden = !lacking;
+  $("arm-without").disabled = !possible();
+  if (lacking) drawButton($("arm-without"), "armed", t("actions.arm_without", lacking));
+}
+
+/** @returns {import("../shared/types.js").Values|null} values of the statement that too few cameras answer; null in other states */
+function lackingCameras() {
+  const statement = known.status?.statement;
+  return statement?.code === "fault_too_few" ? statement.values : null;
 }
 
 /** Whether recordings begin by themselves, if the rig file lets a camera be watched for that. */

@@ -70,6 +70,31 @@ def increment_jacobian(vector: Floats) -> Floats:
     return jacobian
 
 
+def omega_phi_kappa(rotations: Floats) -> Floats:
+    """Angles omega, phi, kappa (..., 3), rad, of R = R_X(omega) R_Y(phi) R_Z(kappa); phi in -pi/2..pi/2."""
+    r = np.asarray(rotations, dtype=float)
+    omega = np.arctan2(-r[..., 1, 2], r[..., 2, 2])
+    phi = np.arcsin(np.clip(r[..., 0, 2], -1.0, 1.0))
+    kappa = np.arctan2(-r[..., 0, 1], r[..., 0, 0])
+    return np.stack([omega, phi, kappa], axis=-1)
+
+
+def omega_phi_kappa_jacobian(angles: Floats) -> Floats:
+    """Derivatives (..., 3, 3) of omega, phi, kappa by the local increments d, at angles (..., 3), rad.
+
+    Not finite at phi = +-pi/2, where omega and kappa turn about one axis.
+    """
+    _, phi, kappa = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
+    jacobian = np.zeros((*phi.shape, 3, 3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        jacobian[..., 0, 0] = np.cos(kappa) / np.cos(phi)
+        jacobian[..., 0, 1] = -np.sin(kappa) / np.cos(phi)
+    jacobian[..., 1, 0], jacobian[..., 1, 1] = np.sin(kappa), np.cos(kappa)
+    jacobian[..., 2, :2] = -np.sin(phi)[..., None] * jacobian[..., 0, :2]
+    jacobian[..., 2, 2] = 1.0
+    return jacobian
+
+
 def nearest_rotation(matrix: Floats) -> Floats:
     """The rotations (..., 3, 3) nearest to matrices with positive determinant (Frobenius norm)."""
     left, _, right = np.linalg.svd(matrix)

@@ -1,19 +1,27 @@
 """Sections of a report that every adjustment has: parameters with sigma, correlations, residuals, findings."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from photogrammetry.adjustment.equations.relations import Kind
-from photogrammetry.adjustment.gross_errors.blunders import BlunderKind, Observation, in_file_frame, name_of
+from photogrammetry.adjustment.gross_errors.blunders import in_file_frame
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
+from photogrammetry.adjustment.solution.global_test import GLOBAL_RISK, GlobalTest
+from photogrammetry.adjustment.solution.reliability import reliability
 from photogrammetry.adjustment.solution.statistics import correlation
 from photogrammetry.geometry.camera_model import INTERIOR
-from photogrammetry.network.model import Role
+from photogrammetry.network.model import AXES
 from photogrammetry.reports.document import Section, Table
 from photogrammetry.reports.drawing.network import network_drawings
 from photogrammetry.reports.drawing.residuals import residual_drawings
+from photogrammetry.reports.record.assumptions import assumptions
+from photogrammetry.reports.record.observed import image_parts, measured_parts, reliability_parts, survey_parts
+from photogrammetry.reports.record.orientations import interior_parts, mean_parts, point_parts, pose_parts
+from photogrammetry.reports.record.strength import coverage_parts
+from photogrammetry.reports.result_extras import joint_covariance
 from photogrammetry.reports.summary import summarise
 
 _STRONG = 0.9  # larger correlations are listed
@@ -21,62 +29,90 @@ _SHOWN = 20  # listed correlations, at most
 _POSE = ("X0", "Y0", "Z0", "angle 1", "angle 2", "angle 3")
 
 
-def adjusted_sections(outcome: Outcome) -> tuple[Section, ...]:
-    """The common sections of an adjusted network."""
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What a report has on request.
+
+    Attributes:
+        detectable: the minimal detectable blunder of each observation, and what it would do.
+        covariance: names of points (`*` and `?`) whose joint covariance it shows.
+    """
+
+    detectable: bool = False
+    covariance: Sequence[str] = ()
+
+
+NOTHING = Wishes()
+
+
+def adjusted_sections(outcome: Outcome, wishes: Wishes = NOTHING) -> tuple[Section, ...]:
+    """The common sections of an adjusted network.
+
+    Args:
+        outcome: the adjusted network.
+        wishes: what was asked for beside.
+
+    Raises:
+        BadInputError: the joint covariance of points that do not exist is asked for.
+    """
     a = outcome.adjustment
+    found = reliability(a)
+    of_images, of_relations = (found.image, found.relation) if wishes.detectable else (None, None)
+    observed = (
+        *_residuals(a),
+        *survey_parts(outcome, of_relations),
+        *measured_parts(a, of_relations),
+        *image_parts(outcome, of_images),
+    )
     sections = [
         Section("Summary", tuple(summarise(outcome))),
+        Section("Assumed a priori", assumptions(a)),
+        Section("Global test", _global_test(a)),
         Section("Network", network_drawings(a)),
-        Section("Interior orientation", _interior(a)),
-        Section("Poses", _poses(a)),
-        Section("Points", _points(a)),
+        Section("Interior orientation", interior_parts(a)),
+        Section("Poses", pose_parts(a)),
+        Section("Points", (*point_parts(a), *mean_parts(a))),
+        Section("Image coverage", coverage_parts(a)),
         Section("Correlations", _correlations(a)),
-        Section("Residuals", (*residual_drawings(a), *_residuals(a))),
+        Section("Joint covariance", _joint(a, wishes.covariance)),
+        Section("Reliability", reliability_parts(a, found)),
+        Section("Residuals", (*residual_drawings(a), *observed)),
     ]
     return tuple(section for section in sections if section.parts)
 
 
-def _interior(a: Adjustment) -> tuple[str | Table, ...]:
-    rows = []
-    for i, camera in enumerate(a.network.cameras):
-        for p in a.parameters(i)[0]:
-            significant = "" if p.name == "c" else "no" if p.insignificant else "yes"
-            rows.append((f"{camera.name} {p.name}", f"{p.value:.6g}", f"{p.sigma:.2g}", significant))
-    if rows:
-        return (Table(("parameter", "value", "sigma", "significant"), tuple(rows)),)
-    given = tuple((camera.name, f"{camera.interior[0]:.6g}") for camera in a.network.cameras)
-    return ("Constant, free of error.", Table(("camera", "c"), given))
-
-
-def _poses(a: Adjustment) -> tuple[str | Table, ...]:
-    sigma = a.sigmas(a.problem.unknowns.pose)
-    rows = []
-    for i, image in enumerate(a.network.images):
-        place = [f"{value:.4f}" for value in a.state.position[i]]
-        spread = [f"{value:.2g}" for value in (*sigma[i, :3], *np.degrees(sigma[i, 3:]) * 60.0)]
-        rows.append((image.name, *place, *spread))
-    unit = a.length_unit
-    head = ("image", "X0", "Y0", "Z0", *(f"sigma {name}" for name in _POSE))
-    return (
-        f"Lengths in {unit or 'length units'}, angles about the camera's own axes in minutes.",
-        Table(head, tuple(rows)),
+def _global_test(a: Adjustment) -> tuple[str | Table, ...]:
+    test = GlobalTest(a.ratio, a.redundancy)
+    if a.sigma0 is None:
+        return (test.words,)
+    low, high = test.limits
+    cells = (
+        f"{a.sigma0:.4g}",
+        f"{a.network.sigma0:g}",
+        f"{a.ratio:.4g}",
+        str(a.redundancy),
+        f"{low:.3f} to {high:.3f}",
     )
+    head = ("sigma0", "a priori", "ratio", "redundancy", f"accepted at {GLOBAL_RISK:.0%}", "chance")
+    return (f"{test.verdict.value}: {test.words}", Table(head, ((*cells, f"{test.chance:.3g}"),)))
 
 
-def _points(a: Adjustment) -> tuple[str | Table, ...]:
-    sigma = a.sigmas(a.problem.unknowns.point)
-    count = np.bincount(a.problem.point, minlength=len(a.network.points))
-    rows = [
-        (
-            point.name,
-            point.role.value,
-            str(count[i]),
-            *(f"{value:.4f}" for value in a.state.xyz[i]),
-            *(f"{value:.2g}" for value in sigma[i]),
-        )
-        for i, point in enumerate(a.network.points)
-    ]
-    return (Table(("point", "role", "rays", "X", "Y", "Z", "sigma X", "sigma Y", "sigma Z"), tuple(rows)),)
+def _joint(a: Adjustment, patterns: Sequence[str]) -> tuple[str | Table, ...]:
+    """Covariances of all pairs of the points asked for, in one row each."""
+    if not patterns:
+        return ()
+    joint = joint_covariance(a, patterns)
+    names, matrix = joint["points"], np.array(joint["covariance"])
+    rows = tuple(
+        (names[i], names[k], *(f"{x:.3e}" for x in matrix[3 * i : 3 * i + 3, 3 * k : 3 * k + 3].ravel()))
+        for i in range(len(names))
+        for k in range(i, len(names))
+    )
+    head = ("one", "other", *(f"{x}{y}" for x in AXES for y in AXES))
+    return (
+        f"A posteriori, ({a.length_unit or 'length units'})²; first axis of one, second of the other:",
+        Table(head, rows),
+    )
 
 
 def _correlations(a: Adjustment) -> tuple[str | Table, ...]:
@@ -105,7 +141,7 @@ def _names(a: Adjustment, image: int) -> list[str]:
 
 
 def _residuals(a: Adjustment) -> tuple[str | Table, ...]:
-    """Residuals by images, of surveyed points, of distances and differences."""
+    """Residuals in the mean of each image."""
     v = in_file_frame(a.network, a.image_residuals())
     w = np.nan_to_num(np.abs(a.image_w()))
     r = a.controlled.image_numbers
@@ -126,26 +162,4 @@ def _residuals(a: Adjustment) -> tuple[str | Table, ...]:
                 )
             )
     head = ("image", "points", "rms vx", "rms vy", "mean r", "largest |w|")
-    parts: list[str | Table] = [f"Images ({a.network.image_unit}):", Table(head, tuple(rows))]
-    checks = [
-        (point.name, *(f"{value:.3g}" for value in a.state.xyz[i] - point.xyz))
-        for i, point in enumerate(a.network.points)
-        if point.role in (Role.CONTROL, Role.CHECK) and point.xyz is not None
-    ]
-    if checks:
-        parts += ["Surveyed points, adjusted - given:", Table(("point", "vX", "vY", "vZ"), tuple(checks))]
-    measured = [
-        *_measured(a, Kind.DISTANCE, BlunderKind.DISTANCE),
-        *_measured(a, Kind.DIFFERENCE, BlunderKind.DIFFERENCE),
-    ]
-    if measured:
-        parts += ["Distances and differences:", Table(("observation", "v", "r", "w"), tuple(measured))]
-    return tuple(parts)
-
-
-def _measured(a: Adjustment, kind: Kind, name: BlunderKind) -> list[tuple[str, ...]]:
-    """Residual, redundancy number and test value of distances or differences."""
-    return [
-        (name_of(a.network, Observation(name, item)), f"{v:.3g}", f"{r:.2f}", f"{w:.1f}" if np.isfinite(w) else "")
-        for item, _, v, r, w in a.relation_tests(kind)
-    ]
+    return (f"Images ({a.network.image_unit}):", Table(head, tuple(rows))) if rows else ()

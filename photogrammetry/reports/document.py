@@ -21,11 +21,11 @@ _STYLE = f"""
 :root{{color-scheme:light dark;{_LIGHT}}}
 @media screen and (prefers-color-scheme:dark){{:root{{{_DARK}}}}}
 *{{box-sizing:border-box}}
-body{{font:16px/1.5 system-ui,sans-serif;background:var(--paper);color:var(--ink);max-width:62rem;margin:auto;\
+body{{font:16px/1.5 system-ui,sans-serif;background:var(--paper);color:var(--ink);max-width:74rem;margin:auto;\
 padding:1rem;overflow-wrap:break-word}}
 h1{{font-size:1.6rem;line-height:1.2;margin:.5rem 0 1.5rem}}
 h2{{font-size:1.2rem;margin:2.2rem 0 .6rem;padding-bottom:.2rem;border-bottom:2px solid var(--faint)}}
-p{{margin:.4rem 0}}
+p{{margin:.4rem 0;max-width:62rem}}
 .table{{overflow-x:auto;margin:.8rem 0;background:\
 linear-gradient(90deg,var(--paper) 50%,transparent) 0 0/2rem 100% no-repeat local,\
 linear-gradient(-90deg,var(--paper) 50%,transparent) 100% 0/2rem 100% no-repeat local,\
@@ -43,8 +43,9 @@ svg{{display:block;width:100%;height:auto;background:var(--fill);border-radius:.
 svg text{{font:10px system-ui,sans-serif;fill:var(--soft)}}
 svg line,svg polyline,svg ellipse,svg circle[fill=none]{{stroke:currentColor}}
 {"".join(f".{name}{{color:var(--{name})}}" for name in ("ink", "soft", "faint", "blue", "red", "green", "amber"))}
+@page{{size:A4;margin:12mm}}
 @media print{{:root{{font-size:10pt}}body{{font-size:10pt;max-width:none;padding:0}}table{{font-size:.75rem}}\
-th,td{{padding:.1rem .4rem}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
+th,td{{padding:.1rem .25rem}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
 h2{{break-after:avoid}}.drawings{{grid-template-columns:1fr 1fr}}svg{{border:1px solid var(--faint)}}}}
 """
 

@@ -8,7 +8,7 @@ from photogrammetry.adjustment.run import Outcome
 from photogrammetry.procedures.calibration import Calibration
 from photogrammetry.procedures.findings import PointTest, Stage
 from photogrammetry.procedures.orientation import Orientation
-from photogrammetry.reports.adjusted import adjusted_sections
+from photogrammetry.reports.adjusted import NOTHING, Wishes, adjusted_sections
 from photogrammetry.reports.document import Report, Section, Table
 from photogrammetry.reports.result_file import outcome_to_json
 from photogrammetry.reports.summary import summarise
@@ -24,11 +24,11 @@ def calibration_lines(calibration: Calibration) -> list[str]:
     return [*summarise(calibration.outcome), *calibration.notes]
 
 
-def calibration_report(calibration: Calibration) -> Report:
-    """The whole report of a calibration."""
+def calibration_report(calibration: Calibration, wishes: Wishes = NOTHING) -> Report:
+    """The whole report of a calibration, with what was asked for beside."""
     notes = calibration.notes or ("All parameters are significant, and none is hard to tell from another.",)
     procedure = "Free adjustment of a 3D frame of unknown targets with self-calibration; inner constraints."
-    sections = (Section("Procedure", (procedure, *notes)), *adjusted_sections(calibration.outcome))
+    sections = (Section("Procedure", (procedure, *notes)), *adjusted_sections(calibration.outcome, wishes))
     return Report("Calibration of the cameras", sections)
 
 
@@ -58,13 +58,14 @@ def orientation_lines(orientation: Orientation) -> list[str]:
     return [*lines, *summarise(_final(orientation))]
 
 
-def orientation_report(orientation: Orientation) -> Report:
-    """The whole report of a pose estimation, stage by stage."""
+def orientation_report(orientation: Orientation, wishes: Wishes = NOTHING) -> Report:
+    """The whole report of a pose estimation, stage by stage, with what was asked for beside."""
     stages = [
         Section(f"Stage {number}: {stage.name.value}", (stage.words, *_findings(stage), *_tests(stage)))
         for number, stage in enumerate(orientation.stages, start=1)
     ]
-    sections = (Section("Procedure", orientation.notes), *stages, *adjusted_sections(_final(orientation)))
+    adjusted = adjusted_sections(orientation.outcome, wishes)
+    sections = (Section("Procedure", orientation.notes), *stages, *adjusted)
     return Report("Pose estimation", sections)
 
 

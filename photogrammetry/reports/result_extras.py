@@ -6,14 +6,18 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.adjustment.solution.datum import DatumError
+from photogrammetry.adjustment.solution.reliability import Effects, reliability
 from photogrammetry.network.model import Network, Role
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 from rig.errors import BadInputError
+
+_RELIABILITY = ("detectable", "effect", "effect_on")
 
 
 def in_datum_of(outcome: Outcome, patterns: Sequence[str]) -> Outcome:
@@ -62,23 +66,42 @@ def joint_covariance(a: Adjustment, patterns: Sequence[str]) -> dict[str, Any]:
 
 
 def with_detectable(result: dict[str, Any], a: Adjustment) -> dict[str, Any]:
-    """The result with the minimal detectable blunder of each observation: it would be found in four of five cases.
+    """The result with the minimal detectable blunder of each observation, and what it would do.
 
-    In the unit of the observation; null where the observation is not controlled.
+    `detectable`, in the unit of the observation, would be found in four of five cases; null where nothing controls it.
+    `effect` is the largest displacement of a point or projection centre by an error of that size, and
+    `effect_on` names that place; one per coordinate.
     """
-    images = a.image_detectable()[np.argsort(a.problem.order)]
-    relations, kinds = a.relation_detectable(), a.problem.relations
-    control = relations[kinds.rows(Kind.CONTROL)].reshape(-1, 3)
-    lists: dict[str, list[Any]] = {
-        "observations": [_listed(pair) for pair in images],
-        "control": [_listed(triple) for triple in control],
-        "distances": _listed(relations[kinds.rows(Kind.DISTANCE)]),
-        "differences": _listed(relations[kinds.rows(Kind.DIFFERENCE)]),
+    found, kinds, back = reliability(a), a.problem.relations, np.argsort(a.problem.order)
+    relations = _entries(a, a.relation_detectable(), found.relation)
+    control = kinds.rows(Kind.CONTROL).reshape(-1, 3)
+    images = _entries(a, a.image_detectable()[back], Effects(found.image.length[back], found.image.place[back]))
+    lists = {
+        "observations": images,
+        "control": [{key: [relations[row][key] for row in rows] for key in _RELIABILITY} for rows in control],
+        "distances": [relations[row] for row in kinds.rows(Kind.DISTANCE)],
+        "differences": [relations[row] for row in kinds.rows(Kind.DIFFERENCE)],
     }
     return result | {
-        key: [entry | {"detectable": value} for entry, value in zip(result[key], values, strict=True)]
-        for key, values in lists.items()
+        key: [entry | more for entry, more in zip(result[key], values, strict=True)] for key, values in lists.items()
     }
+
+
+def _entries(a: Adjustment, detectable: Floats, effects: Effects) -> list[dict[str, Any]]:
+    """For each observation (n,) or pair (n, 2): number or list under each key."""
+    names = [*(f"point {point.name}" for point in a.network.points), *(f"image {i.name}" for i in a.network.images)]
+    known = np.isfinite(detectable)
+    values = (detectable, effects.length, np.array(names, dtype=object)[effects.place])
+    columns = (_where(known, column) for column in values)
+    return [dict(zip(_RELIABILITY, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def _where(known: Flags, column: NDArray[Any]) -> list[Any]:
+    """The column as a list, None where it has no value."""
+    column = column.astype(object)
+    column[~known] = None
+    values: list[Any] = column.tolist()
+    return values
 
 
 def named_points(network: Network, patterns: Sequence[str], option: str) -> Integers:
@@ -92,7 +115,3 @@ def named_points(network: Network, patterns: Sequence[str], option: str) -> Inte
         if not any(fnmatchcase(name, pattern) for name in names):
             raise BadInputError(f'{option}: no point is called "{pattern}"; name points of the network')
     return np.array([i for i, name in enumerate(names) if any(fnmatchcase(name, p) for p in patterns)], dtype=np.intp)
-
-
-def _listed(values: Floats) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -29,9 +29,14 @@ _WEIGHTS = {
 }
 
 
-def write_result(result: dict[str, Any], path: Path) -> None:
+def write_result(result: Mapping[str, Any], path: Path) -> None:
     """Write a result file."""
-    path.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(result_text(result), encoding="utf-8")
+
+
+def result_text(result: Mapping[str, Any]) -> str:
+    """The text of a result file."""
+    return json.dumps(result, allow_nan=False) + "\n"
 
 
 def failure_to_json(status: str, defects: Sequence[Defect] = ()) -> dict[str, Any]:

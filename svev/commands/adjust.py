@@ -6,31 +6,38 @@ from typing import Annotated, Any
 import typer
 
 from photogrammetry.adjustment.equations.unknowns import state_of
+from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.run import adjust as adjust_network
 from photogrammetry.network.file import read_network
 from photogrammetry.network.model import Network
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous
 from photogrammetry.procedures.stages import snoop_network
-from photogrammetry.reports.adjusted import adjusted_sections
+from photogrammetry.reports.adjusted import Wishes, adjusted_sections
 from photogrammetry.reports.document import Report
-from photogrammetry.reports.result_extras import in_datum_of, joint_covariance, named_points, with_detectable
+from photogrammetry.reports.result_extras import in_datum_of, named_points
 from photogrammetry.reports.result_file import outcome_to_json
 from photogrammetry.reports.summary import summarise
 from photogrammetry.start_values.search import complete
 from svev.commands.delivery import (
+    CovarianceOption,
+    DetectableOption,
     JsonOption,
     OutputOption,
     PaperOption,
     ReportOption,
     ReweightOption,
+    as_record,
     deliver,
+    origin,
     refuse_overwriting,
+    with_extras,
     with_weights,
     written,
 )
 
 
 def adjust(
+    context: typer.Context,
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1)")],
     output: OutputOption,
     reweight: ReweightOption = False,
@@ -39,13 +46,8 @@ def adjust(
         bool,
         typer.Option("--snoop", help="take out the worst locatable gross error and adjust again, until there is none"),
     ] = False,
-    detectable: Annotated[
-        bool, typer.Option("--detectable", help="add the smallest error of each observation that would be found")
-    ] = False,
-    covariance: Annotated[
-        list[str] | None,
-        typer.Option("--covariance", help="add the joint covariance of points with this name (* and ?); repeatable"),
-    ] = None,
+    detectable: DetectableOption = False,
+    covariance: CovarianceOption = None,
     datum: Annotated[
         list[str] | None,
         typer.Option("--datum", help="give the sigmas of a free network in the datum of these points; repeatable"),
@@ -62,6 +64,7 @@ def adjust(
     """
     refuse_overwriting(output, network)
     given = with_weights(read_network(network), reweight=reweight, paper=paper)
+    came_from = origin(context, network=network)
     named_points(given, datum or (), "--datum")  # before anything is computed
     named_points(given, covariance or (), "--covariance")
 
@@ -70,16 +73,16 @@ def adjust(
         refuse_ambiguous(given, outcome.adjustment)
         if datum:
             outcome = in_datum_of(outcome, datum)
-        lines = summarise(outcome)
-        lines += written(lambda: Report("Adjustment", adjusted_sections(outcome)), report)
-        result = outcome_to_json(outcome)
-        if detectable:
-            result = with_detectable(result, outcome.adjustment)
-        if covariance:
-            result["joint_covariance"] = joint_covariance(outcome.adjustment, covariance)
-        return result, lines
+        result = with_extras(outcome_to_json(outcome), outcome.adjustment, detectable=detectable, covariance=covariance)
+        wishes = Wishes(detectable, covariance or ())
+        told = written(lambda: as_record(_report(outcome, wishes), came_from, result, output), report)
+        return result, [*summarise(outcome), *told]
 
     deliver(adjusted, output, as_json=as_json)
+
+
+def _report(outcome: Outcome, wishes: Wishes) -> Report:
+    return Report("Adjustment", adjusted_sections(outcome, wishes))
 
 
 def _started(network: Network) -> Network:

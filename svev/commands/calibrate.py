@@ -6,15 +6,31 @@ from typing import Annotated, Any
 import typer
 
 from photogrammetry.network.file import read_network
-from photogrammetry.network.model import Network
 from photogrammetry.procedures.calibration import calibrate as calibrate_network
+from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import calibration_lines, calibration_report, calibration_to_json
-from svev.commands.delivery import JsonOption, OutputOption, ReportOption, deliver, refuse_overwriting, written
+from photogrammetry.reports.result_extras import named_points
+from svev.commands.delivery import (
+    CovarianceOption,
+    DetectableOption,
+    JsonOption,
+    OutputOption,
+    ReportOption,
+    as_record,
+    deliver,
+    origin,
+    refuse_overwriting,
+    with_extras,
+    written,
+)
 
 
 def calibrate(
+    context: typer.Context,
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with images of the frame")],
     output: OutputOption,
+    detectable: DetectableOption = False,
+    covariance: CovarianceOption = None,
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -27,11 +43,15 @@ def calibrate(
     """
     refuse_overwriting(output, network)
     given = read_network(network)
-    deliver(lambda: _calibrated(given, report), output, as_json=as_json)
+    came_from = origin(context, network=network)
+    named_points(given, covariance or (), "--covariance")  # before anything is computed
 
+    def calibrated() -> tuple[dict[str, Any], list[str]]:
+        calibration = calibrate_network(given)
+        adjustment = calibration.outcome.adjustment
+        result = with_extras(calibration_to_json(calibration), adjustment, detectable=detectable, covariance=covariance)
+        wishes = Wishes(detectable, covariance or ())
+        told = written(lambda: as_record(calibration_report(calibration, wishes), came_from, result, output), report)
+        return result, [*calibration_lines(calibration), *told]
 
-def _calibrated(network: Network, report: Path | None) -> tuple[dict[str, Any], list[str]]:
-    calibration = calibrate_network(network)
-    lines = calibration_lines(calibration)
-    lines += written(lambda: calibration_report(calibration), report)
-    return calibration_to_json(calibration), lines
+    deliver(calibrated, output, as_json=as_json)

@@ -1,15 +1,18 @@
 """What the commands of photogrammetry have in common: options, weights, result file, report, exit codes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 
+from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from photogrammetry.network.model import Network, Reweight
 from photogrammetry.reports.document import Report, write_report
+from photogrammetry.reports.record.provenance import Provenance, provenance, signature
+from photogrammetry.reports.result_extras import joint_covariance, with_detectable
 from photogrammetry.reports.result_file import failure_to_json, write_result
 from rig.errors import BadInputError
 from svev import console
@@ -29,6 +32,13 @@ ReweightOption = Annotated[
         "--reweight", help="estimate the weights of images and survey from the residuals, group by group (D.3)"
     ),
 ]
+DetectableOption = Annotated[
+    bool, typer.Option("--detectable", help="add the smallest error of each observation that would be found")
+]
+CovarianceOption = Annotated[
+    list[str] | None,
+    typer.Option("--covariance", help="add the joint covariance of points with this name (* and ?); repeatable"),
+]
 PaperOption = Annotated[bool, typer.Option("--paper", help="estimate the weights by D5 as the paper prints it")]
 
 #: Exit codes.
@@ -38,12 +48,43 @@ REFUSED: Final = RefusedError.exit_code
 _LISTS: Final = ("observations", "points", "images", "calibration")  # too long for a screen
 
 
+def origin(context: typer.Context, **files: Path | None) -> Provenance:
+    """Where the result of this call comes from, for its report.
+
+    Args:
+        context: of the command; its options are told.
+        files: that it reads, by their role.
+    """
+    options = [
+        f"--{name.replace('_', '-')}" if value is True else f"--{name.replace('_', '-')} {each}"
+        for name, value in context.params.items()
+        if name not in files and not isinstance(value, Path) and value not in (None, False)
+        for each in (value if isinstance(value, list) else [value])
+    ]
+    return provenance(" ".join(("svev", str(context.info_name), *options)), files)
+
+
 def written(make: Callable[[], Report], folder: Path | None) -> list[str]:
     """Write a report, if `folder` is given; returns the line that says where it is."""
     if folder is None:
         return []
     text, page = write_report(make(), folder)
     return [f"report in {text} and {page}"]
+
+
+def as_record(report: Report, came_from: Provenance, result: Mapping[str, Any], output: Path) -> Report:
+    """A report with its origin, the checksum of the result file, and a place to sign."""
+    origin_of_all = came_from.with_result(result, output).section()
+    return replace(report, sections=(origin_of_all, *report.sections, signature()))
+
+
+def with_extras(
+    result: dict[str, Any], a: Adjustment, *, detectable: bool, covariance: Sequence[str] | None
+) -> dict[str, Any]:
+    """The result with what `--detectable` and `--covariance` add."""
+    if detectable:
+        result = with_detectable(result, a)
+    return result | {"joint_covariance": joint_covariance(a, covariance)} if covariance else result
 
 
 def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Path, *, as_json: bool) -> None:

@@ -9,15 +9,22 @@ import typer
 from photogrammetry.network.file import read_network
 from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
 from photogrammetry.procedures.orientation import orient as orient_network
+from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import orientation_lines, orientation_report, orientation_to_json
+from photogrammetry.reports.result_extras import named_points
 from svev.commands.delivery import (
+    CovarianceOption,
+    DetectableOption,
     JsonOption,
     OutputOption,
     PaperOption,
     ReportOption,
     ReweightOption,
+    as_record,
     deliver,
+    origin,
     refuse_overwriting,
+    with_extras,
     with_weights,
     written,
 )
@@ -31,6 +38,7 @@ class Alternative(StrEnum):
 
 
 def orient(
+    context: typer.Context,
     network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with reference points")],
     output: OutputOption,
     calibration: Annotated[
@@ -50,6 +58,8 @@ def orient(
     ] = False,
     reweight: ReweightOption = False,
     paper: PaperOption = False,
+    detectable: DetectableOption = False,
+    covariance: CovarianceOption = None,
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -65,11 +75,19 @@ def orient(
     if calibration is not None:
         given = with_calibration(given, read_calibration(calibration))
     given = with_weights(given, reweight=reweight, paper=paper)
+    came_from = origin(context, network=network, calibration=calibration)
+    named_points(given, covariance or (), "--covariance")  # before anything is computed
 
     def oriented() -> tuple[dict[str, Any], list[str]]:
         orientation = orient_network(given, int(alternative), moving, uncertain_interior=uncertain_interior)
-        lines = orientation_lines(orientation)
-        lines += written(lambda: orientation_report(orientation), report)
-        return orientation_to_json(orientation), lines
+        result = with_extras(
+            orientation_to_json(orientation),
+            orientation.outcome.adjustment,
+            detectable=detectable,
+            covariance=covariance,
+        )
+        wishes = Wishes(detectable, covariance or ())
+        told = written(lambda: as_record(orientation_report(orientation, wishes), came_from, result, output), report)
+        return result, [*orientation_lines(orientation), *told]
 
     deliver(oriented, output, as_json=as_json)

@@ -6,6 +6,8 @@ import pytest
 from photogrammetry.geometry.rotation import (
     increment_jacobian,
     nearest_rotation,
+    omega_phi_kappa,
+    omega_phi_kappa_jacobian,
     rotation_from_vector,
     vector_from_rotation,
 )
@@ -41,3 +43,16 @@ def test_nearest_rotation_is_orthonormal_and_near() -> None:
     nearest = nearest_rotation(rounded)
     assert np.abs(nearest @ np.swapaxes(nearest, 1, 2) - np.eye(3)).max() < 1e-14
     assert np.abs(nearest - rotations).max() < 2e-5
+
+
+def test_omega_phi_kappa_and_their_derivatives() -> None:
+    """R_X(omega) R_Y(phi) R_Z(kappa) gives R again; the derivatives are those of central differences."""
+    rotations, h = rotation_from_vector(np.concatenate((_vectors(1.2), _vectors(2.9)))), 1e-6
+    angles = omega_phi_kappa(rotations)
+    turns = [rotation_from_vector(angles[:, i : i + 1] * np.eye(3)[i]) for i in range(3)]
+    assert np.abs(turns[0] @ turns[1] @ turns[2] - rotations).max() < 1e-14
+    steps = rotation_from_vector(h * np.eye(3))
+    ahead, behind = (omega_phi_kappa(rotations[:, None] @ turn) for turn in (steps, np.swapaxes(steps, 1, 2)))
+    change = (ahead - behind + np.pi) % (2.0 * np.pi) - np.pi
+    numeric = np.swapaxes(change, 1, 2) / (2.0 * h)
+    assert np.abs(numeric - omega_phi_kappa_jacobian(angles)).max() < 1e-5 * np.abs(numeric).max()

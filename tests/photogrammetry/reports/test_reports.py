@@ -229,13 +229,13 @@ def test_sections_hold_the_numbers() -> None:
     sections = {section.title: section for section in adjusted_sections(outcome)}
     text = as_text(Report("Rods", tuple(sections.values())))
     a = outcome.adjustment
-    assert f"{a.state.interior[0, 0]:.6g}" in text
+    assert re.search(rf"K1 c +{a.state.interior[0, 0]:.0f} +\d\d +estimated", text)
     measured = next(line for line in text.splitlines() if "distance P11 to P12" in line)
-    assert measured.split()[4] == f"{a.relation_residuals()[0]:.3g}"
+    assert measured.split()[4] == f"{a.relation_residuals()[0]:.5f}"
     table = sections["Points"].parts[0]
     assert isinstance(table, Table)
     assert [row[0] for row in table.rows] == [point.name for point in a.network.points]
-    assert float(table.rows[3][3]) == pytest.approx(a.state.xyz[3, 0], abs=1e-4)
+    assert float(table.rows[3][3]) == pytest.approx(a.state.xyz[3, 0], abs=1e-3)
 
 
 def test_metric_frame_without_image_size() -> None:

@@ -33,23 +33,34 @@ class CalibratedCamera(BaseModel):
     distortion: Literal["projected", "measured"]
 
 
+class _GlobalTest(BaseModel):
+    """What the global test says; results of other programs have none."""
+
+    usable: bool = True
+    words: str = ""
+
+
 class _Result(BaseModel):
     """The keys of a result that a calibration must have; all others are ignored."""
 
     format: Literal["svev-adjustment/1"]
     converged: bool
     cameras: dict[str, Any] = {}
+    global_test: _GlobalTest = _GlobalTest()
 
 
 def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
     """Read the cameras of a result file (`svev-adjustment/1`).
 
     Raises:
-        BadInputError: missing, unreadable, no result file, or one of a calibration that did not converge.
+        BadInputError: missing, unreadable, no result file, or one of a calibration that did not converge or whose
+            observations contradict each other.
     """
     result = validate(_Result, read_json(path), path)
     if not result.converged:
         raise BadInputError(f"{path}: this calibration has no result; calibrate again or name another file")
+    if not result.global_test.usable:
+        raise BadInputError(f"{path}: sigma0 of this result is {result.global_test.words}")
     return {name: _camera(body, f"{path}: cameras.{name}") for name, body in result.cameras.items()}
 
 

@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 
-from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.equations.unknowns import State, state_of
 from photogrammetry.adjustment.gross_errors.blunders import (
     Blunder,
@@ -25,8 +24,9 @@ from photogrammetry.adjustment.gross_errors.blunders import (
 )
 from photogrammetry.adjustment.gross_errors.snooping import BENT
 from photogrammetry.adjustment.run import Outcome, adjust
-from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
-from photogrammetry.adjustment.solution.global_test import ABSURD, TOLERABLE, GlobalTest, Verdict
+from photogrammetry.adjustment.solution.adjustment import adjust_once
+from photogrammetry.adjustment.solution.global_test import ABSURD, GlobalTest
+from photogrammetry.adjustment.solution.usability import is_unusable
 from photogrammetry.geometry.similarity import Similarity, fit_similarity
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from photogrammetry.network.model import Network, Role
@@ -184,9 +184,8 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
         RefusedError: says what to do.
     """
     a = outcome.adjustment
-    test = GlobalTest(a.ratio, a.redundancy)
-    if test.verdict is Verdict.ABSURD and _is_gross(a):
-        raise RefusedError(f"sigma0 is {test.words}{told_of(findings)}")
+    if is_unusable(a):
+        raise RefusedError(f"sigma0 is {GlobalTest(a.ratio, a.redundancy).words}{told_of(findings)}")
     gone = [
         g.network.points[g.blunder.suspect.index].name
         for g in outcome.removed
@@ -195,19 +194,6 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
     left = sum(point.role in SURVEYED for point in a.network.points)
     if 3 * len(gone) > len(gone) + left:
         raise RefusedError(too_many(gone, len(gone) + left) + told_of(findings))
-
-
-def _is_gross(a: Adjustment) -> bool:
-    """Whether residuals of images or survey (rms of the coordinates) exceed what a result may have."""
-    network, columns = a.network, a.problem.image
-    c = np.array([a.state.interior[image.camera, 0] for image in network.images])
-    angles = a.image_residuals() / c[columns][:, None]
-    survey = a.relation_residuals()[a.problem.relations.rows(Kind.CONTROL)]
-    extent = float(np.ptp(a.state.xyz, axis=0).max(initial=0.0))
-    return bool(
-        (len(angles) and not np.sqrt(np.mean(angles**2)) <= TOLERABLE)
-        or (len(survey) and not np.sqrt(np.mean(survey**2)) <= TOLERABLE * extent)
-    )
 
 
 def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]:

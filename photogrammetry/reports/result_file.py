@@ -14,6 +14,7 @@ from photogrammetry.adjustment.gross_errors.blunders import blunder_to_json, in_
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.adjustment.solution.global_test import GlobalTest
+from photogrammetry.adjustment.solution.usability import is_unusable
 from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.diagnosis import Defect
 from photogrammetry.network.model import AXES, Reweight, Role
@@ -101,7 +102,8 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
 
 def _global_test(a: Adjustment) -> dict[str, Any]:
     test = GlobalTest(a.ratio, a.redundancy)
-    return {"ratio": a.ratio, "probability": test.chance, "verdict": test.verdict.value, "words": test.words}
+    numbers = {"ratio": a.ratio, "probability": test.chance}
+    return numbers | {"verdict": test.verdict.value, "words": test.words, "usable": not is_unusable(a)}
 
 
 def status_of(outcome: Outcome) -> str:
@@ -113,6 +115,8 @@ def status_of(outcome: Outcome) -> str:
     behind = a.problem.behind(a.state)
     if behind:
         words += f"; {behind} observed points lie behind their cameras: check the start values and the rotations' sense"
+    if is_unusable(a):
+        words += f"; not to be used: sigma0 is {GlobalTest(a.ratio, a.redundancy).words}"
     words += _WEIGHTS[a.network.reweight]
     if outcome.components is None:
         words += "; the variance components do not settle"

@@ -8,6 +8,7 @@ import typer
 from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.run import adjust as adjust_network
+from photogrammetry.adjustment.solution.usability import is_unusable
 from photogrammetry.network.file import read_network
 from photogrammetry.network.model import Network
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous
@@ -18,6 +19,7 @@ from photogrammetry.reports.result_extras import in_datum_of, named_points
 from photogrammetry.reports.result_file import outcome_to_json
 from photogrammetry.reports.summary import summarise
 from photogrammetry.start_values.search import complete
+from svev import console
 from svev.commands.delivery import (
     CovarianceOption,
     DetectableOption,
@@ -58,7 +60,7 @@ def adjust(
     """Adjust a network of images: bundle adjustment with covariance, tests and variance components.
 
     Exit codes: 0 adjusted, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or with
-    --snoop refused because the data contradict each other.
+    --snoop refused because the data contradict each other. Without --snoop such data give a result that says so.
 
     Example: svev adjust network.json -o result.json
     """
@@ -74,6 +76,8 @@ def adjust(
         if datum:
             outcome = in_datum_of(outcome, datum)
         result = with_extras(outcome_to_json(outcome), outcome.adjustment, detectable=detectable, covariance=covariance)
+        if is_unusable(outcome.adjustment):  # the contract wants the result all the same (decision 0044)
+            console.complain(f"{network}: the observations contradict each other; do not use this result, try --snoop")
         wishes = Wishes(detectable, covariance or ())
         told = written(lambda: as_record(_report(outcome, wishes), came_from, result, output), report)
         return result, [*summarise(outcome), *told]

@@ -217,3 +217,26 @@ def test_absurd_numbers_end_in_one_of_four_ways(seed: int, tmp_path: Path) -> No
     code = main(["adjust", str(tmp_path / "network.json"), "-o", str(tmp_path / "result.json")])
     assert code in {0, 2, 3, 4}
     assert (tmp_path / "result.json").exists() == (code != 2)
+
+
+def test_an_absurd_result_is_shown_and_taken_by_no_other_command(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Three wrong survey points: the contract wants numbers and exit code 0, and nobody may take them for good ones."""
+    network = hill(3).network
+    points = list(network.points)
+    for i, error in ((1, (1.0, -2.0, 0.5)), (6, (-1.5, 1.0, 1.0)), (11, (0.5, 1.5, -2.0))):
+        points[i] = replace(points[i], xyz=np.asarray(points[i].xyz, dtype=float) + np.array(error))
+    code, result = run(replace(network, points=tuple(points)))
+    assert code == 0
+    assert result["sigma0"] > 10.0
+    assert result["global_test"]["usable"] is False
+    assert "not to be used" in result["status"]
+    assert "do not use this result" in capsys.readouterr().err
+    write_network(network, tmp_path / "hill.json")
+    taken = ["orient", str(tmp_path / "hill.json"), "--calibration", str(tmp_path / "result.json")]
+    assert main([*taken, "-o", str(tmp_path / "poses.json")]) == 2
+    assert "correct them, do not use this result" in capsys.readouterr().err
+    code, result = run(network)
+    assert result["global_test"]["usable"] is True
+    assert capsys.readouterr().err == ""

@@ -1,6 +1,7 @@
 """Adjusts a network as its file asks for it: weights, search for gross errors, variance components."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 from photogrammetry.adjustment.equations.unknowns import State, state_of
 from photogrammetry.adjustment.gross_errors.blunders import Blunder, Removed
@@ -8,10 +9,13 @@ from photogrammetry.adjustment.gross_errors.snooping import explained, suspicion
 from photogrammetry.adjustment.gross_errors.snooping import snoop as snooped
 from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK, find_blunders
 from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
+from photogrammetry.adjustment.solution.curvature import Interval, curvature
 from photogrammetry.adjustment.variance_components import Component, estimate_by_paper, estimate_components
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network.model import Network, Reweight
 from rig.errors import BadInputError
+
+_BETTER: Final = 3  # better optima that are gone to, one after the other
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,6 +28,7 @@ class Outcome:
         components: variance components; None where they do not settle.
         removed: the observations that snooping took out, in that order.
         aside: groups of which one is wrong, nobody knows which, and that the adjustment does without.
+        intervals: of camera parameters whose sigma is beyond its linearisation (`settled`).
     """
 
     adjustment: Adjustment
@@ -31,6 +36,7 @@ class Outcome:
     components: tuple[Component, ...] | None
     removed: tuple[Removed, ...] = ()
     aside: tuple[Removed, ...] = ()
+    intervals: tuple[Interval, ...] = ()
 
     @property
     def suspected(self) -> tuple[Removed, ...]:
@@ -78,6 +84,22 @@ def adjust(
         components, adjustment = estimate(adjustment)
         blunders = tuple(find_blunders(adjustment, family_risk))
     return Outcome(adjustment, blunders, components, removed)
+
+
+def settled(outcome: Outcome) -> Outcome:
+    """The outcome at the best optimum that the profiles of its camera parameters lead to, with what they say.
+
+    Raises:
+        NotSolvableError: the better optimum does not determine the unknowns.
+    """
+    shape = curvature(outcome.adjustment)
+    for _ in range(_BETTER):
+        if shape.better is None:
+            break
+        again = adjust(outcome.adjustment.network, shape.better)
+        outcome = replace(again, removed=outcome.removed, aside=outcome.aside)
+        shape = curvature(outcome.adjustment)
+    return replace(outcome, intervals=shape.intervals)
 
 
 def _adjusted(network: Network, start: State, family_risk: float) -> Adjustment:

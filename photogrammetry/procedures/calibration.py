@@ -12,7 +12,7 @@ import numpy as np
 
 from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.gross_errors.blunders import describe
-from photogrammetry.adjustment.run import Outcome, adjust
+from photogrammetry.adjustment.run import Outcome, adjust, settled
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.network.model import Datum, DatumType, Network, Point, Role
 from photogrammetry.network.selection import RAYS, only_points, rays, require_unknown_poses
@@ -50,7 +50,7 @@ def calibrate(network: Network) -> Calibration:
         RefusedError: the images contradict each other so much that no result can be believed.
     """
     free, notes = _free(network)
-    outcome = adjust(free, state_of(complete(free)), snoop=True)
+    outcome = settled(adjust(free, state_of(complete(free)), snoop=True))
     refuse_absurd(outcome, [describe(outcome.adjustment.network, blunder) for blunder in outcome.blunders])
     if outcome.adjustment.scale_is_free:
         notes.append(

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from photogrammetry.adjustment.run import Outcome
+from photogrammetry.adjustment.run import Outcome, settled
 from photogrammetry.network.model import Datum, Network, Role
 from photogrammetry.network.selection import only_points, require_unknown_poses
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous, refuse_contradicted
@@ -56,6 +56,7 @@ def orient(
     network, notes = _prepared(network, alternative, moving)
     search = search_block(network)
     outcome, stage = constrained_stage(search)
+    outcome = settled(outcome)
     refuse_ambiguous(network, outcome.adjustment)
     refuse_contradicted(network, outcome.adjustment)
     return Orientation(outcome, (*search.stages, stage), (*held, *notes))

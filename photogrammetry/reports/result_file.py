@@ -77,7 +77,7 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "global_test": _global_test(a),
         "length_unit": "" if a.scale_is_free else network.length_unit,
         "image_frame": network.image_frame.value,
-        "cameras": _cameras(a),
+        "cameras": _cameras(outcome),
         "images": _images(a),
         "points": _points(a),
         "check_points": _check_points(a),
@@ -117,6 +117,9 @@ def status_of(outcome: Outcome) -> str:
         words += f"; {behind} observed points lie behind their cameras: check the start values and the rotations' sense"
     if is_unusable(a):
         words += f"; not to be used: sigma0 is {GlobalTest(a.ratio, a.redundancy).words}"
+    if outcome.intervals:
+        doubtful = ", ".join(f"{one.camera} {one.parameter.name}" for one in outcome.intervals)
+        words += f"; the sigmas do not hold for parameters beyond their linearisation: {doubtful}"
     words += _WEIGHTS[a.network.reweight]
     if outcome.components is None:
         words += "; the variance components do not settle"
@@ -132,8 +135,8 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _cameras(a: Adjustment) -> dict[str, Any]:
-    out = {}
+def _cameras(outcome: Outcome) -> dict[str, Any]:
+    a, out = outcome.adjustment, {}
     for i, camera in enumerate(a.network.cameras):
         parameters, correlations = a.parameters(i)
         out[camera.name] = {
@@ -149,6 +152,12 @@ def _cameras(a: Adjustment) -> dict[str, Any]:
             # the test value of "this parameter is zero", which makes no sense for c
             "significance": {
                 p.name: abs(p.value) / p.sigma if p.sigma > 0.0 else None for p in parameters if p.name != "c"
+            },
+            # 95 %, where the sigma does not tell it
+            "interval": {
+                one.parameter.name: [_number(one.low), _number(one.high)]
+                for one in outcome.intervals
+                if one.camera == camera.name
             },
         }
     return out

@@ -19,7 +19,12 @@ def summarise(outcome: Outcome) -> list[str]:
     lines = [status_of(outcome), _counts(a)]
     if a.sigma0 is not None:
         lines.append(_verdict(a))
-    lines += _camera_lines(a) + _point_lines(a) + _component_lines(outcome)
+    lines += [
+        *_camera_lines(a),
+        *(one.words for one in outcome.intervals),
+        *_point_lines(a),
+        *_component_lines(outcome),
+    ]
     if outcome.removed:
         lines.append(f"taken out ({len(outcome.removed)}):")
         lines += [f"  {describe(gone.network, gone.blunder)}" for gone in outcome.removed[:_SHOWN]]

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from photogrammetry.adjustment.equations.unknowns import state_of
-from photogrammetry.adjustment.run import Outcome
+from photogrammetry.adjustment.run import Outcome, settled
 from photogrammetry.adjustment.run import adjust as adjust_network
 from photogrammetry.adjustment.solution.usability import is_unusable
 from photogrammetry.network.file import read_network
@@ -72,6 +72,7 @@ def adjust(
 
     def adjusted() -> tuple[dict[str, Any], list[str]]:
         outcome = snoop_network(given) if snoop else adjust_network(given, state_of(_started(given)))
+        outcome = settled(outcome)
         refuse_ambiguous(given, outcome.adjustment)
         if datum:
             outcome = in_datum_of(outcome, datum)

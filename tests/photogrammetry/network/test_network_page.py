@@ -53,8 +53,8 @@ def test_samples_give_what_was_planned(folder: Path) -> None:
         cameras = _result(folder / f"{result}.json")["cameras"]
         wrong = [(cameras[c.name]["c"] - c.interior[0]) / cameras[c.name]["sigma"]["c"] for c in plan.cameras]
         assert np.abs(wrong).max() < 4.0
-    plan = plan_from(read_description(CONFIG / "networks" / "hill-2.toml")).network
-    for result in ("poses", "trial-poses"):
+    for name, result in (("hill-2", "poses"), ("hill-2", "trial-poses"), ("rods", "rods-result")):
+        plan = plan_from(read_description(CONFIG / "networks" / f"{name}.toml")).network
         images = _result(folder / f"{result}.json")["images"]
         errors = np.array([images[i.name]["X0"] for i in plan.images]) - state_of(plan).position
         sigmas = np.array([images[i.name]["sigma_X0"] for i in plan.images])

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final
 
 from capture.clock_reading import ClockReading
-from capture.seam import Arrival, Camera, OpenCamera
+from capture.seam import Arrival, Camera, Commanded, Commands, OpenCamera
 from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.frame import NO_SLOT, Record, RecordKind
@@ -34,6 +34,7 @@ class Grabber:
         period_ns: time between two pulses.
         stopping: tells whether the loop shall end; asked at least every 50 ms while the camera answers.
         stop_fd: becomes readable when `stopping` may have changed, so that the wait for a retry ends at once.
+        commands: when the camera is told to expose; None: pulses come by cable.
     """
 
     def __init__(
@@ -45,11 +46,12 @@ class Grabber:
         period_ns: int,
         stopping: Callable[[], bool],
         stop_fd: int,
+        commands: Commands | None = None,
     ) -> None:
         self._open, self._ring, self._doorbell = open_camera, ring, doorbell
         # A camera that delivers after all has a frame within this time.
         self._last_look_s = _RECEIVE_S + 1.5 * period_ns / NS_PER_S
-        self._stopping, self._stop_fd = stopping, stop_fd
+        self._stopping, self._stop_fd, self._commands = stopping, stop_fd, commands
         self._epoch = 0
         self._frames = self._damaged = 0
         self._last_failure = ""
@@ -86,7 +88,7 @@ class Grabber:
             requests = self._ring.reconnect_requests()
             wanted = requests != asked
             received = camera.bytes_received if wanted else 0
-            arrival = camera.receive(self._last_look_s if wanted else _RECEIVE_S)
+            arrival = self._receive(camera, self._last_look_s if wanted else _RECEIVE_S)
             for text in camera.notices():
                 self._put(RecordKind.NOTICE, text=text)
             if arrival is not None:
@@ -111,6 +113,22 @@ class Grabber:
             elif now >= next_count:
                 self._count(camera)
                 next_count = HostNs(now + _COUNT_EVERY_NS)
+
+    def _receive(self, camera: Camera, timeout_s: float) -> Arrival | None:
+        """Wait for the next arrival, and meanwhile tell the camera to expose, where that is how it gets its pulses."""
+        commands = self._commands
+        if commands is None or not isinstance(camera, Commanded):
+            return camera.receive(timeout_s)
+        now = host_now()
+        end = now + round(timeout_s * NS_PER_S)
+        while True:
+            if commands.is_due(now):
+                camera.fire()
+                now = host_now()
+            arrival = camera.receive(min(max(0, end - now), commands.until_next_ns(now)) / NS_PER_S)
+            now = host_now()
+            if arrival is not None or now >= end:
+                return arrival
 
     def _put_arrival(self, arrival: Arrival) -> None:
         if not arrival.whole:

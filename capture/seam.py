@@ -6,7 +6,7 @@ one `Arrival` per frame. One conformance suite (`tests/capture/test_conformance.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from rig.clocks import ClockLatch, DeviceNs, HostNs
 from rig.frame import NO_SLOT, StampedPixels
@@ -87,6 +87,31 @@ class Camera(Protocol):
 
     def close(self) -> None:
         """Stop and release the camera. Takes a bounded time and never raises."""
+        ...
+
+
+@runtime_checkable
+class Commanded(Protocol):
+    """A camera that can be told to expose."""
+
+    def fire(self) -> None:
+        """Tell the camera to expose now, if it can take a command at present.
+
+        Raises:
+            CameraError: the camera does not answer.
+        """
+        ...
+
+
+class Commands(Protocol):
+    """When a camera is to be told to expose, where no electric pulse does that."""
+
+    def until_next_ns(self, now: HostNs) -> int:
+        """Time from `now` to the next pulse, ns."""
+        ...
+
+    def is_due(self, now: HostNs) -> bool:
+        """Whether the camera is to be told now; once for each pulse."""
         ...
 
 

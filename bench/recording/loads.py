@@ -11,8 +11,8 @@ from rig.settings.model import (
     Region,
     RigSettings,
     SimulationSettings,
-    TriggerSettings,
 )
+from rig.settings.trigger import ExternalTrigger
 
 #: Frames that the simulated cameras draw once and only stamp anew: drawing is not what is measured.
 PRERENDERED = 8
@@ -49,7 +49,7 @@ class Load:
         return RigSettings(
             name=f"bench, {self.name}",
             cameras=cameras,
-            trigger=TriggerSettings(rate_hz=self.rate_hz, settle_s=10.0),
+            trigger=ExternalTrigger(rate_hz=self.rate_hz, settle_s=10.0),
             recorder=RecorderSettings(directory=directory),
             network=NetworkSettings(publish=publish),
             simulation=SimulationSettings(scenario=CONFIG / "scenarios" / "training.toml"),

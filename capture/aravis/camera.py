@@ -12,14 +12,16 @@ from collections.abc import Collection, Mapping, Sequence
 import gi
 
 from capture.aravis.clock import CameraClock
-from capture.aravis.configuration import configure
+from capture.aravis.configuration import SOFTWARE_TRIGGER, configure
 from capture.aravis.features import Features
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
+from capture.command_times import CommandTimes
 from capture.seam import Arrival
-from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, host_now
+from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.settings.model import CameraSettings, NetworkSettings
+from rig.settings.trigger import SoftwareTrigger
 from rig.transport.ring import CameraRing
 
 gi.require_version("Aravis", "0.8")
@@ -39,15 +41,24 @@ _QUEUE_LEAST = 8
 
 
 class AravisCamera:
-    """One GigE Vision camera, triggered by its input line.
+    """One GigE Vision camera, triggered by its input line or, if `software` is given, by commands (`fire`).
 
     Raises:
         CameraNotFoundError: nobody answers at the address.
         CameraError: the camera is in use, lacks a feature, or has another frame size.
     """
 
-    def __init__(self, settings: CameraSettings, network: NetworkSettings, ring: CameraRing, period_ns: int) -> None:
+    def __init__(
+        self,
+        settings: CameraSettings,
+        network: NetworkSettings,
+        ring: CameraRing,
+        period_ns: int,
+        software: SoftwareTrigger | None = None,
+    ) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
+        self._software = software
+        self._commands: CommandTimes | None = None
         self._lost = False
         self._plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
         self._buffers: dict[int, int] = {}
@@ -70,7 +81,7 @@ class AravisCamera:
             self._device.connect("control-lost", self._on_control_lost)
             self._features = Features(self._device)
             self._configure(settings, network)
-            self._clock = CameraClock(settings.name, self._device, self._features)
+            self._open_clock(settings)
             self._stream = self._open_stream(network)
         except GLib.Error as error:
             self.close()
@@ -116,20 +127,31 @@ class AravisCamera:
         now = host_now()
         self._in_aravis -= 1
         slot = self._buffers[hash(buffer)]
-        if buffer.get_status() != Aravis.BufferStatus.SUCCESS:
+        time = self._time_of(buffer, now)
+        if time is None or buffer.get_status() != Aravis.BufferStatus.SUCCESS:
             self._ring.return_slot(slot)
             return Arrival(whole=False, host_time=now)
         self._frame_came = True
         frame_id = buffer.get_frame_id()
         if frame_id > _IDS_16_BIT:
             self._id_modulus = 0  # its ids are long, without a feature that says so
-        return Arrival(
-            True, now, slot, frame_id, self._id_modulus, DeviceNs(buffer.get_timestamp())
-        )  # fmt: skip
+        return Arrival(True, now, slot, frame_id, self._id_modulus, time)
+
+    def fire(self) -> None:
+        """See `capture.seam.Commanded.fire`."""
+        before = host_now()
+        if self._commands is not None and not self._commands.is_free(before):
+            return
+        try:
+            self._device.execute_command(SOFTWARE_TRIGGER)
+        except GLib.Error as error:
+            raise CameraError(f"camera {self._name} does not take the command to expose: {error.message}") from None
+        if self._commands is not None:
+            self._commands.sent(before, host_now())
 
     def latch(self) -> ClockLatch:
-        """See `capture.aravis.clock.CameraClock.latch`."""
-        return self._clock.latch()
+        """See `capture.aravis.clock.CameraClock.latch`; without a clock, that of the commands."""
+        return self._clock.latch() if self._commands is None else self._commands.latch(host_now())
 
     def counters(self) -> Mapping[str, int]:
         """Aravis's own counters of the stream, and the temperature if the camera has a sensor."""
@@ -149,6 +171,8 @@ class AravisCamera:
 
     def notices(self) -> Sequence[str]:
         """What is unusual about the camera's packets."""
+        if self._commands is not None and (notice := self._commands.notice()) is not None:
+            self._notices.append(f"camera {self._name}: {notice}")
         notices, self._notices = self._notices, []
         return notices
 
@@ -181,7 +205,7 @@ class AravisCamera:
     def _configure(self, settings: CameraSettings, network: NetworkSettings) -> None:
         """Set everything that must be set before the stream is made."""
         # No local names for Aravis objects: the traceback of an error would keep the camera's sockets open.
-        self._notices += configure(self._features, settings)
+        self._notices += configure(self._features, settings, software=self._software is not None)
         self._camera.gv_set_packet_size(network.packet_size)
         if self._plain_socket:
             self._camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
@@ -192,6 +216,19 @@ class AravisCamera:
                 f"camera {self._name} sends {payload} bytes per frame, the rig file's region makes "
                 f"{self._ring.frame_bytes}: correct region and pixel_format of {self._name}"
             )
+
+    def _open_clock(self, settings: CameraSettings) -> None:
+        """Find a way to read the camera's clock; one that is told to expose can do without."""
+        try:
+            self._clock = CameraClock(settings.name, self._device, self._features)
+        except CameraError:
+            if self._software is None:
+                raise
+            self._commands = CommandTimes(round(settings.exposure_us * 1000), self._software.longest_ns)
+
+    def _time_of(self, buffer: "Aravis.Buffer", now: HostNs) -> DeviceNs | None:
+        """When the camera exposed, by its clock, or by the command that has made the frame; None: it cannot be told."""
+        return DeviceNs(buffer.get_timestamp()) if self._commands is None else self._commands.answered(now)
 
     def _open_stream(self, network: NetworkSettings) -> "Aravis.Stream":
         sockets = open_sockets()

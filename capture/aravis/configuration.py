@@ -38,10 +38,17 @@ _NOT_REDUCED: Final = ("BinningHorizontal", "BinningVertical", "DecimationHorizo
 #: Exposure and gain may differ so much from those wanted before that is said: steps of the sensor are smaller.
 _EXPOSURE_SHARE, _EXPOSURE_US, _GAIN_DB = 0.02, 20.0, 0.5
 _LEAST: Final = -1e9
+#: The command to expose.
+SOFTWARE_TRIGGER: Final = "TriggerSoftware"
 
 
-def configure(features: Features, settings: CameraSettings) -> list[str]:
+def configure(features: Features, settings: CameraSettings, *, software: bool) -> list[str]:
     """Set everything but the packets, in the order that cameras accept.
+
+    Args:
+        features: of the camera.
+        settings: of the camera in the rig file.
+        software: it exposes at commands, not at pulses of its input.
 
     Returns:
         What could not be set and what that costs, a sentence each.
@@ -57,7 +64,7 @@ def configure(features: Features, settings: CameraSettings) -> list[str]:
         if features.has(name) and not features.switch(name, on=False)
     ]
     _set_image(features, settings)
-    notices += _set_trigger(features, settings)
+    notices += _set_trigger(features, settings, software=software)
     notices += _set_exposure(features, settings.exposure_us)
     notices += _set_gain(features, settings.gain_db)
     return [f"camera {settings.name}: {notice}" for notice in notices]
@@ -92,7 +99,7 @@ def _set_image(features: Features, settings: CameraSettings) -> None:
         raise CameraError(f"camera {name} takes no frames one after the other (AcquisitionMode Continuous)")
 
 
-def _set_trigger(features: Features, settings: CameraSettings) -> list[str]:
+def _set_trigger(features: Features, settings: CameraSettings, *, software: bool) -> list[str]:
     name = settings.name
     selectors = features.entries("TriggerSelector")
     for selector in selectors:
@@ -104,7 +111,7 @@ def _set_trigger(features: Features, settings: CameraSettings) -> list[str]:
         raise CameraError(f"camera {name} has no trigger that takes one frame per pulse (it has {_list(selectors)})")
     if chosen == "AcquisitionStart" and not features.has(_ONE_FRAME[chosen]):
         raise CameraError(f"camera {name} has a trigger that starts it, but none that takes one frame per pulse")
-    notices = [*_set_input(features, settings)]
+    notices = [] if software else _set_input(features, settings)
     for divider in ("TriggerDivider", "TriggerMultiplier"):
         if features.set_number(divider, 1) not in {None, 1.0}:
             notices.append(f"{divider} stays {features.number(divider):g}: it does not take one frame per pulse")
@@ -114,6 +121,12 @@ def _set_trigger(features: Features, settings: CameraSettings) -> list[str]:
     features.choose("TriggerOverlap", "ReadOut", "PreviousFrame")  # else pulses during the readout are ignored
     if features.choose("TriggerMode", "On") is None:
         raise CameraError(f"camera {name} cannot be triggered (TriggerMode): use a camera with a trigger input")
+    if software and (features.choose("TriggerSource", "Software") is None or not features.has(SOFTWARE_TRIGGER)):
+        sources = _list(features.entries("TriggerSource"))
+        raise CameraError(
+            f"camera {name} takes no software trigger (its TriggerSource has {sources}): "
+            'use [trigger] source = "external"'
+        )
     return notices
 
 

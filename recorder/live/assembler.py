@@ -22,6 +22,7 @@ from rig.tag import CameraTag
 from rig.transport.messages import CameraChanged, CameraNews
 from rig.transport.ring import CameraRing
 from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
+from triggering.sources.choice import trigger_source
 
 #: A pulse waits for its frames: exposure, transport, Aravis's retention of damaged frames, and some periods.
 _HOLD_PERIODS: Final = 4
@@ -117,7 +118,8 @@ class Assembler:
         self._stranded_at = HostNs(host_now() + _STRANDED_NS)
         period = rig.trigger.period_ns
         self.hold_ns = hold_ns(period)
-        self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns)
+        spread = trigger_source(rig.trigger).spread_ns
+        self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns, spread_ns=spread)
         self.connected = [False] * len(rings)
         self.settled = HostNs(0)
         self._keeping_up_since: HostNs | None = HostNs(0)

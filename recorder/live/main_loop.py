@@ -18,7 +18,7 @@ from recorder.publishing.keys import check_publication, load_keys
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
-from rig.events import PAIRING, Event, Level
+from rig.events import PAIRING, TRIGGER, Event, Level
 from rig.health import PairingHealth
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
@@ -43,6 +43,8 @@ from rig.transport.messages import (
 from rig.transport.preview import PreviewSlot
 from rig.transport.ring import CameraRing
 from triggering.pairing.alarms import alarms
+from triggering.sources.choice import trigger_source
+from triggering.sources.telling import SpreadTeller
 
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000
@@ -79,6 +81,7 @@ class RecorderLoop:
         self._quit = False
         self._warm = self._unreported = 0
         self._alarmed: set[tuple[str, object]] = set()
+        self._spread = SpreadTeller(trigger_source(rig.trigger))
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -177,6 +180,8 @@ class RecorderLoop:
         )
         self._tell(RecorderHealth(health=health))
         self._tell_alarms(health.pairing)
+        if (said := self._spread.tell(health.pairing)) is not None:
+            self._warn(TRIGGER, said)
         self._own_up()
         self._recordings.health(wire.encode(health))
 

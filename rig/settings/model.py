@@ -11,10 +11,12 @@ from urllib.parse import urlsplit
 from pydantic import Field, model_validator
 
 from rig.settings.strict_toml import StrictModel
+from rig.settings.trigger import ExternalTrigger, SoftwareTrigger, Trigger
 from rig.topics import DEFAULT_PUBLISH
 
 Backend = Literal["aravis", "iidc", "sim", "replay"]
-
+#: The back ends whose cameras can be told to expose.
+COMMANDED: Final[frozenset[Backend]] = frozenset({"aravis"})
 
 #: Less than a chunk of a log holds (`recorder.log.mcap_layout.CHUNK_MAX`), with room for the tag.
 _TRIPLET_BYTES_MAX: Final = 255 << 20
@@ -88,22 +90,6 @@ class CameraSettings(StrictModel):
                 f'trigger_input "{self.trigger_input}" is no input of a FireWire camera: use "Line0" to "Line3"'
             )
         return self
-
-
-class TriggerSettings(StrictModel):
-    """The trigger pulses that expose all cameras at the same instant."""
-
-    source: Literal["external"] = Field("external", description="who makes the pulses; external: not svev")
-    rate_hz: float = Field(30.0, ge=0.1, le=1000, description="pulses per second")
-    settle_s: float = Field(5.0, gt=0, le=120, description="wait at most this long for the first pulses")
-    min_cameras: int | None = Field(
-        None, ge=1, le=8, description="with fewer cameras than this the rig is not armed; left out: all of them"
-    )
-
-    @property
-    def period_ns(self) -> int:
-        """Nominal time between two pulses, ns."""
-        return round(1e9 / self.rate_hz)
 
 
 class RecorderSettings(StrictModel):
@@ -272,7 +258,7 @@ class RigSettings(StrictModel):
 
     name: str = Field(min_length=1, max_length=80)
     cameras: Annotated[tuple[CameraSettings, ...], Field(min_length=1, max_length=8)]
-    trigger: TriggerSettings = TriggerSettings()
+    trigger: Trigger = ExternalTrigger()
     recorder: RecorderSettings = RecorderSettings()
     network: NetworkSettings = NetworkSettings()
     service: ServiceSettings = ServiceSettings()
@@ -309,6 +295,16 @@ class RigSettings(StrictModel):
             raise ValueError(
                 f"trigger.min_cameras = {least}, but the rig has {cameras} cameras: make it {cameras} or less, or "
                 "leave it out"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _cameras_take_commands(self) -> "RigSettings":
+        deaf = next((camera for camera in self.cameras if camera.backend not in COMMANDED), None)
+        if isinstance(self.trigger, SoftwareTrigger) and deaf is not None:
+            raise ValueError(
+                f'trigger.source "software" is a command to each camera, and {deaf.name} with backend '
+                f'"{deaf.backend}" takes none: use source = "external"'
             )
         return self
 

@@ -162,13 +162,16 @@ def validate(model: type[Model], data: dict[str, Any], source: Path | str) -> Mo
 
 def _word(model: type[BaseModel], error: ErrorDetails) -> str:
     """One error in words: the key, what is wrong, what to do."""
-    place = ".".join(str(part + 1) if isinstance(part, int) else part for part in error["loc"])
+    parts, known = _walk(model, error["loc"])
+    place = ".".join(parts)
     match error["type"]:
         case "extra_forbidden":
-            known = _keys_beside(model, error["loc"])
             close = difflib.get_close_matches(str(error["loc"][-1]), known, n=1)
             remedy = f'did you mean "{close[0]}"?' if close else f"known keys here: {', '.join(known)}"
             return f'unknown key "{place}"; {remedy}'
+        case "union_tag_invalid":
+            key, there = error["ctx"]["discriminator"].strip("'"), error["ctx"]["expected_tags"].replace("'", '"')
+            return f'key "{place}.{key}" = {_shown(error["ctx"]["tag"])}: there is {there}; correct it'
         case "missing":
             return f'key "{place}" is missing; add it'
         case "value_error":
@@ -192,16 +195,33 @@ def _value_of(node: dict[str, Any], key: str) -> Any:
     return node.get("properties", {}).get(key, node.get("additionalProperties"))
 
 
-def _keys_beside(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Known keys of the table in which the last key of `location` stands."""
+def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
+    """Follow the location of an error through the model's schema.
+
+    Returns:
+        The keys as they stand in the file, items counted from 1, and the known keys of the table in which the last one
+        stands. Where a key of a table decides about its others, pydantic puts the key's value into the location; it is
+        left out here.
+    """
     schema = model.model_json_schema()
     node: dict[str, Any] = schema
-    for part in location[:-1]:
+    beside = node
+    shown: list[str] = []
+    for part in location:
+        kinds = node.get("discriminator", {}).get("mapping", {})
+        if part in kinds:
+            node = beside = _referred(schema, {"$ref": kinds[part]})
+            continue
+        shown.append(str(part + 1) if isinstance(part, int) else part)
+        beside = node
         inside = node.get("items") if isinstance(part, int) else _value_of(node, part)
-        node = inside if isinstance(inside, dict) else {}
-        for choice in node.get("anyOf", []):
-            if "$ref" in choice:
-                node = choice
-        if "$ref" in node:
-            node = schema["$defs"][node["$ref"].rsplit("/", 1)[1]]
-    return sorted(node.get("properties", {}))
+        node = _referred(schema, inside if isinstance(inside, dict) else {})
+    return shown, sorted(beside.get("properties", {}))
+
+
+def _referred(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
+    """The definition to which a node of a schema refers, or the node itself."""
+    for choice in node.get("anyOf", []):
+        if "$ref" in choice:
+            node = choice
+    return schema["$defs"][node["$ref"].rsplit("/", 1)[1]] if "$ref" in node else node

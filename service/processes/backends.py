@@ -10,6 +10,7 @@ from capture.seam import OpenCamera
 from rig.clocks import HostNs
 from rig.errors import BadInputError, CameraNotFoundError
 from rig.settings.model import Backend, RigSettings
+from rig.settings.trigger import SoftwareTrigger
 from rig.transport.ring import CameraRing
 from service.processes.replayed_log import ReplayedLog, check_replay
 
@@ -19,7 +20,8 @@ _Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
 def _aravis(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:
     from capture.aravis.camera import AravisCamera  # noqa: PLC0415
 
-    return lambda: AravisCamera(rig.cameras[index], rig.network, ring, rig.trigger.period_ns)
+    software = rig.trigger if isinstance(rig.trigger, SoftwareTrigger) else None
+    return lambda: AravisCamera(rig.cameras[index], rig.network, ring, rig.trigger.period_ns, software)
 
 
 def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:

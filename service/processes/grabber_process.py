@@ -9,6 +9,7 @@ from rig.transport.child import begin
 from rig.transport.messages import GrabberConfig, Quit
 from rig.transport.ring import CameraRing
 from service.processes.backends import camera_opener
+from triggering.sources.choice import trigger_source
 
 _PRIORITY: Final = 10  #: above everything ordinary, below the kernel's own interrupt threads at 50
 
@@ -59,6 +60,7 @@ def main() -> None:
         period_ns=rig.trigger.period_ns,
         stopping=child.stopping,
         stop_fd=child.control.fileno(),
+        commands=trigger_source(rig.trigger).commands(child.config.epoch),
     ).run()
     os.close(child.config.doorbell)
 

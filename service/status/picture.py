@@ -28,6 +28,8 @@ from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import tap_guard
 from service.supervision.watching import PulseRate
 from triggering.pairing.alarms import alarms
+from triggering.sources.choice import trigger_source
+from triggering.sources.telling import set_up_only
 
 #: What the status of a camera takes from its health record.
 _MEASURED: Final = (
@@ -126,11 +128,13 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
 
 
 def _pairing_alarm(rig: RigSettings, facts: Facts) -> Statement | None:
-    """What is wrong with clocks, trigger or rate; None: nothing."""
+    """What is wrong with clocks, trigger or rate, or that the trigger is for set-up only; None: nothing."""
     if facts.health is None:
         return None
     names = [camera.name for camera in rig.cameras]
     said = next(alarms(facts.health.pairing, names, rig.trigger.rate_hz), None)
+    if said is None:
+        said = set_up_only(trigger_source(rig.trigger), facts.health.pairing)
     return None if said is None else pairing_alarm(said)
 
 

@@ -294,7 +294,8 @@ def pairing_alarm(said: Phrase) -> Statement:
     """Something is wrong with clocks, trigger or rate.
 
     Args:
-        said: what is wrong, as `triggering.pairing.alarms` says it; what to do stands behind its colon.
+        said: what is wrong, as `triggering.pairing.alarms` and `triggering.sources.telling` say it; what to do stands
+            behind its colon.
     """
     text, _, advice = said.text.partition(": ")
     values = {name: value for name, value in said.values.items() if not isinstance(value, Phrase)}

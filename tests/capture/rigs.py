@@ -23,6 +23,7 @@ def write_rig(
     rate_hz: float = 30.0,
     names: Sequence[str] = ("K1", "K2", "K3"),
     log: Path | None = None,
+    source: str = "external",
     **network: Any,
 ) -> Path:
     """Write a rig file and its scenario.
@@ -36,11 +37,12 @@ def write_rig(
         rate_hz: of the pulses.
         names: cameras of the scenario.
         log: what back end "replay" replays.
+        source: who makes the pulses.
         network: more keys of the [network] table.
     """
     tables = "".join("\n[[faults]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in f.items()) for f in faults or [])
     (directory / "scenario.toml").write_text(f'base = "{SCENARIO}"\nname = "test"\n{scenario}\n{tables}\n')
-    lines = ['name = "test rig"', "[trigger]", f"rate_hz = {rate_hz}"]
+    lines = ['name = "test rig"', "[trigger]", f'source = "{source}"', f"rate_hz = {rate_hz}"]
     lines += ["[simulation]", 'scenario = "scenario.toml"'] if backend != "replay" else []
     lines += [
         "[network]",

@@ -7,6 +7,7 @@ import pytest
 from rig.errors import BadInputError
 from rig.settings.file import CONFIG, load_rig, rig_schema
 from rig.settings.strict_toml import read_toml
+from rig.settings.trigger import ExternalTrigger
 
 RIGS = sorted((CONFIG / "rigs").glob("*.toml"))
 
@@ -166,6 +167,23 @@ def test_the_schema_is_a_schema() -> None:
             'key "trigger.rate_hz" = 1e-300: input should be greater than or equal to 0.1; correct it',
             id="rate almost 0",
         ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'hand'\n",
+            "key \"trigger.source\" = 'hand': there is \"external\", \"software\"; correct it",
+            id="unknown source",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'software'\nrate = 5\n",
+            'unknown key "trigger.rate"; did you mean "rate_hz"?',
+            id="unknown key of a source",
+        ),
+        pytest.param(
+            HEAD + CAMERA.replace("aravis", "sim") + "[trigger]\nsource = 'software'\n"
+            "[simulation]\nscenario = 'x.toml'\n",
+            'trigger.source "software" is a command to each camera, and K1 with backend "sim" takes none: '
+            'use source = "external"',
+            id="cameras that take no commands",
+        ),
         pytest.param(HEAD + CAMERA + "[trigger]\nrate_hz = nan\n", 'key "trigger.rate_hz" = nan: ', id="no number"),
         pytest.param(HEAD + CAMERA + "gain_db = -inf\n", 'key "cameras.1.gain_db" = -inf: ', id="infinite"),
         pytest.param(
@@ -269,4 +287,5 @@ def test_frames_stand_side_by_side_in_the_order_of_the_file(tmp_path: Path) -> N
 def test_the_period_of_the_pulses_is_in_ns(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
     path.write_text(HEAD + CAMERA + "[trigger]\nrate_hz = 30\n")
+    assert load_rig(path).trigger == ExternalTrigger(rate_hz=30)
     assert load_rig(path).trigger.period_ns == 33_333_333

@@ -45,12 +45,15 @@ class Pairer:
         hold_ns: how long after a pulse its frames may come: exposure, transport, retention of damaged frames, and some
             periods, so that the camera's next frame can tell what became of a missing one.
         tolerance_ns: frames whose trigger times are further apart are never of one pulse; 0.3 periods if left out.
+        spread_ns: how far apart the trigger itself may expose the cameras at one pulse.
 
     Raises:
         BadInputError: an argument makes no sense.
     """
 
-    def __init__(self, cameras: int, period_ns: int, *, hold_ns: int, tolerance_ns: int | None = None) -> None:
+    def __init__(
+        self, cameras: int, period_ns: int, *, hold_ns: int, tolerance_ns: int | None = None, spread_ns: int = 0
+    ) -> None:
         tolerance = 1 if tolerance_ns is None else tolerance_ns
         if (
             cameras < 1
@@ -63,7 +66,7 @@ class Pairer:
                 "cannot work: give at least one camera, a tolerance under half the period and a longer hold"
             )
         self._least_hold_ns, self._nominal_ns = hold_ns, period_ns
-        self._train = PulseTrain(period_ns, tolerance_ns)
+        self._train = PulseTrain(period_ns, tolerance_ns, spread_ns)
         self._tracks = [CameraTrack(self._train) for _ in range(cameras)]
         self._held = HeldFrames(cameras)
         self._silence = Silence(self._tracks, self._held, self._train)

@@ -42,6 +42,7 @@ class PulseTrain:
     Args:
         period_ns: nominal period, until one is measured.
         widest_ns: frames further apart are never of one pulse, whatever is learned; None: a share of the period.
+        spread_ns: how far apart the trigger itself may expose the cameras, which is allowed for at any time.
 
     Attributes:
         period_ns: present estimate of the period.
@@ -52,13 +53,14 @@ class PulseTrain:
         split: time of the last pulse that may have been one with that before it, and its distance; None: there is none.
     """
 
-    def __init__(self, period_ns: int, widest_ns: int | None = None) -> None:
+    def __init__(self, period_ns: int, widest_ns: int | None = None, spread_ns: int = 0) -> None:
         self.period_ns, self._nominal_ns = float(period_ns), period_ns
         self.steady = False
         self.last: HostNs | None = None
         self.split: tuple[HostNs, int] | None = None
         self._limit_ns = self.widest_ns = _WIDEST * period_ns if widest_ns is None else float(widest_ns)
-        self.tolerance_ns = min(_SPREAD_NS, self.widest_ns)
+        self._least_ns = _CLOCKS_NS + spread_ns
+        self.tolerance_ns = min(max(_SPREAD_NS, self._least_ns), self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
         self._intervals: deque[int] = deque(maxlen=_RHYTHM)
         self._delivered = 0
@@ -145,7 +147,7 @@ class PulseTrain:
 
     def _learn_tolerance(self) -> None:
         usual = sorted(self._spreads)[int(_USUAL * (len(self._spreads) - 1))]
-        self.tolerance_ns = min(max(_CLOCKS_NS, _SPREADS * usual), self.widest_ns)
+        self.tolerance_ns = min(max(self._least_ns, _SPREADS * usual), self.widest_ns)
 
     @property
     def spread_median_ns(self) -> int:

@@ -5,7 +5,8 @@ from contextlib import ExitStack, contextmanager
 
 from rig.clocks import DeviceNs, HostNs
 from rig.frame import Record, RecordKind
-from rig.settings.model import CameraSettings, RecorderSettings, Region, RigSettings, TriggerSettings
+from rig.settings.model import CameraSettings, RecorderSettings, Region, RigSettings
+from rig.settings.trigger import ExternalTrigger
 from rig.transport.ring import CameraRing
 
 PERIOD = 33_333_333
@@ -21,7 +22,7 @@ def ring_rig(**recorder: float) -> RigSettings:
         for i, (w, h) in enumerate(SIZES)
     )
     return RigSettings(
-        name="test", cameras=cameras, trigger=TriggerSettings(rate_hz=30), recorder=RecorderSettings(**recorder)
+        name="test", cameras=cameras, trigger=ExternalTrigger(rate_hz=30), recorder=RecorderSettings(**recorder)
     )
 
 

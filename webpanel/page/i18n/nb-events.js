@@ -146,4 +146,6 @@ export const events = {
   pairing_clock: ["klokken i {camera} ble stilt mens pulsene kom, og noen av bildene brukes ikke", "la PTP låse før opptak"],
   pairing_spread: ["bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "sjekk triggerkabler og forsinkelser i kameraene"],
   pairing_double: ["to pulser kom med {apart_ms} ms mellomrom, og ingen av kameraene har begge", "sjekk om triggersignalet preller"],
+  trigger_software: ["programvaretrigger: bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "bare til oppsett, ikke til måling"],
+  trigger_software_one: ["kameraet trigges av programvare", "bare til oppsett, ikke til måling"],
 };

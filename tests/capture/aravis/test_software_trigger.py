@@ -1,0 +1,83 @@
+"""A GigE Vision camera that is told to expose: real commands through the real Aravis, with and without a clock."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from capture.aravis.camera import AravisCamera
+from rig.clocks import HostNs, host_now
+from rig.errors import CameraError
+from rig.frame import Record, RecordKind
+from rig.settings.model import RigSettings
+from rig.settings.trigger import SoftwareTrigger
+from rig.transport.ring import CameraRing
+from simrig.gige.camera import Camera, CameraConfig
+from simrig.gige.registers.makers import Maker
+from tests.capture.rigs import SCENARIO, make_rig
+from tests.capture.station import Station
+from tests.support.loopback import Loopback
+from triggering.sources.software import SoftwarePulses
+
+_FRAMES = 12
+
+
+@contextmanager
+def _camera(rig: RigSettings, *, clock: bool = True, maker: Maker = Maker.STANDARD) -> Iterator[CameraRing]:
+    """A simulated camera in this process and the ring for its frames; `clock`: whether its clock can be read."""
+    config = CameraConfig(
+        name="K2", address=rig.cameras[0].address, scenario=SCENARIO, rate_hz=rig.trigger.rate_hz, epoch=host_now(),
+        test_pattern=True, ptp_offset_ns=0, maker=maker,
+    )  # fmt: skip
+    camera, ring = Camera(config), CameraRing.create("K2", rig.cameras[0].frame_bytes, 16)
+    if not clock:
+        camera._device._registers.on_write("GevTimestampControl", lambda _: 0)
+    camera.start()
+    try:
+        yield ring
+    finally:
+        camera.stop()
+        ring.close()
+
+
+def _host_times(records: list[Record]) -> list[HostNs]:
+    """Trigger times of the frames on the host's clock, by the best reading of the camera's."""
+    latches = [record for record in records if record.kind is RecordKind.LATCH]
+    best = min(latches, key=lambda record: record.value)
+    frames = [record for record in records if record.kind is RecordKind.FRAME]
+    return [HostNs(best.host_time + (record.device_time - best.device_time)) for record in frames]
+
+
+@pytest.mark.parametrize("clock", [True, False])
+def test_a_camera_exposes_at_each_command(tmp_path: Path, loopback: Loopback, clock: bool) -> None:
+    rig = make_rig(tmp_path, "aravis", loopback, names=["K2"], source="software", rate_hz=10.0)
+    trigger, origin = rig.trigger, host_now()
+    assert isinstance(trigger, SoftwareTrigger)
+    source = SoftwarePulses(trigger)
+
+    def opened(ring: CameraRing) -> AravisCamera:
+        return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)
+
+    with _camera(rig, clock=clock) as ring, Station(opened, ring, source.commands(origin)) as station:
+        station.await_records(RecordKind.FRAME, _FRAMES)
+    frames = [record for record in station.records if record.kind is RecordKind.FRAME]
+    placed = [divmod(time - origin, trigger.period_ns) for time in _host_times(station.records)]
+    assert len({pulse for pulse, _ in placed}) == len(frames)
+    drift_ns = 500_000  # 100 ppm of some seconds
+    assert max(late for _, late in placed) <= source.spread_ns + drift_ns
+    assert all(frame.host_time > time for frame, time in zip(frames, _host_times(station.records), strict=True))
+    notices = [record.text for record in station.records if record.kind is RecordKind.NOTICE]
+    assert [True for notice in notices if "its clock cannot be read: its frames have the times" in notice] == (
+        [] if clock else [True]
+    )
+
+
+def test_a_camera_without_the_command_is_refused(tmp_path: Path, loopback: Loopback) -> None:
+    rig = make_rig(tmp_path, "aravis", loopback, names=["K2"], source="software")
+    assert isinstance(rig.trigger, SoftwareTrigger)
+    with (
+        _camera(rig, maker=Maker.IMAGING_SOURCE) as ring,
+        pytest.raises(CameraError, match=r"takes no software trigger \(its TriggerSource has Any\)"),
+    ):
+        AravisCamera(rig.cameras[0], rig.network, ring, rig.trigger.period_ns, rig.trigger)

@@ -1,0 +1,14 @@
+"""Pulses from a generator that svev knows nothing of: cameras see them at their inputs."""
+
+from rig.clocks import HostNs
+
+
+class ExternalPulses:
+    """See `triggering.sources.seam.TriggerSource`."""
+
+    spread_ns = 0
+    set_up_only = False
+
+    def commands(self, origin: HostNs) -> None:
+        """No camera is told anything: `origin` has no meaning."""
+        del origin

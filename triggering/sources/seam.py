@@ -1,0 +1,46 @@
+"""What every source of pulses tells those who command cameras and those who pair frames: the `TriggerSource` protocol.
+
+One conformance suite (`tests/triggering/sources/test_conformance.py`) runs over every source.
+"""
+
+from typing import Protocol
+
+from rig.clocks import HostNs
+
+
+class CommandTrain(Protocol):
+    """The pulses of a source that tells each camera to expose. It serves one camera, and waits for nothing itself."""
+
+    def until_next_ns(self, now: HostNs) -> int:
+        """Time from `now` to the next pulse, ns; 0 or more."""
+        ...
+
+    def is_due(self, now: HostNs) -> bool:
+        """Whether the camera is to be told now to expose.
+
+        It is so once for each pulse, and not for one that is past by more than the source allows: a pulse without a
+        frame is better than a frame that belongs to none.
+        """
+        ...
+
+
+class TriggerSource(Protocol):
+    """A source of trigger pulses."""
+
+    @property
+    def spread_ns(self) -> int:
+        """How far apart the source may expose the cameras at one pulse, ns; 0: one edge exposes all."""
+        ...
+
+    @property
+    def set_up_only(self) -> bool:
+        """Whether its frames are good for setting up cameras, but not for measuring."""
+        ...
+
+    def commands(self, origin: HostNs) -> CommandTrain | None:
+        """The pulses at which a camera is to be told to expose; None: it sees them by itself.
+
+        Args:
+            origin: time of a pulse, the same for all cameras of the rig.
+        """
+        ...

@@ -1,0 +1,58 @@
+"""Pulses that are commands to each camera, at even times of the host's clock, which all programs of a computer share.
+
+The grabber of each camera gives its commands by itself, so no program waits for another; the pulses of different
+cameras are the same because all count from the same origin.
+"""
+
+from rig.clocks import HostNs
+from rig.settings.trigger import SoftwareTrigger
+
+
+class SoftwareTrain:
+    """The commands to one camera.
+
+    Args:
+        origin: time of a pulse.
+        period_ns: time between two.
+        latest_ns: a command that would begin later than this after its pulse is not given.
+    """
+
+    def __init__(self, origin: HostNs, period_ns: int, latest_ns: int) -> None:
+        self._origin, self._period_ns, self._latest_ns = origin, period_ns, latest_ns
+        self._done: int | None = None
+
+    def until_next_ns(self, now: HostNs) -> int:
+        """See `triggering.sources.seam.CommandTrain.until_next_ns`."""
+        return (self._origin - now) % self._period_ns
+
+    def is_due(self, now: HostNs) -> bool:
+        """See `triggering.sources.seam.CommandTrain.is_due`; only pulses since the first call are due."""
+        pulse, late_ns = divmod(now - self._origin, self._period_ns)
+        if self._done is None:
+            self._done = pulse
+        if pulse == self._done:
+            return False
+        self._done = pulse
+        return late_ns <= self._latest_ns
+
+
+class SoftwarePulses:
+    """See `triggering.sources.seam.TriggerSource`.
+
+    Args:
+        settings: of the rig file.
+    """
+
+    set_up_only = True
+
+    def __init__(self, settings: SoftwareTrigger) -> None:
+        self._settings = settings
+
+    @property
+    def spread_ns(self) -> int:
+        """A command may begin late, and may be on its way for some time."""
+        return self._settings.latest_ns + self._settings.longest_ns
+
+    def commands(self, origin: HostNs) -> SoftwareTrain:
+        """See `triggering.sources.seam.TriggerSource.commands`."""
+        return SoftwareTrain(origin, self._settings.period_ns, self._settings.latest_ns)

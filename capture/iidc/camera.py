@@ -37,7 +37,7 @@ _LOGGER: Final = logging.getLogger("svev.iidc")
 
 
 class IidcCamera:
-    """One FireWire camera, triggered by its input.
+    """One FireWire camera, triggered by its input or, if `software`, by commands (`fire`).
 
     Raises:
         CameraNotFoundError: it is not there; the message tells why.
@@ -45,8 +45,8 @@ class IidcCamera:
         BadInputError: libdc1394 is missing.
     """
 
-    def __init__(self, settings: CameraSettings, ring: CameraRing, rate_hz: float) -> None:
-        self._settings, self._ring = settings, ring
+    def __init__(self, settings: CameraSettings, ring: CameraRing, rate_hz: float, *, software: bool = False) -> None:
+        self._settings, self._ring, self._software = settings, ring, software
         self._underruns = self._frames = 0
         self._notices: list[str] = []
         region = settings.region
@@ -74,7 +74,7 @@ class IidcCamera:
         self._at_close(lambda: device.set_transmission(on=False))  # also what a crashed run left on
         device.set_transmission(on=False)
         self._format = set_video_format(device, settings, rate_hz)
-        set_trigger(device, settings)
+        set_trigger(device, settings, software=self._software)
         set_gain(device, settings)
         self._avt = AvtRegisters(device)
         self._clock: BusClock = PacketTimes()
@@ -124,6 +124,13 @@ class IidcCamera:
         except Dc1394Error as error:
             raise self._gone(error) from None
         return None
+
+    def fire(self) -> None:
+        """See `capture.seam.Commanded.fire`."""
+        try:
+            self._device.fire()
+        except Dc1394Error as error:
+            raise self._gone(error) from None
 
     def latch(self) -> ClockLatch:
         """See `capture.seam.Camera.latch`."""

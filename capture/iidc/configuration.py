@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from capture.iidc.avt import AvtRegisters
 from capture.iidc.bandwidth import FIXED_FORMATS, Need, framerate_index, is_fixed_format, need
 from capture.iidc.device import Device
-from capture.iidc.structures import COLOR_CODING_MONO8, Feature, VideoMode
+from capture.iidc.structures import COLOR_CODING_MONO8, TRIGGER_SOURCE_0, TRIGGER_SOURCE_SOFTWARE, Feature, VideoMode
 from rig.clocks import NS_PER_US
 from rig.errors import CameraError
 from rig.settings.model import CameraSettings
 
 #: Time from the end of the exposure to the first packet (Marlin manual: 500 us +- 62.5 us).
 READOUT_NS = 500_000
+#: Commands, as a number among the trigger sources.
+_SOFTWARE = TRIGGER_SOURCE_SOFTWARE - TRIGGER_SOURCE_0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,14 +104,18 @@ def _check_region(device: Device, camera: CameraSettings) -> None:
         )
 
 
-def set_trigger(device: Device, camera: CameraSettings) -> None:
-    """Let pulses at the camera's input trigger it.
+def set_trigger(device: Device, camera: CameraSettings, *, software: bool) -> None:
+    """Let pulses at the camera's input trigger it, or commands.
 
     Raises:
         CameraError: the camera has no such input, mode or edge.
     """
     if not device.has(Feature.TRIGGER):
         raise CameraError(f"camera {camera.name} has no trigger input: use another camera")
+    if software:  # cameras that do not list commands among their sources take them beside the pulses at their input
+        listed = _SOFTWARE in device.trigger_sources()
+        device.set_trigger(mode=0, source=_SOFTWARE if listed else None, rising=True)
+        return
     source, sources = int(camera.trigger_input.removeprefix("Line")), device.trigger_sources()
     # Cameras older than IIDC 1.31 have one input and do not number it.
     if source not in (sources or [0]):

@@ -200,6 +200,10 @@ class Device:
             raise CameraError(f'{self.name} triggers on rising edges only: set trigger_edge = "rising"')
         self.call("external_trigger_set_power", 1)
 
+    def fire(self) -> None:
+        """Let the camera expose by its software trigger register (IIDC 1.31, Software_Trigger)."""
+        self.call("software_trigger_set_power", 1)
+
     def is_triggered(self) -> bool:
         """Whether pulses trigger the camera."""
         return bool(self._int("external_trigger_get_power"))

@@ -173,6 +173,7 @@ COLOR_CODING_MONO8: Final = 352
 FRAMERATE_1_875: Final = 32  #: each of the next numbers is twice as fast, up to 240
 TRIGGER_MODE_0: Final = 384
 TRIGGER_SOURCE_0: Final = 576
+TRIGGER_SOURCE_SOFTWARE: Final = 580
 FEATURE_MODE_MANUAL: Final = 736
 CAPTURE_POLICY_POLL: Final = 673
 CAPTURE_FLAGS_DEFAULT: Final = 4  #: allocate channel and bandwidth

@@ -81,7 +81,8 @@ class RecorderLoop:
         self._quit = False
         self._warm = self._unreported = 0
         self._alarmed: set[tuple[str, object]] = set()
-        self._spread = SpreadTeller(trigger_source(rig.trigger))
+        self._source = trigger_source(rig.trigger)
+        self._spread = SpreadTeller(self._source)
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -189,7 +190,8 @@ class RecorderLoop:
         """Tell of what has become wrong with clocks, trigger or rate; again when it comes back."""
         names = [camera.name for camera in self._rig.cameras]
         present = {}
-        for said in alarms(health, names, self._rig.trigger.rate_hz):
+        one_edge = not self._source.set_up_only
+        for said in alarms(health, names, self._rig.trigger.rate_hz, one_edge=one_edge):
             present[said.code, said.values.get("camera")] = said
         for key, said in present.items():
             if key not in self._alarmed:

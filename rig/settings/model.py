@@ -16,7 +16,7 @@ from rig.topics import DEFAULT_PUBLISH
 
 Backend = Literal["aravis", "iidc", "sim", "replay"]
 #: The back ends whose cameras can be told to expose.
-COMMANDED: Final[frozenset[Backend]] = frozenset({"aravis"})
+COMMANDED: Final[frozenset[Backend]] = frozenset({"aravis", "iidc"})
 
 #: Less than a chunk of a log holds (`recorder.log.mcap_layout.CHUNK_MAX`), with room for the tag.
 _TRIPLET_BYTES_MAX: Final = 255 << 20
@@ -300,12 +300,19 @@ class RigSettings(StrictModel):
 
     @model_validator(mode="after")
     def _cameras_take_commands(self) -> "RigSettings":
-        deaf = next((camera for camera in self.cameras if camera.backend not in COMMANDED), None)
-        if isinstance(self.trigger, SoftwareTrigger) and deaf is not None:
-            raise ValueError(
-                f'trigger.source "software" is a command to each camera, and {deaf.name} with backend '
-                f'"{deaf.backend}" takes none: use source = "external"'
-            )
+        if not isinstance(self.trigger, SoftwareTrigger):
+            return self
+        for camera in self.cameras:
+            if camera.backend not in COMMANDED:
+                raise ValueError(
+                    f'trigger.source "software" is a command to each camera, and {camera.name} with backend '
+                    f'"{camera.backend}" takes none: use source = "external"'
+                )
+            if camera.iidc.trigger_mode == 1:
+                raise ValueError(
+                    f"iidc.trigger_mode = 1 of {camera.name} exposes for as long as the pulse lasts, and a command "
+                    "has no length: use trigger_mode = 0"
+                )
         return self
 
     @model_validator(mode="after")

@@ -27,7 +27,8 @@ def _aravis(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> O
 def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:
     from capture.iidc.camera import IidcCamera  # noqa: PLC0415
 
-    return lambda: IidcCamera(rig.cameras[index], ring, rig.trigger.rate_hz)
+    software = isinstance(rig.trigger, SoftwareTrigger)
+    return lambda: IidcCamera(rig.cameras[index], ring, rig.trigger.rate_hz, software=software)
 
 
 def _sim(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:

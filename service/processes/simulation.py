@@ -10,6 +10,7 @@ from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 from rig.settings.model import CameraSettings, Region, RigSettings
+from rig.settings.trigger import SoftwareTrigger
 from simrig.programs.recording_truth import RecordingTruth
 from simrig.programs.scene import SimScene
 from simrig.programs.simulated_hill import SimulatedHill
@@ -50,6 +51,7 @@ def simulated_hill(
         {camera.name: camera.address for camera in gige},
         rig.trigger.rate_hz,
         firewire={camera.name: camera.address for camera in firewire},
+        cable=not isinstance(rig.trigger, SoftwareTrigger),  # GigE Vision cameras are told which source to heed
         epoch=epoch,
         width=region.width,
         height=region.height,

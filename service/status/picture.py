@@ -132,9 +132,11 @@ def _pairing_alarm(rig: RigSettings, facts: Facts) -> Statement | None:
     if facts.health is None:
         return None
     names = [camera.name for camera in rig.cameras]
-    said = next(alarms(facts.health.pairing, names, rig.trigger.rate_hz), None)
-    if said is None:
-        said = set_up_only(trigger_source(rig.trigger), facts.health.pairing)
+    source = trigger_source(rig.trigger)
+    said = next(
+        alarms(facts.health.pairing, names, rig.trigger.rate_hz, one_edge=not source.set_up_only),
+        set_up_only(source, facts.health.pairing),
+    )
     return None if said is None else pairing_alarm(said)
 
 

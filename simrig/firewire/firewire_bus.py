@@ -49,12 +49,14 @@ class Bus:
         train: pulses on the trigger line.
         timer: clock of the bus.
         permitted: whether programs may open the nodes.
+        cable: whether the trigger line is connected to the cameras.
 
     Attributes:
         generation: number of the bus's configuration; every reset makes a new one.
     """
 
-    def __init__(self, loop: Loop, train: PulseTrain, timer: CycleTimer, *, permitted: bool) -> None:
+    def __init__(self, loop: Loop, train: PulseTrain, timer: CycleTimer, *, permitted: bool, cable: bool) -> None:
+        self._cable = cable
         self._loop, self._train, self.timer, self._permitted = loop, train, timer, permitted
         self.resources = IsoResources()
         self.generation = 1
@@ -64,11 +66,12 @@ class Bus:
         self._strangers: list[socket.socket] = []  # connections that have not sent their first request
 
     def connect(self, cameras: Mapping[str, Camera]) -> None:
-        """Plug in the cameras, by name, in their order; from now on they see the pulses."""
+        """Plug in the cameras, by name, in their order; from now on they see the pulses of the line."""
         self._cameras = cameras
         for index, camera in enumerate(cameras.values(), 1):
             self._nodes[f"fw{index}"] = camera
-        self._await_pulse(host_now())
+        if self._cable:
+            self._await_pulse(host_now())
 
     def listen(self, server: socket.socket) -> None:
         """Accept connections of programs."""

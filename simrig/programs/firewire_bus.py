@@ -60,7 +60,7 @@ class BusProgram:
         first = scenario.camera_index(next(iter(config.cameras)))
         timer = CycleTimer(DeviceClock(scenario, first, HostNs(config.epoch)).at)
         self._loop = Loop()
-        self._bus = Bus(self._loop, train, timer, permitted=config.permitted)
+        self._bus = Bus(self._loop, train, timer, permitted=config.permitted, cable=config.cable)
         line = Line(train, timer, self._bus.send, self._bus.reset)
         self._cameras = {
             name: Camera(

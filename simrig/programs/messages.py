@@ -42,6 +42,7 @@ class BusConfig(StrictModel):
     test_pattern: bool = Field(False, description="show a plain pattern instead of the hill: costs nothing")
     signature: Signature = Field("big", description="byte order of the secure image signature; none: old firmware")
     permitted: bool = Field(True, description="whether programs may open /dev/fw*")
+    cable: bool = Field(True, description="whether the hill's pulses reach the cameras' inputs")
 
 
 class GigeCamera(Message):

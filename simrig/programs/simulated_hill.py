@@ -57,6 +57,7 @@ class SimulatedHill:
         epoch: host time of hill pulse 0; None: now.
         test_pattern: show a plain pattern instead of the hill.
         permitted: whether programs may open the FireWire nodes.
+        cable: whether the hill's pulses reach the inputs of the FireWire cameras.
         signature: byte order in which FireWire cameras sign their images; "none": their firmware cannot.
         gige: options of the GigE Vision cameras.
 
@@ -74,6 +75,7 @@ class SimulatedHill:
         epoch: HostNs | None = None,
         test_pattern: bool = False,
         permitted: bool = True,
+        cable: bool = True,
         signature: Signature = "big",
         **gige: Unpack[GigeOptions],
     ) -> None:
@@ -89,6 +91,7 @@ class SimulatedHill:
         self._socket = f"@svev-firewire-{os.getpid()}-{uuid.uuid4().hex[:8]}"
         bus = common | {
             "cameras": dict(firewire), "socket": self._socket, "permitted": permitted, "signature": signature,
+            "cable": cable,
         }  # fmt: skip
         self._bus: CameraProcess | None = None
         self._cameras: dict[str, HillCamera] = {}

@@ -184,6 +184,12 @@ def test_the_schema_is_a_schema() -> None:
             'use source = "external"',
             id="cameras that take no commands",
         ),
+        pytest.param(
+            HEAD + CAMERA.replace("aravis", "iidc").replace("192.168.11.2", "000a4701011b0001")
+            + "iidc = { trigger_mode = 1 }\n[trigger]\nsource = 'software'\n",
+            "iidc.trigger_mode = 1 of K1 exposes for as long as the pulse lasts, and a command has no length",
+            id="pulses that last",
+        ),
         pytest.param(HEAD + CAMERA + "[trigger]\nrate_hz = nan\n", 'key "trigger.rate_hz" = nan: ', id="no number"),
         pytest.param(HEAD + CAMERA + "gain_db = -inf\n", 'key "cameras.1.gain_db" = -inf: ', id="infinite"),
         pytest.param(

@@ -60,5 +60,6 @@ def test_two_pulses_of_which_no_camera_has_both() -> None:
     for pulse in range(31, 34):
         feed.all_cameras(pulse, [pulse + 1] * 3)
     (only,) = said(feed)
+    assert not list(alarms(feed.pairer.health(), ["K1", "K2", "K3"], 30.0, one_edge=False))
     assert only.code == "pairing_double"
     assert only.values == {"apart_ms": 3.3}

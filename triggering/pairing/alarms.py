@@ -10,13 +10,14 @@ from rig.phrase import Phrase, phrase
 _RATE: Final = 0.02
 
 
-def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float) -> Iterator[Phrase]:
+def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float, *, one_edge: bool = True) -> Iterator[Phrase]:
     """What is wrong at present, the most important first, each with what to do about it.
 
     Args:
         health: state of the pairing.
         names: of the cameras.
         rate_hz: rate of the pulses that the rig file names.
+        one_edge: one edge exposes all cameras; if not, frames that lie apart are the source's nature, not a fault.
     """
     measured = health.rate_hz
     if measured is not None and abs(measured / rate_hz - 1) > _RATE:
@@ -28,6 +29,8 @@ def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float) -> Itera
                 "the clock of {camera} was set while pulses came, some of its frames are not used: let PTP lock first"
             )
             yield phrase("pairing_clock", text, camera=name)
+    if not one_edge:
+        return
     if health.alarm:
         text = (
             "the frames of one pulse lie up to {spread_ms} ms apart: check the trigger cables and the cameras' delays"

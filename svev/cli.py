@@ -1,7 +1,8 @@
 """The command line `svev COMMAND`: finds the command, runs it, turns errors into one line and an exit code.
 
 Exit codes: 0 done, 2 bad input, 3 a log is damaged or incomplete, `doctor` found a FAIL, or a network is not solvable,
-4 storage failed or an adjustment did not converge, 5 a camera failed, 6 one of our processes died, 130 interrupted.
+4 storage failed or an adjustment did not converge, 5 a camera failed, 6 one of our processes died, 7 tags of a log are
+contradicted by what else is in it, 130 interrupted.
 `--debug` anywhere on the command line shows the traceback of an error. With `--json` an error of `svev ctl` is a JSON
 object on standard output, too.
 """
@@ -30,6 +31,7 @@ from svev.commands.completion import COMPLETE_VARIABLE
 _COMMANDS: Final = {
     "demo": ("demo", "demo", "Record jumps on the simulated hill; needs no camera."),
     "record": ("record", "record", "Record once with the cameras of a rig file."),
+    "rehearse": ("rehearse", "rehearse_command", "Rehearse a recording to the real disk."),
     "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
     "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
     "completion": ("completion", "completion", "Have the shell complete commands and options."),

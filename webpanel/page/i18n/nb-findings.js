@@ -106,6 +106,17 @@ export const findings = {
   check_trial_reset_ends: ["{camera} fortsetter ikke etter en omstart av bussen ({why})", "opptak kobler det til igjen av seg selv; ikke rør kablene så lenge"],
   check_trial_reset_silent: ["{camera}: ingen bilder kom etter en omstart av bussen", "opptak kobler det til igjen av seg selv; ikke rør kablene så lenge"],
 
+  check_rehearsed: ["{pulses} pulser tatt opp, {complete} fullstendige"],
+  check_rehearsed_without: ["{said}: uten {missing}", "sjekk strøm og kabel"],
+  check_rehearsed_partly: ["{said}: {missing}", "se docs/troubleshooting.md om pulser som ikke er fullstendige, for hva årsakene peker på"],
+  check_rehearsed_alarm: ["klokker, trigger eller takt stemmer ikke: {why}", "rett det, og prøv på nytt"],
+  check_read_back: ["{mb} MB lest tilbake og kontrollert"],
+  check_not_read_back: ["det som ble skrevet, kan ikke leses tilbake: {why}", "se i `dmesg`, ta opp på en annen disk"],
+  check_ledger: ["regnskapet stemmer ikke når det regnes ut på nytt: {why}", "se etter en triggerinngang som preller, og etter klokker som stilles mens pulsene går"],
+  check_exposes_on: ["{camera}: eksponerer i {exposure} ms, pulsene kommer hvert {period} ms", "gjør exposure_us kortere, eller senk trigger.rate_hz"],
+  check_dead_time: ["{camera}: eksponering, utlesing og overføring tar {busy} ms, pulsene kommer hvert {period} ms", "det må eksponere mens det sender: mister det pulser, gjør exposure_us kortere eller utsnittet mindre"],
+  check_spread: ["triggertidene innen en puls ligger {typical} us fra hverandre, høyst {largest} us", "se på triggerkabler og -innganger, og på triggerforsinkelser i kameraene"],
+
   check_clock: ["klokken er synkronisert, høyst {ms} ms feil"],
   check_clock_free: ["klokken er ikke synkronisert: opptak får den datoen og tiden som maskinen tror det er", "kjør: sudo apt-get install systemd-timesyncd, og vent et minutt; uten nettverk stilles den med `date`"],
   check_governor: ["{cores} kjerner, governor: {governor}"],

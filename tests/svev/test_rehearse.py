@@ -1,0 +1,89 @@
+"""`svev rehearse`: real processes record to the real disk; what is wrong fails it, and nothing is left behind."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from recorder.checking.verify import verify
+from rig.frame import FrameStatus
+from rig.settings.file import load_rig
+from rig.settings.model import RigSettings
+from svev.cli import main
+from svev.doctor.finding import Level
+from svev.rehearsal import Rehearsed, judge_pulses
+from tests.capture.rigs import write_rig
+from tests.recorder.logs import ALL_OK, OK, write_log
+from tests.support.loopback import Loopback
+
+ABSENT, LOST = FrameStatus.ABSENT, FrameStatus.LOST
+
+
+def rehearse(rig: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, dict[str, Any]]:
+    arguments = ["rehearse", "--rig", str(rig), "--seconds", "1", "--out", str(folder), "--json"]
+    code = main(arguments)
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_a_rig_that_works_is_ready_and_the_disk_is_as_before(
+    tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "recordings"
+    code, found = rehearse(write_rig(tmp_path, "sim", loopback), out, capsys)
+    assert found["pulses"] == 30
+    failed = [finding for finding in found["findings"] if finding["level"] == "FAIL"]
+    # A crowded computer may lose frames, and its disk may be slow; then it has to say so.
+    assert (code, found["ready"]) == ((3, False) if failed else (0, True)), found
+    if not failed:
+        assert found["verdict"].startswith(f"headroom {found['headroom']['disk']:.1f}x (disk), room for ")
+    assert set(found["latency_ms"]) == {"K1", "K2", "K3"}
+    codes = {finding["code"] for finding in found["findings"]}
+    assert {"check_disk_speed", "check_room", "check_read_back", "check_dead_time", "check_spread"} <= codes
+    assert list(out.iterdir()) == []
+
+
+def test_what_is_wrong_is_named_with_what_to_do(
+    tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each fifth frame of K2 is lost, and K3 exposes for longer than a period."""
+    faults = [{"kind": "lost_frame", "camera": "K2", "at_pulse": pulse} for pulse in range(5, 3000, 5)]
+    rig = write_rig(tmp_path, "sim", loopback, faults=faults)
+    rig.write_text(rig.read_text() + "exposure_us = 40000\n")
+    code, found = rehearse(rig, tmp_path / "recordings", capsys)
+    assert (code, found["ready"]) == (3, False)
+    assert found["causes"]["lost"] >= 5
+    wrong = {finding["code"]: finding for finding in found["findings"] if finding["level"] == "FAIL"}
+    assert "K3: it exposes for 40.0 ms, pulses come every 33.3 ms" in wrong["check_exposes_on"]["what"]
+    assert "lost" in wrong["check_rehearsed_partly"]["what"]
+    assert found["verdict"].startswith("not ready: ")
+    assert list((tmp_path / "recordings").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("least", "pulses", "level"),
+    [
+        (None, (ALL_OK,) * 3, Level.PASS),
+        (2, ((OK, ABSENT, OK),) * 3, Level.WARN),
+        (None, ((OK, ABSENT, OK),) * 3, Level.FAIL),
+        (2, (ALL_OK, (OK, ABSENT, OK), ALL_OK), Level.FAIL),
+        (2, ((OK, LOST, OK),) * 3, Level.FAIL),
+    ],
+    ids=["all", "two are enough", "all are needed", "one comes and goes", "it is there and loses frames"],
+)
+def test_a_camera_that_is_not_needed_fails_no_rehearsal(
+    tmp_path: Path, loopback: Loopback, least: int | None, pulses: tuple[tuple[FrameStatus, ...], ...], level: Level
+) -> None:
+    write_log(tmp_path / "log.mcap", pulses)
+    rig: RigSettings = load_rig(write_rig(tmp_path, "sim", loopback))
+    rig = rig.model_copy(update={"trigger": rig.trigger.model_copy(update={"min_cameras": least})})
+    first = next(judge_pulses(rig, [], verify(tmp_path / "log.mcap")))
+    assert first.level is level, first
+
+
+def test_the_verdict_is_one_line_of_figures() -> None:
+    done = Rehearsed(
+        pulses=90, complete=90, causes={}, headroom={"disk": 4.0, "eth1": 2.14}, jumps=143,
+        spread_us={"median": 12.2, "max": 30.0}, latency_ms={}, findings=(),
+    )  # fmt: skip
+    assert done.verdict == "headroom 2.1x (eth1), room for 143 jumps, spread within a pulse 12 us"

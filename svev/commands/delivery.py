@@ -59,7 +59,7 @@ def origin(context: typer.Context, **files: Path | None) -> Provenance:
         f"--{name.replace('_', '-')}" if value is True else f"--{name.replace('_', '-')} {each}"
         for name, value in context.params.items()
         if name not in files and not isinstance(value, Path) and value not in (None, False)
-        for each in (value if isinstance(value, list) else [value])
+        for each in (value if isinstance(value, list | tuple) else (value,))
     ]
     return provenance(" ".join(("svev", str(context.info_name), *options)), files)
 

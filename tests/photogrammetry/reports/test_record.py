@@ -79,6 +79,19 @@ def test_origin_names_files_with_their_checksums(record: Path) -> None:
     assert "Name and signature" in _sections(record)["Signature"]
 
 
+def test_origin_tells_only_options_that_were_given(record: Path, tmp_path: Path) -> None:
+    command = [
+        "adjust",
+        str(record / "hill.json"),
+        "-o",
+        str(tmp_path / "all.json"),
+        "--report",
+        str(tmp_path / "report"),
+    ]
+    assert main(command) == 0
+    assert "\nsvev adjust\n" in _sections(tmp_path)["Origin"]
+
+
 def test_what_was_assumed_stands_before_what_was_found(record: Path) -> None:
     sections = _sections(record)
     assert list(sections).index("Assumed a priori") < list(sections).index("Poses")

@@ -89,6 +89,7 @@ class Assembler:
         rig: the rig.
         rings: one per camera, in the rig's order.
         buffers: memory in which the triplets are composed.
+        epoch: host time from which the trigger source counts its pulses, as the grabbers know it.
 
     Attributes:
         rig: as given.
@@ -99,7 +100,9 @@ class Assembler:
         settled: `pump` has returned every pulse that fired `hold_ns` before this time or earlier.
     """
 
-    def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], buffers: TripletBuffers) -> None:
+    def __init__(
+        self, rig: RigSettings, rings: Sequence[CameraRing], buffers: TripletBuffers, epoch: HostNs = HostNs(0)
+    ) -> None:
         self.rig, self.buffers, self._rings = rig, buffers, rings
         self._names = [camera.name for camera in rig.cameras]
         self._columns = rig.columns()
@@ -118,8 +121,15 @@ class Assembler:
         self._stranded_at = HostNs(host_now() + _STRANDED_NS)
         period = rig.trigger.period_ns
         self.hold_ns = hold_ns(period)
-        spread = trigger_source(rig.trigger).spread_ns
-        self.pairer = Pairer(len(rings), period, hold_ns=self.hold_ns, spread_ns=spread)
+        source = trigger_source(rig.trigger)
+        commands = source.commands(epoch)
+        self.pairer = Pairer(
+            len(rings),
+            period,
+            hold_ns=self.hold_ns,
+            spread_ns=source.spread_ns,
+            exposes=None if commands is None else commands.exposes,
+        )
         self.connected = [False] * len(rings)
         self.settled = HostNs(0)
         self._keeping_up_since: HostNs | None = HostNs(0)

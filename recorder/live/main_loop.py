@@ -69,7 +69,7 @@ class RecorderLoop:
         in_flight, topics = in_flight_triplets(rig), rig.own_topics()
         held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape, topics).slot_bytes)
         self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held, topics)
-        self._assembler = Assembler(rig, rings, self._buffers)
+        self._assembler = Assembler(rig, rings, self._buffers, config.epoch)
         network = rig.network
         keys = None if network.curve_key_file is None else load_keys(network.curve_key_file)
         self._publisher = Publisher(network.publish, network.publish_ipc, queue=in_flight // 4, keys=keys)

@@ -47,7 +47,7 @@ class GrabberConfig(Message):
         camera: index of the camera to grab from.
         ring: descriptor of the camera's ring.
         doorbell: eventfd that wakes the recorder.
-        epoch: host time of the simulated hill's pulse 0, and of a replay's first pulse.
+        epoch: host time of the simulated hill's pulse 0, of a replay's first pulse, and of a pulse that is a command.
     """
 
     rig: RigSettings
@@ -82,12 +82,14 @@ class RecorderConfig(Message):
         rings: descriptor of each camera's ring.
         doorbell: eventfd that the grabbers ring.
         options: what the recorder does beside recording.
+        epoch: as the grabbers have it.
     """
 
     rig: RigSettings
     rings: tuple[int, ...]
     doorbell: int
     options: RecorderOptions
+    epoch: HostNs
 
 
 class Calibration(msgspec.Struct, frozen=True, kw_only=True):

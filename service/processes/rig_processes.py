@@ -77,7 +77,7 @@ class RigProcesses:
     Args:
         rig: the rig.
         on_event: called for each camera that comes or goes and each process that is started again.
-        epoch: host time of pulse 0 of the simulated hill or the replayed log; now if left out.
+        epoch: host time of pulse 0 of the simulated hill, the replayed log or the commands; now if left out.
         recorder: what the recorder does beside recording.
         environment: variables that grabbers of simulated FireWire cameras need in their environment.
 
@@ -266,7 +266,7 @@ class RigProcesses:
 
     def _start_recorder(self) -> None:
         fds, options = tuple(ring.fd for ring in self._rings), self._options
-        config = RecorderConfig(rig=self._rig, rings=fds, doorbell=self._doorbell, options=options)
+        config = RecorderConfig(rig=self._rig, rings=fds, doorbell=self._doorbell, options=options, epoch=self._epoch)
         preview = () if options.preview is None else (options.preview,)
         self._processes.start(
             ProcessSpec(

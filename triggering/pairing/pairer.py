@@ -7,7 +7,7 @@ been read again. The class is pure: records and times go in, decisions come out.
 """
 
 from bisect import bisect_left, insort
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from operator import attrgetter
 from typing import Final
 
@@ -23,7 +23,7 @@ from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
 from triggering.pairing.silence import SILENT_PERIODS, Silence
 from triggering.pairing.undelivered import undelivered_times
 from triggering.pairing.unwatched import unwatched_time
-from triggering.timeline.pulse_train import PulseTrain
+from triggering.timeline.pulse_train import CLOCKS_NS, PulseTrain
 
 __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 
@@ -46,13 +46,23 @@ class Pairer:
             periods, so that the camera's next frame can tell what became of a missing one.
         tolerance_ns: frames whose trigger times are further apart are never of one pulse; 0.3 periods if left out.
         spread_ns: how far apart the trigger itself may expose the cameras at one pulse.
+        exposes: whether the trigger can have exposed a camera at a time that is known so well, ns; None: at any time.
+            Other frames are of commands that came too late, and are refused: they could be taken for those of the next
+            pulse.
 
     Raises:
         BadInputError: an argument makes no sense.
     """
 
     def __init__(
-        self, cameras: int, period_ns: int, *, hold_ns: int, tolerance_ns: int | None = None, spread_ns: int = 0
+        self,
+        cameras: int,
+        period_ns: int,
+        *,
+        hold_ns: int,
+        tolerance_ns: int | None = None,
+        spread_ns: int = 0,
+        exposes: Callable[[HostNs, float], bool] | None = None,
     ) -> None:
         tolerance = 1 if tolerance_ns is None else tolerance_ns
         if (
@@ -65,7 +75,7 @@ class Pairer:
                 f"pairing of {cameras} cameras, period {period_ns} ns, tolerance {tolerance_ns} ns, hold {hold_ns} ns "
                 "cannot work: give at least one camera, a tolerance under half the period and a longer hold"
             )
-        self._least_hold_ns, self._nominal_ns = hold_ns, period_ns
+        self._least_hold_ns, self._nominal_ns, self._exposes = hold_ns, period_ns, exposes
         self._train = PulseTrain(period_ns, tolerance_ns, spread_ns)
         self._tracks = [CameraTrack(self._train) for _ in range(cameras)]
         self._held = HeldFrames(cameras)
@@ -271,6 +281,11 @@ class Pairer:
     def _place(self, camera: int, record: Record, time: HostNs) -> OpenPulse | None:
         """Assign a frame, triggered at `time`, to its pulse; None if there is no open one."""
         track = self._tracks[camera]
+        if self._exposes is not None and not self._exposes(
+            time, max(CLOCKS_NS, 2 * track.clock.uncertainty_since(time))
+        ):
+            track.refuse(record)
+            return None
         # A frame that was still queued when its camera was disconnected is used, but its id proves nothing.
         if track.connected and not track.follow(record, time):
             return None

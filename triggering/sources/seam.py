@@ -23,6 +23,15 @@ class CommandTrain(Protocol):
         """
         ...
 
+    def exposes(self, time: HostNs, within_ns: float) -> bool:
+        """Whether a camera that was told in time can have exposed at `time`.
+
+        Args:
+            time: trigger time of a frame.
+            within_ns: limit of its error.
+        """
+        ...
+
 
 class TriggerSource(Protocol):
     """A source of trigger pulses."""

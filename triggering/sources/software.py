@@ -15,10 +15,12 @@ class SoftwareTrain:
         origin: time of a pulse.
         period_ns: time between two.
         latest_ns: a command that would begin later than this after its pulse is not given.
+        spread_ns: so long after its pulse a camera exposes at the latest.
     """
 
-    def __init__(self, origin: HostNs, period_ns: int, latest_ns: int) -> None:
-        self._origin, self._period_ns, self._latest_ns = origin, period_ns, latest_ns
+    def __init__(self, origin: HostNs, period_ns: int, latest_ns: int, spread_ns: int) -> None:
+        self._origin, self._period_ns = origin, period_ns
+        self._latest_ns, self._spread_ns = latest_ns, spread_ns
         self._done: int | None = None
 
     def until_next_ns(self, now: HostNs) -> int:
@@ -34,6 +36,10 @@ class SoftwareTrain:
             return False
         self._done = pulse
         return late_ns <= self._latest_ns
+
+    def exposes(self, time: HostNs, within_ns: float) -> bool:
+        """See `triggering.sources.seam.CommandTrain.exposes`."""
+        return (time - self._origin + within_ns) % self._period_ns <= self._spread_ns + 2 * within_ns
 
 
 class SoftwarePulses:
@@ -55,4 +61,4 @@ class SoftwarePulses:
 
     def commands(self, origin: HostNs) -> SoftwareTrain:
         """See `triggering.sources.seam.TriggerSource.commands`."""
-        return SoftwareTrain(origin, self._settings.period_ns, self._settings.latest_ns)
+        return SoftwareTrain(origin, self._settings.period_ns, self._settings.latest_ns, self.spread_ns)

@@ -25,7 +25,7 @@ _ALARM: Final = 0.25
 _WIDEST: Final = 0.3
 #: Clocks that are read four times a second agree to this, ns: half a round trip, drift in between, and the same again
 #: by which frames may have trimmed them.
-_CLOCKS_NS: Final = 500_000
+CLOCKS_NS: Final = 500_000
 #: Spread of the trigger that is allowed for until it is known, ns.
 _SPREAD_NS: Final = 2_500_000
 #: Afterwards: so many times the spread that this share of the pulses keeps. The spread of trigger times that are even
@@ -59,7 +59,7 @@ class PulseTrain:
         self.last: HostNs | None = None
         self.split: tuple[HostNs, int] | None = None
         self._limit_ns = self.widest_ns = _WIDEST * period_ns if widest_ns is None else float(widest_ns)
-        self._least_ns = _CLOCKS_NS + spread_ns
+        self._least_ns = CLOCKS_NS + spread_ns
         self.tolerance_ns = min(max(_SPREAD_NS, self._least_ns), self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
         self._intervals: deque[int] = deque(maxlen=_RHYTHM)

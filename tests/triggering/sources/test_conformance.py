@@ -66,10 +66,33 @@ def test_what_is_past_when_a_camera_is_ready_is_not_made_up_for(source: str) -> 
 
 
 @pytest.mark.parametrize("source", COMMANDING)
+def test_a_frame_of_a_command_that_was_held_up_is_damaged_and_not_in_the_next_pulses_triplet(source: str) -> None:
+    settings = _settings(source)
+    made = trigger_source(settings)
+    exposes = _train(source).exposes
+    feed = _Feed(Pairer(3, settings.period_ns, hold_ns=250 * MS, spread_ns=made.spread_ns, exposes=exposes))
+    for pulse in range(60):
+        fired = ORIGIN + pulse * settings.period_ns
+        feed.frame(0, fired + MS, pulse)
+        feed.frame(1, fired + MS, pulse)
+        if pulse % 10 == 5:
+            feed.frame(2, fired + settings.period_ns - 2 * MS, pulse)  # nearer to the next pulse's frames
+        elif pulse % 10 != 6:  # it was still busy
+            feed.frame(2, fired + MS, pulse)
+        feed.advance(fired + 20 * MS)
+    feed.end(ORIGIN + 100 * settings.period_ns)
+    seen = [{outcome.record.slot for outcome in pulse.outcomes if outcome.record} for pulse in feed.closed]
+    assert seen == [{pulse} for pulse in range(60)]
+    outcomes = [pulse.outcomes[2].status.value for pulse in feed.closed]
+    assert sorted(outcomes) == ["damaged"] * 6 + ["missed"] * 6 + ["ok"] * 48
+
+
+@pytest.mark.parametrize("source", COMMANDING)
 def test_no_frame_gets_into_another_pulses_triplet_however_far_apart_they_are_exposed(source: str) -> None:
     settings = _settings(source)
     made, chance = trigger_source(settings), random.Random(2)
-    feed = _Feed(Pairer(3, settings.period_ns, hold_ns=250 * MS, spread_ns=made.spread_ns))
+    exposes = _train(source).exposes
+    feed = _Feed(Pairer(3, settings.period_ns, hold_ns=250 * MS, spread_ns=made.spread_ns, exposes=exposes))
     whole = 0
     for pulse in range(3000):
         fired = ORIGIN + pulse * settings.period_ns

@@ -4,7 +4,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -27,6 +27,7 @@ from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
 from rig.transport.messages import GoesOn, LogPart, StartRecording, TellResult
+from rig.utc_clock import utc_fields
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse
 
@@ -72,13 +73,12 @@ class Recording:
         self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
         self._anchor = UtcAnchor.take()
         self.failure: StorageError | None = None
-        self.trouble = ""
+        self.trouble = self.continues = ""
         self.ledger = Ledger()
         self._handed = 0
         self._in_flight: deque[_InFlight] = deque()
         self._kept: deque[Held] = deque()
         self._ended = self._stopped = self.mishap = False
-        self.continues = ""
         self._last_before = self._first = PulseNumber(0)
         self._begin(order) if after is None else self._go_on(after)
         self.ledger.follows(self._last_before)
@@ -372,12 +372,12 @@ class Recording:
 
 
 def _open(path: Path, description: LogDescription, buffers: TripletBuffers) -> LogWriter:
-    """Make a log; its folder too, which may have been deleted while a recording was running."""
+    """Make a log, with what is known of UTC; its folder too, which may have been deleted meanwhile."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise storage_error(path, error) from error
-    return LogWriter(path, description, buffers)
+    return LogWriter(path, replace(description, rig={**description.rig, **utc_fields()}), buffers)
 
 
 def _in_background(make: Callable[[], LogWriter]) -> "Future[LogWriter]":

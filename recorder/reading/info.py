@@ -1,6 +1,6 @@
 """Says in a moment what a log holds: reads its tags and events, no pixels."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from recorder.reading.triplets import tag_of
 from rig.tag import TripletTag
 from rig.topics import RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
 from rig.transport import wire
+from rig.utc_clock import UtcState
 from triggering.ledger import Ledger, runs_from_text
 
 
@@ -70,6 +71,11 @@ class LogInfo:
         return tuple(camera.name for camera in self.first.cameras) if self.first else ()
 
     @property
+    def utc(self) -> UtcState | None:
+        """How well the recording computer knew UTC; None: the log does not say."""
+        return UtcState.from_fields(self.rig)
+
+    @property
     def missing_pulses(self) -> int:
         """Number of pulses without a tag."""
         return sum(last - first + 1 for first, last in self.ledger.missing)
@@ -96,6 +102,7 @@ class LogInfo:
             "cameras": list(self.cameras),
             "session": self.session,
             "rig": self.rig,
+            "utc": None if self.utc is None else asdict(self.utc),
             "trouble": self.trouble,
             "messages": self.messages,
             "library": self.library,

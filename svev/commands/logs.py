@@ -154,7 +154,12 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
         yield "offset", f"{spread['median']} us median, {spread['max']} us at most, from the pulse"
     if found.shape is not None:
         yield "triplet", f"{found.shape[1]} x {found.shape[0]} px of {', '.join(found.cameras)}"
-    for name, fields in (("session", found.session), ("rig", found.rig)):
+    if found.utc is not None:
+        yield "utc", found.utc.in_words()
+    elif "utc" in found.rig:
+        yield "utc", f"{found.rig['utc']}: {found.rig.get('utc_why', '')}"
+    rig = {key: value for key, value in found.rig.items() if not key.startswith("utc")}
+    for name, fields in (("session", found.session), ("rig", rig)):
         if text := ", ".join(f"{key} {value}" for key, value in fields.items() if value):
             yield name, text
 

@@ -14,34 +14,17 @@ from pathlib import Path
 
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
+from rig.utc_clock import utc_state
 from service.processes.memory import available_bytes, memory_needed
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 
-_UNSYNCHRONIZED = 0x0040  # STA_UNSYNC, sys/timex.h
 _FAST = {"performance", "schedutil", "ondemand"}
-
-
-class _Timex(ctypes.Structure):
-    """The first fields of `struct timex` (adjtimex(2)); `rest` is room for the other fields."""
-
-    _fields_ = (
-        ("modes", ctypes.c_uint),
-        ("offset", ctypes.c_long),
-        ("freq", ctypes.c_long),
-        ("maxerror", ctypes.c_long),
-        ("esterror", ctypes.c_long),
-        ("status", ctypes.c_int),
-        ("rest", ctypes.c_byte * 256),
-    )
 
 
 def look_at_clock() -> Iterator[Finding]:
     """Is the clock synchronized? It only dates recordings; pulses are paired by a clock that never jumps."""
-    clock = _Timex()
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.adjtimex(ctypes.byref(clock)) < 0:
-        raise OSError(ctypes.get_errno(), f"adjtimex: {os.strerror(ctypes.get_errno())}")
-    if clock.status & _UNSYNCHRONIZED:
+    clock = utc_state()
+    if not clock.synchronized:
         yield warning(
             Topic.TIME,
             "check_clock_free",
@@ -50,7 +33,7 @@ def look_at_clock() -> Iterator[Finding]:
         )
     else:
         what = "the clock is synchronized, off by at most {ms:.0f} ms"
-        yield passed(Topic.TIME, "check_clock", what, ms=clock.maxerror / 1000)
+        yield passed(Topic.TIME, "check_clock", what, ms=clock.at_most_us / 1000)
 
 
 def look_at_processor() -> Iterator[Finding]:

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from recorder.checking.verify import verify
+from recorder.reading.info import info
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.events import Event
@@ -70,6 +71,8 @@ def test_every_pulse_is_recorded_whole_and_unmixed(tmp_path: Path, loopback: Loo
     assert result["bytes"] == Path(result["log"]).stat().st_size
     report = verify(Path(result["log"]))
     assert report.verdict == "clean", report
+    assert report.recounted.agrees, report.recounted.differences
+    assert info(Path(result["log"])).utc is not None
     hill = hill_pulses(Path(result["log"]), load_rig(path))
     assert [len(seen) for seen in hill.values()] == [1] * 60
     first = min(hill[PulseNumber(1)])
@@ -139,6 +142,8 @@ def test_each_fault_is_recorded_with_its_cause(
     }
     assert found == expected
     assert set(expected.values()) == {"missed", "lost", "damaged"}
+    recounted = verify(log).recounted
+    assert recounted.agrees, recounted.differences
     assert _true_pulses(log) == {pulse: min(seen) for pulse, seen in hill.items()}
     what = {"missed_pulse": "a camera does not see a pulse", "lost_frame": "a frame is lost in transfer"}
     what["damaged_frame"] = "a frame comes damaged"
@@ -178,7 +183,9 @@ def test_a_killed_grabber_costs_its_own_frames_only(
     fates = [[camera.status for camera in tag.cameras] for tag, _ in triplets(log)]
     assert all(FrameStatus.ABSENT not in (first, last) for first, _, last in fates), "the others go on"
     assert fates[-1][1] is not FrameStatus.ABSENT
-    assert not verify(log).damaged
+    report = verify(log)
+    assert not report.damaged
+    assert report.recounted.agrees, report.recounted.differences
     lost = f"none: {result['causes']['absent']} frames of K2, absent"
     said = next(line for line in err.splitlines() if "SIGKILL" in line)
     fault_table.tell(PROCESSES, f"kill -9 of a grabber ({backend})", lost=lost, said=said, code=code)

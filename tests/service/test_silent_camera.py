@@ -57,6 +57,7 @@ def test_a_camera_that_falls_silent_is_noticed_and_comes_back(
     assert len(lost) == lost[-1] - lost[0] + 1, "one hole, and whole on both sides"
     report = verify(path)
     messages = [event.message.partition(":")[0] for event in report.events if event.name == "K2"]
+    assert report.recounted.agrees, report.recounted.differences
     assert messages[0] == "silent"
     assert messages[-1] == "connected"
     noticed = next(event for event in report.events if event.name == "K2")

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -14,8 +14,9 @@ import zmq
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from rig.frame import FrameStatus
+from rig.utc_clock import UtcState
 from svev.cli import main
-from tests.recorder.logs import ALL_OK, LOST, OK, write_log
+from tests.recorder.logs import ALL_OK, DESCRIPTION, LOST, OK, write_log
 from tests.support.loopback import Loopback
 
 
@@ -68,6 +69,14 @@ def test_info_prints_the_ledger_of_each_camera(log: Path, svev: Svev) -> None:
     assert "ledger     K2 2 ok, 1 lost, 0 missed, 0 damaged, 0 absent" in svev("info", log).stdout
     found = json.loads(svev("info", log, "--json").stdout)
     assert found["ledger"]["K1"] == {"ok": 3, "lost": 0, "missed": 0, "damaged": 0, "absent": 0}
+
+
+def test_info_says_how_well_utc_is_known(tmp_path: Path, svev: Svev) -> None:
+    fields = UtcState(True, "chrony", 0.0, 20.0, 812.0).to_fields()
+    write_log(tmp_path / "log.mcap", description=replace(DESCRIPTION, rig={"name": "hill", **fields}))
+    lines = svev("info", tmp_path / "log.mcap").stdout.splitlines()
+    assert "utc        synchronized by chrony, off by 20 us (estimated), 812 us at most; 0 us being corrected" in lines
+    assert "rig        name hill" in lines
 
 
 def test_a_recomputed_ledger_that_agrees_is_one_line(log: Path, svev: Svev) -> None:

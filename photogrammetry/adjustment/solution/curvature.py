@@ -28,6 +28,7 @@ _STRAIGHT: Final = 0.1
 #: The ends of the true interval may lie this part of the sigmas' interval elsewhere; sigmas are not known better.
 _SKEW: Final = 0.25
 _EXACT: Final = 1e-3  # least ratio of sigma0: the residuals of error-free simulated data are rounding
+_STEPS: Final = 3  # of the iteration with a parameter held: from so near a start the square sum is right to 1 %
 _SEARCHED: Final = 4  # steps to an end of the interval
 _FARTHER: Final = 3.0  # times as far in one step, at most
 _CLOSE: Final = 0.02  # part of REACH: nearer to an end is not looked for
@@ -97,38 +98,44 @@ def _curvature(a: Adjustment) -> Curvature:
             if np.all(np.abs(sizes - 1.0) <= _SKEW):
                 continue
             intervals.append(Interval(a.network.cameras[camera].name, parameter, low, high))
-            for state in profile.met:
+            for state in profile.met.values():
                 freed = _optimum(a.problem, state, a.free.defect)
                 if freed is not None and a.problem.square_sum(freed) < least:
                     best, least = freed, a.problem.square_sum(freed)
     return Curvature(tuple(intervals), best)
 
 
-def _optimum(problem: Problem, start: State, defect: int, *, single: bool = False) -> State | None:
-    """The optimum next to a state, or where one step leads; None if there is none.
-
-    Args:
-        problem: the network made ready.
-        start: start values.
-        defect: number of free similarity transformations.
-        single: one step only.
-    """
+def _optimum(problem: Problem, start: State, defect: int) -> State | None:
+    """The optimum next to a state; None if there is none."""
     try:
         with only_sound_numbers():
-            return one_step(problem, start, defect)[0] if single else solve(problem, start, defect)[0]
+            return solve(problem, start, defect)[0]
     except (NotConvergedError, NotSolvableError):
         return None
+
+
+def _nearly(problem: Problem, state: State, defect: int, steps: int) -> State | None:
+    """Where a few steps towards the optimum lead; None if they lead nowhere."""
+    try:
+        with only_sound_numbers():
+            for _ in range(steps):
+                state, arrived = one_step(problem, state, defect)
+                if arrived:
+                    break
+    except (NotConvergedError, NotSolvableError):
+        return None
+    return state
 
 
 class _Profile:
     """The square sum along one parameter, everything else adjusted to it.
 
     Attributes:
-        met: the states at the ends of its interval.
+        met: the states at the ends of its interval, by their side.
     """
 
     def __init__(self, a: Adjustment, camera: int, index: int, parameter: Parameter) -> None:
-        self.met: list[State] = []
+        self.met: dict[float, State] = {}
         self._a, self._camera, self._parameter = a, camera, parameter
         columns = a.problem.unknowns.camera[camera]
         self._column = int(columns[columns >= 0][index])
@@ -148,22 +155,22 @@ class _Profile:
             return False
         if abs(self._rise(state) - REACH**2) <= _STRAIGHT * REACH**2:
             return True
-        beside = _optimum(self._held, state, self._a.free.defect, single=True)
+        beside = _nearly(self._held, state, self._a.free.defect, 1)
         return beside is not None and abs(np.sqrt(max(self._rise(beside), 0.0)) - REACH) <= 0.5 * _SKEW * REACH
 
     def end(self, sign: float) -> float:
         """The end of the interval on one side; infinite if it was not met."""
-        reach, rise, state = REACH, 0.0, None
+        reach, rise, near = REACH, 0.0, self._at(sign * REACH)
         for _ in range(_SEARCHED):
-            found = self._adjusted(sign * reach)
+            found = self._adjusted(near)
             if found is None:
                 break
-            state, rise = found, float(np.sqrt(max(self._rise(found), 0.0)))
+            rise = float(np.sqrt(max(self._rise(found), 0.0)))
+            self.met[sign] = found
             if abs(rise - REACH) <= _CLOSE * REACH:
                 break
-            reach *= float(np.clip(REACH / max(rise, _TINY), 1.0 / _FARTHER, _FARTHER))
-        if state is not None:
-            self.met.append(state)
+            farther = reach * float(np.clip(REACH / max(rise, _TINY), 1.0 / _FARTHER, _FARTHER))
+            reach, near = farther, self._at(sign * (farther - reach), found)
         met = abs(rise - REACH) <= _SKEW * REACH
         return self._parameter.value + sign * reach * self._parameter.sigma if met else sign * float("inf")
 
@@ -178,15 +185,15 @@ class _Profile:
     def _held(self) -> Problem:
         return _holding(self._a.problem, self._camera, self._parameter.name)
 
-    def _at(self, sigmas: float) -> State:
-        return self._a.problem.unknowns.moved(self._a.state, sigmas * self._line)
+    def _at(self, sigmas: float, state: State | None = None) -> State:
+        """A state, or the optimum, moved by so many sigmas of the parameter along the line."""
+        return self._a.problem.unknowns.moved(self._a.state if state is None else state, sigmas * self._line)
 
-    def _adjusted(self, sigmas: float) -> State | None:
-        """Everything else adjusted, the parameter so many sigmas from its optimum; None where there is no optimum."""
-        start = self._at(sigmas)
+    def _adjusted(self, start: State) -> State | None:
+        """Everything else adjusted, the parameter as in `start`; None where there is no optimum."""
         if np.any(start.interior[:, 0] <= 0.0):
             return None
-        return _optimum(self._held, start, self._a.free.defect)
+        return _nearly(self._held, start, self._a.free.defect, _STEPS)
 
     def _rise(self, state: State) -> float:
         a = self._a

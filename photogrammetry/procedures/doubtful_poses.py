@@ -10,6 +10,7 @@ import numpy as np
 from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.gross_errors.snooping import BENT
 from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
+from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.diagnosis import (
     Defect,
     DefectKind,
@@ -17,7 +18,7 @@ from photogrammetry.network.diagnosis import (
     NotSolvableError,
     RefusedError,
 )
-from photogrammetry.network.model import Network
+from photogrammetry.network.model import Camera, Network
 from photogrammetry.network.selection import with_interior
 from photogrammetry.start_values.resection import resect
 from photogrammetry.start_values.search import complete
@@ -141,12 +142,18 @@ def _exchanges(network: Network) -> Iterator[tuple[tuple[str, str], Network]]:
     images = [replace(image, position=None, rotation=None) for image in network.images]
     for i, k in combinations(range(len(images)), 2):
         one, other = images[i], images[k]
-        lenses = [network.cameras[image.camera].interior for image in (one, other)]
-        if np.array_equal(lenses[0], lenses[1]):
+        if _alike(network.cameras[one.camera], network.cameras[other.camera]):
             continue
         changed = list(images)
         changed[i], changed[k] = replace(one, camera=other.camera), replace(other, camera=one.camera)
         yield (one.name, other.name), replace(network, images=tuple(changed))
+
+
+def _alike(one: Camera, other: Camera) -> bool:
+    """Whether nothing tells two cameras apart: they differ in nothing but parameters that both estimate freely."""
+    free = [all(name in camera.estimate and name not in camera.sigma for camera in (one, other)) for name in INTERIOR]
+    sides = [(camera.distortion, camera.balance) for camera in (one, other)]
+    return bool(np.all(free | (one.interior == other.interior))) and sides[0] == sides[1]
 
 
 def _ratio(network: Network) -> float:

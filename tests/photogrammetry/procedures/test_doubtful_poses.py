@@ -12,8 +12,10 @@ from photogrammetry.network.diagnosis import NotSolvableError
 from photogrammetry.network.file_writer import write_network
 from photogrammetry.network.model import Camera, Image, ImageFrame, ImageObservations, Network, Point, Role
 from photogrammetry.procedures.orientation import orient
+from photogrammetry.procedures.stages import snoop_network
 from rig.viewing import look_at
 from svev.cli import main
+from tests.photogrammetry.synthetic import hill
 
 _PLACE = np.array([-12.0, -38.0, 4.0])
 _BALLS = np.array([[2.0, -3.0, -5.0], [17.0, 2.0, -4.0], [9.0, 4.0, 2.0], [5.0, 5.0, -1.0]])
@@ -67,3 +69,23 @@ def test_further_images_of_the_same_three_points_do_not_decide() -> None:
     network = replace(one, images=(*one.images, Image("hill-2", 0)), observations=twice)
     with pytest.raises(NotSolvableError, match="image hill-2 shows three points only"):
         orient(network)
+
+
+def test_cameras_that_are_all_unknown_are_not_exchanged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Self-calibration with one wrong survey point: no images without survey are tried with each other's cameras.
+
+    Nothing tells cameras apart whose interior orientations are start values only, and each trial takes seconds.
+    """
+
+    def forbidden(network: Network) -> Network:
+        raise AssertionError("tries exchanged cameras")
+
+    monkeypatch.setattr("photogrammetry.procedures.doubtful_poses.complete", forbidden)
+    network = hill(8).network
+    cameras = tuple(replace(camera, estimate=("c", "x0", "y0")) for camera in network.cameras)
+    points = list(network.points)
+    points[10] = replace(points[10], xyz=np.asarray(points[10].xyz, dtype=float) + np.array([0.3, -0.4, 0.2]))
+    images = tuple(replace(image, position=None, rotation=None) for image in network.images)
+    outcome = snoop_network(replace(network, cameras=cameras, points=tuple(points), images=images))
+    assert [gone.network.points[gone.blunder.suspect.index].name for gone in outcome.removed] == ["B11"]
+    assert outcome.adjustment.ratio < 1.2

@@ -69,7 +69,7 @@ def adjusted_sections(outcome: Outcome, wishes: Wishes = NOTHING) -> tuple[Secti
         Section("Assumed a priori", assumptions(a)),
         Section("Global test", _global_test(a)),
         Section("Network", network_drawings(a)),
-        Section("Interior orientation", interior_parts(a)),
+        Section("Interior orientation", interior_parts(outcome)),
         Section("Poses", pose_parts(a)),
         Section("Points", (*point_parts(a), *mean_parts(a))),
         Section("Image coverage", coverage_parts(a)),

@@ -35,7 +35,8 @@ table{{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-num
 th,td{{padding:.2rem .7rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--faint)}}
 th{{color:var(--soft);font-weight:600}}
 th:first-child,td:first-child{{text-align:left;padding-left:0}}
-@media(max-width:40rem){{table{{font-size:.8rem}}th,td{{padding:.2rem .35rem}}}}
+@media(max-width:40rem){{table{{font-size:.8rem}}th,td{{padding:.2rem .35rem}}\
+th:first-child,td:first-child{{position:sticky;left:0;background:var(--paper)}}}}
 .drawings{{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1.2rem;margin:1rem 0}}
 figure{{margin:0;min-width:0;break-inside:avoid}}
 figcaption{{color:var(--soft);font-size:.85rem;line-height:1.35;margin-top:.3rem}}

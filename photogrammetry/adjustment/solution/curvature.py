@@ -52,13 +52,26 @@ class Interval:
     high: float
 
     @property
+    def ends(self) -> str:
+        """Its ends in words."""
+        known = [f"{end:.4g}" if np.isfinite(end) else "" for end in (self.low, self.high)]
+        match known:
+            case ["", ""]:
+                return "anywhere"
+            case ["", high]:
+                return f"below {high}"
+            case [low, ""]:
+                return f"above {low}"
+            case _:
+                return f"between {' and '.join(known)}"
+
+    @property
     def words(self) -> str:
         """What is wrong, and what to do."""
         p = self.parameter
-        ends = (f"{end:.6g}" if np.isfinite(end) else "any value" for end in (self.low, self.high))
         return (
             f"camera {self.camera}: {p.name} {p.value:.6g} ± {p.sigma:.2g} is beyond its linearisation: 95 % lie "
-            f"between {' and '.join(ends)}; add images rolled by 90 degrees or points in depth, or hold {p.name}"
+            f"{self.ends}; add images rolled by 90 degrees or points in depth, or hold {p.name}"
         )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogrammetry.adjustment.equations.relations import Kind
+from photogrammetry.adjustment.run import Outcome
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.geometry.rotation import omega_phi_kappa, omega_phi_kappa_jacobian
@@ -18,15 +19,16 @@ _ANGLES = ("omega", "phi", "kappa")
 _MATRIX_DECIMALS = 9  # of a rotation that is held: rounding moves a point at 100 m by less than a micrometre
 
 
-def interior_parts(a: Adjustment) -> tuple[str | Table, ...]:
-    """All parameters of each camera: estimated, observed or held."""
-    rows: list[tuple[str, ...]] = []
+def interior_parts(outcome: Outcome) -> tuple[str | Table, ...]:
+    """All parameters of each camera: estimated, observed or held; with the interval where the sigma does not hold."""
+    a, rows = outcome.adjustment, list[tuple[str, ...]]()
+    intervals = {(one.camera, one.parameter.name): f", 95 % {one.ends}" for one in outcome.intervals}
     for i, camera in enumerate(a.network.cameras):
         estimated = {parameter.name: parameter for parameter in a.parameters(i)[0]}
         for name, value in zip(INTERIOR, a.state.interior[i].tolist(), strict=True):
             found = estimated.get(name)
             shown, sigma = with_sigma(value, 0.0 if found is None else found.sigma)
-            how = "held" if found is None else "estimated"
+            how = "held" if found is None else f"estimated{intervals.get((camera.name, name), '')}"
             if found is not None and name in camera.sigma:
                 how += f", observed {camera.interior[INTERIOR.index(name)]:.6g} ± {camera.sigma[name]:.3g}"
             significant = "" if found is None or name == "c" else "no" if found.insignificant else "yes"

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import Lens, linearise
 from photogrammetry.planning.description import Description, read_description
 from photogrammetry.planning.monte_carlo import simulate
-from photogrammetry.planning.plan import Plan, plan_from
+from photogrammetry.planning.plan import Plan, in_picture, plan_from
 from photogrammetry.planning.prediction import Sigmas, adjusted_plan, predict
 from photogrammetry.planning.step_three import error_free_sights, intersect_flight, intersect_samples
 from photogrammetry.reports.document import Drawing
@@ -162,10 +163,95 @@ def test_the_documented_verdict_is_what_the_networks_give() -> None:
         for axis in axes
     ]
     cases += [plumb, levelled]
-    for row, case in zip(documented, cases, strict=True):
-        plan = plan_from(validate(Description, case, "rods"))
+    plans = [plan_from(validate(Description, case, "rods")) for case in cases]
+    plans.append(_with_observed_poses(plans[0]))
+    for row, plan in zip(documented, plans, strict=True):
         points = predict(plan, adjusted_plan(plan)).points.mean(axis=1)[[0, 8, 16]]
         assert row == pytest.approx(10.0 * points.ravel(), abs=0.0051)
+    assert documented[-1].mean() == pytest.approx(0.165, abs=0.0051)
+    known = tuple(replace(camera, estimate=()) for camera in plans[-1].network.cameras)
+    plan = replace(plans[-1], network=replace(plans[-1].network, cameras=known))
+    assert 10.0 * predict(plan, adjusted_plan(plan)).points.mean() == pytest.approx(0.13, abs=0.0051)
+
+
+def _with_observed_poses(plan: Plan) -> Plan:
+    """The plan with the pseudo-observations of appendix D.2: poses to 0.5 dm and 0.1 gon."""
+    position, angles = np.full(3, 0.05), np.full(3, 0.1 * np.pi / 200.0)
+    images = tuple(replace(image, sigma_position=position, sigma_angles=angles) for image in plan.network.images)
+    return replace(plan, network=replace(plan.network, images=images))
+
+
+#: As printed: camera positions of table 1, table 2 (dm), and the interior orientations of table 1 (px).
+_POSITIONS = np.array([[0.43, 0.48, 0.42], [0.44, 0.52, 0.39], [0.84, 0.69, 0.72]])
+_POINTS = np.array(
+    [
+        *([0.25, 0.20, 0.15], [0.15, 0.15, 0.15], [0.25, 0.25, 0.20]),
+        *([0.15, 0.15, 0.10], [0.10, 0.10, 0.10], [0.20, 0.20, 0.15]),
+    ]
+)
+_INTERIOR = np.array([[1.9, 3.8, 3.8], [2.0, 3.8, 3.7], [5.0, 10.0, 11.0]])
+
+
+def _misfit(ours: Floats, printed: Floats) -> float:
+    return float(np.sqrt(np.mean(np.log(ours / printed) ** 2)))
+
+
+def _tables(descriptions: Sequence[dict[str, Any]]) -> tuple[float, int]:
+    """Misfit of the camera positions, and how many of the 18 figures of table 2 are within rounding."""
+    found = []
+    for case in descriptions:
+        plan = plan_from(validate(Description, case, "hill"))
+        found.append(predict(plan, adjusted_plan(plan)))
+    points = np.concatenate([10.0 * each.points.mean(axis=1)[[0, 8, 16]] for each in found])
+    return _misfit(10.0 * found[0].positions, _POSITIONS), int((np.abs(points - _POINTS) < 0.0251).sum())
+
+
+def test_the_documented_other_hill_is_nearer_to_table_2() -> None:
+    here = [read_toml(NETWORKS / f"hill-{i}.toml") for i in (1, 2)]
+    there = json.loads(json.dumps(here))
+    for description in there:
+        for camera, azimuth in zip(description["cameras"], np.radians((-82.0, -62.0, -40.0)), strict=True):
+            (image,) = camera["images"]
+            sight = 0.9 * np.subtract(image["X0"], image["look_at"])
+            turned = np.hypot(*sight[:2]) * np.array((np.cos(azimuth), np.sin(azimuth)))
+            image["look_at"] = [9.5, 0.0, -3.0]
+            image["X0"] = [float(x) for x in np.add(image["look_at"], (*turned, sight[2]))]
+        for ball in description["balls"]:
+            x, y, z = ball["X"]
+            ball["X"] = [2.0 + 9.0 * (x - 0.5) / 17.5, y, z]
+        plan = plan_from(validate(Description, description, "hill"))
+        assert plan.flight is not None
+        seen = [plan.flight.points, plan.flight.skis, np.array([ball["X"] for ball in description["balls"]])]
+        cameras, images = plan.network.cameras, plan.network.images
+        assert all(in_picture(cameras[image.camera], image, xyz)[1].all() for image in images for xyz in seen)
+    text = " ".join(PAGE.read_text().split())
+    misfit, cells = _tables(here)
+    nearer, more = _tables(there)
+    assert f"{more} of the 18 figures" in text
+    assert f"({cells} above)" in text
+    assert f"root mean square of ln(ours / printed): {nearer:.2f} for {misfit:.2f})" in text
+
+
+def test_the_documented_other_frame_is_nearer_to_table_1() -> None:
+    here = read_toml(NETWORKS / "laboratory.toml")
+    there = json.loads(json.dumps(here))
+    grid = np.stack(np.meshgrid((-0.25, 0.0, 0.25), (-0.25, 0.0, 0.25), (-0.15, 0.0, 0.15)), axis=-1).reshape(-1, 3)
+    there["balls"] = [{"name": f"F{i}", "role": "tie", "X": xyz} for i, xyz in enumerate(grid.tolist())]
+    for camera, distance, aside in zip(there["cameras"], (2.0, 2.0, 4.0), (45.0, 45.0, 85.0), strict=True):
+        for image, azimuth, roll in zip(
+            camera["images"], np.radians((-aside, 0.0, aside)), (90.0, 0.0, 90.0), strict=True
+        ):
+            image["X0"] = [float(distance * np.sin(azimuth)), float(-distance * np.cos(azimuth)), 0.0]
+            image["roll_deg"] = roll
+    found = []
+    for case in (here, there):
+        plan = plan_from(validate(Description, case, "laboratory"))
+        found.append(predict(plan, adjusted_plan(plan)).interior[:, :3])
+    text = " ".join(PAGE.read_text().split())
+    misfit, nearer = (_misfit(sigmas, _INTERIOR) for sigmas in found)
+    assert f"root mean square of ln(ours / printed): {misfit:.2f}." in text
+    lists = [", ".join(f"{sigma:.1f}" for sigma in column) for column in found[1].T]
+    assert f"it is {nearer:.2f}: c {lists[0]}; x0 {lists[1]}; y0 {lists[2]}." in text
 
 
 def test_the_command_prints_tables_and_json(capsys: pytest.CaptureFixture[str]) -> None:

@@ -31,7 +31,7 @@ def _record(rig: Path, out: Path, seconds: float) -> tuple[int, dict[str, Any], 
 def test_three_cameras_are_recorded_unmixed_and_their_spread_is_told(
     tmp_path: Path, loopback: Loopback, backend: str
 ) -> None:
-    path = write_rig(tmp_path, backend, loopback, source="software", rate_hz=5.0)
+    path = write_rig(tmp_path, backend, loopback, source="software", rate_hz=8.0)
     code, result, said = _record(path, tmp_path / "logs", 2)
     assert code in {0, 5}, said  # 5: the busy machine gave no camera a command in time
     assert result["alarms"] == []

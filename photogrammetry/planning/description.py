@@ -81,6 +81,20 @@ class SkiEntry(StrictModel):
     length: Positive
 
 
+class ObstacleEntry(StrictModel):
+    """A box with faces along the axes that hides what is behind it: two opposite corners."""
+
+    name: Name
+    corner: Triple
+    opposite: Triple
+
+    @model_validator(mode="after")
+    def _has_a_volume(self) -> "ObstacleEntry":
+        if not np.all(np.subtract(self.corner, self.opposite)):
+            raise ValueError(f'obstacle "{self.name}" is flat; give corners that differ in X, Y and Z')
+        return self
+
+
 class StickEntry(StrictModel):
     """The points and skis that define the angles of Fig. 6; O lies midway between the points of the two skis."""
 
@@ -134,6 +148,7 @@ class Description(StrictModel):
     balls: list[BallEntry] = Field(default=[])
     rods: list[RodEntry] = Field(default=[])
     differences: list[DifferenceEntry] = Field(default=[])
+    obstacles: list[ObstacleEntry] = Field(default=[])
     jumper: JumperEntry | None = None
 
     def target_names(self) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogrammetry.geometry.camera_model import INTERIOR, Lens, camera_coordinates, image_point
+from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.model import (
     AXES,
     Camera,
@@ -20,7 +20,8 @@ from photogrammetry.network.model import (
     Role,
 )
 from photogrammetry.planning.description import Description, JumperEntry
-from rig.arrays import Flags, Floats, Integers
+from photogrammetry.planning.sight import Obstacle, in_picture, in_sight
+from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 from rig.viewing import look_at
 
@@ -66,12 +67,14 @@ class Plan:
         network: step 2 (or the laboratory's step 1): true values, error-free observations.
         sigma: of an image coordinate (px).
         flight: step 3; None without a jumper.
+        obstacles: what hides targets and jumper.
     """
 
     name: str
     network: Network
     sigma: float
     flight: Flight | None
+    obstacles: tuple[Obstacle, ...] = ()
 
 
 def plan_from(description: Description) -> Plan:
@@ -86,34 +89,44 @@ def plan_from(description: Description) -> Plan:
         for index, entry in enumerate(description.cameras)
         for number, image in enumerate(entry.images, 1)
     )
+    obstacles = tuple(
+        Obstacle(each.name, np.minimum(each.corner, each.opposite), np.maximum(each.corner, each.opposite))
+        for each in description.obstacles
+    )
     points, distances, differences = _targets(description)
     flight = _flight(description, len(points))
     if flight is not None:
-        _check_flight(flight, cameras, images)
+        _check_flight(flight, cameras, images, obstacles)
         for position, name in np.argwhere(flight.tie >= 0):
             points.append(Point(f"{flight.names[name]} at {position + 1}", Role.TIE, flight.points[position, name]))
     network = Network(
         cameras,
         images,
         tuple(points),
-        _observations(cameras, images, points, description.sigma.image),
+        _observations(cameras, images, points, description.sigma.image, obstacles),
         tuple(distances),
         tuple(differences),
         Datum(DatumType(description.datum)),
         description.length_unit,
     )
-    return Plan(description.name, network, description.sigma.image, flight)
+    return Plan(description.name, network, description.sigma.image, flight, obstacles)
 
 
-def in_picture(camera: Camera, image: Image, xyz: Floats) -> tuple[Floats, Flags]:
-    """Image coordinates (..., 2) of points (..., 3), and whether they lie in front and within the picture (...)."""
-    if image.position is None or image.rotation is None or camera.size is None:
-        raise ValueError("a planned image has a pose and a size")
-    lens = Lens(camera.interior, np.asarray(camera.balance), np.asarray(False))
-    with np.errstate(all="ignore"):
-        xy = image_point(lens, image.rotation, image.position, xyz)
-        front = camera_coordinates(image.rotation, image.position, xyz)[..., 2] < 0.0
-    return xy, front & (np.abs(xy) <= np.array(camera.size) / 2.0).all(axis=-1)
+def hidden(plan: Plan) -> dict[str, list[str]]:
+    """What obstacles hide: names of targets, jumper points and skis (with their position) by image."""
+    found: dict[str, list[str]] = {}
+    network, flight = plan.network, plan.flight
+    moving = set() if flight is None else set(flight.tie.ravel().tolist())
+    places = [(point.name, np.asarray(point.xyz)) for i, point in enumerate(network.points) if i not in moving]
+    for names, xyz in () if flight is None else ((flight.names, flight.points), (flight.ski_names, flight.skis)):
+        places += [(f"{name} at {t + 1}", xyz[t, i]) for t in range(len(xyz)) for i, name in enumerate(names)]
+    for image in network.images if plan.obstacles else ():
+        camera = network.cameras[image.camera]
+        for name, xyz in places:
+            shown = in_picture(camera, image, xyz)[1]
+            if np.any(shown & ~in_sight(plan.obstacles, camera, image, xyz)[1]):
+                found.setdefault(image.name, []).append(name)
+    return found
 
 
 def _camera(name: str, c: float, size: list[int], estimate: Sequence[str]) -> Camera:
@@ -184,22 +197,30 @@ def _stick(jumper: JumperEntry) -> Stick | None:
     )
 
 
-def _check_flight(flight: Flight, cameras: tuple[Camera, ...], images: tuple[Image, ...]) -> None:
+def _check_flight(
+    flight: Flight, cameras: tuple[Camera, ...], images: tuple[Image, ...], obstacles: tuple[Obstacle, ...]
+) -> None:
     """Raise BadInputError unless two images show every point, and two images every ski as a whole."""
     for names, xyz in ((flight.names, flight.points[:, :, None]), (flight.ski_names, flight.skis)):
-        seen = np.sum([in_picture(cameras[image.camera], image, xyz)[1].all(axis=-1) for image in images], axis=0)
+        seen = np.sum(
+            [in_sight(obstacles, cameras[image.camera], image, xyz)[1].all(axis=-1) for image in images], axis=0
+        )
         for position, which in np.argwhere(seen < 2):
             raise BadInputError(
                 f"{names[which]} at position {position + 1} of the path is in {seen[position, which]} images; "
-                "aim the cameras so that two see it, or shorten the path"
+                "aim the cameras so that two see it, or shorten the path; obstacles may hide it"
             )
 
 
 def _observations(
-    cameras: tuple[Camera, ...], images: tuple[Image, ...], points: list[Point], sigma: float
+    cameras: tuple[Camera, ...],
+    images: tuple[Image, ...],
+    points: list[Point],
+    sigma: float,
+    obstacles: tuple[Obstacle, ...],
 ) -> ImageObservations:
     xyz = np.array([point.xyz for point in points], dtype=float).reshape(-1, 3)
-    shown = [in_picture(cameras[image.camera], image, xyz) for image in images]
+    shown = [in_sight(obstacles, cameras[image.camera], image, xyz) for image in images]
     where = [(i, p) for i, (_, seen) in enumerate(shown) for p in np.flatnonzero(seen)]
     xy = np.array([shown[i][0][p] for i, p in where]).reshape(-1, 2)
     image, point = (np.array([pair[k] for pair in where], dtype=np.intp) for k in (0, 1))

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from photogrammetry.network.model import ImageFrame, Network, Point, Role
-from photogrammetry.planning.plan import Plan, in_picture
+from photogrammetry.planning.plan import Plan
+from photogrammetry.planning.sight import in_picture
 from rig.arrays import Floats
 
 

@@ -20,7 +20,8 @@ from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.jumper.stick_model import body_angles, direction_of
 from photogrammetry.network.diagnosis import NotConvergedError
 from photogrammetry.network.model import Network
-from photogrammetry.planning.plan import Flight, Plan, Stick, in_picture
+from photogrammetry.planning.plan import Flight, Plan, Stick
+from photogrammetry.planning.sight import in_sight
 from rig.arrays import Flags, Floats
 
 _MOST_STEPS = 30
@@ -64,7 +65,7 @@ def error_free_sights(plan: Plan, flight: Flight) -> Sights:
     network = plan.network
 
     def sighted(xyz: Floats) -> tuple[Floats, Flags]:
-        both = [in_picture(network.cameras[image.camera], image, xyz) for image in network.images]
+        both = [in_sight(plan.obstacles, network.cameras[image.camera], image, xyz) for image in network.images]
         return np.stack([xy for xy, _ in both], axis=1), np.stack([seen for _, seen in both], axis=1)
 
     points, points_seen = sighted(flight.points.reshape(-1, 3))

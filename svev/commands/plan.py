@@ -9,7 +9,7 @@ from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network.file_writer import write_network
 from photogrammetry.planning.description import read_description
 from photogrammetry.planning.monte_carlo import SAMPLES, simulate
-from photogrammetry.planning.plan import Plan, plan_from
+from photogrammetry.planning.plan import Plan, hidden, plan_from
 from photogrammetry.planning.prediction import adjusted_plan, predict
 from photogrammetry.planning.simulated import simulated_network
 from photogrammetry.reports.document import as_text
@@ -62,10 +62,14 @@ def plan(
         console.complain(f"not converged: {error}")
         raise typer.Exit(NOT_CONVERGED) from None
     tables = plan_report(planned, adjusted, predicted, simulated, samples)
+    unseen = hidden(planned)
     if as_json:
-        console.print_json(plan_to_json(planned, predicted, simulated, samples))
+        more = {"hidden": unseen} if planned.obstacles else {}
+        console.print_json(plan_to_json(planned, predicted, simulated, samples) | more)
     else:
         console.say_text(as_text(tables))
+        for image, names in unseen.items():
+            console.say(f"hidden from {image}: {', '.join(names)}")
     for line in written(lambda: tables, report):
         console.say(line, aside=as_json)
 

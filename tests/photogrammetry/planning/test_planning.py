@@ -15,8 +15,9 @@ from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import Lens, linearise
 from photogrammetry.planning.description import Description, read_description
 from photogrammetry.planning.monte_carlo import simulate
-from photogrammetry.planning.plan import Plan, in_picture, plan_from
+from photogrammetry.planning.plan import Plan, hidden, plan_from
 from photogrammetry.planning.prediction import Sigmas, adjusted_plan, predict
+from photogrammetry.planning.sight import Obstacle, in_picture
 from photogrammetry.planning.step_three import error_free_sights, intersect_flight, intersect_samples
 from photogrammetry.reports.document import Drawing
 from photogrammetry.reports.plan import plan_report, worst_disagreement
@@ -402,3 +403,47 @@ def test_what_is_not_determined_is_said_with_exit_code_3(tmp_path: Path, capsys:
     (tmp_path / "network.toml").write_text(text)
     assert main(["plan", str(tmp_path / "network.toml")]) == 3
     assert "not solvable" in capsys.readouterr().err
+
+
+def test_an_obstacle_hides_what_is_behind_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A tower between K2 and the ball B9, and nothing but that ball and parts of the flight behind it."""
+    text = (NETWORKS / "hill-1.toml").read_text()
+    plan, _, predicted = _planned("hill-1")
+    k2, ball = plan.network.images[1].position, next(p.xyz for p in plan.network.points if p.name == "B9")
+    middle = 0.8 * np.asarray(k2) + 0.2 * np.asarray(ball)
+    tower = f'[[obstacles]]\nname = "tower"\ncorner = {(middle - 0.1).tolist()}\nopposite = {(middle + 0.1).tolist()}\n'
+    (tmp_path / "tower.toml").write_text(text.replace("[[cameras]]", tower + "[[cameras]]", 1))
+    hiding = plan_from(read_description(tmp_path / "tower.toml"))
+    rays = {(i, p) for i, p in zip(plan.network.observations.image, plan.network.observations.point, strict=True)}
+    left = {(i, p) for i, p in zip(hiding.network.observations.image, hiding.network.observations.point, strict=True)}
+    names = {(plan.network.images[i].name, plan.network.points[p].name) for i, p in rays - left}
+    assert ("K2-1", "B9") in names
+    assert {image for image, _ in names} == {"K2-1"}
+    assert len(names) < 5
+    assert {name for name in hidden(hiding)["K2-1"] if " at " not in name} == {ball for _, ball in names}
+    assert not hidden(plan)
+    with_tower = predict(hiding, adjusted_plan(hiding))
+    assert np.all(with_tower.positions >= predicted.positions)
+    assert with_tower.positions[1].sum() > predicted.positions[1].sum()
+    assert main(["plan", str(tmp_path / "tower.toml"), "--samples", "100"]) == 0
+    assert "hidden from K2-1: B9" in capsys.readouterr().out
+    behind = tower.replace(str((middle + 0.1).tolist()), str((middle - 0.1).tolist()))
+    (tmp_path / "flat.toml").write_text(text.replace("[[cameras]]", behind + "[[cameras]]", 1))
+    with pytest.raises(BadInputError, match='obstacle "tower" is flat'):
+        read_description(tmp_path / "flat.toml")
+
+
+def test_a_box_hides_along_any_direction() -> None:
+    box = Obstacle("box", np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 1.0]))
+    eye = np.array([-5.0, 0.0, 0.0])
+    ahead = np.array(
+        [[5.0, 0.0, 0.0], [0.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [5.0, 5.0, 0.0], [-9.0, 0.0, 0.0], [5.0, 0.0, 1.9]]
+    )
+    assert box.hides(eye, ahead).tolist() == [True, True, False, False, False, True]
+    rng = np.random.default_rng(1)
+    eyes, ends = rng.uniform(-4.0, 4.0, (2, 300, 3))
+    along = np.linspace(0.0, 1.0, 2001)[:, None]
+    for one, other in zip(eyes, ends, strict=True):
+        depth = (1.0 - np.abs(one + along * (other - one)).max(axis=1)).max()  # how far the way goes into the box
+        if abs(depth) > 0.01:
+            assert bool(box.hides(one, other)) == (depth > 0.0)

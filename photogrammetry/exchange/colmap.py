@@ -138,7 +138,8 @@ def _points(path: Path) -> dict[str, dict[str, Any]]:
 
 def _rotation(quaternion: Floats) -> Floats:
     """(3, 3) of a quaternion w, x, y, z of any length."""
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    bounded = quaternion / np.abs(quaternion).max()
+    w, x, y, z = bounded / np.linalg.norm(bounded)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -1,6 +1,7 @@
 """Files of other programs: what is carried over projects as the other program does, and comes back as it was."""
 
 import json
+import random
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -338,3 +339,38 @@ def test_the_imported_is_adjusted(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert result["global_test"]["verdict"] == "agrees"
     assert main(["network", "import", str(model), "-o", str(model / "images.txt")]) == 2
     assert "is an input and would be overwritten" in capsys.readouterr().err
+
+
+_ODD = ("nan", "1e400", "-1", "0", "", "x", "1e300", "9" * 30, "[", "}", "é", "1e-320", "\x00", "null", "true")
+
+
+@pytest.mark.parametrize("kind", ["colmap", "photomodeler", "opencv", "aicon", "survey"])
+def test_a_spoilt_file_is_read_or_refused_in_one_line(kind: str, tmp_path: Path) -> None:
+    """Words exchanged, lost and added at random; never a crash, and never a warning of numpy."""
+    network, chance = hill(1).network, random.Random(kind)
+    board = {"extrinsic_parameters": np.ones((2, 6)), "image_points": np.ones((2, 3, 2))}
+    (tmp_path / "export.txt").write_text(_photomodeler(network))
+    (tmp_path / "balls.csv").write_text("name,X,Y,Z,sigma\nB1,1,2,3,0.1\nB2,1,2,4,0.1\n")
+    files = {
+        "colmap": list(_colmap(tmp_path / "model", network).iterdir()),
+        "photomodeler": [tmp_path / "export.txt"],
+        "opencv": [_opencv(tmp_path / "K1.yml", K, D, **board)],
+        "aicon": _aicon(tmp_path),
+        "survey": [tmp_path / "balls.csv"],
+    }[kind]
+    said = []
+    for _ in range(60):
+        path = chance.choice(sorted(files))
+        text = path.read_text()
+        words = re.split(r"(\s+|,|;)", text)
+        for _ in range(chance.choice((1, 1, 2, 5))):
+            place = chance.randrange(len(words))
+            words[place : place + chance.choice((0, 1, 1, 40))] = [chance.choice(_ODD)]
+        path.write_text("".join(words))
+        try:
+            import_network(files, sigma=0.5, sigma_mm=0.001)
+        except BadInputError as error:
+            said.append(str(error))
+        path.write_text(text)
+    assert len(said) > 10
+    assert "\n" not in "".join(said)

@@ -151,6 +151,19 @@ class _Camera:
     between: list[tuple[PulseNumber, FrameStatus]] = field(default_factory=list)
     gaps: list[_Gap] = field(default_factory=list)
     breaks: list[UtcNs] = field(default_factory=list)
+    soonest: int | None = None  #: time from a pulse to the arrival of its frame, ns
+    latest: int = 0
+
+    def arrived(self, frame: _Frame) -> None:
+        """Note how long after its pulse a frame came."""
+        late = frame.host - frame.time
+        self.soonest = late if self.soonest is None else min(self.soonest, late)
+        self.latest = max(self.latest, late)
+
+    @property
+    def scatter(self) -> int:
+        """By how much the arrivals of its frames vary, ns."""
+        return 0 if self.soonest is None else self.latest - self.soonest
 
     def gain(self) -> float:
         """How much faster than the pulses' clock the camera's runs, as a factor."""
@@ -223,14 +236,17 @@ class Recount:
             cut, camera.first = True, frame
         else:
             by_clock = (frame.device - last.device) / camera.gain()
-            by_pulse = frame.time - last.time
-            cut = abs(by_clock - by_pulse) >= nearest / 2
-            if cut and _is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
-                off = (by_clock - by_pulse) / 1e6
-                why = f"clock, number and arrival say that it was triggered {abs(off):.1f} ms "
+            off = by_clock - (frame.time - last.time)
+            cut = abs(off) >= nearest / 2
+            if cut and (frames := _slept_through(camera, last, frame, off)):
+                why = f"{frames} frames that its numbers tell of came while this computer's clock stood still"
+                self._differs(Difference(last.pulse, camera.name, FrameStatus.OK, None, why))
+            elif cut and _is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
+                why = f"clock and number say that it was triggered {abs(off) / 1e6:.1f} ms "
                 why += "after this pulse" if off > 0 else "before this pulse"
                 self._differs(Difference(frame.pulse, camera.name, FrameStatus.OK, None, why))
                 return
+        camera.arrived(frame)
         camera.states[FrameStatus.OK] += 1
         steps = 0 if last is None else frame.pulse - last.pulse
         if cut or camera.between or not _goes_on(last, frame, steps):
@@ -291,6 +307,16 @@ def _goes_on(last: _Frame | None, frame: _Frame, steps: int) -> bool:
     if last is None or _id_step(last.frame_id, frame.frame_id) != steps:
         return False
     return last.triggers is None or frame.triggers is None or frame.triggers - last.triggers == steps
+
+
+def _slept_through(camera: _Camera, last: _Frame, frame: _Frame, off: float) -> int:
+    """How many frames the camera took while the clock stood still that times pulses and arrivals; 0: it went on.
+
+    That clock stops while the computer is suspended; then pulses and arrivals agree, and the camera's clock went on.
+    """
+    frames = _id_step(last.frame_id, frame.frame_id) - (frame.pulse - last.pulse)
+    by_arrival = (frame.host - last.host) - (frame.time - last.time)
+    return frames if frames > 0 and off > 2 * camera.scatter and abs(by_arrival) < off / 2 else 0
 
 
 def _is_of_another_pulse(last: _Frame, frame: _Frame, by_clock: float, nearest: int, *, certain: bool) -> bool:

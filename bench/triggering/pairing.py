@@ -22,7 +22,7 @@ CASES: Final = (
     Case("clocks step by one period", steps_ms=_STEPS[7:]),
     Case("clocks step by 37 s", steps_ms=(37_000.0, -37_000.0)),
     Case("clocks step, arrivals spread", steps_ms=_STEPS, latency_ms=(5.0, 45.0)),
-    *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (99.0, 101.0, 105.0, 110.0)),
+    *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (31.5, 99.0, 101.0, 105.0, 110.0)),
     *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (70.0, 95.0, 120.0)),
     *(Case(f"{rate:g} Hz, the rig file says 30", rates_hz=(rate,)) for rate in (15.0, 7.5)),
     Case("30, then 50, then 120 Hz", rates_hz=(30.0, 50.0, 120.0)),

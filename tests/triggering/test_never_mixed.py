@@ -1,4 +1,7 @@
-"""Clocks that are set, rates that the rig file does not name, double pulses: no triplet mixes pulses."""
+"""Clocks that are set, rates that the rig file does not name, double pulses: no triplet mixes pulses.
+
+The ledger, recomputed from the tags, accuses nobody of more than what the pairing itself found out too late.
+"""
 
 import math
 from dataclasses import replace
@@ -7,35 +10,88 @@ import pytest
 
 from bench.triggering.hill import Case, Hill, Result
 from bench.triggering.pairing import CASES, pairing_table, run_case
+from tests.support.reliability import FaultTable
+from tests.triggering.tags import recount, tags_of
+from triggering.pairing.alarms import alarms
 from triggering.pairing.belief import Witness
+from triggering.pairing.outcomes import ClosedPulse
+from triggering.recount import Recounted
 
 PULSES = 1500
+NAMES = ["K1", "K2", "K3"]
 #: Triplets that each step, restart or suspension may cost: two frames show it, and those on their way are not used.
 COST = 4
 
 
-def run(case: Case) -> tuple[Result, int]:
-    """The result of a case whose troubles come every four seconds, and the number of troubles."""
+#: Pulses between two looks at what is wrong; that is told for ten seconds.
+LOOK = 30
+
+
+class WatchedHill(Hill):
+    """A hill whose decided pulses are kept.
+
+    Attributes:
+        closed: the decided pulses.
+        said: the first thing that was said of clocks, trigger or rate; empty: nothing.
+    """
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(replace(case, every_s=4.0), PULSES)
+        self.closed: list[ClosedPulse] = []
+        self.said = ""
+
+    def _check(self, closed: list[ClosedPulse]) -> None:
+        for pulse in closed:
+            self.closed.append(pulse)
+            if not self.said and len(self.closed) % LOOK == 0:
+                health = self._pairer.health()
+                self.said = next((said.text for said in alarms(health, NAMES, self._case.rate_hz)), "")
+        super()._check(closed)
+
+    @property
+    def contradicted(self) -> int:
+        """Frames that the pairing itself called lost before their numbers said that there were none."""
+        return sum(camera.contradicted for camera in self._pairer.health().cameras)
+
+
+def troubles_of(case: Case) -> int:
+    """How many troubles come, one every four seconds."""
     rates = [1 / rate for rate in case.rates_hz]
     seconds = PULSES * sum(rates) / len(rates)
-    troubles = math.ceil(seconds / 4) if case.steps_ms or case.reboots or case.suspended else 0
-    return Hill(replace(case, every_s=4.0), PULSES).run(), troubles
+    return math.ceil(seconds / 4) if case.steps_ms or case.reboots or case.suspended else 0
+
+
+def told(result: Result, said: str, found: Recounted) -> tuple[str, str]:
+    """What is lost, and what alarm and ledger say, for the table of faults."""
+    lost = f"{result.not_found} of {result.possible} triplets, 0 mixed" if result.not_found else "none, 0 mixed"
+    first = "the ledger agrees" if found.agrees else f"the ledger: {found.differences[0].in_words()}"
+    return lost, f"{said}; {first}" if said else first
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_no_triplet_mixes_pulses_and_every_possible_one_is_found(case: Case) -> None:
-    result, troubles = run(case)
+def test_no_triplet_mixes_pulses_and_every_possible_one_is_found(case: Case, fault_table: FaultTable) -> None:
+    hill, troubles = WatchedHill(case), troubles_of(case)
+    result = hill.run()
     assert result.possible > PULSES // 4
     assert result.mixed == 0
     assert result.invented == 0
     assert result.not_found <= COST * troubles
+    found = recount(tags_of(hill.closed))
+    asleep = len(NAMES) * troubles if case.suspended else 0
+    assert found.disagreements <= hill.contradicted + asleep, found.differences
+    assert case.reboots or found.unproven <= len(NAMES) * COST * (troubles + 1)
+    lost, said = told(result, hill.said, found)
+    fault_table.tell("Clocks, rates and pulses", case.name, lost=lost, said=said)
 
 
 def test_the_bench_sees_mixed_triplets(monkeypatch: pytest.MonkeyPatch) -> None:
     """A pairing that believes every clock mixes them."""
     monkeypatch.setattr(Witness, "believes", lambda *_: True)
     case = next(case for case in CASES if case.name == "clocks step by one period")
-    assert run(case)[0].mixed > 0
+    hill = WatchedHill(case)
+    assert hill.run().mixed > 0
+    wrong = [each for each in recount(tags_of(hill.closed)).differences if each.found is None]
+    assert wrong, "what is mixed is named afterwards"
 
 
 def test_the_table_of_the_bench() -> None:

@@ -1,7 +1,7 @@
 """The ledger recomputed from a log's tags and events: it agrees with what is true, and names every tag that is not."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 import pytest
@@ -12,41 +12,11 @@ from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 from tests.triggering.simulation import Hill, Outage, Run, Scenario
-from triggering.recount import Recount, Recounted
+from tests.triggering.tags import OK, recount, tags_of
 
-LOST, MISSED, DAMAGED, ABSENT, OK = (
-    FrameStatus.LOST, FrameStatus.MISSED, FrameStatus.DAMAGED, FrameStatus.ABSENT, FrameStatus.OK,
-)  # fmt: skip
+LOST, MISSED, DAMAGED, ABSENT = FrameStatus.LOST, FrameStatus.MISSED, FrameStatus.DAMAGED, FrameStatus.ABSENT
 #: What becomes of single frames, (pulse, camera); all others come.
 FAULTS = {(100, 1): LOST, (120, 1): MISSED, (140, 1): DAMAGED, (160, 0): LOST, (160, 2): MISSED}
-
-
-def tags_of(run: Run) -> list[TripletTag]:
-    """The tags that the recorder would write."""
-    return [
-        TripletTag(
-            PulseNumber(pulse.number), UtcNs(pulse.time), "", "r", (48, 64 * len(pulse.outcomes)),
-            tuple(
-                CameraTag(f"K{place + 1}", (64 * place, 64 * place + 64), outcome.status) if outcome.record is None
-                else CameraTag(
-                    f"K{place + 1}", (64 * place, 64 * place + 64), OK, outcome.record.frame_id,
-                    None if outcome.record.trigger_count < 0 else outcome.record.trigger_count,
-                    outcome.record.device_time, UtcNs(outcome.record.host_time), 0.0,
-                )
-                for place, outcome in enumerate(pulse.outcomes)
-            ),
-        )
-        for pulse in run.closed
-    ]  # fmt: skip
-
-
-def recount(tags: Iterable[TripletTag], events: Iterable[Event] = ()) -> Recounted:
-    account = Recount()
-    for event in events:
-        account.happened(event)
-    for tag in tags:
-        account.add(tag)
-    return account.finish()
 
 
 def changed(tags: Sequence[TripletTag], pulse: int, change: Callable[[CameraTag], CameraTag]) -> list[TripletTag]:
@@ -61,7 +31,7 @@ def changed(tags: Sequence[TripletTag], pulse: int, change: Callable[[CameraTag]
 @pytest.fixture(scope="module")
 def tags() -> list[TripletTag]:
     run = Run(Hill(Scenario(seed=1, pulses=240, faults=FAULTS)))
-    found = tags_of(run)
+    found = tags_of(run.closed)
     assert {(tag.pulse - 1, place) for tag in found for place, c in enumerate(tag.cameras) if c.status is not OK} == {
         *FAULTS
     }
@@ -78,7 +48,7 @@ def test_it_agrees_with_the_truth_whatever_was_lost_or_missed(trigger_counts: bo
     )  # fmt: skip
     run = Run(Hill(scenario))
     assert not run.silent
-    found = recount(tags_of(run))
+    found = recount(tags_of(run.closed))
     assert found.agrees, found.differences
     assert found.pulses == 1500
     truth = [Counter(fates[camera] for fates in run.hill.fates) for camera in range(3)]
@@ -140,7 +110,7 @@ def test_absent_needs_an_event_that_says_so() -> None:
     """K2 is frozen for a second; its clock and its numbers go on as if nothing had happened."""
     run = Run(Hill(Scenario(seed=2, pulses=200, outages=(Outage(1, 2.0, 3.0, None),))))
     assert run.silent == {1}
-    frozen = tags_of(run)
+    frozen = tags_of(run.closed)
     away = [tag for tag in frozen if tag.cameras[1].status is ABSENT]
     assert len(away) > 20
     silent = Event(UtcNs(away[2].time), Level.WARNING, "K2", "silent: three pulses behind the other cameras")

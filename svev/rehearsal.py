@@ -4,13 +4,15 @@ The doctor examines parts at rest. A rehearsal has the cameras, their processes,
 work together as in a recording, and then asks the log itself what came of it.
 """
 
+import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from ipaddress import IPv4Address
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, Final
 
 from recorder.checking.verify import VerifyReport, verify
 from recorder.reading.items import Chunk
@@ -35,6 +37,8 @@ _ODD_SPREAD, _WRONG_SPREAD = 0.05, 0.25
 #: Of each packet of `network.packet_size` bytes, IP, UDP and GVSP headers; and on the wire, beside it: preamble,
 #: Ethernet header, checksum, gap between packets.
 _HEADERS, _FRAMING = 20 + 8 + 8, 8 + 14 + 4 + 12
+#: Folder of a rehearsal in that of the recordings, with the number of its process behind it.
+_FOLDER: Final = ".rehearsal-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +106,9 @@ def rehearse(
     # What fails here is to be seen, so nothing goes on elsewhere.
     here = rig.recorder.model_copy(update={"directory": directory, "fallback_directory": None})
     rig = rig.model_copy(update={"recorder": here})
+    _clear_away(directory)
     findings = [*look_at_disk(rig, directory), *look_at_interfaces(rig)]
-    with tempfile.TemporaryDirectory(prefix=".rehearsal-", dir=directory) as folder:
+    with tempfile.TemporaryDirectory(prefix=f"{_FOLDER}{os.getpid()}-", dir=directory) as folder:
         log = Path(folder) / name
         with HeadlessRig(rig, rig_toml, say) as running:
             result, disk_error = record(running, rig, log, seconds, session={"session": "rehearsal"}, progress=progress)
@@ -122,6 +127,24 @@ def rehearse(
         latency_ms=timing.latency_ms,
         findings=tuple(findings),
     )
+
+
+def _clear_away(directory: Path) -> None:
+    """Remove what rehearsals left whose process was killed."""
+    for left in directory.glob(f"{_FOLDER}*"):
+        pid = left.name.removeprefix(_FOLDER).partition("-")[0]
+        if pid.isdecimal() and not _runs(int(pid)):
+            shutil.rmtree(left)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # it is somebody else's
+        return True
+    return True
 
 
 @dataclass(frozen=True, slots=True)

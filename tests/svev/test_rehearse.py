@@ -1,6 +1,8 @@
 """`svev rehearse`: real processes record to the real disk; what is wrong fails it, and nothing is left behind."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,10 @@ def test_a_rig_that_works_is_ready_and_the_disk_is_as_before(
     tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "recordings"
+    killed = subprocess.Popen([sys.executable, "-c", ""])
+    killed.wait(10)
+    (out / f".rehearsal-{killed.pid}-x").mkdir(parents=True)
+    (out / f".rehearsal-{killed.pid}-x" / "log.mcap").touch()
     code, found = rehearse(write_rig(tmp_path, "sim", loopback), out, capsys)
     assert found["pulses"] == 30
     failed = [finding for finding in found["findings"] if finding["level"] == "FAIL"]

@@ -54,6 +54,7 @@ class Grabber:
         self._stopping, self._stop_fd, self._commands = stopping, stop_fd, commands
         self._epoch = 0
         self._frames = self._damaged = 0
+        self._told = True  # the camera had reason to send a frame while it was last waited for
         self._last_failure = ""
 
     def run(self) -> None:
@@ -93,11 +94,11 @@ class Grabber:
                 self._put(RecordKind.NOTICE, text=text)
             if arrival is not None:
                 self._put_arrival(arrival)
-            elif wanted and camera.bytes_received == received:
+            elif wanted and camera.bytes_received == received and self._told:
                 # The recorder asked, then we looked once more and found nothing: the camera is silent, we are not late.
                 raise CameraError("no frame while the other cameras have theirs; connecting again")
             elif wanted:
-                requests = asked  # its frame is on the way, slowly: look again
+                requests = asked  # its frame is on the way, slowly, or it was told to take none: look again
             asked = requests
             # Clock and counters are read just after a frame: the next one is farthest away, and the camera is sure to
             # answer (a dead one blocks for seconds). Without pulses they are read after a second of quiet, or when the
@@ -121,8 +122,11 @@ class Grabber:
             return camera.receive(timeout_s)
         now = host_now()
         end = now + round(timeout_s * NS_PER_S)
+        half = (now + end) // 2  # the frame of a later command may still be on its way at the end
+        self._told = False
         while True:
             if commands.is_due(now):
+                self._told = self._told or now <= half
                 camera.fire()
                 now = host_now()
             arrival = camera.receive(min(max(0, end - now), commands.until_next_ns(now)) / NS_PER_S)

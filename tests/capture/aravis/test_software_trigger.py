@@ -18,6 +18,7 @@ from simrig.gige.registers.makers import Maker
 from tests.capture.rigs import SCENARIO, make_rig
 from tests.capture.station import Station
 from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
 from triggering.sources.software import SoftwarePulses
 
 _FRAMES = 12
@@ -71,6 +72,39 @@ def test_a_camera_exposes_at_each_command(tmp_path: Path, loopback: Loopback, cl
     assert [True for notice in notices if "its clock cannot be read: its frames have the times" in notice] == (
         [] if clock else [True]
     )
+
+
+class _FewCommands:
+    """Commands like those of a grabber that is too late for all others: `left` more are given in time."""
+
+    def __init__(self, left: int) -> None:
+        self.left = left
+
+    def until_next_ns(self, now: HostNs) -> int:
+        del now
+        return 10_000_000
+
+    def is_due(self, now: HostNs) -> bool:
+        del now
+        self.left -= 1
+        return self.left >= 0
+
+
+def test_a_camera_that_was_not_told_to_expose_is_not_silent(tmp_path: Path, loopback: Loopback) -> None:
+    rig = make_rig(tmp_path, "aravis", loopback, names=["K2"], source="software", rate_hz=10.0)
+    trigger, commands = rig.trigger, _FewCommands(left=3)
+    assert isinstance(trigger, SoftwareTrigger)
+
+    def opened(ring: CameraRing) -> AravisCamera:
+        return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)
+
+    with _camera(rig) as ring, Station(opened, ring, commands) as station:
+        station.await_records(RecordKind.FRAME, 1)
+        ring.request_reconnect()
+        wait_until(lambda: commands.left < -100, "the grabber has looked for a frame for some time", 20)
+        commands.left = 3
+        station.await_records(RecordKind.FRAME, 2)
+    assert {record.epoch for record in station.records} == {1}
 
 
 def test_a_camera_without_the_command_is_refused(tmp_path: Path, loopback: Loopback) -> None:

@@ -28,6 +28,10 @@ _BREAKS: Final = frozenset({CameraNews.CONNECTED.value, CameraNews.SILENT.value,
 _IDS_16_BIT: Final = 65535
 #: The rate of a camera's clock is known from frames that are at least so far apart.
 _BASE_NS: Final = NS_PER_S
+#: No clock is wrong by more than this share; what looks like it is no clock.
+_GAIN_MAX: Final = 0.01
+#: Frame numbers and trigger counts have 64 bits.
+_COUNT_MAX: Final = 1 << 64
 #: Disagreements that are kept one by one; the counts go on.
 _KEPT: Final = 10_000
 
@@ -169,7 +173,8 @@ class _Camera:
         """How much faster than the pulses' clock the camera's runs, as a factor."""
         if self.first is None or self.last is None or self.last.time - self.first.time < _BASE_NS:
             return 1.0
-        return (self.last.device - self.first.device) / (self.last.time - self.first.time)
+        gain = (self.last.device - self.first.device) / (self.last.time - self.first.time)
+        return gain if abs(gain - 1) < _GAIN_MAX else 1.0
 
 
 class Recount:
@@ -298,6 +303,8 @@ class Recount:
 def _frame(tag: TripletTag, part: CameraTag) -> _Frame | None:
     """The frame of a camera's part of a tag; None if that says too little of it."""
     if part.frame_id is None or part.device_time is None or part.host_time is None:
+        return None
+    if max(abs(part.frame_id), abs(part.trigger_count or 0)) > _COUNT_MAX:
         return None
     return _Frame(tag.pulse, tag.time, part.frame_id, part.trigger_count, part.device_time, part.host_time)
 

@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from rig.clocks import NS_PER_S, DeviceNs, UtcNs
 from rig.events import Event, Level
@@ -118,3 +120,31 @@ def test_absent_needs_an_event_that_says_so() -> None:
     assert {each.tagged for each in recount(frozen).differences} == {ABSENT}
     elsewhere = msgspec.structs.replace(silent, name="K3")
     assert not recount(frozen, [elsewhere]).agrees
+
+
+_NUMBERS = st.one_of(st.integers(0, 100), st.integers(-(10**20), 10**20), st.just(10**400))
+_TIMES = st.one_of(st.integers(0, 10**10), st.integers(-(10**20) + 1, 10**20 - 1), st.just(5))
+
+
+@settings(deadline=None, max_examples=100)
+@example([(pulse, pulse * 2 * NS_PER_S, OK, pulse, pulse, 5, 5) for pulse in (1, 2, 3)])
+@example([(pulse, pulse * NS_PER_S, OK, 10**400 * pulse, 1, 5 * pulse, 5) for pulse in (1, 2, 3)])
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 10**12), _TIMES, st.sampled_from(FrameStatus), _NUMBERS, _NUMBERS, _TIMES, _TIMES),
+        max_size=12,
+    )
+)
+def test_whatever_a_log_says_it_is_judged(rows: list[tuple[int, int, FrameStatus, int, int, int, int]]) -> None:
+    """Damaged and hostile logs hold tags that no recorder wrote."""
+    tags = [
+        TripletTag(
+            PulseNumber(pulse), UtcNs(time), "", "r", (48, 64),
+            (CameraTag("K1", (0, 64), status, frame_id, triggers, DeviceNs(device), UtcNs(host)),),
+        )
+        for pulse, time, status, frame_id, triggers, device, host in rows
+    ]  # fmt: skip
+    found = recount(tags)
+    assert found.pulses <= len(rows)
+    assert sum(states.total() for states in found.states.values()) <= found.pulses
+    assert all(difference.in_words() for difference in found.differences)

@@ -121,7 +121,7 @@ def rehearse(
         pulses=report.ledger.pulses,
         complete=report.ledger.complete,
         causes=result["causes"],
-        headroom={name: round(times, 2) for name, times in _headroom(rig, findings)},
+        headroom={name: round(times, 2) for name, times in headroom_of(rig, findings)},
         jumps=room_for(rig, free_bytes(directory) or 0).jumps,
         spread_us=timing.spread_us,
         latency_ms=timing.latency_ms,
@@ -255,8 +255,13 @@ def _judge_timing(rig: RigSettings, timing: _Timing) -> Iterator[Finding]:
         yield judged(level, Topic.TIME, said, "look at trigger cables and inputs, and at trigger delays in the cameras")
 
 
-def _headroom(rig: RigSettings, findings: list[Finding]) -> Iterator[tuple[str, float]]:
-    """Speed over speed needed, of the disk and of each link whose speed is known."""
+def headroom_of(rig: RigSettings, findings: list[Finding]) -> Iterator[tuple[str, float]]:
+    """Speed over speed needed, by name, of the disk and of each link whose speed is known.
+
+    Args:
+        rig: the rig.
+        findings: among them, how fast the disk is.
+    """
     for finding in findings:
         if finding.code == "check_disk_speed":
             yield "disk", float(str(finding.values["writes"])) / float(str(finding.values["needed"]))

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from ipaddress import IPv4Address, IPv4Network
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,12 @@ import pytest
 
 from recorder.checking.verify import verify
 from rig.frame import FrameStatus
-from rig.settings.file import load_rig
+from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from svev.cli import main
 from svev.doctor.finding import Level
-from svev.rehearsal import Rehearsed, judge_pulses
+from svev.gige.interfaces import Interface
+from svev.rehearsal import Rehearsed, headroom_of, judge_pulses
 from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, OK, write_log
 from tests.support.loopback import Loopback
@@ -93,3 +95,12 @@ def test_the_verdict_is_one_line_of_figures() -> None:
         spread_us={"median": 12.2, "max": 30.0}, latency_ms={}, findings=(),
     )  # fmt: skip
     assert done.verdict == "headroom 2.1x (eth1), room for 143 jumps, spread within a pulse 12 us"
+
+
+def test_cameras_behind_one_port_share_its_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By hand: 3 x 640 x 480 px at 30 Hz are 221.2 Mbit/s of pixels; of 9038 bytes on the wire 8964 are pixels."""
+    port = Interface("eth1", 9000, 1000, IPv4Network("192.168.0.0/16"), IPv4Address("192.168.0.1"))
+    monkeypatch.setattr("svev.rehearsal.interface_to", lambda _: port)
+    ((name, times),) = headroom_of(load_rig(CONFIG / "rigs" / "hill-gige.toml"), [])
+    assert name == "eth1"
+    assert times == pytest.approx(1000 / (221.184 * 9038 / 8964))

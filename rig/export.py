@@ -25,6 +25,8 @@ class Kind(StrEnum):
     CONTACT_SHEET = "contact_sheet"  #: a page with triplets of the jump
 
 
+#: What holds every pixel as it was recorded: of 10- and 12-bit cameras 16 bits, 65535 at the most.
+LOSSLESS: Final = frozenset({Kind.FFV1, Kind.PNG, Kind.TIFF})
 #: The ending of what comes out, empty for a folder.
 ENDINGS: Final = {
     Kind.H264: ".mp4", Kind.FFV1: ".mkv", Kind.PNG: "", Kind.TIFF: "", Kind.CSV: ".csv", Kind.CONTACT_SHEET: ".png",

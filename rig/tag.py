@@ -11,6 +11,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from rig.clocks import DeviceNs, UtcNs
 from rig.frame import FrameStatus
+from rig.pixels import Pixels
 from rig.pulse import PulseNumber
 from rig.topics import TAG
 from rig.transport import wire
@@ -45,6 +46,21 @@ class CameraTag(
         ]
         | UnsetType
     ) = UNSET
+    rows: (
+        Annotated[
+            int, Meta(ge=1, description="rows of the camera's frame; left out if the frame is as high as the triplet")
+        ]
+        | UnsetType
+    ) = UNSET
+
+    @property
+    def part(self) -> tuple[slice, slice]:
+        """The camera's frame in the triplet, (rows, columns)."""
+        return slice(None if self.rows is UNSET else self.rows), slice(*self.columns)
+
+    def size(self, shape: tuple[int, int]) -> tuple[int, int]:
+        """Width and height of the camera's frames, px, in a triplet of so many rows and columns."""
+        return int(self.columns[1] - self.columns[0]), int(shape[0] if self.rows is UNSET else self.rows)
 
 
 class TripletTag(msgspec.Struct, frozen=True, rename={"time": "time_ns"}):
@@ -57,7 +73,39 @@ class TripletTag(msgspec.Struct, frozen=True, rename={"time": "time_ns"}):
     shape: Annotated[tuple[int, int], Meta(description="rows, columns of the triplet")]
     cameras: tuple[CameraTag, ...]
     complete: Annotated[bool, Meta(description="every camera delivered its frame")] = False
-    dtype: str = "uint8"
+    dtype: Annotated[str, Meta(description="uint8, or uint16 with the lower byte first")] = "uint8"
+    encoding: Annotated[str, Meta(description="of the pixels, of a mosaic of colours; left out: grey")] | UnsetType = (
+        UNSET
+    )
+    bits: (
+        Annotated[int, Meta(description="how many bits of a pixel are significant, the lowest ones; left out: 8")]
+        | UnsetType
+    ) = UNSET
+
+    @classmethod
+    def made(
+        cls, pulse: PulseNumber, time: UtcNs, session: str, recording: str, shape: tuple[int, int],
+        cameras: tuple[CameraTag, ...], pixels: Pixels,
+    ) -> "TripletTag":  # fmt: skip
+        """A tag of a triplet with pixels of this kind."""
+        encoding = pixels.encoding if pixels.is_mosaic else UNSET
+        bits = UNSET if pixels.bits == 8 else pixels.bits
+        dtype = pixels.dtype.name
+        return cls(pulse, time, session, recording, shape, cameras, dtype=dtype, encoding=encoding, bits=bits)
+
+    @property
+    def pixels(self) -> Pixels:
+        """How the triplet holds its pixels.
+
+        Raises:
+            ValueError: as no triplet of ours does.
+        """
+        bits = 8 if self.bits is UNSET else self.bits
+        encoding = ("mono8" if bits == 8 else "mono16") if self.encoding is UNSET else self.encoding
+        found = Pixels(encoding, bits)
+        if self.dtype != found.dtype.name:
+            raise ValueError(f"no pixels of ours: {self.dtype} with {found.bits} significant bits")
+        return found
 
     def __post_init__(self) -> None:
         """Derive `complete` from the cameras, whatever value was given."""

@@ -38,7 +38,7 @@ class Preview:
 
     Attributes:
         pulse: number of its pulse since the recorder was started.
-        pixels: (rows, columns), uint8; the caller owns it.
+        pixels: (rows, columns), uint8, or blue, green, red, (rows, columns, 3); the caller owns it.
         columns: first and one past the last column by camera.
         statuses: what became of the pulse, by camera.
     """
@@ -267,7 +267,7 @@ class RigService(Protocol):
         ...
 
     def image(self, recording_id: str, pulse: int) -> NDArray[np.uint8]:
-        """One triplet of a recording, (rows, columns), uint8; the caller owns it."""
+        """One triplet of a recording to look at, uint8, (rows, columns) or (rows, columns, 3); the caller owns it."""
         ...
 
     def liveliest_pulse(self, recording_id: str) -> int:

@@ -17,6 +17,8 @@ from rig.automatic import AutomaticChange, Mark, Marked
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
 from rig.errors import BadInputError, StateForbidsError, SvevError, UnknownRecordingError
 from rig.phrase import Phrase, phrase
+from rig.picture import shown
+from rig.pixels import MONO8
 from rig.pulse import RigPulse
 from rig.status import (
     ArmOrder,
@@ -208,7 +210,10 @@ class Service(Archive):
             if self.status().state is not State.IDLE and self._slot.newest() not in {0, newer_than}:
                 image = self._slot.read()
                 if image is not None and image.pulse != newer_than:
-                    return Preview(image.pulse, image.pixels, self._supervisor.rig.columns(), image.statuses)
+                    rig = self._supervisor.rig
+                    # Deeper pixels have been made eight bits by the recorder.
+                    pixels = shown(image.pixels, rig.pixels if rig.pixels.is_mosaic else MONO8, coloured=True)
+                    return Preview(image.pulse, pixels, rig.columns(), image.statuses)
             if time.monotonic() > deadline or self._closing.wait(_POLL_S):
                 return None
 

@@ -19,6 +19,7 @@ from analysis.cameras.pose_change import FEWEST, Displacements
 from analysis.scene.camera_system import PlacedCamera
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Flags, Floats
+from rig.picture import Grey
 
 _LARGEST = 16  # px, radius of a ball
 _AROUND = 3  # px around a ball that are matched too
@@ -93,7 +94,7 @@ class BallTracker:
         )
         self._last = np.zeros(3)
 
-    def measure(self, frame: NDArray[np.uint8]) -> FrameTurn | None:
+    def measure(self, frame: Grey) -> FrameTurn | None:
         """Match one frame.
 
         Args:
@@ -113,7 +114,7 @@ class BallTracker:
             self._last = found.turn
         return found
 
-    def _from(self, frame: NDArray[np.uint8], start: Floats) -> FrameTurn | None:
+    def _from(self, frame: Grey, start: Floats) -> FrameTurn | None:
         """Match from predicted displacements (n, 2)."""
         off = np.array(start, float)
         for _ in range(_STEPS):
@@ -132,7 +133,7 @@ class BallTracker:
             turn, covariance, np.where(kept[:, None], measured, np.nan), np.where(kept[:, None], variance, np.nan)
         )
 
-    def _matched(self, frame: NDArray[np.uint8], off: Floats) -> tuple[Floats, Floats, Flags]:
+    def _matched(self, frame: Grey, off: Floats) -> tuple[Floats, Floats, Flags]:
         """Steps (n, 2) from the displacements at which the template is taken, variances (n, 2), which are sound."""
         whole = np.rint(off).astype(int)
         template = _displaced(self._template, off - whole)
@@ -164,7 +165,7 @@ class BallTracker:
         variance = np.diagonal(cofactors, axis1=1, axis2=2)[:, 2:] * (factor / safe**2)[:, None] + _MODEL_SIGMA**2
         return -theta[:, 2:] / safe[:, None], variance, sound
 
-    def _windows(self, frame: NDArray[np.uint8], corner: NDArray[np.int_], size: int) -> tuple[Floats, Flags]:
+    def _windows(self, frame: Grey, corner: NDArray[np.int_], size: int) -> tuple[Floats, Flags]:
         """Grey values (n, size, size), and which windows lie in the image."""
         rows, columns = frame.shape
         inside = (corner >= 0).all(axis=1) & (corner[:, 0] + size <= columns) & (corner[:, 1] + size <= rows)

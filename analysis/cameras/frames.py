@@ -4,16 +4,14 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.frame import FrameStatus
+from rig.picture import Grey, measurable
 from rig.pulse import PulseNumber
 
 #: Images (rows, columns) by camera; valid until the next pulse is taken.
-Frames = Mapping[str, NDArray[np.uint8]]
+Frames = Mapping[str, Grey]
 
 
 class FrameSource(Protocol):
@@ -53,13 +51,13 @@ class LogFrames:
                     continue
                 triplet = self._stored[pulse]
                 try:
-                    image = triplet.image(reader)
+                    image = measurable(triplet.image(reader), triplet.tag.pixels)
                 except ValueError:
                     continue  # `svev verify` names it; other pulses are not touched
                 yield (
                     pulse,
                     {
-                        camera.name: image[:, slice(*camera.columns)]
+                        camera.name: image[camera.part]
                         for camera in triplet.tag.cameras
                         if camera.status is FrameStatus.OK
                     },

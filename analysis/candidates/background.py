@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from analysis.candidates.median import median
 from analysis.scene.static_image import GreyImage, StaticImage
 from rig.arrays import Floats, Integers
+from rig.picture import Grey
 
 _SAMPLES = 8_000  # pixels of the grid
 _ROUNDS, _CLIP = 4, 3.0  # of the robust adjustment; sigmas
@@ -119,7 +120,7 @@ class Background:
 
     def regions(
         self,
-        image: NDArray[np.uint8],
+        image: Grey,
         stamped: tuple[int, int, int] | None = None,
         within: tuple[int, int, int, int] | None = None,
     ) -> list[Region]:
@@ -145,7 +146,7 @@ class Background:
         return [self._region(image, moment, front, box) for box in _boxes(front)]
 
     def _region(
-        self, image: NDArray[np.uint8], moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]
+        self, image: Grey, moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]
     ) -> Region:
         left, top, right, bottom = box
         part = slice(top, bottom), slice(left, right)
@@ -166,7 +167,7 @@ class Background:
         variance += self._shift[part]
         return behind, variance
 
-    def _moment(self, image: NDArray[np.uint8]) -> "_Moment":
+    def _moment(self, image: Grey) -> "_Moment":
         """Light, shift and noise of an image (robust adjustment of the grid)."""
         sample = image[self._grid].ravel().astype(float)
         rows, values = self._weighted, sample * self._weight

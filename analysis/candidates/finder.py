@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from msgspec import UNSET
-from numpy.typing import NDArray
 
 from analysis.candidates.background import Background, Region
 from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs, half_size
@@ -25,6 +24,7 @@ from recorder.reading.triplets import stored_triplets, triplets
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
+from rig.picture import Grey, measurable
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 
@@ -47,7 +47,7 @@ class Finder:
         self._regions: OrderedDict[tuple[PulseNumber, str], list[Region]] = OrderedDict()
         self._kept, self._memory = 0, memory
 
-    def find(self, tag: TripletTag, image: NDArray[np.uint8]) -> PulseCandidates:
+    def find(self, tag: TripletTag, image: Grey) -> PulseCandidates:
         """The candidates of a pulse; keeps what a second look needs.
 
         Args:
@@ -64,9 +64,7 @@ class Finder:
             found[camera.name] = _candidates(regions)
         return PulseCandidates(tag.pulse, tag.time, found)
 
-    def find_expected(
-        self, tag: TripletTag, image: NDArray[np.uint8], expected: Mapping[str, Expected]
-    ) -> PulseCandidates:
+    def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:
         """The candidates of a pulse near where a jumper is expected: faster than all of them.
 
         Args:
@@ -94,15 +92,13 @@ class Finder:
         spots = find_expected(parts, columns) if parts else [Spots.none() for _ in names]
         return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
 
-    def _blocks(
-        self, tag: TripletTag, image: NDArray[np.uint8]
-    ) -> Iterator[tuple[CameraTag, Background, NDArray[np.uint8]]]:
+    def _blocks(self, tag: TripletTag, image: Grey) -> Iterator[tuple[CameraTag, Background, Grey]]:
         """The cameras that delivered, with their static scene and their part of the image."""
         for camera in tag.cameras:
             background = self._backgrounds.get(camera.name)
             if camera.status is not FrameStatus.OK or background is None:
                 continue
-            block = image[:, slice(*camera.columns)]
+            block = image[camera.part]
             if block.shape != background.shape:
                 raise BadInputError(
                     f"{camera.name}: image of {block.shape[1]} x {block.shape[0]} px, but the static image has "
@@ -191,7 +187,7 @@ def find_candidates(
             total = len(stored_triplets(reader))
     found = []
     for tag, image in triplets(log):
-        found.append(finder.find(tag, image))
+        found.append(finder.find(tag, measurable(image, tag.pixels)))
         if progress is not None:
             progress(min(1.0, len(found) / max(1, total)))
     return found

@@ -17,6 +17,7 @@ from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.clocks import NS_PER_S
 from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
+from rig.picture import shown
 from rig.tag import CameraTag
 from rig.topics import SESSION_METADATA
 
@@ -53,7 +54,8 @@ def write_contact_sheet(log: Path, out: Path, count: int = 12, *, pulses: range 
         if not triplets:
             raise LogDamagedError(f"{log}: holds no image that could be shown; look at it with `svev verify`")
         chosen = liveliest(reader, triplets, count)
-        images = [_shrunk(triplet.image(reader), _tile_size(triplets[0].tag.shape)) for triplet in chosen]
+        size = _tile_size(triplets[0].tag.shape)
+        images = [_shrunk(shown(t.image(reader), t.tag.pixels, coloured=True), size) for t in chosen]
         sheet = _sheet(chosen, images, _title(reader.metadata.get(SESSION_METADATA, {}), triplets))
     _, data = cv2.imencode(".png", sheet)
     with whole_file(out) as part:
@@ -82,7 +84,7 @@ def _shrunk(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8
 def _sheet(
     chosen: Sequence[StoredTriplet], images: Sequence[NDArray[np.uint8]], title: tuple[str, str]
 ) -> NDArray[np.uint8]:
-    height, width = images[0].shape
+    height, width = images[0].shape[:2]
     across = _across(chosen[0].tag.shape)
     down = -(-len(chosen) // across)
     sheet = np.full((_TITLE + down * (height + _CAPTION + _MARGIN), _SHEET_WIDTH, 3), _PAPER, np.uint8)
@@ -92,7 +94,7 @@ def _sheet(
     for place, (triplet, image) in enumerate(zip(chosen, images, strict=True)):
         row, column = place // across, place % across
         x, y = _MARGIN + column * (width + _MARGIN), _TITLE + row * (height + _CAPTION + _MARGIN)
-        sheet[y : y + height, x : x + width] = image[:, :, np.newaxis]
+        sheet[y : y + height, x : x + width] = image if image.ndim == 3 else image[:, :, np.newaxis]
         for camera in triplet.tag.cameras:
             _draw_camera(sheet[y : y + height, x : x + width], camera, width / triplet.tag.shape[1])
         seconds = (triplet.tag.time - start) / NS_PER_S

@@ -7,7 +7,6 @@ from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.film.contact_sheet import write_contact_sheet
 from analysis.film.shots import Recording, Shot
@@ -16,6 +15,7 @@ from analysis.film.video_file import FFV1, VideoFile, h264
 from analysis.film.whole import whole_file, whole_folder
 from analysis.film.words import caption, write_caption, write_lacking
 from rig.export import ENDINGS, ExportOrder, Kind, Quality
+from rig.pixels import Stored
 
 #: Told how many pulses are done, and of how many.
 Progress = Callable[[int, int], None]
@@ -94,13 +94,13 @@ def _write_video(recording: Recording, order: ExportOrder, out: Path, tell: Prog
             video.close()
 
 
-def _picture(recording: Recording, shot: Shot, order: ExportOrder) -> NDArray[np.uint8]:
+def _picture(recording: Recording, shot: Shot, order: ExportOrder) -> Stored:
     """The picture of a pulse; without loss, only pulses that the log does not know have words, unless asked for."""
     picture, columns = shot.image, recording.columns
     if order.kind is not Kind.FFV1 and picture.shape[1] > _WIDEST_PX:
         scale = _WIDEST_PX / picture.shape[1]
         size = (_WIDEST_PX, max(2, round(picture.shape[0] * scale)))
-        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), picture.dtype)
         columns = tuple((round(first * scale), round(end * scale)) for first, end in columns)
     named = bool(shot.lacking) and (order.kind is not Kind.FFV1 or shot.tag is None or order.burn_in)
     if not named and not order.burn_in:
@@ -123,7 +123,7 @@ def _write_pictures(recording: Recording, kind: Kind, folder: Path, tell: Progre
     for done, shot in enumerate(recording.shots(), 1):
         for place, (first, end) in enumerate(recording.columns):
             if place not in shot.lacking:
-                block = np.ascontiguousarray(shot.image[:, first:end])
+                block = np.ascontiguousarray(shot.image[: recording.rows[place], first:end])
                 _, data = cv2.imencode(ending, block, settings)
                 file = folder / names[place] / f"{names[place]}_{shot.pulse:0{digits}d}{ending}"
                 file.write_bytes(data.tobytes())

@@ -6,15 +6,16 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets, tags
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError
-from rig.export import ExportOrder
+from rig.export import LOSSLESS, ExportOrder
 from rig.frame import FrameStatus
+from rig.picture import exported, shown
+from rig.pixels import Stored
 from rig.tag import TripletTag
 
 #: Pulses without a tag that are shown: an hour at 30 Hz. More come from a damaged number, not from lost pulses.
@@ -31,14 +32,15 @@ class Shot:
         pulse: its number.
         time: of the pulse; that of one without a tag lies evenly between its neighbours.
         tag: what became of it; None if the log does not say.
-        image: the chosen cameras side by side, (rows, columns), black where a frame is missing; valid until the next.
+        image: the chosen cameras side by side, (rows, columns), of colour cameras (rows, columns, 3), black where a
+            frame is missing; valid until the next.
         lacking: by place of the camera why there is no frame.
     """
 
     pulse: int
     time: UtcNs
     tag: TripletTag | None
-    image: NDArray[np.uint8]
+    image: Stored
     lacking: Mapping[int, str]
 
 
@@ -49,6 +51,7 @@ class Recording:
         log: the log.
         cameras: names of the chosen cameras.
         columns: of each in the pictures, first and one past the last.
+        rows: of the frames of each.
         pulses: the chosen ones, without gaps.
         session: who jumped, as it was corrected.
         rate_hz: pulses per second.
@@ -67,8 +70,11 @@ class Recording:
             self._tags.setdefault(int(tag.pulse), tag)
         self.pulses = _chosen(found, order)
         self._blocks = _blocks(found, order)
-        self._shape = next(iter(self._tags.values())).shape
+        first = next(iter(self._tags.values()))
+        self._shape, self._pixels, self._lossless = first.shape, first.pixels, order.kind in LOSSLESS
         self.cameras = tuple(self._blocks)
+        rows = {camera.name: camera.size(first.shape)[1] for camera in first.cameras}
+        self.rows = tuple(rows[name] for name in self.cameras)
         widths = [end - first for first, end in self._blocks.values()]
         ends = np.cumsum(widths).tolist()
         self.columns = tuple((end - width, end) for end, width in zip(ends, widths, strict=True))
@@ -112,19 +118,20 @@ class Recording:
 
     def _shot(self, reader: LogReader, pulse: int, stored: StoredTriplet | None) -> Shot:
         tag = self._tags.get(pulse)
-        if tag is not None and tag.shape != self._shape:
+        if tag is not None and (tag.shape, tag.pixels) != (self._shape, self._pixels):
             raise BadInputError(f"{self.log}: the images change their size at pulse {pulse}: export the parts apart")
-        image: NDArray[np.uint8] | None = None
+        image: Stored | None = None
         if stored is not None:
             try:
                 image = stored.image(reader)
             except ValueError:  # `svev verify` names it; here the picture says that it is missing
                 image = None
-        whole = np.zeros(self._shape, np.uint8) if image is None else image
+        held = np.zeros(self._shape, self._pixels.dtype) if image is None else image
+        whole = exported(held, self._pixels) if self._lossless else shown(held, self._pixels, coloured=True)
         blocks = list(self._blocks.values())
         everything = blocks[0][0] == 0 and self.columns == tuple(blocks) and blocks[-1][1] == self._shape[1]
-        shown = whole if everything else np.hstack([whole[:, first:end] for first, end in blocks])
-        return Shot(pulse, self.time_of(pulse), tag, shown, self._lacking(tag, seen=image is not None))
+        chosen = whole if everything else np.hstack([whole[:, first:end] for first, end in blocks])
+        return Shot(pulse, self.time_of(pulse), tag, chosen, self._lacking(tag, seen=image is not None))
 
     def _lacking(self, tag: TripletTag | None, *, seen: bool) -> dict[int, str]:
         """Why cameras show nothing, by their place."""

@@ -8,7 +8,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Any, BinaryIO, Final
 
 import av
 import numpy as np
@@ -16,15 +16,15 @@ from av.error import FFmpegError
 from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
-#: Grey (rows, columns) or blue, green, red (rows, columns, 3).
-Picture = NDArray[np.uint8]
+#: Grey (rows, columns), also of 16 bits, or blue, green, red (rows, columns, 3).
+Picture = NDArray[np.unsignedinteger[Any]]
 
 _TIME_BASE: Final = Fraction(1, 1_000_000)
 _CONTAINERS: Final[Mapping[str, str]] = {".mp4": "mp4", ".mkv": "matroska", ".webm": "webm"}
 #: Of files that can be written.
 ENDINGS: Final = tuple(_CONTAINERS)
-#: Names of pixel formats in FFmpeg, of pictures with two and three dimensions.
-_GIVEN: Final[Mapping[int, str]] = {2: "gray", 3: "bgr24"}
+#: Names of pixel formats in FFmpeg, of pictures with so many dimensions and bytes per number.
+_GIVEN: Final[Mapping[tuple[int, int], str]] = {(2, 1): "gray", (2, 2): "gray16le", (3, 1): "bgr24"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,20 +33,25 @@ class Codec:
 
     Attributes:
         name: of the encoder in FFmpeg.
-        pixels: pixel format that is stored, for grey and for coloured pictures.
+        pixels: pixel format that is stored, by that of the pictures.
         options: of the encoder.
         halved: colours are stored for two by two pixels, so that rows and columns have to be even.
     """
 
     name: str
-    pixels: tuple[str, str] = ("yuv420p", "yuv420p")
+    pixels: Mapping[str, str] = field(default_factory=lambda: {"gray": "yuv420p", "bgr24": "yuv420p"})
     options: Mapping[str, str] = field(default_factory=dict)
     halved: bool = True
 
 
 VP9: Final = Codec("libvpx-vp9", options={"crf": "28", "b": "0", "deadline": "realtime", "cpu-used": "6", "g": "30"})
 #: Every picture for itself, with a checksum, so that damage stays small and is found.
-FFV1: Final = Codec("ffv1", ("gray", "bgr0"), {"level": "3", "slicecrc": "1", "g": "1"}, halved=False)
+FFV1: Final = Codec(
+    "ffv1",
+    {"gray": "gray", "gray16le": "gray16le", "bgr24": "bgr0"},
+    {"level": "3", "slicecrc": "1", "g": "1"},
+    halved=False,
+)
 
 
 def h264(crf: int) -> Codec:
@@ -68,7 +73,7 @@ class VideoFile:
     def __init__(self, out: Path, ending: str, first: Picture, rate_hz: float, codec: Codec) -> None:
         rows, columns = first.shape[:2]
         self._size = (columns // 2 * 2, rows // 2 * 2) if codec.halved else (columns, rows)
-        self._given = _GIVEN[first.ndim]
+        self._given = _GIVEN[first.ndim, first.itemsize]
         options = {"video_track_timescale": str(_TIME_BASE.denominator)} if ending == ".mp4" else {}
         self._on_disk: BinaryIO = out.open("wb")  # Python's own file: errors of the disk are never lost
         try:
@@ -81,7 +86,7 @@ class VideoFile:
         if not isinstance(stream, VideoStream):
             raise TypeError(f"{codec.name} makes no video")
         stream.width, stream.height = self._size
-        stream.pix_fmt = codec.pixels[first.ndim - 2]
+        stream.pix_fmt = codec.pixels[self._given]
         stream.time_base = stream.codec_context.time_base = _TIME_BASE
         self._stream = stream
         self._last_us = -1

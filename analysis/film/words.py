@@ -7,10 +7,10 @@ from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.film.shots import Shot
 from rig.clocks import NS_PER_S
+from rig.pixels import Stored
 
 FONT: Final = cv2.FONT_HERSHEY_DUPLEX
 _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
@@ -31,13 +31,13 @@ def caption(shot: Shot, session: Mapping[str, str]) -> str:
     return (f"bib {plain}  " if plain else "") + f"pulse {shot.pulse}  {clock}.{thousandths:03d} UTC"
 
 
-def write_caption(picture: NDArray[np.uint8], text: str) -> None:
+def write_caption(picture: Stored, text: str) -> None:
     """Write a line at the lower left, in place, as large as fits."""
     size = _size(picture, text)
     write_outlined(picture, text, (round(8 * size), picture.shape[0] - round(12 * size)), size)
 
 
-def write_lacking(picture: NDArray[np.uint8], shot: Shot, columns: tuple[tuple[int, int], ...]) -> None:
+def write_lacking(picture: Stored, shot: Shot, columns: tuple[tuple[int, int], ...]) -> None:
     """Write into each black block why there is no frame, in place."""
     for place, word in shot.lacking.items():
         block = picture[:, slice(*columns[place])]
@@ -46,15 +46,21 @@ def write_lacking(picture: NDArray[np.uint8], shot: Shot, columns: tuple[tuple[i
         write_outlined(block, word, ((block.shape[1] - wide) // 2, (block.shape[0] + high) // 2), size)
 
 
-def _size(picture: NDArray[np.uint8], text: str) -> float:
+def _size(picture: Stored, text: str) -> float:
     """Size of the letters: a part of the height, smaller if the text would not fit."""
     size = min(max(picture.shape[0] * _PART / _LETTER_PX, _LEAST), _MOST)
     (wide, _), _ = cv2.getTextSize(text, FONT, size, 1)
     return float(min(size, size * 0.95 * picture.shape[1] / max(1, wide)))
 
 
-def write_outlined(picture: NDArray[np.uint8], text: str, at: tuple[int, int], size: float) -> None:
+def write_outlined(picture: Stored, text: str, at: tuple[int, int], size: float) -> None:
     """Write white words with a black edge into a grey or coloured picture, in place; `at`: where they begin, px."""
+    if picture.dtype != np.uint8:  # OpenCV writes into pictures of eight bits only
+        before = (picture >> 8).astype(np.uint8)
+        after = before.copy()
+        write_outlined(after, text, at, size)
+        np.copyto(picture, after * np.uint16(257), where=after != before)
+        return
     edge, thick = max(1, round(1.5 * size)), max(1, round(size))
     for dx in (-edge, 0, edge):  # a thicker pen would make the words longer
         for dy in (-edge, 0, edge):

@@ -11,6 +11,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.errors import LogDamagedError, UnknownRecordingError
 from rig.frame import FrameStatus
+from rig.picture import measurable
 
 #: Number of pulses whose images are compared, in the whole log and once more in the stretch found there.
 _SAMPLES = 240
@@ -103,7 +104,7 @@ def _evenly(length: int, count: int) -> list[int]:
 
 def _background(reader: LogReader, samples: Sequence[StoredTriplet]) -> NDArray[np.float32]:
     """The picture without what moves: the median of small images, (rows, columns)."""
-    return np.median([_small(sample.image(reader)) for sample in samples], axis=0).astype(np.float32)
+    return np.median([_small(sample, reader) for sample in samples], axis=0).astype(np.float32)
 
 
 def _activity(
@@ -112,7 +113,7 @@ def _activity(
     """For each sample, how many pixels of its small image differ from the background by more than noise."""
     changed = []
     for sample in samples:
-        difference = np.abs(_small(sample.image(reader)) - background)
+        difference = np.abs(_small(sample, reader) - background)
         for camera in sample.tag.cameras:
             if camera.status is not FrameStatus.OK:  # a black block is no motion
                 scale = background.shape[1] / sample.tag.shape[1]
@@ -134,9 +135,13 @@ def _lively_run(activity: NDArray[np.float64]) -> tuple[int, int]:
     return int(best[0]), int(best[-1])
 
 
-def _small(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    rows, columns = image.shape
+def _small(sample: StoredTriplet, reader: LogReader) -> NDArray[np.float32]:
+    """The image of a pulse, made small: grey values of eight bits."""
+    stored = sample.image(reader)
+    rows, columns = stored.shape
     width = max(1, columns * _SMALL_ROWS // rows)
     step = max(1, rows // (4 * _SMALL_ROWS))  # of a large image every so many pixels are enough
-    image = np.ascontiguousarray(image[::step, ::step])
+    if not sample.tag.pixels.is_mosaic:  # of which every other pixel has another colour
+        stored = stored[::step, ::step]
+    image = measurable(np.ascontiguousarray(stored), sample.tag.pixels)
     return cv2.resize(image, (width, _SMALL_ROWS), interpolation=cv2.INTER_AREA).astype(np.float32)

@@ -56,11 +56,8 @@ def log_facts(path: Path) -> LogFacts:
         messages.append(
             "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"
         )
-    rows = about.first.shape[0]
-    cameras = {
-        tag.name: MeasuredCamera((tag.columns[1] - tag.columns[0], rows), exposures.get(tag.name, _EXPOSURE_US) / 1e6)
-        for tag in tags
-    }
+    shape = about.first.shape
+    cameras = {tag.name: MeasuredCamera(tag.size(shape), exposures.get(tag.name, _EXPOSURE_US) / 1e6) for tag in tags}
     columns = {tag.name: (int(tag.columns[0]), int(tag.columns[1])) for tag in tags}
     return LogFacts(path, about.recording, about.session, _rate_hz(about), columns, cameras, tuple(messages))
 

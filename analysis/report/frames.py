@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets
 from rig.frame import FrameStatus
+from rig.picture import shown
 from rig.tag import TripletTag
 
 Grey = NDArray[np.uint8]
@@ -27,7 +28,7 @@ def frames_of(log: Path, pulses: Collection[int]) -> Iterator[tuple[TripletTag, 
         for stored in stored_triplets(reader):
             if stored.tag.pulse in wanted:
                 try:
-                    image = stored.image(reader)
+                    image = shown(stored.image(reader), stored.tag.pixels)
                 except ValueError:
                     continue  # the account of the log (`svev verify`) names damaged chunks
                 yield stored.tag, image
@@ -35,8 +36,4 @@ def frames_of(log: Path, pulses: Collection[int]) -> Iterator[tuple[TripletTag, 
 
 def camera_images(tag: TripletTag, image: Grey) -> dict[str, Grey]:
     """The images of the cameras that delivered, by name; no copies."""
-    return {
-        camera.name: image[:, camera.columns[0] : camera.columns[1]]
-        for camera in tag.cameras
-        if camera.status is FrameStatus.OK
-    }
+    return {camera.name: image[camera.part] for camera in tag.cameras if camera.status is FrameStatus.OK}

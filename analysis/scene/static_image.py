@@ -22,6 +22,7 @@ from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.arrays import Floats
 from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
+from rig.picture import Grey, measurable
 
 GreyImage = NDArray[np.float32]
 
@@ -89,18 +90,19 @@ def static_images(log: Path, pulses: range | None = None, frames: int = FRAMES) 
         if not stored:
             raise LogDamagedError(f"{log}: holds no image that could be measured; look at it with `svev verify`")
         rows, columns = stored[0].tag.shape
-        count = max(_FEWEST, min(frames, _MEMORY // (rows * columns)))
+        pixel = 4 if stored[0].tag.pixels.bits > 8 else 1  # bytes
+        count = max(_FEWEST, min(frames, _MEMORY // (rows * columns * pixel)))
         wanted = _spread(stored, count)
-        blocks: dict[str, list[NDArray[np.uint8]]] = {name: [] for name in wanted}
+        blocks: dict[str, list[Grey]] = {name: [] for name in wanted}
         for place in sorted(set().union(*wanted.values())):
             image = _image(stored[place], reader, log)
             for camera in stored[place].tag.cameras:
                 if place in wanted.get(camera.name, ()):
-                    blocks[camera.name].append(image[:, slice(*camera.columns)].copy())
+                    blocks[camera.name].append(image[camera.part].copy())
     return {name: static_image(name, blocks.pop(name)) for name in wanted}
 
 
-def static_image(camera: str, frames: Sequence[NDArray[np.uint8]]) -> StaticImage:
+def static_image(camera: str, frames: Sequence[Grey]) -> StaticImage:
     """The static image of frames (rows, columns) of one camera, at least one.
 
     Args:
@@ -114,12 +116,12 @@ def static_image(camera: str, frames: Sequence[NDArray[np.uint8]]) -> StaticImag
         return StaticImage(camera, grey, np.full_like(grey, _spatial_noise(distinct[0])), n)
     twice = _twice_median(distinct)
     median = np.asarray(twice / np.float32(2), np.float32)
-    twice_off = [cv2.absdiff(frame.astype(np.uint16) * 2, twice) for frame in distinct]
-    deviation = np.stack(twice_off).astype(np.uint16, copy=False)  # twice what it is
+    twice_off = [cv2.absdiff(frame.astype(twice.dtype) * 2, twice) for frame in distinct]
+    deviation = np.stack(twice_off).astype(twice.dtype, copy=False)  # twice what it is
     factor = _SMALL_SAMPLE[n - 2] if n < 10 else n / (n - 0.8)
     mad = np.asarray(np.float32(_MAD_TO_SIGMA * factor / 4) * _twice_median(deviation), np.float32)
     limit = _CLIP * np.maximum(_model(median, mad**2, quantile=None), np.float32(1.0))
-    agrees = (deviation <= np.minimum(2 * limit, 2 * 255).astype(np.uint16)).view(np.uint8)
+    agrees = (deviation <= np.minimum(2 * limit, 2 * 255).astype(twice.dtype)).view(np.uint8)
     count, grey, variance = (np.zeros(median.shape, np.float32) for _ in range(3))
     for frame, counts in zip(distinct, agrees, strict=True):
         cv2.accumulate(counts, count)
@@ -140,14 +142,15 @@ def static_image(camera: str, frames: Sequence[NDArray[np.uint8]]) -> StaticImag
     return StaticImage(camera, grey, noise.astype(np.float32), n)
 
 
-def _twice_median(values: NDArray[np.unsignedinteger[Any]]) -> NDArray[np.uint16]:
-    """Twice the medians of whole numbers (n, rows, columns) over the first axis.
+def _twice_median(values: NDArray[Any]) -> NDArray[Any]:
+    """Twice the medians of values (n, rows, columns) over the first axis: uint16 of whole numbers, else float32.
 
     All pixels of a strip, which stays in the processor's cache, are sorted at once by one network of comparisons.
     """
     n, rows, columns = values.shape
     flat = values.reshape(n, -1)
-    twice = np.empty(rows * columns, np.uint16)
+    whole = np.issubdtype(values.dtype, np.integer)
+    twice = np.empty(rows * columns, np.uint16 if whole else np.float32)
     for first in range(0, rows * columns, _STRIP):
         part = slice(first, first + _STRIP)
         sorted_ = [row.copy() for row in flat[:, part]]
@@ -156,7 +159,7 @@ def _twice_median(values: NDArray[np.unsignedinteger[Any]]) -> NDArray[np.uint16
             np.minimum(sorted_[low], sorted_[high], out=spare)
             np.maximum(sorted_[low], sorted_[high], out=sorted_[high])
             sorted_[low], spare = spare, sorted_[low]
-        np.add(sorted_[(n - 1) // 2], sorted_[n // 2], out=twice[part], dtype=np.uint16)
+        np.add(sorted_[(n - 1) // 2], sorted_[n // 2], out=twice[part], dtype=twice.dtype)
     return twice.reshape(rows, columns)
 
 
@@ -188,20 +191,20 @@ def _spread(stored: Sequence[StoredTriplet], count: int) -> dict[str, set[int]]:
     return {name: {there[name][round(float(i))] for i in evenly[name]} for name in order}
 
 
-def _image(triplet: StoredTriplet, reader: LogReader, log: Path) -> NDArray[np.uint8]:
+def _image(triplet: StoredTriplet, reader: LogReader, log: Path) -> Grey:
     try:
-        return triplet.image(reader)
+        return measurable(triplet.image(reader), triplet.tag.pixels)
     except ValueError as error:
         raise LogDamagedError(
             f"{log}: the image of pulse {triplet.tag.pulse} is damaged ({error}); see which are with `svev verify`"
         ) from None
 
 
-def _distinct(frames: Sequence[NDArray[np.uint8]]) -> list[NDArray[np.uint8]]:
+def _distinct(frames: Sequence[Grey]) -> list[Grey]:
     """The frames without those that repeat an earlier one, whatever moves in a small part of them."""
     step = max(1, frames[0].size // _PROBES)
-    kept: list[NDArray[np.uint8]] = []
-    probes: list[NDArray[np.uint8]] = []
+    kept: list[Grey] = []
+    probes: list[Grey] = []
     for frame in frames:
         probe = frame.ravel()[::step]
         if not any(np.mean(probe == other) > _SAME for other in probes):
@@ -238,7 +241,7 @@ def _line(x: Floats, y: Floats) -> tuple[float, float]:
     return float(np.median(y - slope * x)), slope
 
 
-def _spatial_noise(frame: NDArray[np.uint8]) -> float:
+def _spatial_noise(frame: Grey) -> float:
     """Noise of a single image: MAD after a filter that no plane and no straight edge along an axis passes."""
     kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
     filtered = cv2.filter2D(frame.astype(np.float32), -1, kernel)

@@ -16,7 +16,6 @@ from types import TracebackType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.cameras.live_watch import LiveWatch
 from analysis.cameras.oriented_scene import OrientedScene
@@ -37,6 +36,7 @@ from rig.errors import BadInputError
 from rig.events import Level
 from rig.frame import FrameStatus
 from rig.phrase import phrase, plain
+from rig.picture import Grey, measurable
 from rig.tag import TripletTag
 
 #: A jumper is sought so often, in the candidates of so long a time, and followed once so many pulses show him.
@@ -109,7 +109,8 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         if recording.last is not None:
             self.missed += max(0, tag.pulse - recording.last.pulse - 1)
         recording.last = tag
-        image = np.zeros(tag.shape, np.uint8) if received.image is None else received.image
+        stored = np.zeros(tag.shape, tag.pixels.dtype) if received.image is None else received.image
+        image = measurable(stored, tag.pixels)
         if self._finder is None:
             recording.wait(tag, image)
             if recording.is_ready():
@@ -159,7 +160,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         while recording.waiting and (finder := self._finder) is not None:
             self._measure(recording, finder, *recording.waiting.popleft())
 
-    def _measure(self, recording: Streamed, finder: Finder, tag: TripletTag, image: NDArray[np.uint8]) -> None:
+    def _measure(self, recording: Streamed, finder: Finder, tag: TripletTag, image: Grey) -> None:
         """Follow the jumper, or look whether one comes."""
         follower = recording.follower
         if follower is None:
@@ -176,12 +177,12 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         if recording.follower is None and recording.unseen_s() > _OVER_S:
             self._end_jump(recording)
 
-    def _look_at_balls(self, recording: Streamed, tag: TripletTag, image: NDArray[np.uint8]) -> None:
+    def _look_at_balls(self, recording: Streamed, tag: TripletTag, image: Grey) -> None:
         """Between two jumps, watch the balls in some frames a second; orient the cameras anew if one has moved."""
         due = tag.pulse - recording.watched >= _WATCH_S * recording.rate_hz
         if self._watch is None or recording.seen is not None or not due:
             return
-        frames = {c.name: image[:, slice(*c.columns)] for c in tag.cameras if c.status is FrameStatus.OK}
+        frames = {c.name: image[c.part] for c in tag.cameras if c.status is FrameStatus.OK}
         if not self._watch.look(tag.pulse, frames):
             return
         recording.watched = tag.pulse

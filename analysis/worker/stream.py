@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 import zmq
-from numpy.typing import NDArray
 from zmq.auth import load_certificate
 
 from rig.errors import BadInputError
+from rig.pixels import Stored
 from rig.tag import TripletTag
 from rig.topics import TRIPLET
 
@@ -41,11 +41,11 @@ class Received:
 
     Attributes:
         tag: what became of the pulse.
-        image: (rows, columns), uint8; None if no camera delivered a frame.
+        image: (rows, columns), as stored; None if no camera delivered a frame.
     """
 
     tag: TripletTag
-    image: NDArray[np.uint8] | None
+    image: Stored | None
 
 
 class Stream:
@@ -118,10 +118,11 @@ def _triplet(parts: list[memoryview]) -> Received | None:
         return None
     try:
         tag = TripletTag.decode(parts[0])
+        kind = tag.pixels
     except ValueError:
         return None
     if not len(parts[1]):
         return Received(tag, None)
-    if len(parts[1]) != tag.shape[0] * tag.shape[1]:
+    if len(parts[1]) != tag.shape[0] * tag.shape[1] * kind.size:
         return None
-    return Received(tag, np.frombuffer(parts[1], np.uint8).reshape(tag.shape))
+    return Received(tag, np.frombuffer(parts[1], kind.dtype).reshape(tag.shape))

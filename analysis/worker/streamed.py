@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.candidates.model import PulseCandidates
 from analysis.measurements.model import MeasuredCamera
@@ -14,6 +13,7 @@ from analysis.worker.following import Follower
 from rig.clocks import NS_PER_S
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
+from rig.picture import Grey
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
@@ -49,7 +49,7 @@ class Streamed:
     def __init__(self, first: TripletTag) -> None:
         self.first = first
         self.last: TripletTag | None = None
-        self.waiting: deque[tuple[TripletTag, NDArray[np.uint8]]] = deque()
+        self.waiting: deque[tuple[TripletTag, Grey]] = deque()
         self.candidates: deque[PulseCandidates] = deque()
         self.follower: Follower | None = None
         self.seen: tuple[PulseNumber, PulseNumber] | None = None
@@ -73,15 +73,12 @@ class Streamed:
 
     def cameras(self, exposures_s: Mapping[str, float]) -> dict[str, MeasuredCamera]:
         """Image size and exposure time of each camera."""
-        rows = self.first.shape[0]
         return {
-            camera.name: MeasuredCamera(
-                (camera.columns[1] - camera.columns[0], rows), exposures_s.get(camera.name, 0.0)
-            )
+            camera.name: MeasuredCamera(camera.size(self.first.shape), exposures_s.get(camera.name, 0.0))
             for camera in self.first.cameras
         }
 
-    def wait(self, tag: TripletTag, image: NDArray[np.uint8]) -> None:
+    def wait(self, tag: TripletTag, image: Grey) -> None:
         """Keep a triplet until the cameras are oriented; the oldest make room."""
         self.waiting.append((tag, image.copy()))
         while len(self.waiting) * image.nbytes > _WAITING_BYTES:
@@ -113,11 +110,7 @@ class Streamed:
         """
         images = {}
         for place, camera in enumerate(self.first.cameras):
-            frames = [
-                image[:, slice(*camera.columns)]
-                for tag, image in self.waiting
-                if tag.cameras[place].status is FrameStatus.OK
-            ]
+            frames = [image[camera.part] for tag, image in self.waiting if tag.cameras[place].status is FrameStatus.OK]
             if frames:
                 chosen = np.unique(np.linspace(0, len(frames) - 1, _FRAMES).round().astype(int))
                 images[camera.name] = static_image(camera.name, [frames[i] for i in chosen])

@@ -37,7 +37,7 @@ class ReplayCamera:
 
     def __init__(self, settings: CameraSettings, ring: CameraRing, timeline: Timeline) -> None:
         self._name, self._ring, self._timeline = settings.name, ring, timeline
-        self._shape = (settings.region.height, settings.region.width)
+        self._shape, self._pixel = (settings.region.height, settings.region.width), settings.format.pixels.dtype
         self._underruns = 0
         self._pulse = self._await_presence()
         self._connection = timeline.connection(self._pulse)
@@ -138,7 +138,7 @@ class ReplayCamera:
         if slot is None:
             self._underruns += 1
             return None
-        out = self._ring.frame(slot).reshape(self._shape)
+        out = self._ring.frame(slot).view(self._pixel).reshape(self._shape)
         whole = timeline.source.read_into(out, pulse % len(timeline.source.times))
         sleep_until(ready)
         if not whole:

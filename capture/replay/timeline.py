@@ -12,10 +12,10 @@ from statistics import median
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.clocks import NS_PER_US, DeviceNs, HostNs, UtcNs
 from rig.frame import FrameStatus
+from rig.pixels import Stored
 from rig.tag import CameraTag
 
 #: A device clock that jumps by more than this plus the drift of a crystal was set anew: a new connection begins.
@@ -50,7 +50,7 @@ class FrameSource(Protocol):
         """Usual time between two pulses."""
         ...
 
-    def read_into(self, out: NDArray[np.uint8], place: int) -> bool:
+    def read_into(self, out: Stored, place: int) -> bool:
         """Copy the frame of one pulse.
 
         Args:

@@ -41,7 +41,7 @@ class Scene(Protocol):
         ...
 
     def render_into(self, out: NDArray[np.uint8], pulse: int) -> None:
-        """Draw the frame, shape (rows, columns)."""
+        """Write the bytes of a frame, as the camera's pixel format has them, shape (bytes,)."""
         ...
 
 
@@ -112,7 +112,7 @@ class SimCamera:
             return None
         slot = self._ring.take_slot() if exposure is FrameStatus.OK else None
         if slot is not None:
-            self._scene.render_into(self._ring.frame(slot).reshape(self._shape), pulse)
+            self._scene.render_into(self._ring.frame(slot), pulse)
         elif exposure is FrameStatus.OK:
             self._underruns += 1
             return None

@@ -34,6 +34,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.errors import BadInputError, LogDamagedError, StorageError, UnknownRecordingError
+from rig.picture import shown
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
@@ -107,7 +108,9 @@ class Catalogue:
         return tuple(tags(self._log(recording)))
 
     def image(self, recording: str, pulse: int) -> NDArray[np.uint8]:
-        """The image of one pulse, (rows, columns), uint8, a copy. Reads no other image.
+        """The image of one pulse, to look at, a copy: (rows, columns), uint8, of a mosaic (rows, columns, 3).
+
+        Reads no other image.
 
         Raises:
             UnknownRecordingError: there is no such recording, no such pulse in it, or no camera delivered a frame.
@@ -120,7 +123,8 @@ class Catalogue:
             raise UnknownRecordingError(f"recording {recording} has no image of pulse {pulse}: choose another pulse")
         with LogReader(path, skim=True) as reader:
             try:
-                return stored_image(reader, pulse, *place).copy()
+                stored, pixels = stored_image(reader, pulse, *place)
+                return np.array(shown(stored, pixels, coloured=True))
             except ValueError as error:
                 raise LogDamagedError(
                     f"{path}: the image of pulse {pulse} is damaged ({error}); see the others with `svev verify`"

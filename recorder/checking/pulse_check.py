@@ -19,7 +19,8 @@ from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
 from rig.jumper import JumperState
-from rig.tag import TripletTag
+from rig.pixels import Stored
+from rig.tag import CameraTag, TripletTag
 from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
 from triggering.ledger import Ledger
 from triggering.recount import Recount
@@ -49,7 +50,7 @@ class PulseCheck:
         self.ledger, self.recount = Ledger(), Recount()
         self.events: list[Event] = []
         self._report = report
-        self._cameras: tuple[tuple[str, tuple[int, int]], ...] | None = None
+        self._cameras: tuple[object, ...] | None = None
         self._without_image: dict[int, TripletTag] = {}
 
     def take(self, chunk: Chunk) -> None:
@@ -94,7 +95,7 @@ class PulseCheck:
         self._without_image[tag.pulse] = tag
 
     def _tag_flaw(self, tag: TripletTag, message: Message, says_complete: object) -> str:
-        cameras = tuple((camera.name, camera.columns) for camera in tag.cameras)
+        cameras = tuple((camera.name, camera.columns, camera.rows) for camera in tag.cameras)
         self._cameras = self._cameras or cameras
         earlier = self.ledger.last_time
         blocks = [camera.columns for camera in tag.cameras]
@@ -174,8 +175,15 @@ def _image_flaw(image: ImageView, tag: TripletTag, publish_time: UtcNs) -> str:
         return str(error)
     if image.time != tag.time or image.time != publish_time:
         return "the time in its image is not that of its tag"
-    for camera in tag.cameras:
-        first, end = camera.columns
-        if camera.status is not FrameStatus.OK and everything[:, first:end].any():
-            return f"{camera.name} is {camera.status.value}, but its block of the image is not black"
-    return ""
+    if image.encoding != tag.pixels.encoding:
+        return f'its image is "{image.encoding}", its tag says "{tag.pixels.encoding}"'
+    return next((flaw for camera in tag.cameras if (flaw := _block_flaw(everything, camera))), "")
+
+
+def _block_flaw(image: Stored, camera: CameraTag) -> str:
+    """What is not black in a triplet, (rows, columns), though no frame of the camera is there."""
+    _, rows = camera.size((image.shape[0], image.shape[1]))
+    block = image[:, slice(*camera.columns)]
+    if camera.status is not FrameStatus.OK:
+        return f"{camera.name} is {camera.status.value}, but its block of the image is not black" if block.any() else ""
+    return f"{camera.name} has {rows} rows, but what is below them is not black" if block[rows:].any() else ""

@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
 from msgspec import UNSET
-from numpy.typing import NDArray
 
+from recorder.live.unpacking import unpacker
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
 from rig.phrase import Phrase, phrase, plain
+from rig.pixels import Stored
 from rig.settings.model import RigSettings
 from rig.tag import CameraTag
 from rig.transport.messages import CameraChanged, CameraNews
@@ -106,8 +106,10 @@ class Assembler:
         self.rig, self.buffers, self._rings = rig, buffers, rings
         self._names = [camera.name for camera in rig.cameras]
         self._columns = rig.columns()
-        self._shapes = [(camera.region.height, camera.region.width) for camera in rig.cameras]
-        self._blocks: dict[int, list[NDArray[np.uint8]]] = {}
+        self._rows = [camera.region.height for camera in rig.cameras]
+        self._low = [UNSET if rows == rig.triplet_shape[0] else rows for rows in self._rows]
+        self._unpack = [unpacker(camera) for camera in rig.cameras]
+        self._blocks: dict[int, list[Stored]] = {}
         self._waiting: list[_Composition] = []
         self._decided: deque[ClosedPulse] = deque()
         self._changes: list[CameraChanged] = []
@@ -211,10 +213,11 @@ class Assembler:
         return tuple(self._camera_tags(pulse, anchor))
 
     def _camera_tags(self, pulse: ClosedPulse, anchor: UtcAnchor) -> Iterator[CameraTag]:
-        for name, columns, outcome in zip(self._names, self._columns, pulse.outcomes, strict=True):
+        cameras = zip(self._names, self._columns, self._low, pulse.outcomes, strict=True)
+        for name, columns, rows, outcome in cameras:
             record = outcome.record
             if outcome.status is not FrameStatus.OK or record is None:
-                yield CameraTag(name, columns, outcome.status)
+                yield CameraTag(name, columns, outcome.status, rows=rows)
                 continue
             triggers = None if record.trigger_count < 0 else record.trigger_count
             offset = None if outcome.offset_ns is None else outcome.offset_ns / NS_PER_US
@@ -222,7 +225,8 @@ class Assembler:
             pixels = StampedPixels.from_value(record.value)
             stamped = UNSET if pixels is None else (pixels.row, columns[0] + pixels.column, pixels.count)
             yield CameraTag(
-                name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset, stamped
+                name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset, stamped,
+                rows,
             )  # fmt: skip
 
     def _read(self, camera: int) -> None:
@@ -300,14 +304,14 @@ class Assembler:
             part.pending.clear()
 
     def _copy(self, camera: int, record: Record, slot: int) -> None:
-        frame = self._rings[camera].frame(record.slot).reshape(self._shapes[camera])
-        np.copyto(self._blocks_of(slot)[camera], frame)
+        self._unpack[camera](self._rings[camera].frame(record.slot), self._blocks_of(slot)[camera])
         self._rings[camera].release(record.slot)
 
-    def _blocks_of(self, slot: int) -> list[NDArray[np.uint8]]:
-        """Views of the cameras' blocks of one buffer, made once."""
+    def _blocks_of(self, slot: int) -> list[Stored]:
+        """Views of the cameras' frames in one buffer, made once; nobody ever writes what is below a low one."""
         if slot not in self._blocks:
-            self._blocks[slot] = [self.buffers.block(slot, columns) for columns in self._columns]
+            blocks = (self.buffers.block(slot, columns) for columns in self._columns)
+            self._blocks[slot] = [block[:rows] for block, rows in zip(blocks, self._rows, strict=True)]
         return self._blocks[slot]
 
     def _blacken(self, pulse: ClosedPulse, slot: int) -> None:

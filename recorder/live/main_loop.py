@@ -67,8 +67,9 @@ class RecorderLoop:
         self._rig, self._doorbell, self._control = rig, config.doorbell, control
         self._preview = None if config.options.preview is None else PreviewSlot(config.options.preview)
         in_flight, topics = in_flight_triplets(rig), rig.own_topics()
-        held = preroll_triplets(rig, config.options.preroll_s, SlotLayout(rig.triplet_shape, topics).slot_bytes)
-        self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held, topics)
+        slot_bytes = SlotLayout(rig.triplet_shape, topics, rig.pixels).slot_bytes
+        held = preroll_triplets(rig, config.options.preroll_s, slot_bytes)
+        self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held, topics, rig.pixels)
         self._assembler = Assembler(rig, rings, self._buffers, config.epoch)
         network = rig.network
         keys = None if network.curve_key_file is None else load_keys(network.curve_key_file)
@@ -139,7 +140,8 @@ class RecorderLoop:
         if self._preview is not None and self._preview.due(now):
             pixels = None if triplet.slot is None else self._buffers.pixels(triplet.slot)
             statuses = [outcome.status for outcome in triplet.pulse.outcomes]
-            self._preview.write(triplet.pulse.number, triplet.pulse.time, statuses, pixels, now)
+            bits = self._rig.pixels.bits
+            self._preview.write(triplet.pulse.number, triplet.pulse.time, statuses, pixels, now, bits)
         if not self._recordings.running:  # whole triplets show that all cameras see the same pulses
             self._warm = self._warm + 1 if triplet.pulse.complete else 0
             if self._warm == _WARM_PULSES:

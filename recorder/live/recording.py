@@ -70,7 +70,7 @@ class Recording:
     def __init__(self, order: StartRecording, assembler: Assembler, after: "Recording | None" = None) -> None:
         rig, session_name = assembler.rig, order.session.get("session", "")
         check_tag_fits(assembler.buffers.layout, [camera.name for camera in rig.cameras], session_name, order.recording)
-        self._order, self._shape, self._assembler = order, rig.triplet_shape, assembler
+        self._order, self._assembler = order, assembler
         self._anchor = UtcAnchor.take()
         self.failure: StorageError | None = None
         self.trouble = self.continues = ""
@@ -205,7 +205,8 @@ class Recording:
         if not self._handed:
             self._first = self._first_number(pulse.time)
         number, time = PulseNumber(self._first + self._handed), self._anchor.utc(pulse.time)
-        return TripletTag(number, time, session, self.id, self._shape, cameras)
+        rig = self._assembler.rig
+        return TripletTag.made(number, time, session, self.id, rig.triplet_shape, cameras, rig.pixels)
 
     def write(self, tag: TripletTag, held: Held, slot: int | None, encoded: bytes) -> None:
         """Hand one pulse to the log. The recording keeps it too, until it is known to be in the file.

@@ -246,8 +246,8 @@ class Recordings:
 
     def _opened(self, recording: Recording) -> None:
         self._phase = _Phase.RUNNING
-        rows, columns = self._buffers.shape
-        self._watch = DiskWatch(rows * columns * self._assembler.rig.trigger.rate_hz, self._underruns())
+        rig = self._assembler.rig
+        self._watch = DiskWatch(rig.triplet_bytes * rig.trigger.rate_hz, self._underruns())
         said = wording.started(recording.id)
         if self._parts.earlier:
             before = self._parts.earlier[-1]

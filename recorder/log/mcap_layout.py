@@ -25,6 +25,7 @@ from mcap.records import McapRecord
 from recorder.log.crc import combined_crc
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
+from rig.pixels import MONO8, Pixels
 from rig.pulse import PulseNumber
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -136,6 +137,7 @@ class SlotLayout:
 
     Attributes:
         shape: rows and columns of the triplet.
+        kind: how it holds its pixels.
         images: the image messages: one of the triplet or, on request, one of each camera.
         pixels: offset of the first pixel in the slot.
         end: offset of one past the last pixel.
@@ -143,28 +145,32 @@ class SlotLayout:
         most_tag_bytes: longest tag that has room before the pixels.
     """
 
-    def __init__(self, shape: tuple[int, int], cameras: Sequence[tuple[str, tuple[int, int]]] = ()):
+    def __init__(
+        self, shape: tuple[int, int], cameras: Sequence[tuple[str, tuple[int, int]]] = (), kind: Pixels = MONO8
+    ):
         """Lay out a slot.
 
         Args:
             shape: rows and columns of the triplet.
             cameras: name and columns of each camera, if each gets an image message of its own.
+            kind: how the triplet holds its pixels.
 
         Raises:
             BadInputError: the triplet is larger than a chunk may be.
         """
-        if HEAD_ROOM + shape[0] * shape[1] > CHUNK_MAX:
+        column_bytes = shape[0] * kind.size
+        if HEAD_ROOM + shape[1] * column_bytes > CHUNK_MAX:
             raise BadInputError(
                 f"a triplet of {shape[1]} x {shape[0]} px: a log takes {CHUNK_MAX >> 20} MB per pulse at most; "
                 "make the cameras' regions smaller"
             )
-        self.shape = shape
+        self.shape, self.kind = shape, kind
         self.pixels = start = HEAD_ROOM
         images = []
         for place, (name, (begin, end)) in enumerate(cameras or [("triplet", (0, shape[1]))]):
             channel = FIRST_CAMERA_CHANNEL + place if cameras else TRIPLET_CHANNEL
             start += len(self._image_head(channel, name, end - begin, PulseNumber(1), UtcNs(0), UtcNs(0))) * (place > 0)
-            images.append(SlotImage(name, channel, (begin, end), start, start + shape[0] * (end - begin)))
+            images.append(SlotImage(name, channel, (begin, end), start, start + column_bytes * (end - begin)))
             start = images[-1].end
         self.images = tuple(images)
         self.end = start
@@ -231,19 +237,24 @@ class SlotLayout:
         """What stands before the pixels of an image message; of a camera's image it is always as long."""
         shape = (self.shape[0], columns)
         own = channel != TRIPLET_CHANNEL
-        prefix = camera_image_prefix(shape, pulse_time, frame) if own else raw_image_prefix(shape, pulse_time)
-        return _message_head(channel, pulse, len(prefix) + shape[0] * columns, pulse_time, log_time) + prefix
+        kind = self.kind
+        if own:
+            prefix = camera_image_prefix(shape, pulse_time, frame, kind)
+        else:
+            prefix = raw_image_prefix(shape, pulse_time, kind)
+        data_bytes = len(prefix) + shape[0] * columns * self.kind.size
+        return _message_head(channel, pulse, data_bytes, pulse_time, log_time) + prefix
 
 
-def raw_image_prefix(shape: tuple[int, int], time: UtcNs) -> bytes:
-    """A serialized `foxglove.RawImage` up to the pixels, which come last: mono8, rows without gaps."""
-    image = _raw_image(shape, "triplet")
+def raw_image_prefix(shape: tuple[int, int], time: UtcNs, kind: Pixels = MONO8) -> bytes:
+    """A serialized `foxglove.RawImage` up to the pixels, which come last, rows without gaps."""
+    image = _raw_image(shape, "triplet", kind)
     image.timestamp.FromNanoseconds(time)
     head: bytes = image.SerializeToString()
-    return head + _data_field(shape)
+    return head + _data_field(shape, kind)
 
 
-def camera_image_prefix(shape: tuple[int, int], time: UtcNs, frame: str) -> bytes:
+def camera_image_prefix(shape: tuple[int, int], time: UtcNs, frame: str, kind: Pixels = MONO8) -> bytes:
     """The same for the image of a camera; as long whatever the time, because other pixels stand right before it.
 
     The numbers of the time stamp are filled up with zero bits, which protobuf allows.
@@ -251,16 +262,18 @@ def camera_image_prefix(shape: tuple[int, int], time: UtcNs, frame: str) -> byte
     seconds, nanoseconds = divmod(time, NS_PER_S)
     stamp = b"".join(bytes([field << 3]) + _varint(number, 5) for field, number in ((1, seconds), (2, nanoseconds)))
     timestamp = bytes([RawImage.TIMESTAMP_FIELD_NUMBER << 3 | 2, len(stamp)]) + stamp
-    head: bytes = _raw_image(shape, frame).SerializeToString()
-    return timestamp + head + _data_field(shape)
+    head: bytes = _raw_image(shape, frame, kind).SerializeToString()
+    return timestamp + head + _data_field(shape, kind)
 
 
-def _raw_image(shape: tuple[int, int], frame: str) -> RawImage:
-    return RawImage(frame_id=frame, width=shape[1], height=shape[0], encoding="mono8", step=shape[1])
+def _raw_image(shape: tuple[int, int], frame: str, kind: Pixels) -> RawImage:
+    step = shape[1] * kind.size
+    return RawImage(frame_id=frame, width=shape[1], height=shape[0], encoding=kind.encoding, step=step)
 
 
-def _data_field(shape: tuple[int, int]) -> bytes:
-    return bytes([RawImage.DATA_FIELD_NUMBER << 3 | 2]) + _varint(shape[0] * shape[1])  # type 2: length, then bytes
+def _data_field(shape: tuple[int, int], kind: Pixels) -> bytes:
+    length = shape[0] * shape[1] * kind.size
+    return bytes([RawImage.DATA_FIELD_NUMBER << 3 | 2]) + _varint(length)  # type 2: length, then bytes
 
 
 def join_pages(parts: Iterable[bytes]) -> mmap.mmap:

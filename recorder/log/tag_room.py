@@ -7,6 +7,7 @@ from recorder.log.mcap_layout import SlotLayout
 from rig.clocks import DeviceNs, UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
+from rig.pixels import Pixels
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 
@@ -28,18 +29,19 @@ def check_tag_fits(layout: SlotLayout, cameras: Sequence[str], session: str, rec
     Raises:
         BadInputError: it does not fit.
     """
-    longest = _longest_tag(layout.shape, cameras, session, recording + _LONGER_NAME)
+    longest = _longest_tag(layout.shape, layout.kind, cameras, session, recording + _LONGER_NAME)
     if (too_many := len(longest) - layout.most_tag_bytes) > 0:
         raise BadInputError(
             f"the names of session and recording take {too_many} bytes too many for the tags of the log: shorten them"
         )
 
 
-def _longest_tag(shape: tuple[int, int], cameras: Sequence[str], session: str, recording: str) -> bytes:
+def _longest_tag(shape: tuple[int, int], kind: Pixels, cameras: Sequence[str], session: str, recording: str) -> bytes:
     number, time = PulseNumber(_LARGEST), UtcNs(_LARGEST)
     pixels = (shape[0], shape[1], _LARGEST)
+    device, offset = DeviceNs(_LARGEST), _LONGEST_OFFSET_US
     parts = tuple(
-        CameraTag(name, shape, FrameStatus.OK, number, number, DeviceNs(_LARGEST), time, _LONGEST_OFFSET_US, pixels)
+        CameraTag(name, shape, FrameStatus.OK, number, number, device, time, offset, pixels, shape[0])
         for name in cameras
     )
-    return TripletTag(number, time, session, recording, shape, parts).encode()
+    return TripletTag.made(number, time, session, recording, shape, parts, kind).encode()

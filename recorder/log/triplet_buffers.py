@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recorder.log.mcap_layout import PAGE, SlotLayout, round_up
+from rig.pixels import MONO8, Pixels, Stored
 
 _HUGE_PAGE = 2 * 1024 * 1024
 
@@ -26,17 +27,24 @@ class TripletBuffers:
         layout: where pixels and log records stand in a slot.
     """
 
-    def __init__(self, shape: tuple[int, int], count: int, cameras: Sequence[tuple[str, tuple[int, int]]] = ()):
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        count: int,
+        cameras: Sequence[tuple[str, tuple[int, int]]] = (),
+        kind: Pixels = MONO8,
+    ):
         """Reserve the memory.
 
         Args:
             shape: rows and columns of the triplet.
             count: number of slots.
             cameras: name and columns of each camera, if the pixels of each stand together.
+            kind: how triplets hold their pixels.
         """
         self.shape = shape
         self.count = count
-        self.layout = SlotLayout(shape, cameras)
+        self.layout = SlotLayout(shape, cameras, kind)
         slot_bytes = self.layout.slot_bytes
         memory = mmap.mmap(
             -1, round_up(count * slot_bytes, _HUGE_PAGE) + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
@@ -97,16 +105,16 @@ class TripletBuffers:
                 self._free.append(slot)
                 self._freed.notify()
 
-    def pixels(self, slot: int) -> NDArray[np.uint8]:
-        """The slot's triplet, (rows, columns), uint8, C-contiguous.
+    def pixels(self, slot: int) -> Stored:
+        """The slot's triplet, (rows, columns), C-contiguous.
 
         In place, always the same view; a new copy if the pixels of each camera stand together.
         """
         images = self._images[slot]
         return images[0] if len(images) == 1 else np.hstack(images)
 
-    def block(self, slot: int, columns: tuple[int, int]) -> NDArray[np.uint8]:
-        """A camera's pixels of the slot in place, (rows, columns), uint8.
+    def block(self, slot: int, columns: tuple[int, int]) -> Stored:
+        """A camera's pixels of the slot in place, (rows, columns).
 
         Args:
             slot: which slot.
@@ -118,8 +126,8 @@ class TripletBuffers:
                 return image[:, columns[0] - first : columns[1] - first]
         raise ValueError(f"columns {columns} are not those of a camera")
 
-    def write(self, slot: int, triplet: NDArray[np.uint8] | int) -> None:
-        """Copy a triplet, (rows, columns), uint8, into the slot, or fill it with a grey value."""
+    def write(self, slot: int, triplet: Stored | int) -> None:
+        """Copy a triplet, (rows, columns), into the slot, or fill it with a grey value."""
         for layout, image in zip(self.layout.images, self._images[slot], strict=True):
             first, end = layout.columns
             np.copyto(image, triplet if isinstance(triplet, int) else triplet[:, first:end])
@@ -136,5 +144,6 @@ class TripletBuffers:
         self._images.clear()
         self._slots.clear()
 
-    def _images_in(self, slot: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-        return [slot[image.start : image.end].reshape(self.shape[0], -1) for image in self.layout.images]
+    def _images_in(self, slot: NDArray[np.uint8]) -> list[Stored]:
+        rows, kind = self.shape[0], self.layout.kind.dtype
+        return [slot[image.start : image.end].view(kind).reshape(rows, -1) for image in self.layout.images]

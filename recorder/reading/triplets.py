@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
-from numpy.typing import NDArray
 
 from recorder.log.mcap_layout import CHUNK_MAX, raw_image_prefix
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from rig.clocks import UtcNs
 from rig.events import Event
+from rig.pixels import Pixels, Stored
 from rig.tag import TripletTag
 from rig.topics import CAMERA_TOPIC, TAG, TRIPLET
 
@@ -26,8 +26,8 @@ _OTHERS_MAX = 1 << 12
 _DATA_KEY = RawImage.DATA_FIELD_NUMBER << 3 | 2
 
 
-def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
-    """Every pulse of a log: its tag, and its image, (rows, columns), uint8, valid until the next one is taken.
+def triplets(path: Path) -> Iterator[tuple[TripletTag, Stored]]:
+    """Every pulse of a log: its tag, and its image, (rows, columns), valid until the next one is taken.
 
     The block of a camera that is not ok is black; the whole image of a pulse without any frame is black. Pulses in
     damaged parts of the log are left out.
@@ -43,7 +43,7 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, NDArray[np.uint8]]]:
                 if message.topic == TAG.name and message.data is not None:
                     tag = read_tag(message.data)
                     data = images.get(tag.pulse)
-                    yield tag, np.zeros(tag.shape, np.uint8) if data is None else pixels(view_image(data))
+                    yield tag, np.zeros(tag.shape, tag.pixels.dtype) if data is None else pixels(view_image(data))
 
 
 def tags(path: Path) -> Iterator[TripletTag]:
@@ -67,17 +67,17 @@ class StoredTriplet:
     offset: int
     length: int
 
-    def image(self, reader: LogReader) -> NDArray[np.uint8]:
-        """The pixels, (rows, columns), uint8, valid until anything else is read.
+    def image(self, reader: LogReader) -> Stored:
+        """The pixels, (rows, columns), valid until anything else is read.
 
         Raises:
             ValueError: the chunk is damaged, or holds no image of ours.
         """
-        return stored_image(reader, self.tag.pulse, self.offset, self.length)
+        return stored_image(reader, self.tag.pulse, self.offset, self.length)[0]
 
 
-def stored_image(reader: LogReader, pulse: int, offset: int, length: int) -> NDArray[np.uint8]:
-    """The pixels of a pulse, (rows, columns), uint8, from a chunk; valid until anything else is read.
+def stored_image(reader: LogReader, pulse: int, offset: int, length: int) -> tuple[Stored, Pixels]:
+    """The image of a pulse, (rows, columns), and how it holds its pixels; valid until anything else is read.
 
     Raises:
         ValueError: the chunk is damaged, or holds no image of ours.
@@ -86,7 +86,9 @@ def stored_image(reader: LogReader, pulse: int, offset: int, length: int) -> NDA
     image = images_of(chunk).get(pulse)
     if chunk.flaw or image is None or image.data is None:
         raise ValueError(chunk.flaw or "its chunk holds no whole image")
-    return pixels(view_image(image.data))
+    view = view_image(image.data)
+    found = (tag_of(message) for message in chunk.messages if message.sequence == pulse)
+    return pixels(view), next((tag.pixels for tag in found if tag is not None), view.kind)
 
 
 def images_of(chunk: Chunk) -> dict[int, Message]:
@@ -120,10 +122,10 @@ def _side_by_side(messages: Sequence[Message]) -> Message | None:
         blocks = [pixels(view) for view in views]
     except ValueError:
         return None
-    if len({(view.time, view.rows) for view in views}) > 1:
+    if len({(view.time, view.rows, view.encoding) for view in views}) > 1:
         return None
     whole = np.hstack(blocks)
-    data = raw_image_prefix((whole.shape[0], whole.shape[1]), views[0].time) + whole.tobytes()
+    data = raw_image_prefix((whole.shape[0], whole.shape[1]), views[0].time, views[0].kind) + whole.tobytes()
     return replace(first, topic=TRIPLET.name, data=memoryview(data))
 
 
@@ -176,7 +178,7 @@ def read_tag(data: bytes | memoryview) -> TripletTag:
     rows, columns = tag.shape
     if not (tag.pulse <= _SEQUENCE_MAX and 0 <= tag.time <= _TIME_MAX):
         raise ValueError("pulse or time out of bounds")
-    if rows < 1 or columns < 1 or rows * columns > CHUNK_MAX or not tag.cameras or tag.dtype != "uint8":
+    if rows < 1 or columns < 1 or rows * columns * tag.pixels.size > CHUNK_MAX or not tag.cameras:
         raise ValueError("no shape of a triplet")
     return tag
 
@@ -189,7 +191,7 @@ class ImageView:
         time: time stamp, UTC.
         rows, columns: size in px.
         step: bytes from row to row.
-        encoding: of the pixels; ours are "mono8".
+        encoding: of the pixels; ours are "mono8", "mono16" and those of Bayer mosaics with 8 bits.
         pixels: the pixels in place, no copy; as many bytes as the message says, or as it has left.
     """
 
@@ -199,6 +201,18 @@ class ImageView:
     step: int
     encoding: str
     pixels: memoryview
+
+    @property
+    def kind(self) -> Pixels:
+        """How the pixels are held; an image does not say how many of 16 bits are significant: its tag does.
+
+        Raises:
+            ValueError: as no log of ours does.
+        """
+        try:
+            return Pixels(self.encoding, 16 if self.encoding == "mono16" else 8)
+        except ValueError:
+            raise ValueError(f'the image is "{self.encoding}", which no recorder of svev writes') from None
 
 
 def view_image(message: memoryview) -> ImageView:
@@ -228,17 +242,19 @@ def view_image(message: memoryview) -> ImageView:
     return ImageView(time, image.height, image.width, image.step, image.encoding, pixels)
 
 
-def pixels(image: ImageView) -> NDArray[np.uint8]:
-    """The pixels of a mono8 image in place, (rows, columns), uint8.
+def pixels(image: ImageView) -> Stored:
+    """The pixels of an image in place, (rows, columns).
 
     Raises:
         ValueError: the image has another encoding, gaps between its rows, or not as many pixels as it says.
     """
-    if image.encoding != "mono8" or image.step != image.columns:
-        raise ValueError(f'the image is "{image.encoding}" with {image.step} bytes per row, not mono8 without gaps')
-    if len(image.pixels) != image.rows * image.columns:
-        raise ValueError(f"the image has {len(image.pixels)} pixels instead of {image.rows * image.columns}")
-    return np.frombuffer(image.pixels, np.uint8).reshape(image.rows, image.columns)
+    kind = image.kind
+    if image.step != image.columns * kind.size:
+        raise ValueError(f'the image is "{image.encoding}" with {image.step} bytes per row, not without gaps')
+    wanted = image.rows * image.step
+    if len(image.pixels) != wanted:
+        raise ValueError(f"the image has {len(image.pixels) // kind.size} pixels instead of {wanted // kind.size}")
+    return np.frombuffer(image.pixels, kind.dtype).reshape(image.rows, image.columns)
 
 
 def _field_length(message: memoryview, position: int, wire_type: int) -> tuple[int, int]:

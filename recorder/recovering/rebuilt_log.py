@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.items import Message
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Event
+from rig.pixels import MONO8, Pixels, Stored
 from rig.tag import TripletTag
 
 _SLOTS: Final = 4
@@ -28,6 +26,7 @@ class RebuiltLog:
         description: LogDescription,
         shape: tuple[int, int],
         own_topics: Sequence[tuple[str, tuple[int, int]]] = (),
+        kind: Pixels = MONO8,
     ) -> None:
         """Create the log.
 
@@ -36,6 +35,7 @@ class RebuiltLog:
             description: what it says before its first message.
             shape: rows and columns of its triplets.
             own_topics: name and columns of each camera whose images have a topic of their own.
+            kind: how its triplets hold their pixels.
 
         Raises:
             BadInputError: the new log exists already, or cannot be made.
@@ -43,7 +43,7 @@ class RebuiltLog:
         """
         self._path = path
         self._closed = False
-        self._buffers = TripletBuffers(shape, _SLOTS, own_topics)
+        self._buffers = TripletBuffers(shape, _SLOTS, own_topics, kind)
         try:
             self._writer = LogWriter(path, description, self._buffers)
         except BaseException:
@@ -59,12 +59,12 @@ class RebuiltLog:
             self._path.unlink(missing_ok=True)
         self._buffers.close()
 
-    def pulse(self, tag: TripletTag, picture: NDArray[np.uint8] | None, message: Message | None) -> None:
+    def pulse(self, tag: TripletTag, picture: Stored | None, message: Message | None) -> None:
         """Write a pulse.
 
         Args:
             tag: what became of the pulse.
-            picture: its pixels, (rows, columns), uint8; None if there are none.
+            picture: its pixels, (rows, columns); None if there are none.
             message: the message that holds the tag unchanged, None if there is none.
 
         Raises:

@@ -12,9 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from recorder.log.extent import last_before
 from recorder.log.session_changes import session_changes
@@ -29,6 +27,7 @@ from rig.errors import BadInputError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.phrase import plain
+from rig.pixels import Stored
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -115,13 +114,16 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
         attachments = reader.attachments
         description = LogDescription(
             session={**reader.metadata.get(SESSION_METADATA, {}), **changes},
-            rig=reader.metadata.get(RIG_METADATA, {"cameras": ", ".join(name for name, _ in chain.constants.cameras)}),
+            rig=reader.metadata.get(
+                RIG_METADATA, {"cameras": ", ".join(each.name for each in chain.constants.cameras)}
+            ),
             rig_toml=attachments.get(RIG_ATTACHMENT, b""),
             calibration_json=attachments.get(CALIBRATION_ATTACHMENT),
             calibrations=scan.calibrations,
         )
-        own_topics = chain.constants.cameras if reader.has_camera_topics else ()
-        with RebuiltLog(target, description, chain.constants.shape, own_topics) as rebuilt:
+        found = chain.constants
+        own_topics = [(camera.name, camera.columns) for camera in found.cameras] if reader.has_camera_topics else ()
+        with RebuiltLog(target, description, found.shape, own_topics, found.pixels) as rebuilt:
             recovery = _Recovery(reader, rebuilt, chain, scan)
             recovery.write(lambda share: done(reader.size // 2 + round(reader.size / 2 * share)))
             size = recovery.finish()
@@ -210,7 +212,7 @@ class _Recovery:
         else:
             self.ledger.add(tag)
 
-    def _read(self, sighting: Sighting) -> tuple[TripletTag, NDArray[np.uint8] | None, Message | None]:
+    def _read(self, sighting: Sighting) -> tuple[TripletTag, Stored | None, Message | None]:
         """Tag, pixels and tag message of a pulse, as far as they are there; valid until anything else is read."""
         match sighting.rank:
             case Rank.HEADS:
@@ -251,7 +253,9 @@ def _loss(ledger: Ledger, lost_pixels: Sequence[tuple[int, int]], findings: Sequ
 def _without_pixels(tag: TripletTag) -> TripletTag:
     """The tag of a pulse whose pixels are lost: frames that were ok are damaged."""
     cameras = tuple(
-        CameraTag(camera.name, camera.columns, FrameStatus.DAMAGED) if camera.status is FrameStatus.OK else camera
+        CameraTag(camera.name, camera.columns, FrameStatus.DAMAGED, rows=camera.rows)
+        if camera.status is FrameStatus.OK
+        else camera
         for camera in tag.cameras
     )
     return replace(tag, cameras=cameras)

@@ -7,11 +7,9 @@ behind zeroed padding, or where a block of the file was copied to.
 from collections.abc import Callable
 from typing import Final
 
-import numpy as np
 from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import DataEnd
-from numpy.typing import NDArray
 
 from recorder.checking.verify import Findings
 from recorder.log.channels import CALIBRATION_TOPIC
@@ -24,6 +22,7 @@ from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from recorder.recovering.salvage import pulse_of, tags_in
 from recorder.recovering.sightings import Constants, Rank, Sighting
 from rig.frame import FrameStatus
+from rig.pixels import Stored
 from rig.tag import TripletTag
 from rig.topics import CAMERA_TOPIC, NOTES, RESULTS, TAG, TRIPLET
 
@@ -178,10 +177,11 @@ def is_whole(tag: TripletTag, image: Message | None) -> bool:
     return image is not None and picture_of(image, tag) is not None
 
 
-def picture_of(image: Message, tag: TripletTag) -> NDArray[np.uint8] | None:
-    """The pixels of an image message, None if it is damaged or has another shape than its tag says."""
+def picture_of(image: Message, tag: TripletTag) -> Stored | None:
+    """The pixels of an image message, None if it is damaged or has another shape or encoding than its tag says."""
     try:
-        found = pixels(view_image(image.data or memoryview(b"")))
+        view = view_image(image.data or memoryview(b""))
+        found = pixels(view)
     except ValueError:
         return None
-    return found if found.shape == tag.shape else None
+    return found if (found.shape, view.encoding) == (tag.shape, tag.pixels.encoding) else None

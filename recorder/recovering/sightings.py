@@ -14,6 +14,7 @@ from typing import Self
 
 from rig.clocks import UtcNs
 from rig.frame import FrameStatus
+from rig.pixels import Pixels
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 
@@ -28,24 +29,24 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """What all tags of a recording have in common."""
+    """What all tags of a recording have in common; the cameras as they are where no frame can be read."""
 
     session: str
     recording: str
     shape: tuple[int, int]
-    dtype: str
-    cameras: tuple[tuple[str, tuple[int, int]], ...]
+    pixels: Pixels
+    cameras: tuple[CameraTag, ...]
 
     @classmethod
     def of(cls, tag: TripletTag) -> Self:
         """The constants of a tag."""
-        cameras = tuple((camera.name, camera.columns) for camera in tag.cameras)
-        return cls(tag.session, tag.recording, tag.shape, tag.dtype, cameras)
+        damaged = FrameStatus.DAMAGED
+        cameras = tuple(CameraTag(each.name, each.columns, damaged, rows=each.rows) for each in tag.cameras)
+        return cls(tag.session, tag.recording, tag.shape, tag.pixels, cameras)
 
     def damaged_tag(self, pulse: PulseNumber, time: UtcNs) -> TripletTag:
         """The tag of a pulse of which only number and time are known: the frames of all cameras are damaged."""
-        cameras = tuple(CameraTag(name, columns, FrameStatus.DAMAGED) for name, columns in self.cameras)
-        return TripletTag(pulse, time, self.session, self.recording, self.shape, cameras, dtype=self.dtype)
+        return TripletTag.made(pulse, time, self.session, self.recording, self.shape, self.cameras, self.pixels)
 
 
 @dataclass(frozen=True, slots=True)

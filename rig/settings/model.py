@@ -6,12 +6,13 @@
 import re
 from pathlib import Path
 from typing import Annotated, Final, Literal
-from urllib.parse import urlsplit
 
 from pydantic import Field, model_validator
 
+from rig.pixels import FORMATS, PixelFormat, PixelFormatName, Pixels
 from rig.settings.strict_toml import StrictModel
 from rig.settings.trigger import ExternalTrigger, SoftwareTrigger, Trigger
+from rig.settings.webhook import WebhookSettings
 from rig.topics import DEFAULT_PUBLISH
 
 Backend = Literal["aravis", "iidc", "sim", "replay"]
@@ -56,7 +57,11 @@ class CameraSettings(StrictModel):
         "relative to the working directory, the same for all cameras; name says which camera of it",
     )
     region: Region = Region()
-    pixel_format: Literal["Mono8"] = "Mono8"
+    pixel_format: PixelFormatName = Field(
+        "Mono8",
+        description="what the camera sends. Logs hold 8 bits per pixel as mono8, 10 and 12 as mono16, whether packed "
+        "or not",
+    )
     exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
     gain_db: float = Field(0.0, ge=0, le=60)
     trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
@@ -65,8 +70,13 @@ class CameraSettings(StrictModel):
 
     @property
     def frame_bytes(self) -> int:
-        """Bytes of one frame."""
-        return self.region.width * self.region.height
+        """Bytes of one frame as the camera sends it."""
+        return self.format.frame_bytes(self.region.width, self.region.height)
+
+    @property
+    def format(self) -> PixelFormat:
+        """How the camera sends its pixels."""
+        return FORMATS[self.pixel_format]
 
     @model_validator(mode="after")
     def _address_where_needed(self) -> "CameraSettings":
@@ -75,11 +85,24 @@ class CameraSettings(StrictModel):
         return self
 
     @model_validator(mode="after")
+    def _lines_hold_whole_groups(self) -> "CameraSettings":
+        if self.region.width % (group := self.format.group):
+            raise ValueError(
+                f"region.width of {self.name} is {self.region.width}: in {self.pixel_format} {group} pixels stand "
+                f"together, so make it a multiple of {group}"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _firewire_keys_make_sense(self) -> "CameraSettings":
         if self.backend != "iidc":
             if "iidc" in self.model_fields_set:
                 raise ValueError(f'iidc = ... is for backend "iidc" only, this one is "{self.backend}": remove it')
             return self
+        if self.pixel_format != "Mono8":
+            raise ValueError(
+                f'pixel_format "{self.pixel_format}" is not for backend "iidc": FireWire cameras send "Mono8" here'
+            )
         if not re.fullmatch(r"(0x)?[0-9A-Fa-f]{16}", self.address):
             raise ValueError(
                 f'address "{self.address}" is no GUID: give the 16 hexadecimal digits of the camera\'s label, '
@@ -150,56 +173,6 @@ class NetworkSettings(StrictModel):
         "net.core.rmem_max small; off: always through plain sockets",
     )
     resend: bool = Field(True, description="ask the camera again for lost packets")
-
-
-#: What people who are elsewhere can be told.
-Occasion = Literal["fault", "recording", "disk", "cameras"]
-
-
-def checked_url(url: str) -> str:
-    """The address of a webhook, as it is.
-
-    Raises:
-        ValueError: it is none; the message does not quote it, since it may be secret.
-    """
-    try:
-        place = urlsplit(url)
-        known = place.scheme in {"http", "https"} and bool(place.hostname) and place.port != 0
-    except ValueError:  # a port that is no number
-        known = False
-    if not known or not url.isascii() or not url.isprintable() or " " in url:
-        raise ValueError("this is no address of a webhook: give one like https://example.org/hook")
-    if place.username is not None:
-        raise ValueError("the address holds a name or password: put the secret into token_file")
-    return url
-
-
-class WebhookSettings(StrictModel):
-    """Where the service sends notifications, for people who are elsewhere."""
-
-    url: str | None = Field(
-        None, description="address that takes a POST of JSON; the rig file stands in every log, so it is no secret"
-    )
-    url_file: Path | None = Field(
-        None, description="file that holds the address alone, where it is secret, relative to the rig file"
-    )
-    token_file: Path | None = Field(
-        None, description="file with a token that is sent as Authorization: Bearer, relative to the rig file"
-    )
-    events: tuple[Occasion, ...] = Field(
-        ("fault", "recording", "disk", "cameras"),
-        min_length=1,
-        description="fault: the rig has one, and it is over; recording: one has ended, with its verdict; disk: nearly "
-        "full; cameras: one is gone, and is back",
-    )
-
-    @model_validator(mode="after")
-    def _one_address(self) -> "WebhookSettings":
-        if (self.url is None) == (self.url_file is None):
-            raise ValueError("a webhook needs its address: give url, or url_file where it is secret")
-        if self.url is not None:
-            checked_url(self.url)
-        return self
 
 
 class ServiceSettings(StrictModel):
@@ -282,8 +255,13 @@ class RigSettings(StrictModel):
             raise ValueError(
                 f"address {', '.join(a for _, a in sorted(doubled))} is used twice: give each camera its own address"
             )
-        if len({camera.region.height for camera in self.cameras}) > 1:
-            raise ValueError("cameras differ in region.height: frames stand side by side, so make the heights equal")
+        stored = {camera.format.pixels: camera for camera in self.cameras}
+        if len(stored) > 1:
+            given = ", ".join(f"{camera.name} {camera.pixel_format}" for camera in stored.values())
+            raise ValueError(
+                f"cameras differ in pixel_format ({given}): one image holds all frames of a pulse, so choose formats "
+                "with the same number of bits and the same colours"
+            )
         if self.simulation is None and any(camera.backend == "sim" for camera in self.cameras):
             raise ValueError('backend "sim" needs a [simulation] table: add scenario = "../scenarios/training.toml"')
         return self
@@ -335,7 +313,7 @@ class RigSettings(StrictModel):
     @model_validator(mode="after")
     def _triplets_fit_into_a_log(self) -> "RigSettings":
         rows, columns = self.triplet_shape
-        if rows * columns > _TRIPLET_BYTES_MAX:
+        if self.triplet_bytes > _TRIPLET_BYTES_MAX:
             raise ValueError(
                 f"a triplet of {columns} x {rows} px: a log takes 256 MB per pulse at most; make the cameras' regions "
                 "smaller"
@@ -369,8 +347,20 @@ class RigSettings(StrictModel):
 
     @property
     def triplet_shape(self) -> tuple[int, int]:
-        """Rows and columns of the triplet: the frames side by side (paper, Fig. 3)."""
-        return self.cameras[0].region.height, sum(camera.region.width for camera in self.cameras)
+        """Rows and columns of the triplet: the frames side by side (paper, Fig. 3), as high as the highest of them."""
+        heights = (camera.region.height for camera in self.cameras)
+        return max(heights), sum(camera.region.width for camera in self.cameras)
+
+    @property
+    def triplet_bytes(self) -> int:
+        """Bytes of a triplet's pixels."""
+        rows, columns = self.triplet_shape
+        return rows * columns * self.pixels.size
+
+    @property
+    def pixels(self) -> Pixels:
+        """How triplets hold their pixels."""
+        return self.cameras[0].format.pixels
 
     def own_topics(self) -> tuple[tuple[str, tuple[int, int]], ...]:
         """Name and columns of each camera whose images have a topic of their own; none if triplets have one."""

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
+from rig.pixels import Stored
 from rig.pulse import RigPulse
 
 _MAGIC: Final = 0x3156_4552_5056_5653  # "SVVPREV1" read as a little-endian word
@@ -139,8 +140,9 @@ class PreviewSlot:
         pulse: RigPulse,
         time_: HostNs,
         statuses: Sequence[FrameStatus],
-        pixels: NDArray[np.uint8] | None,
+        pixels: Stored | None,
         now: HostNs,
+        bits: int = 8,
     ) -> None:
         """Write an image into the slot.
 
@@ -148,8 +150,9 @@ class PreviewSlot:
             pulse: number of the pulse since the recorder was started.
             time_: host time of the pulse.
             statuses: what became of the pulse in each camera.
-            pixels: (rows, columns), uint8; None: black.
+            pixels: (rows, columns); None: black.
             now: present time; the next image is due `1 / MAX_PER_S` seconds later.
+            bits: how many bits of a pixel are significant; the highest eight of them are shown.
         """
         self._next = HostNs(now + NS_PER_S // MAX_PER_S)
         self._words[_SEQUENCE] += 1
@@ -157,6 +160,8 @@ class PreviewSlot:
         self._view[_STATUSES : _STATUSES + self.cameras] = bytes(_KINDS.index(status) for status in statuses)
         if pixels is None:
             self._pixels.fill(0)
+        elif bits > 8:
+            np.right_shift(pixels, bits - 8, out=self._pixels, casting="unsafe")
         else:
             np.copyto(self._pixels, pixels)
         self._words[_SEQUENCE] += 1

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
-from rig.settings.model import WebhookSettings, checked_url
+from rig.settings.webhook import WebhookSettings, checked_url
 
 #: A receiver that has not answered after this time is given up, s.
 DEADLINE_S: Final = 10.0

@@ -9,7 +9,7 @@ from typing import Final, Self
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.phrase import phrase
-from rig.settings.model import WebhookSettings
+from rig.settings.webhook import WebhookSettings
 from rig.status import Recording
 from service.alarms.delivery import DEADLINE_S, Failure, deliver, read_target
 from service.alarms.occasions import Notification, with_verdict

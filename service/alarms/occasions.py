@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Final, Literal
 
-from rig.settings.model import Occasion
+from rig.settings.webhook import Occasion
 from rig.status import CameraState, Level, Model, Recording, State, Status
 
 #: A change of a camera, of the fault or of the disk is told so long after the last one of it at the earliest, s: a

@@ -41,7 +41,9 @@ class MotionWatch:
         self._camera = [camera.name for camera in rig.cameras].index(motion.camera)
         first, last = rig.columns()[self._camera]
         part = motion.region
-        self._rows = slice(None) if part is None else slice(part.y, part.y + part.height)
+        self._rows = (
+            slice(rig.cameras[self._camera].region.height) if part is None else slice(part.y, part.y + part.height)
+        )
         self._columns = slice(first, last) if part is None else slice(first + part.x, first + part.x + part.width)
         self._detector = MotionDetector(motion.least_share)
         self._looked_at, self._pulse = HostNs(0), 0

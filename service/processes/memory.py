@@ -27,7 +27,7 @@ def ring_slots(rig: RigSettings) -> int:
 
 def memory_needed(rig: RigSettings, preroll_s: float) -> Mapping[str, int]:
     """Bytes of the buffers, by the key of the rig file that decides on them."""
-    slot_bytes = SlotLayout(rig.triplet_shape, rig.own_topics()).slot_bytes
+    slot_bytes = SlotLayout(rig.triplet_shape, rig.own_topics(), rig.pixels).slot_bytes
     return {
         "recorder.ring_s": sum(camera.frame_bytes for camera in rig.cameras) * ring_slots(rig),
         "recorder.triplets_s": in_flight_triplets(rig) * slot_bytes,

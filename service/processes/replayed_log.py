@@ -9,13 +9,13 @@ from statistics import median
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import UNREADABLE, LogReader
 from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, CameraError
+from rig.pixels import FORMATS, Stored
 from rig.settings.model import CameraSettings, RigSettings
 from rig.tag import CameraTag, TripletTag
 from rig.topics import TAG
@@ -60,17 +60,16 @@ class ReplayedLog:
             raise
         self.period_ns = _period_ns(self.times) or rig.trigger.period_ns
 
-    def read_into(self, out: NDArray[np.uint8], place: int) -> bool:
+    def read_into(self, out: Stored, place: int) -> bool:
         """Read the pixels of a pulse, as `capture.replay.timeline.FrameSource.read_into` says."""
         ahead = (place + _FETCH_AHEAD) % len(self._offsets)
         os.posix_fadvise(self._fd, self._offsets[ahead], self._lengths[ahead], os.POSIX_FADV_WILLNEED)
-        first, end = self.tags[place].columns
         try:
             chunk = self._reader.chunk(self._offsets[place], self._lengths[place])
             image = next(iter(images_of(chunk).values()), None)
             if chunk.flaw or image is None or image.data is None:
                 return False
-            np.copyto(out, pixels(view_image(image.data))[:, first:end])
+            np.copyto(out, pixels(view_image(image.data))[self.tags[place].part], casting="no")
         except BadInputError as error:
             raise CameraError(str(error)) from None
         except UNREADABLE:  # the chunk holds something else, or frames of another size
@@ -97,13 +96,21 @@ def check_replay(rig: RigSettings) -> None:
             continue
         with LogReader(Path(camera.address), skim=True) as reader:
             tags = [tag for tag, _ in islice(_pulses(reader), _RATE_PULSES)]
-        first, end = _camera_of(tags[0], camera).columns
-        rows, columns = tags[0].shape[0], end - first
+        columns, rows = _camera_of(tags[0], camera).size(tags[0].shape)
         if (rows, columns) != (camera.region.height, camera.region.width):
             raise BadInputError(
                 f"camera {camera.name}: its frames in {camera.address} are {columns} x {rows}, "
                 f"the rig file's region is {camera.region.width} x {camera.region.height}: "
                 f"write region = {{ width = {columns}, height = {rows} }}"
+            )
+        held = tags[0].pixels
+        whole = (
+            name for name, each in FORMATS.items() if each.pixels == held and each.frame_bytes(2, 2) == 4 * held.size
+        )
+        if camera.pixel_format != (written := next(whole, camera.pixel_format)):
+            raise BadInputError(
+                f"camera {camera.name}: {camera.address} holds its frames as {held.encoding} with {held.bits} bits, "
+                f'the rig file says {camera.pixel_format}: write pixel_format = "{written}"'
             )
         period_ns = _period_ns([tag.time for tag in tags])
         if period_ns is not None and abs(rig.trigger.period_ns / period_ns - 1) > _RATE_TOLERANCE:

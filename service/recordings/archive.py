@@ -176,7 +176,7 @@ class Archive(ABC):
         return _as_pulses(recording_id, self._catalogue.tags(recording_id))
 
     def image(self, recording_id: str, pulse: int) -> NDArray[np.uint8]:
-        """One triplet of a recording, (rows, columns), uint8."""
+        """One triplet of a recording, uint8, (rows, columns), or blue, green, red, (rows, columns, 3)."""
         return self._catalogue.image(recording_id, pulse)
 
     def liveliest_pulse(self, recording_id: str) -> int:

@@ -60,8 +60,7 @@ def usable_bytes(rig: RigSettings, free_bytes: int) -> float:
 
 def bytes_per_s(rig: RigSettings) -> float:
     """Bytes per second of a recording when all cameras deliver at the rig's rate."""
-    rows, columns = rig.triplet_shape
-    return rows * columns * rig.trigger.rate_hz
+    return rig.triplet_bytes * rig.trigger.rate_hz
 
 
 def room_for(rig: RigSettings, free_bytes: int, trash_bytes: int = 0) -> Room:

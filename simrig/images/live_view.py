@@ -6,8 +6,8 @@ lens; then the light of the moment, and the sensor's noise.
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import exposure
 from simrig.images.scene.background import paint
@@ -37,9 +37,10 @@ class LiveView:
         width: width of the image, px.
         height: height of the image, px.
         rate_hz: rate of the pulses.
+        bits: of a pixel.
     """
 
-    def __init__(self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float) -> None:
+    def __init__(self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float, bits: int = 8) -> None:
         self._scenario, self._rate_hz = scenario, rate_hz
         self._settings = scenario.cameras[camera]
         self._jumps = JumpSeries(scenario)
@@ -58,10 +59,10 @@ class LiveView:
             self._lens = 1 - cover, cover * np.float32(LENS_SNOW) + glare(light.glare_spots, width, height, rng)
         self._reflections = Reflections(scenario, camera) if light.reflections else None
         self._daylight = Daylight(light, scenario.seed)
-        self._sensor = Sensor(scenario.image, scenario.seed, camera, (height, width))
+        self._sensor = Sensor(scenario.image, scenario.seed, camera, (height, width), bits)
         self._image: Image = np.empty((height, width), np.float32)
 
-    def render_into(self, out: NDArray[np.uint8], pulse: HillPulse) -> None:
+    def render_into(self, out: Stored, pulse: HillPulse) -> None:
         """Render the image of hill pulse `pulse` into `out`, shape (height, width); its rows may lie apart."""
         image, scene_s = self._image, self._settings.middle_s(pulse, self._rate_hz)
         exposure_s = self._settings.exposure_us / 1e6

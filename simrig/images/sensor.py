@@ -5,8 +5,8 @@ import zlib
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images.scene.drawing import Image
 from simrig.world.scenario import ImageEffects
@@ -24,9 +24,11 @@ class Sensor:
         seed: seed of the scenario.
         camera: index of the camera.
         shape: rows and columns of the image.
+        bits: of a pixel.
     """
 
-    def __init__(self, effects: ImageEffects, seed: int, camera: int, shape: tuple[int, int]) -> None:
+    def __init__(self, effects: ImageEffects, seed: int, camera: int, shape: tuple[int, int], bits: int = 8) -> None:
+        self._scale, self._white = np.float32(2.0 ** (bits - 8)), (1 << bits) - 1
         self._effects, self._key, self._shape = effects, (seed, camera), shape
         self._fields: list[Image] = []
         if effects.noise_sigma or effects.electrons_per_grey:
@@ -35,7 +37,7 @@ class Sensor:
             self._fields = [rng.standard_normal(size, np.float32) for _ in range(_FIELDS)]
         self._noise = np.empty(shape, np.float32)
 
-    def read(self, light: Image, out: NDArray[np.uint8], pulse: HillPulse) -> None:
+    def read(self, light: Image, out: Stored, pulse: HillPulse) -> None:
         """Turn an image without noise, in grey values, into what the sensor gives; `light` is used up.
 
         Args:
@@ -45,7 +47,13 @@ class Sensor:
         """
         if self._fields:
             self._add_noise(light, pulse)
-        out[...] = cv2.convertScaleAbs(np.maximum(light, 0, out=light))
+        np.maximum(light, 0, out=light)
+        if out.dtype == np.uint8:
+            out[...] = cv2.convertScaleAbs(light)
+        else:
+            light *= self._scale
+            np.rint(np.minimum(light, self._white, out=light), out=light)
+            out[...] = light
 
     def _add_noise(self, light: Image, pulse: HillPulse) -> None:
         number = zlib.crc32(_KEY.pack(*self._key, pulse))

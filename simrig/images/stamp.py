@@ -1,8 +1,8 @@
 """The stamp in a simulated frame: which camera took it at which hill pulse.
 
-It stands in the last 16 pixels of the last line, like the secure image signature of AVT's cameras. So a test can read
-from the pixels alone whether a triplet mixes pulses. Bytes: magic "SVEV", camera index, pulse (8, big-endian),
-check (lowest 3 bytes of the CRC-32 of the 13 bytes before, big-endian).
+It stands in the last 16 pixels of the last line, a byte in each, like the secure image signature of AVT's cameras. So a
+test can read from the pixels alone whether a triplet mixes pulses. Bytes: magic "SVEV", camera index, pulse (8,
+big-endian), check (lowest 3 bytes of the CRC-32 of the 13 bytes before, big-endian).
 """
 
 import struct
@@ -10,8 +10,8 @@ import zlib
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.pixels import Stored
 from rig.pulse import HillPulse
 
 STAMP_BYTES = 16
@@ -32,7 +32,7 @@ class Stamp:
     pulse: HillPulse
 
 
-def write(image: NDArray[np.uint8], camera: int, pulse: HillPulse) -> None:
+def write(image: Stored, camera: int, pulse: HillPulse) -> None:
     """Stamp `image`, shape (h, w) with w >= 16, in place.
 
     Raises:
@@ -43,9 +43,9 @@ def write(image: NDArray[np.uint8], camera: int, pulse: HillPulse) -> None:
     image[-1, -STAMP_BYTES:] = np.frombuffer(body + _check(body), np.uint8)
 
 
-def read(image: NDArray[np.uint8]) -> Stamp | None:
+def read(image: Stored) -> Stamp | None:
     """The stamp of `image`, shape (h, w); None if it carries none or a broken one."""
-    data = image[-1, -STAMP_BYTES:].tobytes()
+    data = image[-1, -STAMP_BYTES:].astype(np.uint8).tobytes()
     body, check = data[: _BODY.size], data[_BODY.size :]
     if check != _check(body) or not body.startswith(_MAGIC):
         return None

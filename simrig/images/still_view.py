@@ -6,6 +6,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import exposure
 from simrig.images.scene.background import paint
@@ -31,11 +32,13 @@ class StillView:
         height: height of the image, px.
         rate_hz: rate of the pulses.
         rng: decides the noise.
+        bits: of a pixel.
     """
 
     def __init__(
-        self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float, rng: np.random.Generator
-    ) -> None:
+        self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float, rng: np.random.Generator,
+        bits: int = 8,
+    ) -> None:  # fmt: skip
         self._scenario = scenario
         self._camera = camera
         self._rate_hz = rate_hz
@@ -46,20 +49,22 @@ class StillView:
         Balls(scenario, projection).draw(radiance, projection)
         clean = image.black_level + settings.gain * np.clip(radiance, 0, BRIGHTEST)
         self._clean = np.rint(clean).astype(np.uint8)
-        self._noisy = [self._clean]
+        self._scale = np.float32(2.0 ** (bits - 8))
+        self._white = (1 << bits) - 1
+        self._noisy: list[Stored] = [_quantized(clean, bits)]
         if image.noise_sigma:
-            self._noisy = [_with_noise(clean, image.noise_sigma, rng) for _ in range(_NOISES)]
+            self._noisy = [_with_noise(clean, image.noise_sigma, rng, bits) for _ in range(_NOISES)]
         self._projection = projection
         self._exposure_s = settings.exposure_us / 1e6
         self._figure = Figure(scenario, projection, image.black_level, settings.gain)
 
-    def render_into(self, out: NDArray[np.uint8], pulse: HillPulse) -> None:
+    def render_into(self, out: Stored, pulse: HillPulse) -> None:
         """Render the image of hill pulse `pulse` into `out`, shape (height, width); its rows may lie apart."""
         noise = zlib.crc32(_NOISE_KEY.pack(self._scenario.seed, self._camera, pulse)) % len(self._noisy)
         np.copyto(out, self._noisy[noise])
         self._draw_jumper(out, pulse, self._noisy[noise - 1])
 
-    def _draw_jumper(self, out: NDArray[np.uint8], pulse: HillPulse, other: NDArray[np.uint8]) -> None:
+    def _draw_jumper(self, out: Stored, pulse: HillPulse, other: Stored) -> None:
         """Draw the jumper with the noise of another realisation than the background's around it."""
         there = self._jumps.at(self._scenario.cameras[self._camera].middle_s(pulse, self._rate_hz))
         if there is None:
@@ -70,13 +75,20 @@ class StillView:
         if not drawn:
             return
         rows, columns, sprite = drawn
-        sprite += other[rows, columns]
+        sprite += np.divide(other[rows, columns], self._scale, dtype=np.float32)
         sprite -= self._clean[rows, columns]
-        out[rows, columns] = np.clip(np.rint(sprite, out=sprite), 0, 255, out=sprite)
+        sprite *= self._scale
+        out[rows, columns] = np.clip(np.rint(sprite, out=sprite), 0, self._white, out=sprite)
 
 
-def _with_noise(clean: NDArray[np.float32], sigma: float, rng: np.random.Generator) -> NDArray[np.uint8]:
+def _with_noise(clean: NDArray[np.float32], sigma: float, rng: np.random.Generator, bits: int) -> Stored:
     noisy = rng.standard_normal(clean.shape, np.float32)
     noisy *= sigma
     noisy += clean
-    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+    return _quantized(noisy, bits)
+
+
+def _quantized(grey: NDArray[np.float32], bits: int) -> Stored:
+    """Whole numbers of so many bits from grey levels of eight bits."""
+    values: NDArray[np.float32] = np.clip(np.rint(grey * np.float32(2.0 ** (bits - 8))), 0, (1 << bits) - 1)
+    return values.astype(np.uint8) if bits == 8 else values.astype(np.uint16)

@@ -1,8 +1,8 @@
 """What one camera of the simulated hill sees: the image of every hill pulse."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import stamp
 from simrig.images.live_view import LiveView
@@ -27,22 +27,24 @@ class CameraView:
         rate_hz: rate of the pulses; hill pulse n shows scene time n / rate_hz, or a little later if it is exposed for
             some time.
 
+        bits: of a pixel; white is 2**bits - 1.
+
     Raises:
         IndexError: the scenario has no such camera.
     """
 
-    def __init__(self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float) -> None:
+    def __init__(self, scenario: Scenario, camera: int, width: int, height: int, rate_hz: float, bits: int = 8) -> None:
         self._stamped = camera if scenario.stamp else None
         self._rate_hz = rate_hz
         rng = np.random.default_rng((scenario.seed, camera, 99))
         self._view: StillView | LiveView
         if _is_live(scenario, camera):
-            self._view = LiveView(scenario, camera, width, height, rate_hz)
+            self._view = LiveView(scenario, camera, width, height, rate_hz, bits)
         else:
-            self._view = StillView(scenario, camera, width, height, rate_hz, rng)
-        self._snow = Snowfall(scenario.image.snow_flakes, width, height, rng)
+            self._view = StillView(scenario, camera, width, height, rate_hz, rng, bits)
+        self._snow = Snowfall(scenario.image.snow_flakes, width, height, rng, _FLAKE_GREY * 2.0 ** (bits - 8))
 
-    def render_into(self, out: NDArray[np.uint8], pulse: HillPulse) -> None:
+    def render_into(self, out: Stored, pulse: HillPulse) -> None:
         """Render the image of hill pulse `pulse` into `out`, shape (height, width); its rows may lie apart."""
         self._view.render_into(out, pulse)
         self._snow.draw(out, pulse / self._rate_hz)
@@ -65,9 +67,13 @@ class Snowfall:
         width: width of the image, px.
         height: height of the image, px.
         rng: decides where the flakes start and how they look.
+        grey: of a flake.
     """
 
-    def __init__(self, flakes: int, width: int, height: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self, flakes: int, width: int, height: int, rng: np.random.Generator, grey: float = _FLAKE_GREY
+    ) -> None:
+        self._grey = grey
         self._size = np.array((width, height), float)
         self._start = rng.uniform(0, 1, (flakes, 2)) * self._size
         speed = np.stack((rng.normal(35, 20, flakes), rng.uniform(60, 190, flakes)), axis=1)
@@ -76,7 +82,7 @@ class Snowfall:
         self._strength = rng.uniform(0.2, 0.95, (flakes, 1, 1))
         self._steps = np.arange(-_FLAKE_HALF, _FLAKE_HALF + 1)
 
-    def draw(self, image: NDArray[np.uint8], time_s: float) -> None:
+    def draw(self, image: Stored, time_s: float) -> None:
         """Draw the flakes of scene time `time_s` into `image` (h, w), in place."""
         if not len(self._start):
             return
@@ -89,4 +95,4 @@ class Snowfall:
         cover = self._strength * down[:, :, None] * across[:, None, :]
         where = rows[:, :, None], columns[:, None, :]
         below = image[where]
-        image[where] = below + cover * (_FLAKE_GREY - below)
+        image[where] = below + cover * (self._grey - below)

@@ -8,6 +8,7 @@ from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.pulse import HillPulse
 from rig.settings.model import RigSettings
+from simrig.images.packing import Packing
 from simrig.images.view import CameraView
 from simrig.world.faults import Fault, FaultKind, FaultPlan
 from simrig.world.pulses import DeviceClock, PulseTrain
@@ -39,7 +40,11 @@ class SimScene:
         settings = rig.cameras[index]
         camera = scenario.camera_index(settings.name)
         self._train = PulseTrain(epoch, rig.trigger.rate_hz, scenario.pauses)
-        self._view = CameraView(scenario, camera, settings.region.width, settings.region.height, rig.trigger.rate_hz)
+        region, held = settings.region, settings.format.pixels
+        self._shape = (region.height, region.width)
+        self._view = CameraView(scenario, camera, region.width, region.height, rig.trigger.rate_hz, bits=held.bits)
+        self._frame = np.zeros(self._shape, held.dtype)
+        self._packing = None if settings.pixel_format == "Mono8" else Packing(settings.pixel_format)
         self._clock = DeviceClock(scenario, camera, epoch)
         self._plan = FaultPlan(scenario.faults_of(settings.name))
         self._dark_until = HostNs(0)
@@ -74,5 +79,9 @@ class SimScene:
         return FrameStatus.MISSED if time < self._dark_until else FrameStatus.OK
 
     def render_into(self, out: NDArray[np.uint8], pulse: int) -> None:
-        """Draw the frame, shape (rows, columns)."""
-        self._view.render_into(out, HillPulse(pulse))
+        """Write the bytes of the frame as the camera sends them, shape (bytes,)."""
+        if self._packing is None:
+            self._view.render_into(out.reshape(self._shape), HillPulse(pulse))
+        else:
+            self._view.render_into(self._frame, HillPulse(pulse))
+            self._packing.pack(self._frame, out)

@@ -15,7 +15,8 @@ from rig.disk import free_bytes
 from rig.events import Event, Level
 from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
-from rig.settings.model import RigSettings, WebhookSettings
+from rig.settings.model import RigSettings
+from rig.settings.webhook import WebhookSettings
 from rig.status import ArmOrder
 from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot

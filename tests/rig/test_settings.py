@@ -117,9 +117,14 @@ def test_the_schema_is_a_schema() -> None:
             id="no address",
         ),
         pytest.param(
-            HEAD + CAMERA + SECOND + "region = { height = 100 }\n",
-            "cameras differ in region.height: frames stand side by side, so make the heights equal",
-            id="heights",
+            HEAD + CAMERA + SECOND + 'pixel_format = "Mono12"\n',
+            "cameras differ in pixel_format (K1 Mono8, K2 Mono12): one image holds all frames of a pulse, so choose",
+            id="bits",
+        ),
+        pytest.param(
+            HEAD + CAMERA + 'pixel_format = "Mono10p"\nregion = { width = 642 }\n',
+            '"cameras.1": region.width of K1 is 642: in Mono10p 4 pixels stand together, so make it a multiple of 4',
+            id="groups",
         ),
         pytest.param(
             HEAD + '[[cameras]]\nname = "K1"\nbackend = "sim"\n',
@@ -248,6 +253,15 @@ def test_a_path_through_a_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BadInputError, match=r"cannot be read \(Not a directory\)"):
         load_rig(tmp_path / "file" / "rig.toml")
+
+
+def test_frames_may_be_packed_and_of_different_sizes(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    packed = 'pixel_format = "Mono12Packed"\nregion = { width = 800, height = 100 }\n'
+    path.write_text(HEAD + CAMERA + packed + SECOND + 'pixel_format = "Mono12"\n')
+    rig = load_rig(path)
+    assert [camera.frame_bytes for camera in rig.cameras] == [800 * 100 * 3 // 2, 640 * 480 * 2]
+    assert (rig.triplet_shape, rig.triplet_bytes) == ((480, 1440), 480 * 1440 * 2)
 
 
 def test_an_endless_file_is_no_rig_file() -> None:

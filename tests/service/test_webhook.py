@@ -15,7 +15,7 @@ import pytest
 from rig.errors import BadInputError, UnknownRecordingError
 from rig.events import Event
 from rig.settings.file import load_rig
-from rig.settings.model import WebhookSettings
+from rig.settings.webhook import WebhookSettings
 from rig.status import CameraState, CameraStatus, DiskStatus, Model, Recording, State, Statement, Status
 from service.alarms.delivery import Target, deliver
 from service.alarms.messenger import QUEUE_MAX, Messenger

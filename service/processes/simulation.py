@@ -9,9 +9,9 @@ from capture.sim.camera import Scene
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
-from rig.settings.model import CameraSettings, Region, RigSettings
+from rig.settings.model import CameraSettings, RigSettings
 from rig.settings.trigger import SoftwareTrigger
-from simrig.programs.recording_truth import RecordingTruth
+from simrig.programs.recording_truth import RecordingTruth, gige_sensor
 from simrig.programs.scene import SimScene
 from simrig.programs.simulated_hill import SimulatedHill
 from simrig.world.scenario import load_scenario
@@ -45,7 +45,7 @@ def simulated_hill(
         return nullcontext()
     for camera in gige:
         _check_loopback(camera)
-    region = gige[0].region if gige else Region()
+    width, height = gige_sensor(rig)
     return SimulatedHill(
         rig.simulation.scenario,
         {camera.name: camera.address for camera in gige},
@@ -53,8 +53,8 @@ def simulated_hill(
         firewire={camera.name: camera.address for camera in firewire},
         cable=not isinstance(rig.trigger, SoftwareTrigger),  # GigE Vision cameras are told which source to heed
         epoch=epoch,
-        width=region.width,
-        height=region.height,
+        width=width,
+        height=height,
         prerendered=prerendered,
         link_mbit_s=link_mbit_s,
     )

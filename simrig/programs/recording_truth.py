@@ -77,16 +77,15 @@ class RecordingTruth:
 
 def windows(rig: RigSettings) -> dict[str, Window]:
     """Which part of the image that a simulated camera draws is in the log, by camera."""
-    gige = [camera.region for camera in rig.cameras if camera.backend == "aravis"]
-    return {camera.name: _window(camera, gige) for camera in rig.cameras}
+    return {camera.name: _window(camera, gige_sensor(rig)) for camera in rig.cameras}
 
 
-def _window(camera: CameraSettings, gige: list[Region]) -> Window:
+def _window(camera: CameraSettings, gige: tuple[int, int]) -> Window:
     region = camera.region
     left, top = region.x, region.y
     match camera.backend:
-        case "aravis":  # the sensor of all is as large as the first one's region
-            full = (gige[0].width, gige[0].height)
+        case "aravis":
+            full = gige
         case "iidc":  # the middle of the sensor shows what the scenario says, in VGA; Format_0 reads that out
             full = VGA
             if region != _VGA_REGION:
@@ -94,3 +93,9 @@ def _window(camera: CameraSettings, gige: list[Region]) -> Window:
         case _:
             left, top, full = 0, 0, (region.width, region.height)
     return Window(full, left, top, region.width, region.height)
+
+
+def gige_sensor(rig: RigSettings) -> tuple[int, int]:
+    """Width and height of the sensor of all simulated GigE Vision cameras of a rig: each region fits into it."""
+    regions = [camera.region for camera in rig.cameras if camera.backend == "aravis"] or [_VGA_REGION]
+    return max(region.width for region in regions), max(region.height for region in regions)

@@ -52,9 +52,13 @@ def _log(process: "subprocess.Popen[str]") -> Path:
     return Path(result["log"])
 
 
-@pytest.mark.parametrize("formats", [("Mono12Packed", "Mono12p", "Mono12"), ("BayerRG8",) * 3], ids=["mono16", "bayer"])
-def test_a_recording(tmp_path: Path, loopback: Loopback, formats: Sequence[str]) -> None:
-    rig = _rig(tmp_path, "sim", loopback, formats)
+@pytest.mark.parametrize(
+    ("backend", "formats"),
+    [("aravis", ("Mono12Packed", "Mono12p", "Mono12")), ("sim", ("BayerRG8",) * 3)],
+    ids=["mono16", "bayer"],
+)
+def test_a_recording(tmp_path: Path, loopback: Loopback, backend: str, formats: Sequence[str]) -> None:
+    rig = _rig(tmp_path, backend, loopback, formats)
     held = FORMATS[formats[0]].pixels
     published = {}
     process = _start(rig, tmp_path / "logs")

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 
 from rig.clocks import NS_PER_S, HostNs, host_now
+from rig.pixels import FORMATS
 from simrig.gige.control.control_channel import ControlChannel, Peer
 from simrig.gige.imaging.camera_clock import CameraClock
 from simrig.gige.imaging.frame_store import FrameStore
@@ -33,6 +34,8 @@ USER_SET_LOAD_NS = 30_000_000  #: a real camera needs this time to read its flas
 _ACTION_QUEUE = 10
 _NS_PER_MS = 1_000_000
 _COLD_C, _WARM_C, _WARM_UP_S = 21.0, 43.0, 600.0
+
+_FORMAT_NAMES = {each.code: name for name, each in FORMATS.items()}
 
 
 class Device:
@@ -169,7 +172,7 @@ class Device:
         clock, sensor = self._clock, self._sensor
         if "TimestampLatch" in self._registers:
             write("TimestampLatch", _command(self._latch_clock))
-        read("PayloadSize", lambda: self._registers.number("Width") * self._registers.number("Height"))
+        read("PayloadSize", lambda: self._format().payload_bytes)
         read("PtpStatus", lambda: clock.ptp_status(host_now()))
         read("CounterValue", lambda: sensor.trigger_count)
         read("DeviceTemperature", self._temperature)
@@ -235,7 +238,8 @@ class Device:
         frame = self._format()
         if self._store is None or self._store.format != frame:
             self._store = FrameStore(frame)
-            self._painter.prepare((slot.image for slot in self._store.slots), frame.rows, frame.columns)
+            images = (slot.image for slot in self._store.slots)
+            self._painter.prepare(images, frame.rows, frame.columns, frame.pixel_format)
         self._transmitter.restart(self._store)
         self._link.connect(*self._destination())
         delay_ticks, tick_hz = self._registers.number("GevSCPD"), self._registers.number("GevTimestampTickFrequency")
@@ -255,6 +259,7 @@ class Device:
             number("OffsetY"),
             number("GevSCPS") & PACKET_SIZE_MASK,
             bool(number("GevGVSPConfiguration") & EXTENDED_IDS),
+            _FORMAT_NAMES[number("PixelFormat")],
         )
 
     def _destination(self) -> Peer:

@@ -23,7 +23,7 @@ class Slot:
     """Memory of one frame.
 
     Attributes:
-        image: its pixels, shape (height, width).
+        image: its pixels as they are sent, shape (bytes,).
         table: its packets.
     """
 
@@ -74,7 +74,7 @@ class FrameStore:
         address = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
         self.slots = tuple(
             Slot(
-                pixels[index, : frame.payload_bytes].reshape(frame.height, frame.width),
+                pixels[index, : frame.payload_bytes],
                 PacketTable(frame, address + index * stride),
             )
             for index in range(count)

@@ -208,7 +208,8 @@ class Sensor:
             return
         slot = ahead.slot if ahead is not None and ahead.store is store else store.take()
         if slot is not None:
-            self._painter.paint(slot.image, store.format.rows, store.format.columns, pulse)
+            frame = store.format
+            self._painter.paint(slot.image, frame.rows, frame.columns, pulse, frame.pixel_format)
             self._ahead = _Ahead(store, slot, pulse)
 
     def _serve(self, trigger: Trigger) -> None:

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.pixels import FORMATS
 from simrig.gige.protocol.gvcp import Status
-
-MONO8 = 0x01080001  #: pixel format code
 
 IP_UDP_BYTES = 28  #: headers below GVSP that the packet size includes
 WIRE_BYTES = 38  #: Ethernet header, check sequence, preamble and gap, which it does not include
@@ -46,6 +45,7 @@ class FrameFormat:
         offset_y: first row on the sensor.
         packet_size: bytes on the network layer, IP and UDP headers included.
         extended: 64-bit block ids and 32-bit packet ids.
+        pixel_format: how its pixels are sent, by the name in `rig.pixels.FORMATS`.
     """
 
     width: int
@@ -54,6 +54,7 @@ class FrameFormat:
     offset_y: int
     packet_size: int
     extended: bool
+    pixel_format: str = "Mono8"
 
     @property
     def rows(self) -> slice:
@@ -67,8 +68,8 @@ class FrameFormat:
 
     @property
     def payload_bytes(self) -> int:
-        """Bytes of the image (Mono8)."""
-        return self.width * self.height
+        """Bytes of the image."""
+        return FORMATS[self.pixel_format].frame_bytes(self.width, self.height)
 
     @property
     def header(self) -> "np.dtype[np.void]":
@@ -77,7 +78,7 @@ class FrameFormat:
 
     @property
     def data_bytes(self) -> int:
-        """Pixels in a full packet."""
+        """Bytes of the image in a full packet."""
         return self.packet_size - IP_UDP_BYTES - self.header.itemsize
 
     @property
@@ -138,8 +139,8 @@ class PacketTable:
         frame = self._format
         self._headers["block_id"] = block_id
         _LEADER_BODY.pack_into(
-            self._leader, 0, 0, _IMAGE, ticks & 0xFFFFFFFFFFFFFFFF, MONO8, frame.width, frame.height,
-            frame.offset_x, frame.offset_y, 0, 0,
+            self._leader, 0, 0, _IMAGE, ticks & 0xFFFFFFFFFFFFFFFF, FORMATS[frame.pixel_format].code,
+            frame.width, frame.height, frame.offset_x, frame.offset_y, 0, 0,
         )  # fmt: skip
         if self._damaged:
             self._headers["status"] = 0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from xml.etree import ElementTree as ET
 
-from simrig.gige.protocol.gvsp import MONO8
+from rig.pixels import FORMATS
 from simrig.gige.registers.makers import Dialect
 from simrig.gige.registers.register_map import WORD, Kind, Register
 from simrig.gige.registers.register_table import (
@@ -105,7 +105,7 @@ _MEASURED = (
     ("Gain", "AnalogControl", "dB"),
 )
 _CHOSEN = (
-    ("PixelFormat", _IMAGE, (("Mono8", MONO8),)),
+    ("PixelFormat", _IMAGE, tuple((name, each.code) for name, each in FORMATS.items())),
     ("AcquisitionMode", _ACQUISITION, _entries(AcquisitionMode)),
     ("TriggerSelector", _ACQUISITION, (("FrameStart", 0),)),
     ("TriggerMode", _ACQUISITION, (("Off", 0), ("On", 1))),
@@ -161,6 +161,13 @@ _ROOT = {
 }  # fmt: skip
 
 
+def _offered(feature: Feature, dialect: Dialect) -> tuple[tuple[str, int], ...]:
+    """The values of an enumeration; of pixel formats those that the maker's cameras have."""
+    if feature.name != "PixelFormat" or not dialect.formats:
+        return feature.entries
+    return tuple((name, value) for name, value in feature.entries if name in dialect.formats)
+
+
 def _of_the_maker(features: Sequence[Feature], dialect: Dialect, named: Mapping[str, Register]) -> Iterator[Feature]:
     """The features of a maker's cameras."""
     for feature in features:
@@ -170,7 +177,7 @@ def _of_the_maker(features: Sequence[Feature], dialect: Dialect, named: Mapping[
         yield replace(
             feature,
             name=dialect.names.get(feature.name, feature.name),
-            entries=feature.entries if entries is None else _numbered(entries),
+            entries=_offered(feature, dialect) if entries is None else _numbered(entries),
             maximum=_reachable(feature.maximum, dialect.without),
         )
     for extra in dialect.extra:

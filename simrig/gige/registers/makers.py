@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
+from rig.pixels import FORMATS
 from simrig.gige.registers.register_map import Kind, Register
 
 
@@ -58,6 +59,7 @@ class Dialect:
         entries: names of an enumeration's values, in their order.
         extra: further features.
         latch_register: whether the bootstrap register latches the clock.
+        formats: pixel formats that these cameras have; empty: all.
     """
 
     names: Mapping[str, str] = field(default_factory=dict)
@@ -65,17 +67,20 @@ class Dialect:
     entries: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     extra: tuple[Extra, ...] = ()
     latch_register: bool = True
+    formats: tuple[str, ...] = ()
 
 
 _AUTO: Final = ("Off", "Once", "Continuous")
 _CONTINUOUS: Final = 2
 _SHORT_IDS: Final = frozenset({"GevGVSPExtendedIDMode"})
 _COUNTERS: Final = frozenset({"CounterValue", "CounterReset"})
+_PACKED_AS_BEFORE: Final = ("Mono8", "Mono10", "Mono10Packed", "Mono12", "Mono12Packed", "BayerRG8")
 #: An entry's place is its value, so the first input is the one that the trigger cable is plugged into.
 
 DIALECTS: Final[Mapping[Maker, Dialect]] = {
     Maker.STANDARD: Dialect(),
     Maker.BASLER: Dialect(
+        formats=("Mono8", "Mono12", "Mono12Packed"),
         names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
         without=_SHORT_IDS | _COUNTERS | {"Gain", "PtpEnable", "PtpStatus", "DeviceTemperature"},
         entries={
@@ -106,6 +111,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         latch_register=False,
     ),
     Maker.HIKROBOT: Dialect(
+        formats=_PACKED_AS_BEFORE,
         without=_SHORT_IDS | _COUNTERS | {"PtpEnable", "GevIEEE1588", "GevIEEE1588Status", "AcquisitionFrameRate"},
         entries={"TriggerSelector": ("FrameBurstStart",), "TriggerSource": ("Line0", "Line2", "Software")},
         extra=(
@@ -129,6 +135,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         ),
     ),
     Maker.JAI: Dialect(
+        formats=_PACKED_AS_BEFORE,
         without=_COUNTERS | {"TriggerActivation", "AcquisitionFrameRateEnable", "PtpEnable", "GevIEEE1588"},
         entries={
             "ExposureMode": ("Timed", "TriggerWidth", "Off"),
@@ -159,6 +166,8 @@ def _as_made(register: Register, dialect: Dialect) -> Register:
         return replace(register, writable=False)
     if register.name == "AcquisitionFrameRateEnable" and register.name in dialect.without:
         return replace(register, default=0)  # such a camera takes every pulse
+    if register.name == "PixelFormat" and dialect.formats:
+        return replace(register, choices=tuple(FORMATS[name].code for name in dialect.formats))
     if register.choices and register.name in dialect.entries:
         return replace(register, choices=tuple(range(len(dialect.entries[register.name]))))
     return register

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from itertools import count
 
-from simrig.gige.protocol.gvsp import MONO8
+from rig.pixels import FORMATS
 from simrig.gige.registers.register_map import Kind, Register
 
 VENDOR = "Svev"
@@ -183,7 +183,7 @@ def _settings() -> list[Register]:
         return Register(name, next(place), writable=True, choices=(1,))
 
     return [
-        choice("PixelFormat", MONO8, locked=True),
+        choice("PixelFormat", *(each.code for each in FORMATS.values()), locked=True),
         choice("AcquisitionMode", *AcquisitionMode, locked=True),
         command("AcquisitionStart"),
         command("AcquisitionStop"),

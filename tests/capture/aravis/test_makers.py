@@ -106,7 +106,11 @@ def _frames(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], li
     ("made", "settings", "told"),
     [
         (Maker.BASLER, {"trigger_input": "Line0"}, 'has no trigger input "Line0" (it has Line1, Line3, Software)'),
-        (Maker.HIKROBOT, {"pixel_format": "Mono10"}, "has no pixel format Mono10 (it has Mono8): correct pixel_format"),
+        (
+            Maker.HIKROBOT,
+            {"pixel_format": "Mono10p"},
+            "has no pixel format Mono10p (it has Mono8, Mono10, Mono12, ",
+        ),
     ],
     indirect=["made"],
 )

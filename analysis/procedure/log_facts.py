@@ -56,6 +56,11 @@ def log_facts(path: Path) -> LogFacts:
         messages.append(
             "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"
         )
+    if about.first.pixels.is_mosaic:
+        messages.append(
+            "the cameras have colour filters: grey values are interpolated from neighbours, which softens edges; the "
+            "sigmas of ski angles, the roll above all, are too small"
+        )
     shape = about.first.shape
     cameras = {tag.name: MeasuredCamera(tag.size(shape), exposures.get(tag.name, _EXPOSURE_US) / 1e6) for tag in tags}
     columns = {tag.name: (int(tag.columns[0]), int(tag.columns[1])) for tag in tags}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import av
 import cv2
+import httpx
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -23,6 +24,7 @@ from rig.pixels import FORMATS
 from rig.settings.file import load_rig
 from simrig.images import stamp
 from tests.capture.rigs import write_rig
+from tests.service.serving import serving
 from tests.support.loopback import Loopback
 
 SIZES = [(320, 240), (200, 160), (48, 300)]
@@ -92,6 +94,24 @@ def test_a_recording(tmp_path: Path, loopback: Loopback, backend: str, formats: 
     recover(log, recovered)
     assert [(t, i.tobytes()) for t, i in triplets(recovered)] == [(t, i.tobytes()) for t, i in triplets(log)]
     _exported(log, tmp_path)
+
+
+def test_the_panel_shows_colours(tmp_path: Path, loopback: Loopback) -> None:
+    with serving(tmp_path, _rig(tmp_path, "sim", loopback, ("BayerGB8",) * 3), loopback) as service:
+        service.arm()
+        recording = service.post("/api/recordings", {"preroll_s": 0})["id"]
+        service.await_pulses(5)
+        service.post(f"/api/recordings/{recording}/stop")
+        path = f"{service.url}/api/recordings/{recording}/pulses/2"
+        pictures = [
+            httpx.get(address, timeout=60, trust_env=False).raise_for_status().content
+            for address in (f"{service.url}/api/preview.jpg", f"{path}.jpg", f"{path}.png")
+        ]
+    for data in pictures:
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        assert picture is not None
+        assert picture.shape == (300, 568, 3)
+        assert 40 < picture[:160].mean() < 200
 
 
 def _exported(log: Path, folder: Path) -> None:

@@ -52,6 +52,16 @@ def test_grey_values_and_noise_are_those_of_the_scene() -> None:
     assert float(np.mean((error / image.sigma) ** 2)) == pytest.approx(1.0, abs=0.1)
 
 
+def test_grey_values_of_more_than_eight_bits_are_finer() -> None:
+    """Fractions of a grey level, as 12 bits give them: noise below one level is found as it is."""
+    rng = np.random.default_rng(3)
+    fine = [np.rint(16 * (_scene() + rng.normal(0, 0.6, (ROWS, COLUMNS)))) / 16 for _ in range(31)]
+    image = static_image("K1", [frame.astype(np.float32) for frame in fine])
+    error = image.grey - _scene()
+    assert np.median(image.noise) == pytest.approx(0.6, rel=0.05)
+    assert float(np.mean((error / image.sigma) ** 2)) == pytest.approx(1.0, abs=0.1)
+
+
 def test_noise_that_grows_with_the_light_is_found() -> None:
     rng = np.random.default_rng(5)
     scene = np.tile(np.linspace(20, 220, 200), (100, 1))

@@ -72,6 +72,10 @@ class Trace:
         ends: (2, 2) px, where it visibly ends; a body, the other ski or a low contrast may hide more of it.
         width: px, from edge to edge.
         contrast: grey values against what is around it; negative: darker.
+        one_sided: (k,) by how much the points move across the axis, to the side (-y, x) of its direction (x, y) from
+            end to end, if half of the width grows by 1: 0 where both edges are seen, -1 or 1 where one is.
+        of_width: px, the part of `common` and `lasting` that the uncertainty of the width makes.
+        lasting: px, the part of `common` that neighbouring images share.
     """
 
     xy: Floats
@@ -80,6 +84,9 @@ class Trace:
     ends: Floats
     width: float
     contrast: float
+    one_sided: Floats
+    of_width: float
+    lasting: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

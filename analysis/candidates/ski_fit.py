@@ -8,6 +8,7 @@ what remains unexplained, with a price for each bar.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -43,7 +44,8 @@ _HOPELESS = 5.0  # residuals over noise of a first explanation that no other sta
 _COMPARED = 700  # pixels with which explanations are compared; the best one is adjusted to all
 _UNSEEN = 1e-3  # 1 / px^2: weight of a bar's shift below which a section says nothing about it
 _POINT = 0.012  # of the width: a ski's border waves by that, and it is nearer to the camera at one end
-_AXIS = 0.015  # px by which the middle between the edges of a ski may be off its axis
+#: By so much the middle between the edges of a ski may be off its axis, standard deviation, px; in the next image too.
+AXIS_PX: Final = 0.015
 _FEWEST = 30  # pixels
 
 
@@ -59,6 +61,10 @@ class FittedBar:
         brightness: grey value.
         contrast: brightness minus the background's median.
         misfit: root mean square of the normalized residuals of the sections that count.
+        one_sided: (k,) by how much the points move across the axis if the bar's half width grows by 1: 0 where both its
+            edges are seen, -1 or 1 where one is.
+        of_width: px, the part of `common` and `lasting` that the uncertainty of the width makes.
+        lasting: px, the part of `common` that neighbouring images share: they show the same things beside the ski.
     """
 
     bar: Bar
@@ -68,6 +74,9 @@ class FittedBar:
     brightness: float
     contrast: float
     misfit: float
+    one_sided: Floats
+    of_width: float
+    lasting: float
 
 
 def fit_bars(region: Region, starts: Sequence[Sequence[Bar]], brighter: bool, points: int) -> list[FittedBar]:
@@ -249,43 +258,67 @@ class _Fit:
         place = np.floor((along - t0) / max(1e-9, t1 - t0) * sections).astype(int)
         good = self._good & (place >= 0) & (place < sections)
         bar = Bar(pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across, 2 * float(np.exp(theta[1])))
-        t, shift, sigma = self._shifts(k, good, place[good], along[good], sections)
+        t, shift, sigma, one_sided = self._shifts(k, good, place[good], along[good], sections)
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
         t, shift, sigma = t[fine], shift[fine], np.hypot(max(1.0, self.misfit) * sigma[fine], _POINT * bar.width)
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
         contrast = median(theta[0] - pixels.behind)
-        common = float(np.linalg.norm((self._common(k, t, sigma), doubt, _AXIS)))
-        return FittedBar(bar, xy, sigma, common, float(theta[0]), contrast, self.misfit)
+        own, of_width = self._common(k, t, sigma)
+        lasting = float(np.linalg.norm((of_width, doubt, AXIS_PX)))
+        return FittedBar(
+            bar,
+            xy,
+            sigma,
+            float(np.hypot(own, lasting)),
+            float(theta[0]),
+            contrast,
+            self.misfit,
+            one_sided[fine] / (bar.width / 2),
+            of_width,
+            lasting,
+        )
 
     def _shifts(
         self, k: int, good: Flags, place: Integers, along: Floats, sections: int
-    ) -> tuple[Floats, Floats, Floats]:
-        """Where along, how far off the axis, and with which sigma, section by section: all bars' shifts together."""
-        j, v = self._at.design[SHARED::OF_BAR, good], self._at.residuals[good]
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Where along, how far off the axis, and with which sigma, section by section: all bars' shifts together.
+
+        The last array is how the shifts change with the logarithm of the half width.
+        """
+        j, v, by_width = (
+            part[..., good] for part in (self._at.design[SHARED::OF_BAR], self._at.residuals, self._at.design[1])
+        )
         normal = np.empty((sections, self.count, self.count))
-        right = np.empty((sections, self.count))
+        right, right_width = np.empty((sections, self.count)), np.empty((sections, self.count))
         for a in range(self.count):
             right[:, a] = np.bincount(place, j[a] * v, sections)
+            right_width[:, a] = np.bincount(place, j[a] * by_width, sections)
             for b in range(self.count):
                 normal[:, a, b] = np.bincount(place, j[a] * j[b], sections)
         seen = normal[:, k, k] > _UNSEEN
         inverse = np.linalg.inv(normal[seen] + _UNSEEN * np.eye(self.count))
-        t, shift, sigma = (np.full(sections, np.nan) for _ in range(3))
+        t, shift, sigma, one_sided = (np.full(sections, np.nan) for _ in range(4))
         t[seen] = np.bincount(place, j[k] ** 2 * along, sections)[seen] / normal[seen, k, k]
         shift[seen] = np.einsum("na,na->n", inverse[:, k], right[seen])
+        one_sided[seen] = -np.einsum("na,na->n", inverse[:, k], right_width[seen])
         sigma[seen] = np.sqrt(inverse[:, k, k])
         sigma[~(sigma < MARGIN)] = np.nan
-        return t, shift, sigma
+        return t, shift, sigma, one_sided
 
-    def _common(self, k: int, t: Floats, sigma: Floats) -> float:
-        """What width, brightness and blur add to the sigma of the axis; all points share it."""
-        first = SHARED + OF_BAR * k
-        whole = np.linalg.inv(self._normal)[first : first + 2, first : first + 2] * max(1.0, self.misfit) ** 2
+    def _common(self, k: int, t: Floats, sigma: Floats) -> tuple[float, float]:
+        """What brightness and blur add to the sigma of the axis, and what the width does; all points share it."""
+        inverse = np.linalg.inv(self._normal)
+        line = slice(SHARED + OF_BAR * k, SHARED + OF_BAR * k + 2)
+        by_width = inverse[line, 1]
+        whole = inverse[line, line]
         weight = sigma**-2
         row = np.array((1.0, float(np.average(t, weights=weight))))
-        return float(np.sqrt(max(0.0, row @ whole @ row - 1 / weight.sum())))
+        scale, own = max(1.0, self.misfit) ** 2, 1 / float(weight.sum())
+        parts = whole, whole - np.outer(by_width, by_width) / inverse[1, 1]
+        common, given_width = (max(0.0, scale * float(row @ part @ row) - own) for part in parts)
+        return float(np.sqrt(given_width)), float(np.sqrt(common - given_width))
 
 
 def _quantile(values: Floats, share: float) -> float:

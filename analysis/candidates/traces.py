@@ -129,7 +129,19 @@ def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
     offset = np.array((region.x, region.y), float)
     xy, sigma = fitted.xy[inner], fitted.sigma[inner]
     sigma = sigma * _bent(t[inner], (xy - bar.ends[0]) @ np.array((-along[1], along[0])), sigma)
-    return Trace(xy + offset, sigma, fitted.common, bar.ends + offset, bar.width, fitted.contrast)
+    one_sided = np.clip(fitted.one_sided[inner], -1.0, 1.0)
+    ends = bar.ends + offset
+    return Trace(
+        xy + offset,
+        sigma,
+        fitted.common,
+        ends,
+        bar.width,
+        fitted.contrast,
+        one_sided,
+        fitted.of_width,
+        fitted.lasting,
+    )
 
 
 def _bent(t: Floats, off: Floats, sigma: Floats) -> float:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
+from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
+from analysis.identification.body import REACH_M
 from analysis.identification.flights import Flight, find_flights, find_tracks
 from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.refinement import refined
@@ -25,7 +27,7 @@ from analysis.measurements.model import (
     SkiMeasurement,
 )
 from analysis.scene.camera_system import CameraSystem
-from rig.arrays import Flags, Integers
+from rig.arrays import Flags, Floats, Integers
 
 _SEARCH_HZ = 30.0  #: tracks are sought in so many pulses per second: displacements that stand out of the noise
 _BEYOND_S = 0.6  #: that markers are followed before the first and after the last point of a track
@@ -122,6 +124,7 @@ class Sighting:
         if look is not None:
             markers = follow_further(views, window, flight, markers, look)
             markers = refined(views, window, flight, markers, self.appearance, look)
+        _tell_skis_apart(views, window, flight)
         traces = straight_traces(views, window)
         skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
         pulses = [
@@ -149,6 +152,33 @@ def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Fli
 
 def _named(pulse: PulseMeasurements) -> set[str]:
     return {label for image in pulse.images.values() for label in image.points}
+
+
+def _tell_skis_apart(views: Views, window: Window, flight: Flight) -> None:
+    """Learn how wide a ski of this jump is for each camera, and correct the traces of skis that hide each other."""
+    scales: list[Floats] = []
+    near: list[list[list[int]]] = []
+    widths: list[list[float]] = []
+    for k in range(len(views)):
+        sight = views.see(k, flight.place(window.time_s))
+        scales.append(np.asarray(np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2))))
+        near.append([])
+        widths.append([])
+        for t, middle in enumerate(sight.xy - window.shift[:, k]):
+            traces, scale = window.traces(t, k), float(scales[k][t])
+            away = [float(np.linalg.norm(trace.ends.mean(axis=0) - middle)) for trace in traces]
+            near[k].append([i for i, distance in enumerate(away) if distance < REACH_M * scale])
+            widths[k] += [px / scale for px in clear_widths([traces[i] for i in near[k][t]])]
+    everywhere = SkiWidth.of([width for of_camera in widths for width in of_camera])
+    for k in range(len(views)):
+        known = SkiWidth.of(widths[k]) or everywhere
+        if known is None:
+            continue
+        for t, own in enumerate(near[k]):
+            if own:
+                traces = window.traces(t, k)
+                told = told_apart([traces[i] for i in own], known.m * float(scales[k][t]), known.spread)
+                window.put_traces(t, k, told + tuple(trace for i, trace in enumerate(traces) if i not in own))
 
 
 def straight_traces(views: Views, window: Window) -> list[list[list[StraightTrace]]]:
@@ -200,4 +230,5 @@ def named_pulse(
 
 def _ski(parts: Sequence[Trace]) -> SkiMeasurement:
     xy, sigma = np.concatenate([part.xy for part in parts]), np.concatenate([part.sigma for part in parts])
-    return SkiMeasurement(xy, sigma, common=max(part.common for part in parts))
+    common, lasting = max(part.common for part in parts), max(part.lasting for part in parts)
+    return SkiMeasurement(xy, sigma, common=common, lasting=lasting)

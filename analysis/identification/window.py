@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
+from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.identification.body import REACH_M
 from analysis.identification.flights import Flight
 from analysis.identification.space_points import Appearance, Rays, find_space_points, rays_of
@@ -105,6 +105,17 @@ class Window:
         name = self._views.names[k]
         image = self.candidates[t].images[name]
         images = {**self.candidates[t].images, name: ImageCandidates(spots, image.traces)}
+        self.candidates[t] = replace(self.candidates[t], images=images)
+
+    def traces(self, t: int, k: int) -> tuple[Trace, ...]:
+        """The traces of an image; none where it is missing."""
+        image = self.candidates[t].images.get(self._views.names[k])
+        return () if image is None else image.traces
+
+    def put_traces(self, t: int, k: int, traces: tuple[Trace, ...]) -> None:
+        """Replace the traces of an image."""
+        name = self._views.names[k]
+        images = {**self.candidates[t].images, name: replace(self.candidates[t].images[name], traces=traces)}
         self.candidates[t] = replace(self.candidates[t], images=images)
 
     def renew(self, order: Sequence[int]) -> None:

@@ -63,6 +63,7 @@ class SkiEntry(_Measured):
 
     xy: Annotated[list[Place], Field(min_length=2)]
     common: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
+    lasting: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
 
     @model_validator(mode="after")
     def _sigma_fits(self) -> "SkiEntry":

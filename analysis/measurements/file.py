@@ -92,7 +92,7 @@ def _point(entry: PointEntry) -> PointMeasurement:
 
 def _ski(entry: SkiEntry) -> SkiMeasurement:
     xy = np.array(entry.xy)
-    return SkiMeasurement(xy, np.array(entry.sigmas(len(xy))), entry.source, entry.common)
+    return SkiMeasurement(xy, np.array(entry.sigmas(len(xy))), entry.source, entry.common, entry.lasting)
 
 
 def _jump_text(jump: JumpMeasurements) -> str:
@@ -120,7 +120,8 @@ def _point_entry(point: PointMeasurement) -> dict[str, Any]:
 
 def _ski_entry(ski: SkiMeasurement) -> dict[str, Any]:
     entry = {"xy": _places(ski.xy), "sigma": [_sigma(s) for s in ski.sigma], "source": ski.source.value}
-    return entry | {"common": _sigma(ski.common)} if ski.common else entry
+    shared = {"common": ski.common, "lasting": ski.lasting}
+    return entry | {name: _sigma(value) for name, value in shared.items() if value}
 
 
 def _places(xy: Any) -> Any:

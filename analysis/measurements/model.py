@@ -50,12 +50,14 @@ class SkiMeasurement:
         source: who measured it.
         common: px, standard deviation of an error across the ski that all points share (the axis as seen is not that
             of the ski); 0 where there is none.
+        lasting: px, the part of it that neighbouring pulses share; 0 where there is none.
     """
 
     xy: Floats
     sigma: Floats
     source: Source = Source.AUTOMATIC
     common: float = 0.0
+    lasting: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -55,6 +55,17 @@ class Solution:
     coupling: Floats
     response: Floats
 
+    def moved_by(self, by_states: Floats, by_shared: Floats) -> Floats:
+        """Changes of the states (n, s, f) by f right-hand sides.
+
+        Args:
+            by_states: (n, s, f) right-hand sides of the equations of all pulses.
+            by_shared: (b, f) of those of the shared unknowns.
+        """
+        alone = _back(self.inverse, self.coupling, _forward(self.inverse, self.coupling, by_states))
+        pull = by_shared - np.einsum("nsb,nsf->bf", self.response, by_states)
+        return np.asarray(alone - self.response @ (self.shared_covariance @ pull))
+
     def covariance_of(self, by_states: Floats, by_shared: Floats | None = None) -> Floats:
         """Covariance (f, f) of f linear functions.
 

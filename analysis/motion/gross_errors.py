@@ -15,6 +15,7 @@ from scipy.special import chdtri
 
 from analysis.motion.bundle import MEDIAN, Adjusted, rows_by_shared, settled
 from analysis.motion.channels import CHANNELS
+from analysis.motion.lasting import LASTING_S, pulls, runs
 from analysis.motion.prior import STATE
 from rig.arrays import Flags, Floats, Integers
 
@@ -22,8 +23,6 @@ from rig.arrays import Flags, Floats, Integers
 FALSE_REMOVAL_P: Final = 0.05
 _SIGNIFICANT: Final = 3.1  # sigmas; right ones are held for too small with a probability of 0.001
 _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
-_LASTING_S: Final = 0.2  # an arm or a ski covers half a marker for some tenths of a second
-_GAP_S, _GAP_PULSES = 0.05, 1.5  # behind a longer gap it may be another error
 _RIVAL_P: Final = 1e-3  # a suspect that is not that unlikely beside another one has a rival in it
 
 
@@ -131,7 +130,7 @@ def lasting_errors(adjusted: Adjusted) -> Flags:
     tests = np.array([windows.test((w,)) for w in range(len(windows.middle))])
     limit, rival = float(chdtri(2, FALSE_REMOVAL_P / len(tests))), float(chdtri(2, _RIVAL_P))
     for w in np.flatnonzero(tests > limit):
-        near = np.flatnonzero(np.abs(windows.middle - windows.middle[w]) < _LASTING_S)
+        near = np.flatnonzero(np.abs(windows.middle - windows.middle[w]) < LASTING_S)
         if tests[w] < tests[near].max():
             continue
         for other in near[tests[near] > tests[w] - rival]:
@@ -173,40 +172,28 @@ def _windows(adjusted: Adjusted) -> _Windows:
     """Eliminate all unknowns of the bundle from the normal equations of the windows' errors."""
     observed, used = adjusted.model.observed, adjusted.used
     members = np.full(used.shape, -1)
-    found = [(run, i, g) for i in range(used.shape[1]) for g in range(used.shape[2]) for run in _runs(adjusted, i, g)]
-    for w, (pulses, i, g) in enumerate(found):
-        members[pulses, i, g] = w
-    count, shared = len(found), rows_by_shared(adjusted)
-    by_states = np.zeros((len(used), STATE, count, 2))
-    by_shared = np.zeros((shared.shape[-1], count, 2))
+    found = [
+        run
+        for i in range(used.shape[1])
+        for g in range(used.shape[2])
+        for run in runs(adjusted, i, g, LASTING_S)
+        if len(run.pulses) > 1
+    ]
+    count = len(found)
     pull, own = np.zeros((count, 2)), np.zeros((count, 2, 2))
-    for w, (pulses, i, g) in enumerate(found):
-        white = observed.whitener[pulses, i, g]
-        rows = np.einsum("pac,pab->pcb", adjusted.equations.by_channels[pulses, i, g], white)
-        by_states[pulses, :, w] = np.einsum("d,pcb->pdcb", adjusted.instants[i], rows).reshape(-1, STATE, 2)
-        by_shared[:, w] = np.einsum("pas,pab->sb", shared[pulses, i, g], white)
-        pull[w] = np.einsum("pab,pa->b", white, adjusted.equations.v[pulses, i, g])
+    for w, run in enumerate(found):
+        at = run.pulses, run.camera, run.group
+        members[at] = w
+        white = observed.whitener[at]
+        pull[w] = np.einsum("pab,pa->b", white, adjusted.equations.v[at])
         own[w] = np.einsum("pab,pac->bc", white, white)
+    by_states, by_shared = pulls(adjusted, found, [np.tile(np.eye(2), (len(run.pulses), 1, 1)) for run in found])
     spread = adjusted.solution.covariance_of(
         by_states.reshape(len(used), STATE, -1), by_shared.reshape(len(by_shared), -1)
     )
     normal = -spread.reshape(count, 2, count, 2).transpose(0, 2, 1, 3)
     normal[range(count), range(count)] += (1 + _FLOOR) * own
-    sizes = np.array([len(pulses) for pulses, _, _ in found])
+    sizes = np.array([len(run.pulses) for run in found])
     single = np.linalg.inv(own) * sizes[:, None, None] if count else own
-    middle = np.array([observed.times[pulses].mean() for pulses, _, _ in found])
+    middle = np.array([observed.times[run.pulses].mean() for run in found])
     return _Windows(members, middle, pull, normal, single)
-
-
-def _runs(adjusted: Adjusted, camera: int, group: int) -> list[Integers]:
-    """Pulses in which a camera measured a thing: runs without long gaps, none longer than an error lasts."""
-    times = adjusted.model.observed.times
-    pulses = np.flatnonzero(adjusted.used[:, camera, group])
-    gap = max(_GAP_S, _GAP_PULSES * adjusted.model.prior.unit)
-    runs: list[list[int]] = []
-    for k in pulses.tolist():
-        if runs and times[k] - times[runs[-1][-1]] < gap and times[k] - times[runs[-1][0]] < _LASTING_S:
-            runs[-1].append(k)
-        else:
-            runs.append([k])
-    return [np.array(run) for run in runs if len(run) > 1]

@@ -18,6 +18,7 @@ from analysis.motion.bundle import (
     with_prior,
 )
 from analysis.motion.gross_errors import fitting_sigmas, statistics, without_gross_errors
+from analysis.motion.lasting import lasting_covariance
 from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
 from analysis.motion.prior import prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states
@@ -226,6 +227,7 @@ def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
     model, used = adjusted.model, adjusted.used
     rank = model.root.shape[1]
     states, covariance, cross = _over_takeoff(adjusted, edge)
+    covariance = covariance + lasting_covariance(adjusted)
     by_hand = [dict(zip(GROUPS, row, strict=True)) for row in np.asarray((model.observed.by_hand & used).any(axis=1))]
     return smoothed_states(
         model.frame,

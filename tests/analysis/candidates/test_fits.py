@@ -11,8 +11,11 @@ from analysis.candidates.background import Background, Region
 from analysis.candidates.bar_model import Bar, pixels_around
 from analysis.candidates.bar_model import modelled as model_of_bars
 from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs
+from analysis.candidates.model import Trace
 from analysis.candidates.ski_fit import fit_bars
+from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
 from analysis.candidates.soft_discs import fit_soft_discs
+from analysis.candidates.traces import find_traces
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Floats
 from tests.analysis.scene.rendering import Spot, clean_image
@@ -121,6 +124,57 @@ def test_two_skis_that_nearly_cover_each_other_are_told_apart() -> None:
             assert abs(middle) < 0.1, "px: a thirtieth of the width"
 
 
+@pytest.mark.parametrize("apart", [1.8, 2.4, 3.6])
+def test_skis_that_hide_each_others_edges_are_placed_by_their_width(apart: float) -> None:
+    """Nothing but the width tells how far apart they are; before, the sigma knew nothing of that."""
+    rng = np.random.default_rng(17)
+    width, along = 4.4, np.array((78.0, -9.0))
+    across = np.array((-along[1], along[0])) / np.hypot(*along)
+    begins = np.array((12.3, 26.2)), np.array((12.3, 26.2)) + 0.04 * along + apart * across
+    clean = np.full((50, 110), 70.0)
+    for a in begins:
+        clean += _capsule(clean.shape, a, a + along, width / 2) * (200.0 - clean)
+    clean = gaussian_filter(clean, 0.5)
+    before, after = [], []
+    for _ in range(4):
+        region = _region(clean + NOISE * rng.standard_normal(clean.shape), np.full(clean.shape, 70.0))
+        traces = find_traces(region)
+        told = told_apart(traces, width, 0.02)
+        assert len(told) == 2
+        before += [min(_off(trace, a, across) for a in begins) for trace in traces]
+        for a in begins:
+            nearest = min(told, key=lambda trace: abs(_off(trace, a, across)))
+            after.append(_off(nearest, a, across) / np.hypot(nearest.common, 0.02))
+    assert np.abs(before).max() > 0.2, "px: a fit that estimates the width too"
+    assert np.mean(np.square(after)) < 2.0
+
+
+def test_a_ski_of_another_width_has_an_edge_that_is_not_its_own() -> None:
+    xy = np.column_stack((np.linspace(10, 80, 15), np.full(15, 20.0)))
+    usual = Trace(
+        xy, np.full(15, 0.05), 0.02, np.array(((8.0, 20.0), (82.0, 20.0))), 4.4, 120.0, np.zeros(15), 0.0, 0.02
+    )
+    (right,), (narrow,) = (told_apart([trace], 4.4, 0.02) for trace in (usual, replace(usual, width=3.4)))
+    assert right.common == usual.common
+    assert narrow.common == pytest.approx(0.5, abs=0.02)
+
+
+def test_skis_that_lie_apart_tell_their_width() -> None:
+    rng = np.random.default_rng(23)
+    clean = np.full((60, 110), 70.0)
+    for a, b in (((10.0, 30.0), (95.0, 12.0)), ((12.0, 33.0), (99.0, 42.0))):
+        clean += _capsule(clean.shape, np.array(a), np.array(b), 2.2) * (200.0 - clean)
+    clean = gaussian_filter(clean, 0.5)
+    widths = []
+    for _ in range(4):
+        grey = clean + NOISE * rng.standard_normal(clean.shape)
+        widths += clear_widths(find_traces(_region(grey, np.full(clean.shape, 70.0))))
+    known = SkiWidth.of(widths)
+    assert known is not None
+    assert known.m == pytest.approx(4.4, rel=0.03)
+    assert known.spread < 0.04
+
+
 def test_changing_light_and_shake_are_no_movement() -> None:
     rng = np.random.default_rng(5)
     scene = gaussian_filter(rng.uniform(0, 1, (120, 160)), 3.0)
@@ -144,6 +198,21 @@ def _region(grey: Floats, behind: Floats) -> Region:
     sigma = np.full(grey.shape, NOISE, np.float32)
     front = np.abs(grey - behind) > 4 * NOISE
     return Region(0, 0, grey.astype(np.float32), behind.astype(np.float32), sigma, sigma, front)
+
+
+def _off(trace: Trace, place: Floats, across: Floats) -> float:
+    """How far a trace lies from a line through a place, px across it."""
+    return float(np.average((trace.xy - place) @ across, weights=trace.sigma**-2))
+
+
+def _capsule(shape: tuple[int, ...], a: Floats, b: Floats, radius: float) -> Floats:
+    """Which share of each pixel a bar with round ends covers."""
+    steps = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
+    y = (np.arange(shape[0])[:, None] + steps).ravel()[:, None] - a[1]
+    x = (np.arange(shape[1])[:, None] + steps).ravel() - a[0]
+    place = np.clip((x * (b - a)[0] + y * (b - a)[1]) / ((b - a) @ (b - a)), 0, 1)
+    inside = np.hypot(x - place * (b - a)[0], y - place * (b - a)[1]) < radius
+    return np.asarray(inside.reshape(shape[0], _PARTS, shape[1], _PARTS).mean(axis=(1, 3)))
 
 
 def _share(shape: tuple[int, ...], a: Floats, b: Floats, half: float) -> Floats:

@@ -1,0 +1,137 @@
+"""Skis that hide each other's edges: their axes by the edges that are seen and the width that skis of the jump have.
+
+Where two skis lie side by side and overlap, an image shows one long thing. Its outer edges are measured well, but what
+is between them is one brightness: how far the axes are apart, only the width of a ski tells. The fit estimates the
+width together with the axes, but what it has of it may be little and wrong: a boot, a bent tip. The width is told by
+the images of the same jump in which the skis lie apart. It is learned for each camera, since a flat ski shows each of
+them another width, and in metres, since the jumper comes nearer. Then it replaces what the fit found, as if the fit had
+been made with it: the fit knows how its points depend on the width (`Trace.one_sided`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.candidates.model import Trace
+from rig.arrays import Floats
+
+_ALIKE = 0.5  # ratio of lengths, and of widths, of two skis that are both in sight
+_FREE = 0.5  # median `one_sided` of a trace of which both edges are seen, at most
+_FEWEST = 8  # traces that tell a width
+_LEAST_SPREAD = 0.02  # of a width's logarithm, standard deviation: how well edges tell it
+_MAD_TO_SIGMA = 1.4826
+_SIGNIFICANT = 3.0  # standard deviations
+_TWO = 2.0  # widths: two skis that hide no edge of each other
+
+
+@dataclass(frozen=True, slots=True)
+class SkiWidth:
+    """The width that the skis of a jump show to a camera.
+
+    Attributes:
+        m: median.
+        spread: standard deviation of its logarithm.
+    """
+
+    m: float
+    spread: float
+
+    @classmethod
+    def of(cls, widths: Sequence[float]) -> "SkiWidth | None":
+        """What clear traces with such widths, m, tell; None if they are too few."""
+        if len(widths) < _FEWEST:
+            return None
+        logarithm = np.log(np.array(widths))
+        middle = float(np.median(logarithm))
+        spread = _MAD_TO_SIGMA * float(np.median(np.abs(logarithm - middle)))
+        return cls(float(np.exp(middle)), max(spread, _LEAST_SPREAD))
+
+
+def clear_widths(traces: Sequence[Trace]) -> list[float]:
+    """Widths, px, of the two skis of an image where they do not hide each other; none if it does not show two.
+
+    Args:
+        traces: of the place where the jumper is.
+    """
+    order = sorted(traces, key=lambda trace: -_length(trace))[:2]
+    if len(order) < 2:
+        return []
+    one, two = order
+    lengths, widths = sorted((_length(one), _length(two))), sorted((one.width, two.width))
+    alike = one.contrast * two.contrast > 0 and lengths[0] > _ALIKE * lengths[1] and widths[0] > _ALIKE * widths[1]
+    hidden = max(float(np.median(np.abs(trace.one_sided))) for trace in order)
+    return [one.width, two.width] if alike and hidden < _FREE else []
+
+
+def told_apart(traces: Sequence[Trace], px: float, spread: float) -> tuple[Trace, ...]:
+    """The traces of an image as those of skis whose width is known.
+
+    Points of which one edge is seen move by half of what the width was off. A single trace that is too wide becomes
+    two. Any other one of another width has an edge that is not its own: its standard deviation grows by half of the
+    difference.
+
+    Args:
+        traces: of an image.
+        px: width of a ski there.
+        spread: standard deviation of its logarithm.
+    """
+    found: list[Trace] = []
+    for trace in traces:
+        excess, sigma = (trace.width - px) / 2, spread * px / 2
+        hidden = np.abs(trace.one_sided)
+        if np.median(hidden) < _FREE and _SIGNIFICANT * spread < np.log(trace.width / px) < np.log(_TWO):
+            one_of_two = _off(replace(trace, width=px), sigma)
+            found += [_moved(one_of_two, side * excess) for side in (-1, 1)]
+        else:
+            foreign = abs(excess) * (1 - float(hidden.max()))
+            found.append(_off(_given(trace, excess, sigma), float(np.sqrt(max(0.0, foreign**2 - sigma**2)))))
+    return tuple(found)
+
+
+def _given(trace: Trace, excess: float, sigma: float) -> Trace:
+    """A trace as if it had been fitted with another half width, which is known with sigma, px.
+
+    The error of the width is common to the points: it shifts the axis by their mean dependence, and turns it where they
+    depend on it differently.
+    """
+    share, weight = trace.one_sided, trace.sigma**-2
+    along, across = _axes(trace)
+    mean = float(weight @ share / weight.sum())
+    place = (trace.xy - weight @ trace.xy / weight.sum()) @ along
+    turned = sigma**2 * float((weight * place) @ share) ** 2 / float(weight @ place**2)
+    return replace(
+        trace,
+        xy=trace.xy - excess * share[:, None] * across,
+        sigma=trace.sigma * np.sqrt(1 + turned),
+        common=_exchanged(trace.common, trace.of_width, mean * sigma),
+        of_width=abs(mean * sigma),
+        lasting=_exchanged(trace.lasting, trace.of_width, mean * sigma),
+        ends=trace.ends - excess * mean * across,
+        width=trace.width - 2 * excess,
+    )
+
+
+def _exchanged(whole: float, before: float, after: float) -> float:
+    """A standard deviation of which one part is another now."""
+    return float(np.sqrt(max(0.0, whole**2 - before**2) + after**2))
+
+
+def _moved(trace: Trace, by: float) -> Trace:
+    """A trace moved aside by some px."""
+    aside = by * _axes(trace)[1]
+    return replace(trace, xy=trace.xy + aside, ends=trace.ends + aside)
+
+
+def _off(trace: Trace, more: float) -> Trace:
+    """A trace that may be off by some px more, in neighbouring images too."""
+    return replace(trace, common=float(np.hypot(trace.common, more)), lasting=float(np.hypot(trace.lasting, more)))
+
+
+def _axes(trace: Trace) -> tuple[Floats, Floats]:
+    along = (trace.ends[1] - trace.ends[0]) / _length(trace)
+    return along, np.array((-along[1], along[0]))
+
+
+def _length(trace: Trace) -> float:
+    return float(np.hypot(*(trace.ends[1] - trace.ends[0])))

@@ -43,8 +43,9 @@ _CAP = 25.0  # squared residuals are counted up to that when explanations are co
 _HOPELESS = 5.0  # residuals over noise of a first explanation that no other start will mend
 _COMPARED = 700  # pixels with which explanations are compared; the best one is adjusted to all
 _UNSEEN = 1e-3  # 1 / px^2: weight of a bar's shift below which a section says nothing about it
+_BOTH_EDGES = 0.5  # of the weight of a section's width is left beside its shift, at least, where both edges tell it
 _POINT = 0.012  # of the width: a ski's border waves by that, and it is nearer to the camera at one end
-#: By so much the middle between the edges of a ski may be off its axis, standard deviation, px; in the next image too.
+#: By so much the middle between the edges of a ski may be off its axis, standard deviation, px.
 AXIS_PX: Final = 0.015
 _FEWEST = 30  # pixels
 
@@ -63,6 +64,7 @@ class FittedBar:
         misfit: root mean square of the normalized residuals of the sections that count.
         one_sided: (k,) by how much the points move across the axis if the bar's half width grows by 1: 0 where both its
             edges are seen, -1 or 1 where one is.
+        widening: (k,) by how much half of the width is larger there than the bar's, px; NaN where nothing tells.
         of_width: px, the part of `common` and `lasting` that the uncertainty of the width makes.
         lasting: px, the part of `common` that neighbouring images share: they show the same things beside the ski.
     """
@@ -75,6 +77,7 @@ class FittedBar:
     contrast: float
     misfit: float
     one_sided: Floats
+    widening: Floats
     of_width: float
     lasting: float
 
@@ -258,7 +261,7 @@ class _Fit:
         place = np.floor((along - t0) / max(1e-9, t1 - t0) * sections).astype(int)
         good = self._good & (place >= 0) & (place < sections)
         bar = Bar(pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across, 2 * float(np.exp(theta[1])))
-        t, shift, sigma, one_sided = self._shifts(k, good, place[good], along[good], sections)
+        t, shift, sigma, one_sided, widening = self._shifts(k, good, place[good], along[good], sections)
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
@@ -266,26 +269,28 @@ class _Fit:
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
         contrast = median(theta[0] - pixels.behind)
         own, of_width = self._common(k, t, sigma)
-        lasting = float(np.linalg.norm((of_width, doubt, AXIS_PX)))
+        lasting = float(np.hypot(of_width, doubt))
         return FittedBar(
             bar,
             xy,
             sigma,
-            float(np.hypot(own, lasting)),
+            float(np.linalg.norm((own, lasting, AXIS_PX))),
             float(theta[0]),
             contrast,
             self.misfit,
             one_sided[fine] / (bar.width / 2),
+            widening[fine] * bar.width / 2,
             of_width,
             lasting,
         )
 
     def _shifts(
         self, k: int, good: Flags, place: Integers, along: Floats, sections: int
-    ) -> tuple[Floats, Floats, Floats, Floats]:
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Where along, how far off the axis, and with which sigma, section by section: all bars' shifts together.
 
-        The last array is how the shifts change with the logarithm of the half width.
+        The last two arrays are how the shifts change with the logarithm of the width, and by how much that logarithm
+        differs in the section; NaN where both edges do not tell it.
         """
         j, v, by_width = (
             part[..., good] for part in (self._at.design[SHARED::OF_BAR], self._at.residuals, self._at.design[1])
@@ -299,13 +304,20 @@ class _Fit:
                 normal[:, a, b] = np.bincount(place, j[a] * j[b], sections)
         seen = normal[:, k, k] > _UNSEEN
         inverse = np.linalg.inv(normal[seen] + _UNSEEN * np.eye(self.count))
-        t, shift, sigma, one_sided = (np.full(sections, np.nan) for _ in range(4))
+        t, shift, sigma, one_sided, widening = (np.full(sections, np.nan) for _ in range(5))
         t[seen] = np.bincount(place, j[k] ** 2 * along, sections)[seen] / normal[seen, k, k]
         shift[seen] = np.einsum("na,na->n", inverse[:, k], right[seen])
         one_sided[seen] = -np.einsum("na,na->n", inverse[:, k], right_width[seen])
         sigma[seen] = np.sqrt(inverse[:, k, k])
         sigma[~(sigma < MARGIN)] = np.nan
-        return t, shift, sigma, one_sided
+        width = np.bincount(place, by_width**2, sections)[seen]
+        left = (
+            width + (right_width[seen] * one_sided[seen, None]).sum(axis=1) if self.count == 1 else np.zeros_like(width)
+        )
+        off = np.bincount(place, by_width * v, sections)[seen] - (right_width[seen] * shift[seen, None]).sum(axis=1)
+        with np.errstate(all="ignore"):
+            widening[seen] = np.where(left > _BOTH_EDGES * width, off / left, np.nan)
+        return t, shift, sigma, one_sided, widening
 
     def _common(self, k: int, t: Floats, sigma: Floats) -> tuple[float, float]:
         """What brightness and blur add to the sigma of the axis, and what the width does; all points share it."""

@@ -14,13 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.candidates.model import Trace
+from analysis.candidates.traces import bent
 from rig.arrays import Floats
 
 _ALIKE = 0.5  # ratio of lengths, and of widths, of two skis that are both in sight
 _FREE = 0.5  # median `one_sided` of a trace of which both edges are seen, at most
 _FEWEST = 8  # traces that tell a width
 _LEAST_SPREAD = 0.02  # of a width's logarithm, standard deviation: how well edges tell it
+_FEWEST_POINTS = 3  # on an axis
 _MAD_TO_SIGMA = 1.4826
+_ONE_EDGE = np.sqrt(2.0)  # standard deviation of an edge's place, in those of the middle of two
+_RESOLUTION = 1.0  # px; edges that are nearer to each other look like one
+_UNRESOLVED = _RESOLUTION / np.sqrt(12.0)  # px, standard deviation of what may be anywhere within that
 _SIGNIFICANT = 3.0  # standard deviations
 _TWO = 2.0  # widths: two skis that hide no edge of each other
 
@@ -80,13 +85,13 @@ def told_apart(traces: Sequence[Trace], px: float, spread: float) -> tuple[Trace
     for trace in traces:
         excess, sigma = (trace.width - px) / 2, spread * px / 2
         hidden = np.abs(trace.one_sided)
-        if np.median(hidden) < _FREE and _SIGNIFICANT * spread < np.log(trace.width / px) < np.log(_TWO):
-            one_of_two = _off(replace(trace, width=px), sigma)
-            found += [_moved(one_of_two, side * excess) for side in (-1, 1)]
+        wide = _SIGNIFICANT * spread < np.log(trace.width / px) < np.log(_TWO)
+        if wide and np.median(hidden) < _FREE and np.count_nonzero(np.isfinite(trace.widening)) >= _FEWEST_POINTS:
+            found += [_off(_one_of_two(trace, px, side), sigma) for side in (-1, 1)]
         else:
             foreign = abs(excess) * (1 - float(hidden.max()))
             found.append(_off(_given(trace, excess, sigma), float(np.sqrt(max(0.0, foreign**2 - sigma**2)))))
-    return tuple(found)
+    return tuple(_resolved(found, i) for i in range(len(found)))
 
 
 def _given(trace: Trace, excess: float, sigma: float) -> Trace:
@@ -117,10 +122,41 @@ def _exchanged(whole: float, before: float, after: float) -> float:
     return float(np.sqrt(max(0.0, whole**2 - before**2) + after**2))
 
 
-def _moved(trace: Trace, by: float) -> Trace:
-    """A trace moved aside by some px."""
-    aside = by * _axes(trace)[1]
-    return replace(trace, xy=trace.xy + aside, ends=trace.ends + aside)
+def _one_of_two(trace: Trace, px: float, side: int) -> Trace:
+    """One of two skis of known width that look like one: each edge of the trace is one of a ski's.
+
+    Args:
+        trace: of both.
+        px: width of a ski.
+        side: of which edge, -1 or 1 to the side (-y, x) of the trace's direction.
+    """
+    told = np.isfinite(trace.widening)
+    along, across = _axes(trace)
+    half, widening = (trace.width - px) / 2, trace.widening[told]
+    aside = trace.one_sided[told] * widening + side * (half + widening)
+    xy = trace.xy[told] + aside[:, None] * across
+    sigma = _ONE_EDGE * trace.sigma[told]
+    place = (xy - trace.ends[0]) @ along
+    sigma = sigma * bent(place, (xy - trace.ends[0]) @ across, sigma)
+    ends, one_sided = trace.ends + side * half * across, np.full(len(xy), -float(side))
+    return replace(
+        trace, xy=xy, sigma=sigma, ends=ends, width=px, one_sided=one_sided, widening=np.full(len(xy), np.nan)
+    )
+
+
+def _resolved(traces: Sequence[Trace], i: int) -> Trace:
+    """A trace with a larger standard deviation where another one is too near to be told from it."""
+    trace = traces[i]
+    near = np.zeros(len(trace.xy), bool)
+    for other in (other for k, other in enumerate(traces) if k != i):
+        along, across = _axes(other)
+        from_end = trace.xy - other.ends[0]
+        place = from_end @ along
+        near |= (np.abs(from_end @ across) < _RESOLUTION) & (place > 0) & (place < _length(other))
+    near &= np.abs(trace.one_sided) > _FREE
+    sigma = np.where(near, np.hypot(trace.sigma, _UNRESOLVED), trace.sigma)
+    share = float((sigma[near] ** -2.0).sum() / (sigma**-2.0).sum())
+    return _off(replace(trace, sigma=sigma), share * _UNRESOLVED)
 
 
 def _off(trace: Trace, more: float) -> Trace:

@@ -128,7 +128,7 @@ def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
         return None
     offset = np.array((region.x, region.y), float)
     xy, sigma = fitted.xy[inner], fitted.sigma[inner]
-    sigma = sigma * _bent(t[inner], (xy - bar.ends[0]) @ np.array((-along[1], along[0])), sigma)
+    sigma = sigma * bent(t[inner], (xy - bar.ends[0]) @ np.array((-along[1], along[0])), sigma)
     one_sided = np.clip(fitted.one_sided[inner], -1.0, 1.0)
     ends = bar.ends + offset
     return Trace(
@@ -139,15 +139,21 @@ def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
         bar.width,
         fitted.contrast,
         one_sided,
+        fitted.widening[inner],
         fitted.of_width,
         fitted.lasting,
     )
 
 
-def _bent(t: Floats, off: Floats, sigma: Floats) -> float:
+def bent(t: Floats, off: Floats, sigma: Floats) -> float:
     """By how much points scatter more about a straight line than their sigmas say; 1 if they do not.
 
     A line through parts of two skis, of which a body hides the rest, is such a case.
+
+    Args:
+        t: (k,) px along the line.
+        off: (k,) px across it.
+        sigma: (k,) of these.
     """
     design = np.column_stack((np.ones(len(t)), t)) / sigma[:, None]
     values = off / sigma

@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.candidates.ski_fit import AXIS_PX
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, SkiMeasurement, Source
 from analysis.motion.channels import CHANNELS, MotionFrame
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
@@ -40,8 +39,7 @@ class Observations:
         whitener: (n, m, 6, 2, 2): root of the weight matrix of a group's two observations.
         seen: (n, m, 6) which groups were measured.
         by_hand: (n, m, 6) which of them a person measured.
-        lasting: (n, m, 6, 2) px, standard deviations of errors that last in neighbouring pulses (`lasting`): of a shift
-            of both points of a ski, and of a turn that moves each of them by as much; 0 for points of the body.
+        lasting: (n, m, 6) px, standard deviation of a shift of both points of a ski that neighbouring pulses share.
     """
 
     names: tuple[str, ...]
@@ -67,7 +65,7 @@ class Observations:
 
     def scaled(self, factors: Floats) -> "Observations":
         """The same with the standard deviations of each kind of group (6,) times a factor."""
-        return replace(self, whitener=self.whitener / factors[:, None, None], lasting=self.lasting * factors[:, None])
+        return replace(self, whitener=self.whitener / factors[:, None, None], lasting=self.lasting * factors)
 
 
 def observations(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Observations:
@@ -82,7 +80,7 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
         np.zeros((n, m, 6, 2, 2)),
         np.zeros((n, m, 6), bool),
         np.zeros((n, m, 6), bool),
-        np.zeros((n, m, 6, 2)),
+        np.zeros((n, m, 6)),
     )
     for i, name in enumerate(names):
         skis: list[tuple[tuple[int, int, int], SkiMeasurement]] = []
@@ -97,7 +95,7 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
                     skis.append(((k, i, group), ski))
         for (at, ski), ends, covariance in zip(skis, *_two_points([ski for _, ski in skis], system[name]), strict=True):
             _put(out, at, ends, covariance, ski.source)
-            out.lasting[at] = ski.lasting, min(ski.lasting, AXIS_PX)
+            out.lasting[at] = ski.lasting
     return out
 
 

@@ -124,16 +124,20 @@ def test_two_skis_that_nearly_cover_each_other_are_told_apart() -> None:
             assert abs(middle) < 0.1, "px: a thirtieth of the width"
 
 
-@pytest.mark.parametrize("apart", [1.8, 2.4, 3.6])
-def test_skis_that_hide_each_others_edges_are_placed_by_their_width(apart: float) -> None:
-    """Nothing but the width tells how far apart they are; before, the sigma knew nothing of that."""
+@pytest.mark.parametrize(("apart", "turned"), [(2.4, 0.0), (3.6, 0.0), (2.2, 0.5)])
+def test_skis_that_hide_each_others_edges_are_placed_by_their_width(apart: float, turned: float) -> None:
+    """Nothing but the width tells how far apart they are, at each place."""
     rng = np.random.default_rng(17)
     width, along = 4.4, np.array((78.0, -9.0))
     across = np.array((-along[1], along[0])) / np.hypot(*along)
-    begins = np.array((12.3, 26.2)), np.array((12.3, 26.2)) + 0.04 * along + apart * across
+    first, second = np.array((12.3, 26.2)), np.array((12.3, 26.2)) + 0.04 * along
+    ends = [
+        np.stack((first, first + along)),
+        np.stack((second + (apart - turned) * across, second + along + (apart + turned) * across)),
+    ]
     clean = np.full((50, 110), 70.0)
-    for a in begins:
-        clean += _capsule(clean.shape, a, a + along, width / 2) * (200.0 - clean)
+    for a, b in ends:
+        clean += _capsule(clean.shape, a, b, width / 2) * (200.0 - clean)
     clean = gaussian_filter(clean, 0.5)
     before, after = [], []
     for _ in range(4):
@@ -141,22 +145,39 @@ def test_skis_that_hide_each_others_edges_are_placed_by_their_width(apart: float
         traces = find_traces(region)
         told = told_apart(traces, width, 0.02)
         assert len(told) == 2
-        before += [min(_off(trace, a, across) for a in begins) for trace in traces]
-        for a in begins:
-            nearest = min(told, key=lambda trace: abs(_off(trace, a, across)))
-            after.append(_off(nearest, a, across) / np.hypot(nearest.common, 0.02))
-    assert np.abs(before).max() > 0.2, "px: a fit that estimates the width too"
+        for line in ends:
+            before.append(min((_normalized(trace, line) for trace in traces), key=lambda z: abs(z[0])))
+            after.append(min((_normalized(trace, line) for trace in told), key=lambda z: abs(z[0])))
+    assert np.mean(np.square(before)) > 4.0, "a fit that estimates the width too"
     assert np.mean(np.square(after)) < 2.0
 
 
 def test_a_ski_of_another_width_has_an_edge_that_is_not_its_own() -> None:
     xy = np.column_stack((np.linspace(10, 80, 15), np.full(15, 20.0)))
     usual = Trace(
-        xy, np.full(15, 0.05), 0.02, np.array(((8.0, 20.0), (82.0, 20.0))), 4.4, 120.0, np.zeros(15), 0.0, 0.02
+        xy,
+        np.full(15, 0.05),
+        0.02,
+        np.array(((8.0, 20.0), (82.0, 20.0))),
+        4.4,
+        120.0,
+        np.zeros(15),
+        np.zeros(15),
+        0.0,
+        0.02,
     )
     (right,), (narrow,) = (told_apart([trace], 4.4, 0.02) for trace in (usual, replace(usual, width=3.4)))
     assert right.common == usual.common
     assert narrow.common == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize(("apart", "common"), [(0.5, 0.29), (1.5, 0.05)])
+def test_skis_that_nearly_cover_each_other_may_lie_anywhere_within_a_pixel(apart: float, common: float) -> None:
+    xy = np.column_stack((np.linspace(10, 80, 15), np.full(15, 20.0)))
+    ends, aside = np.array(((8.0, 20.0), (82.0, 20.0))), np.array((0.0, apart))
+    one = Trace(xy, np.full(15, 0.05), 0.02, ends, 4.4, 120.0, np.ones(15), np.full(15, np.nan), 0.0, 0.02)
+    two = replace(one, xy=xy + aside, ends=ends + aside, one_sided=-np.ones(15))
+    assert [trace.common for trace in told_apart([one, two], 4.4, 0.02)] == pytest.approx([common] * 2, abs=0.01)
 
 
 def test_skis_that_lie_apart_tell_their_width() -> None:
@@ -200,9 +221,14 @@ def _region(grey: Floats, behind: Floats) -> Region:
     return Region(0, 0, grey.astype(np.float32), behind.astype(np.float32), sigma, sigma, front)
 
 
-def _off(trace: Trace, place: Floats, across: Floats) -> float:
-    """How far a trace lies from a line through a place, px across it."""
-    return float(np.average((trace.xy - place) @ across, weights=trace.sigma**-2))
+def _normalized(trace: Trace, line: Floats) -> tuple[float, float]:
+    """How far a trace is shifted and turned from a line (2, 2) through two places, over the standard deviations."""
+    along = (line[1] - line[0]) / np.hypot(*(line[1] - line[0]))
+    off, place = (trace.xy - line[0]) @ np.array((-along[1], along[0])), (trace.xy - line[0]) @ along
+    weight = trace.sigma**-2
+    place = place - np.average(place, weights=weight)
+    shift, turn = np.average(off, weights=weight), weight @ (off * place) / (weight @ place**2)
+    return float(shift / np.hypot(trace.common, weight.sum() ** -0.5)), float(turn * np.sqrt(weight @ place**2))
 
 
 def _capsule(shape: tuple[int, ...], a: Floats, b: Floats, radius: float) -> Floats:

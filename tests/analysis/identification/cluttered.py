@@ -159,7 +159,18 @@ def _ski(
 
 
 def _trace(xy: Floats) -> Trace:
-    return Trace(xy, np.full(len(xy), SKI_SIGMA_PX), 0.05, xy[[0, -1]], 3.2, 100.0, np.zeros(len(xy)), 0.0, 0.05)
+    return Trace(
+        xy,
+        np.full(len(xy), SKI_SIGMA_PX),
+        0.05,
+        xy[[0, -1]],
+        3.2,
+        100.0,
+        np.zeros(len(xy)),
+        np.zeros(len(xy)),
+        0.0,
+        0.05,
+    )
 
 
 def _false_trace(size: Floats, rng: np.random.Generator) -> Trace:

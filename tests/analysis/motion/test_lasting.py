@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.candidates.ski_fit import AXIS_PX
 from analysis.measurements.model import JumpMeasurements
 from analysis.motion.lasting import LASTING_S
 from analysis.motion.smoother import smooth
@@ -13,28 +12,27 @@ from rig.arrays import Floats
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
 
 DRAWS = 4
-SHIFT_PX = 0.08
+OFF_PX = 0.1
 ANGLES = ("gamma", "dphi", "phi")
 
 
 def test_errors_that_last_are_not_averaged_away() -> None:
-    """Axes are off for some tenths of a second. With the sigmas of independent errors the mean square is 4.3."""
+    """Axes are off for some tenths of a second; images tell how far, in every other draw only the residuals do."""
     honesty, system = Honesty(), true_cameras()
     for draw in range(DRAWS):
         rng, truth = np.random.default_rng(draw), true_jump(draw)
-        measured = simulated_measurements(truth, system, rng, ski_sigma_px=0.05)
-        jump = _off_for_long(measured.jumps[0], measured.rate_hz, rng)
+        measured = simulated_measurements(truth, system, rng)
+        jump = _off_for_long(measured.jumps[0], measured.rate_hz, rng, OFF_PX * (draw % 2))
         judge(truth, jump, smooth(jump, measured, system), honesty)
     pairs = np.array(
         [p for (phase, name), of in honesty.pairs.items() if name in ANGLES and phase != "table" for p in of]
     )
     error, sigma = pairs.T
-    # Some 5 independent times in each of 4 draws, three angles: the mean square scatters by 0.2.
-    assert 0.4 < np.mean((error / sigma) ** 2) < 1.6
-    assert sigma.mean() < 1.5 * np.sqrt(np.mean(error**2))
+    # Errors that last tell little of their own size in so few jumps; as independent ones they give 8.
+    assert 0.4 < np.mean((error / sigma) ** 2) < 2.5
 
 
-def _off_for_long(jump: JumpMeasurements, rate_hz: float, rng: np.random.Generator) -> JumpMeasurements:
+def _off_for_long(jump: JumpMeasurements, rate_hz: float, rng: np.random.Generator, told: float) -> JumpMeasurements:
     """The same with axes that are shifted and turned, in each camera for itself, alike in neighbouring pulses."""
     alike = np.exp(-1 / (rate_hz * LASTING_S))
     errors: dict[tuple[str, str], Floats] = {}
@@ -51,8 +49,8 @@ def _off_for_long(jump: JumpMeasurements, rate_hz: float, rng: np.random.Generat
                 place = np.linspace(-1, 1, len(ski.xy)) * np.sqrt(3)  # tail to tip, root mean square 1
                 axis = ski.xy[-1] - ski.xy[0]
                 across = np.array((-axis[1], axis[0])) / np.hypot(*axis)
-                off = SHIFT_PX * error[0] + AXIS_PX * error[1] * place
-                skis[side] = replace(ski, xy=ski.xy + off[:, None] * across, common=SHIFT_PX, lasting=SHIFT_PX)
+                off = OFF_PX * (error[0] + error[1] * place)
+                skis[side] = replace(ski, xy=ski.xy + off[:, None] * across, common=OFF_PX, lasting=told)
             images[name] = replace(image, skis=skis)
         pulses.append(replace(pulse, images=images))
     return replace(jump, pulses=tuple(pulses))

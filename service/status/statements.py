@@ -202,8 +202,7 @@ def too_few_cameras(cameras: Sequence[CameraSettings], heard: Sequence[CameraPre
         level=Level.ERROR,
         code="fault_too_few",
         text=f"{present} of {len(cameras)} cameras answer, {least} are needed: without {names}",
-        advice="check power and cables; the rig is armed by itself as soon as enough of them answer; or arm without "
-        f"{names} (svev ctl arm --min-cameras {present})",
+        advice=f"check power and cables: when enough answer, the rig is armed by itself; or arm without {names}",
         values={"present": present, "cameras": len(cameras), "least": least, "missing": names},
     )
 

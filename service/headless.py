@@ -22,10 +22,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, TypeVar
 
+from rig.api.recordings import Counts, Recording, SessionFields
+from rig.api.status import State
 from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, StorageError, UnknownRecordingError
 from rig.events import PAIRING, Event
 from rig.settings.model import RigSettings
-from rig.status import Counts, Recording, SessionFields, State
 from rig.transport import wire
 from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
 from service.processes.backends import check_backends

@@ -9,27 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from prometheus_client.metrics_core import Metric
 
-from rig.automatic import AutomaticChange, Mark, Marked
-from rig.export import ExportJob, ExportOrder
+from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.export import ExportJob, ExportOrder
+from rig.api.looking import Moment, Note, VoiceNote
+from rig.api.recordings import Pulses, Recording, RecordingOrder, RecordingQuery, SessionChange, StopOrder, Trash
+from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
+from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
 from rig.frame import FrameStatus
-from rig.looking import Moment, Note, VoiceNote
 from rig.phrase import Phrase
 from rig.pulse import RigPulse
-from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
-from rig.status import (
-    ArmOrder,
-    DoctorReport,
-    Event,
-    Pulses,
-    Recording,
-    RecordingOrder,
-    RecordingQuery,
-    RigView,
-    SessionChange,
-    Status,
-    StopOrder,
-    Trash,
-)
 
 
 @dataclass(frozen=True, slots=True)

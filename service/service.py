@@ -13,26 +13,15 @@ from prometheus_client.metrics_core import Metric
 
 from recorder.catalogue.folder import Catalogue
 from rig import events
-from rig.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
+from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
 from rig.errors import BadInputError, StateForbidsError, SvevError, UnknownRecordingError
 from rig.phrase import Phrase, phrase
 from rig.picture import shown
 from rig.pixels import MONO8
 from rig.pulse import RigPulse
-from rig.status import (
-    ArmOrder,
-    AutomaticStatus,
-    DoctorReport,
-    Event,
-    Recording,
-    RecordingOrder,
-    RigView,
-    SessionChange,
-    State,
-    Status,
-    StopOrder,
-)
 from rig.transport.preview import PreviewSlot
 from service.automatic.watch import MotionWatch
 from service.exports.jobs import Exports

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Final
 
+from rig.api.recordings import Causes, Counts
 from rig.clocks import NS_PER_S, UtcNs
 from rig.frame import FrameStatus
 from rig.pulse import Pause, PulseNumber
-from rig.status import Causes, Counts
 from rig.tag import TripletTag
 from triggering.timeline.pauses import PauseFinder, pause_of_margin
 

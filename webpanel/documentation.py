@@ -7,7 +7,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import Response
 
-from rig.status import Event
+from rig.api.status import Event
 from webpanel.door.access import Access
 from webpanel.door.guard import OPEN, PROTECTED
 from webpanel.door.logins import COOKIE

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from rig.api.fields import Model
 from rig.errors import (
     BadInputError,
     StateForbidsError,
@@ -21,7 +22,6 @@ from rig.errors import (
     UnknownLineError,
     UnknownRecordingError,
 )
-from rig.status import Model
 
 _PAGE_POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; media-src 'self'; "

@@ -10,9 +10,9 @@ import numpy as np
 from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets, tags
+from rig.api.export import LOSSLESS, ExportOrder
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError
-from rig.export import LOSSLESS, ExportOrder
 from rig.frame import FrameStatus
 from rig.picture import exported, shown
 from rig.pixels import Stored

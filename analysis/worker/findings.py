@@ -8,12 +8,12 @@ from analysis.procedure.jump import ComputedJump
 from analysis.report.course import course_of
 from analysis.report.figures import EARLY_S, FAR_M
 from analysis.result.model import MeasuredRecording, Quantity
+from rig.api.jump import LastJump, MeasuredValue
 from rig.clocks import NS_PER_S, UtcNs
 from rig.events import Level
 from rig.jumper import JumperState
 from rig.phrase import Phrase
 from rig.pulse import PulseNumber
-from rig.status import LastJump, MeasuredValue
 
 
 @dataclass(frozen=True, slots=True, eq=False)

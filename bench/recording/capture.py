@@ -12,8 +12,8 @@ from bench.recording.gstreamer import SINKS, run_gstreamer
 from bench.recording.loads import PRERENDERED, Load
 from bench.recording.processes import cpu_seconds
 from recorder.publishing.subscriber import median_and_p99, subscriber
+from rig.api.recordings import Counts
 from rig.clocks import HostNs, UtcAnchor, UtcNs, host_now
-from rig.status import Counts
 from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from service.recordings.storage import new_log_path

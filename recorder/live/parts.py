@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Final
 
 from recorder.live.recording import Recording
+from rig.api.recordings import Counts
 from rig.clocks import host_now
 from rig.errors import FileVanishedError, StorageError, SvevError
-from rig.status import Counts
 from rig.transport.messages import RecorderFailed, RecordingFinished, RecordingProgress
 
 #: A recording has so many logs at most, however often one of them fails.

@@ -12,6 +12,8 @@ from typing import ClassVar, Final
 import msgspec
 
 from rig import errors
+from rig.api.jump import LastJump
+from rig.api.recordings import Counts
 from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
@@ -19,7 +21,6 @@ from rig.health import Health
 from rig.phrase import Phrase, phrase
 from rig.pulse import Pause, PulseNumber
 from rig.settings.model import RigSettings
-from rig.status import Counts, LastJump
 
 
 class Message(msgspec.Struct, kw_only=True, tag=True):

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Final, Self
 
+from rig.api.recordings import Recording
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.phrase import phrase
 from rig.settings.webhook import WebhookSettings
-from rig.status import Recording
 from service.alarms.delivery import DEADLINE_S, Failure, deliver, read_target
 from service.alarms.occasions import Notification, with_verdict
 

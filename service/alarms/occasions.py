@@ -4,8 +4,11 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Final, Literal
 
+from rig.api.fields import Model
+from rig.api.recordings import Recording
+from rig.api.statement import Level
+from rig.api.status import CameraState, State, Status
 from rig.settings.webhook import Occasion
-from rig.status import CameraState, Level, Model, Recording, State, Status
 
 #: A change of a camera, of the fault or of the disk is told so long after the last one of it at the earliest, s: a
 #: camera with a loose plug comes and goes every few seconds.

@@ -4,10 +4,10 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
+from rig.api.status import State
 from rig.clocks import NS_PER_S, HostNs
 from rig.frame import FrameStatus
 from rig.settings.model import MotionSettings, RigSettings
-from rig.status import State
 from rig.transport.preview import PreviewImage, PreviewSlot
 from service.automatic.motion import MotionDetector
 

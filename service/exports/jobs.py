@@ -17,8 +17,8 @@ from pathlib import Path
 from select import select
 from typing import Any, Final
 
+from rig.api.export import ENDINGS, ExportJob, ExportOrder, ExportState
 from rig.errors import StateForbidsError, StorageError, UnknownExportError
-from rig.export import ENDINGS, ExportJob, ExportOrder, ExportState
 
 FOLDER: Final = ".exports"
 #: A file is kept for so long, unless its room is needed.

@@ -12,8 +12,8 @@ import zipfile
 from pathlib import Path
 from typing import Any, Final
 
+from rig.api.export import ExportOrder
 from rig.errors import SvevError
-from rig.export import ExportOrder
 
 _NICE: Final = 19
 #: Between two lines that say how far it is.

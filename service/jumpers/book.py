@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from rig.errors import ChangedMeanwhileError, StateForbidsError
-from rig.start_list import (
+from rig.api.recordings import NextJumper, RecordingOrder, SessionFields
+from rig.api.start_list import (
     LINES_MAX,
     JumperChange,
     LineChange,
@@ -19,7 +19,8 @@ from rig.start_list import (
     UndoOrder,
     who,
 )
-from rig.status import NextJumper, RecordingOrder, SessionFields, Statement
+from rig.api.statement import Statement
+from rig.errors import ChangedMeanwhileError, StateForbidsError
 from service.jumpers import moves
 from service.jumpers.keeper import Change, Keeper
 from service.jumpers.table import Table, read_table

@@ -13,10 +13,11 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from rig.api.fields import Model
+from rig.api.start_list import StartList
+from rig.api.statement import Statement
 from rig.events import Event, Level
 from rig.phrase import phrase, plain
-from rig.start_list import StartList
-from rig.status import Model, Statement
 
 NAME: Final = ".svev-start-list.json"
 UNDO_NAME: Final = ".svev-start-list-undo.json"

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
+from rig.api.recordings import NextJumper, SessionFields
+from rig.api.start_list import Mark, NewLine, StartLine, StartList
 from rig.errors import UnknownLineError
-from rig.start_list import Mark, NewLine, StartLine, StartList
-from rig.status import NextJumper, SessionFields
 
 
 def line_of(start_list: StartList, line: int) -> StartLine:

@@ -11,8 +11,8 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from rig.api.start_list import COLUMN_NAME_MAX, COLUMNS_MAX, LINES_MAX, NewLine
 from rig.errors import BadInputError
-from rig.start_list import COLUMN_NAME_MAX, COLUMNS_MAX, LINES_MAX, NewLine
 
 _SEPARATORS: Final = (";", ",", "\t")
 #: Parts of the name, which no own column is called by.

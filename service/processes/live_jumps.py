@@ -12,8 +12,8 @@ from analysis.result import file as result_file
 from analysis.result.model import Jump, MeasuredRecording
 from analysis.worker.findings import MeasuredJump
 from recorder.log.jumper_path import jumper_path
+from rig.api.jump import LastJump
 from rig.errors import BadInputError, StorageError
-from rig.status import LastJump
 from service.recordings.live_results import summaries
 
 

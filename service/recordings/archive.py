@@ -12,25 +12,24 @@ from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from recorder.log.extent import CONTINUES
-from rig.clocks import NS_PER_S
-from rig.errors import StateForbidsError, StillRecordingError
-from rig.export import ExportJob, ExportOrder
-from rig.looking import Moment, MomentKind, Note, VoiceNote
-from rig.pulse import Pause
-from rig.status import (
+from rig.api.export import ExportJob, ExportOrder
+from rig.api.looking import Moment, MomentKind, Note, VoiceNote
+from rig.api.recordings import (
     Causes,
     Counts,
-    Level,
     Pulses,
     PulseSummary,
     Recording,
     RecordingQuery,
     RecordingState,
     SessionFields,
-    Statement,
-    Status,
     Trash,
 )
+from rig.api.statement import Level, Statement
+from rig.api.status import Status
+from rig.clocks import NS_PER_S
+from rig.errors import StateForbidsError, StillRecordingError
+from rig.pulse import Pause
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
 from service.recordings import live_results

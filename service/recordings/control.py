@@ -9,6 +9,9 @@ from pathlib import Path
 
 import msgspec
 
+from rig.api.recordings import Recording, RecordingOrder, SessionChange, SessionFields, StopOrder
+from rig.api.statement import Statement
+from rig.api.status import State
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import (
     BadInputError,
@@ -21,7 +24,6 @@ from rig.errors import (
 from rig.events import Event, Level
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.status import Recording, RecordingOrder, SessionChange, SessionFields, State, Statement, StopOrder
 from rig.transport.messages import (
     Calibration,
     RecorderFailed,

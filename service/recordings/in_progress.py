@@ -5,9 +5,10 @@ from concurrent.futures import Future
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rig.api.recordings import Counts, Recording, RecordingState, SessionChange, SessionFields
+from rig.api.statement import Level, Statement
 from rig.clocks import NS_PER_S, host_now
 from rig.errors import SvevError
-from rig.status import Counts, Level, Recording, RecordingState, SessionChange, SessionFields, Statement
 from rig.transport.messages import RecordingFinished, RecordingProgress, RecordingStarted, StartRecording
 from service.recordings.interruption import Interruption
 from service.recordings.listing import more_of

@@ -9,9 +9,9 @@ from typing import Final
 import msgspec
 
 from recorder.reading.info import LogInfo, info
+from rig.api.recordings import SessionFields
 from rig.clocks import NS_PER_S, HostNs
 from rig.errors import SvevError
-from rig.status import SessionFields
 from rig.transport.messages import GoesOn, StartRecording
 
 #: A disk from which the log is not read within this time hangs.

@@ -8,9 +8,11 @@ from typing import Any, Final
 
 from recorder.catalogue.entry import Entry
 from recorder.log.extent import CONTINUES, CONTINUES_AFTER
+from rig.api.fields import LONGEST_LINE, LONGEST_TAG
+from rig.api.recordings import RecordingQuery, SessionFields, Sorting
+from rig.api.start_list import COLUMN_NAME_MAX, COLUMNS_MAX
+from rig.api.statement import Level
 from rig.clocks import NS_PER_S, UtcNs
-from rig.start_list import COLUMN_NAME_MAX, COLUMNS_MAX
-from rig.status import LONGEST_LINE, LONGEST_TAG, Level, RecordingQuery, SessionFields, Sorting
 from service.recordings.notes import NOTE_FIELD
 
 #: What a search looks at, beside the id.

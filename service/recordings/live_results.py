@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from recorder.log.jumper_path import jumper_path
-from rig.status import LastJump
+from rig.api.jump import LastJump
 
 
 def summaries(log: Path) -> list[LastJump]:

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 from typing import Final
 
 from recorder.catalogue.voice_notes import StoredVoice
+from rig.api.looking import VOICES_MAX, Note, VoiceNote
 from rig.errors import StateForbidsError, UnknownRecordingError
-from rig.looking import VOICES_MAX, Note, VoiceNote
 from service.seam import Download
 
 #: How the names of fields with notes begin.

@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 from typing import Final
 
 from rig import events
+from rig.api.status import Event
 from rig.clocks import NS_PER_S
-from rig.status import Event
 
 _KEPT: Final = 1000
 

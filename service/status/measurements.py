@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 
+from rig.api.status import CameraState, State, Status
 from rig.health import Health
-from rig.status import CameraState, State, Status
 
 
 def measurements(status: Status, health: Health | None) -> Iterator[Metric]:

@@ -5,22 +5,12 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
 
+from rig.api.jump import LastJump
+from rig.api.recordings import NextJumper, Recording
+from rig.api.statement import Level, Statement
+from rig.api.status import CameraStatus, DiskStatus, PrerollStatus, ProcessStatus, PulseStatus, State, Status
 from rig.health import Health
 from rig.settings.model import RigSettings
-from rig.status import (
-    CameraStatus,
-    DiskStatus,
-    LastJump,
-    Level,
-    NextJumper,
-    PrerollStatus,
-    ProcessStatus,
-    PulseStatus,
-    Recording,
-    State,
-    Statement,
-    Status,
-)
 from service.processes.rig_processes import CameraPresence
 from service.recordings.storage import Room
 from service.status.statements import about_camera, about_state, camera_state, pairing_alarm, process_restarted

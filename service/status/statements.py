@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from rig.api.statement import Level, Statement
+from rig.api.status import CameraState, State
 from rig.errors import SvevError
 from rig.phrase import Phrase, Value, phrase
 from rig.pulse import Pause
 from rig.settings.model import CameraSettings
-from rig.status import CameraState, Level, State, Statement
 from rig.transport.messages import CameraNews
 from service.processes.rig_processes import CameraPresence
 

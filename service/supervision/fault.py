@@ -2,9 +2,9 @@
 
 import time
 
+from rig.api.statement import Statement
 from rig.errors import SvevError
 from rig.phrase import Phrase, phrase
-from rig.status import Statement
 from rig.transport.process_table import BackOff
 from service.status.statements import failed
 

@@ -22,7 +22,7 @@ from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Final
 
-from rig.status import State
+from rig.api.status import State
 
 FOLLOWS: Final[Mapping[State, frozenset[State]]] = MappingProxyType(
     {

@@ -11,13 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from rig.api.jump import LastJump
+from rig.api.status import State, Status
 from rig.disk import free_bytes
 from rig.errors import ProcessDiedError, StateForbidsError, SvevError
 from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
-from rig.status import LastJump, State, Status
 from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderHealth, RecorderOptions, RecorderReport
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import ANALYSIS, RECORDER, CameraPresence

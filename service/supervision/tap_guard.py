@@ -8,8 +8,9 @@ Programs that leave `seen` out are obeyed at once: they name what they start and
 
 from typing import Final
 
+from rig.api.recordings import StopOrder
+from rig.api.status import State, TapGuard
 from rig.errors import ChangedMeanwhileError, ConfirmFirstError, TooSoonError
-from rig.status import State, StopOrder, TapGuard
 from service.supervision.state_machine import Phase
 
 #: Second taps by cold fingers, and taps meant for the state before, come within this time after a change of state.

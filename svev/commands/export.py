@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from analysis.film.export import export, in_file_name
 from analysis.film.shots import Recording
+from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
 from rig.errors import BadInputError
-from rig.export import ENDINGS, ExportOrder, Kind, Quality
 from svev import console
 from svev.commands.logs import AlsoJson, LogPath
 

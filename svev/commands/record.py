@@ -8,10 +8,10 @@ import typer
 from pydantic import TypeAdapter, ValidationError
 
 from recorder.publishing.keys import check_publication
+from rig.api.fields import LONGEST_LINE, Line
 from rig.errors import BadInputError, PairingAlarmError, PulsesPausedError
 from rig.pulse import Pause
 from rig.settings.file import load_rig
-from rig.status import LONGEST_LINE, Line
 from service.headless import HeadlessRig
 from service.headless import record as record_with
 from service.recordings.storage import new_log_path

@@ -7,9 +7,10 @@ from datetime import UTC, datetime
 from typing import Final
 from urllib.parse import urlsplit
 
+from rig.api.statement import Level
+from rig.api.status import State
 from rig.errors import BadInputError
 from rig.settings.model import RigSettings
-from rig.status import Level, State
 from service.alarms.delivery import Target, deliver, read_target
 from service.alarms.occasions import Notification
 from svev.doctor.finding import Finding, Topic, failure, passed, warning

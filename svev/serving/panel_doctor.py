@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from rig import status as models
+from rig.api import status as models
+from rig.api.status import CameraState, State, Status
 from rig.settings.model import RigSettings
-from rig.status import CameraState, State, Status
 from svev.doctor.examination import probes, run_probe
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed
 

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 from playwright.sync_api import TimeoutError as NotInTimeError
 
-from rig.status import State
+from rig.api.status import State
 from tests.browser.conftest import Open
 from tests.browser.test_page import READY, enter, jumps
 from tests.support.waiting import wait_until

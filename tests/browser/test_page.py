@@ -12,20 +12,13 @@ import httpx
 import pytest
 from playwright.sync_api import Page, Route, expect
 
+from rig.api.jump import LastJump, MeasuredValue
+from rig.api.recordings import Recording, RecordingOrder
+from rig.api.statement import Level, Statement
+from rig.api.status import AutomaticStatus, State, Status
 from rig.errors import StateForbidsError, StorageError
 from rig.frame import FrameStatus
 from rig.phrase import phrase, plain
-from rig.status import (
-    AutomaticStatus,
-    LastJump,
-    Level,
-    MeasuredValue,
-    Recording,
-    RecordingOrder,
-    State,
-    Statement,
-    Status,
-)
 from service.status.statements import recording_ended
 from tests.browser.conftest import Open
 from tests.recorder.logs import ALL_OK

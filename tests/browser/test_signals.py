@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from rig.status import State
+from rig.api.status import State
 from tests.browser.conftest import Open
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel

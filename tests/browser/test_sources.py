@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig import start_list, status
+from rig.api import jump, recordings, start_list, statement, status
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"
@@ -195,7 +195,8 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    model: type[Any] = getattr(start_list if hasattr(start_list, name) else status, name)
+    rooms = (start_list, recordings, statement, jump, status)
+    model: type[Any] = next(getattr(room, name) for room in rooms if hasattr(room, name))
     fields = (
         list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]
     )
@@ -241,5 +242,5 @@ def test_icons_that_are_shown_exist() -> None:
     drawn = set(re.findall(r'<symbol id="([\w-]+)"', (PAGE / "icons.svg").read_text()))
     shown = set(re.findall(r"icons\.svg#([\w-]+)", (PAGE / "index.html").read_text()))
     shown |= set(re.findall(r'\bicon(?:\(|: )"([\w-]+)"', _sources()))
-    shown |= {state.value for state in status.State} - {"disarming"} | {level.value for level in status.Level}
+    shown |= {state.value for state in status.State} - {"disarming"} | {level.value for level in statement.Level}
     assert shown <= drawn

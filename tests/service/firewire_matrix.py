@@ -21,12 +21,12 @@ from typing import Any, Final
 from recorder.checking.verify import verify
 from recorder.publishing.subscriber import free_address
 from recorder.reading.triplets import triplets
+from rig.api.recordings import Counts
 from rig.clocks import host_now
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
-from rig.status import Counts
 from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill

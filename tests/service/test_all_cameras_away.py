@@ -11,9 +11,9 @@ import pytest
 
 from recorder.checking.verify import verify
 from recorder.reading.info import info
+from rig.api.recordings import Counts
 from rig.clocks import host_now
 from rig.frame import FrameStatus
-from rig.status import Counts
 from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill

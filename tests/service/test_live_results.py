@@ -11,9 +11,9 @@ from analysis.result.model import MeasuredRecording
 from analysis.worker.findings import MeasuredJump
 from recorder.catalogue.folder import Catalogue
 from recorder.log.jumper_path import jumper_path
+from rig.api.jump import LastJump
 from rig.errors import StorageError
 from rig.pulse import PulseNumber
-from rig.status import LastJump
 from service.processes.live_jumps import keep
 from service.recordings import live_results
 from tests.analysis.result.recordings import recording

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from recorder.checking.verify import verify
-from rig.status import State
+from rig.api.status import State
 from service.supervision.state_machine import FOLLOWS
 from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving

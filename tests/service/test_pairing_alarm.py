@@ -1,7 +1,7 @@
 """An alarm of the pairing on the page."""
 
+from rig.api.statement import Level
 from rig.phrase import phrase
-from rig.status import Level
 from service.status.statements import pairing_alarm
 
 

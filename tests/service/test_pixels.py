@@ -19,7 +19,7 @@ from analysis.worker.stream import Source, connected
 from recorder.checking.verify import verify
 from recorder.reading.triplets import triplets
 from recorder.recovering.recover import recover
-from rig.export import ExportOrder, Kind
+from rig.api.export import ExportOrder, Kind
 from rig.pixels import FORMATS
 from rig.settings.file import load_rig
 from simrig.images import stamp

@@ -7,9 +7,9 @@ import pytest
 
 from recorder.checking.verify import verify
 from recorder.reading.triplets import triplets
+from rig.api.recordings import Counts
 from rig.clocks import NS_PER_S, host_now
 from rig.frame import FrameStatus
-from rig.status import Counts
 from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill

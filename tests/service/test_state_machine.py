@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.status import State
+from rig.api.status import State
 from service.supervision.state_machine import FOLLOWS, StateMachine
 
 

@@ -12,11 +12,14 @@ from typing import Any
 
 import pytest
 
+from rig.api.fields import Model
+from rig.api.recordings import Recording
+from rig.api.statement import Statement
+from rig.api.status import CameraState, CameraStatus, DiskStatus, State, Status
 from rig.errors import BadInputError, UnknownRecordingError
 from rig.events import Event
 from rig.settings.file import load_rig
 from rig.settings.webhook import WebhookSettings
-from rig.status import CameraState, CameraStatus, DiskStatus, Model, Recording, State, Statement, Status
 from service.alarms.delivery import Target, deliver
 from service.alarms.messenger import QUEUE_MAX, Messenger
 from service.alarms.occasions import Notification, Occasions

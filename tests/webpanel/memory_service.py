@@ -14,37 +14,31 @@ from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamil
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
-from rig.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.jump import LastJump
+from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
+from rig.api.statement import Level, Statement
+from rig.api.status import (
+    ArmOrder,
+    AutomaticStatus,
+    CameraState,
+    CameraStatus,
+    DiskStatus,
+    DoctorReport,
+    Event,
+    Finding,
+    PrerollStatus,
+    ProcessStatus,
+    PulseStatus,
+    RigView,
+    State,
+    Status,
+)
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
-from rig.status import (  # fmt: skip
-    ArmOrder,
-    AutomaticStatus,
-    CameraState,
-    CameraStatus,
-    Counts,
-    DiskStatus,
-    DoctorReport,
-    Event,
-    Finding,
-    LastJump,
-    Level,
-    PrerollStatus,
-    ProcessStatus,
-    PulseStatus,
-    Recording,
-    RecordingOrder,
-    RecordingState,
-    RigView,
-    SessionChange,
-    State,
-    Statement,
-    Status,
-    StopOrder,
-)
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording

@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from rig.looking import VOICE_BYTES_MAX
+from rig.api.looking import VOICE_BYTES_MAX
 from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access
 from webpanel.door.logins import Caller, Door, check_role

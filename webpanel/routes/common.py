@@ -8,7 +8,7 @@ from fastapi import APIRouter, Body, Path, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 
-from rig.status import Model
+from rig.api.fields import Model
 from webpanel.problems import MEDIA_TYPE
 
 

@@ -10,8 +10,8 @@ from anyio.to_thread import run_sync
 from fastapi import APIRouter, Path, Query, Request, Response
 from numpy.typing import NDArray
 
-from rig.looking import Moment, NewNote, Note, VoiceNote
-from rig.status import Pulses, RecordingState
+from rig.api.looking import Moment, NewNote, Note, VoiceNote
+from rig.api.recordings import Pulses, RecordingState
 from service.seam import RigService
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, RecordingId, Responses, jpeg_answer, refusals, strict_router

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from rig.status import Status
+from rig.api.status import Status
 from service.seam import RigService
 from webpanel.door.streams import Streams
 from webpanel.routes.common import refusals, strict_router

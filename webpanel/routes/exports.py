@@ -6,7 +6,7 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Depends, Path
 from fastapi.responses import FileResponse
 
-from rig.export import ExportJob, ExportOrder
+from rig.api.export import ExportJob, ExportOrder
 from service.seam import RigService
 from webpanel.door.streams import Streams
 from webpanel.routes.common import CHANGING, RecordingId, Responses, refusals, strict_router

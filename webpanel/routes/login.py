@@ -6,8 +6,8 @@ from fastapi import APIRouter, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from rig.api.fields import Model
 from rig.phrase import phrase
-from rig.status import Model
 from service.seam import RigService
 from webpanel.door.logins import COOKIE, SESSION_S, Caller, Door
 from webpanel.door.roles import Role

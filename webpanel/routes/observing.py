@@ -13,7 +13,7 @@ from prometheus_client.metrics_core import CounterMetricFamily, Metric
 from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from rig.status import Model
+from rig.api.fields import Model
 from service.seam import RigService
 from webpanel.routes.common import Responses, StrictRoute
 

@@ -8,19 +8,11 @@ from fastapi import APIRouter, Body, Depends, Query, Request, Response
 from isal import igzip as gzip
 from pydantic import AwareDatetime, BeforeValidator, TypeAdapter
 
-from rig.automatic import AutomaticChange, Mark, Marked
-from rig.status import (
-    LONGEST_LINE,
-    LONGEST_TAG,
-    Level,
-    Recording,
-    RecordingOrder,
-    RecordingQuery,
-    SessionChange,
-    Sorting,
-    Status,
-    StopOrder,
-)
+from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.fields import LONGEST_LINE, LONGEST_TAG
+from rig.api.recordings import Recording, RecordingOrder, RecordingQuery, SessionChange, Sorting, StopOrder
+from rig.api.statement import Level
+from rig.api.status import Status
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.events import Changes

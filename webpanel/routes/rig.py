@@ -6,7 +6,7 @@ import anyio
 from anyio.to_thread import run_sync
 from fastapi import APIRouter
 
-from rig.status import ArmOrder, DoctorReport, RigView, Status
+from rig.api.status import ArmOrder, DoctorReport, RigView, Status
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 

@@ -6,8 +6,8 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
-from rig.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
-from rig.status import NextJumper
+from rig.api.recordings import NextJumper
+from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from service.seam import Jumpers, RigService
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router

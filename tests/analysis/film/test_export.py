@@ -19,8 +19,8 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
+from rig.api.export import ExportOrder, Kind, Quality
 from rig.errors import BadInputError
-from rig.export import ExportOrder, Kind, Quality
 from rig.frame import FrameStatus
 from svev.cli import main
 from tests.recorder.logs import (

@@ -4,10 +4,10 @@ import pytest
 
 from recorder.log.mcap_layout import SlotLayout
 from recorder.log.tag_room import check_tag_fits
+from rig.api.fields import LONGEST_LINE
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
-from rig.status import LONGEST_LINE
 
 NAMES = [f"a{number}" + "x" * 14 for number in range(8)]
 SHAPE = (16, 8 * 16384)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from rig.api.recordings import RecordingOrder
+from rig.api.start_list import JumperChange, LineChange, Mark, NewLine, Rules, Turn, UndoOrder
 from rig.errors import ChangedMeanwhileError, StateForbidsError, UnknownLineError
 from rig.events import Event
-from rig.start_list import JumperChange, LineChange, Mark, NewLine, Rules, Turn, UndoOrder
-from rig.status import RecordingOrder
 from service.jumpers.book import JumperBook
 from service.jumpers.keeper import NAME, UNDO_NAME, Keeper
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from recorder.reading.triplets import triplets
-from rig.export import ExportOrder, ExportState
-from rig.status import State
+from rig.api.export import ExportOrder, ExportState
+from rig.api.status import State
 from service.exports.jobs import FOLDER, Exports
 from tests.recorder.logs import ALL_OK, LOST, OK
 from tests.support.waiting import wait_until

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from recorder.reading.info import info
-from rig.looking import VOICE_BYTES_MAX, VOICES_MAX
+from rig.api.looking import VOICE_BYTES_MAX, VOICES_MAX
 from tests.recorder.logs import ALL_OK, make_image, make_tag
 from tests.webpanel.memory_service import SHAPE, MemoryService, write_recording
 from tests.webpanel.serving import refused

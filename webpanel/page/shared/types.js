@@ -1,5 +1,5 @@
 /**
- * The shapes of the answers of the REST API, as in rig/status.py and rig/start_list.py (a test compares them).
+ * The shapes of the answers of the REST API, as in rig/api (a test compares them).
  *
  * @typedef {"idle"|"arming"|"armed"|"recording"|"disarming"|"fault"} State
  * @typedef {"good"|"info"|"warning"|"error"} Level

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from rig.status import WHOLE, Model
+from rig.api.fields import WHOLE, Model
 
 _CAMERAS_MAX: Final = 8
 _PulseNumber = Annotated[int, Field(ge=1, le=2**53), WHOLE]

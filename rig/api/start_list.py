@@ -5,7 +5,9 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, StrictBool
 
-from rig.status import WHOLE, Line, Model, NextJumper, SessionChange, SessionFields, Statement, Text, WholeNumber
+from rig.api.fields import WHOLE, Line, Model, Text, WholeNumber
+from rig.api.recordings import NextJumper, SessionChange, SessionFields
+from rig.api.statement import Statement
 
 #: As many lines and own columns as a start list may have, and the length of a column's name.
 LINES_MAX: Final = 500

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from rig.status import Model
+from rig.api.fields import Model
 
 #: All notes of a recording fit into the file of its session fields with room to spare.
 NOTE_MAX = 120

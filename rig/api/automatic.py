@@ -2,7 +2,8 @@
 
 from pydantic import AwareDatetime, Field, StrictBool
 
-from rig.status import Line, Model, Recording
+from rig.api.fields import Line, Model
+from rig.api.recordings import Recording
 
 
 class Mark(Model):

@@ -1,0 +1,29 @@
+"""What was measured of the last jump, in the form of the REST API."""
+
+from datetime import datetime
+
+from pydantic import Field
+
+from rig.api.fields import Model
+
+
+class MeasuredValue(Model):
+    """A number with its standard deviation."""
+
+    value: float
+    sigma: float
+
+
+class LastJump(Model):
+    """Main figures of the jump that was measured last, m/s and degrees; null where not measured."""
+
+    recording: str
+    jump: int = Field(description="number of the jump in the recording")
+    time: datetime = Field(description="take-off, or first pulse where that was not found, UTC")
+    ok: bool = Field(description="whether the jump was measured well")
+    verdict: str = Field(description="the verdict in words")
+    takeoff_speed: MeasuredValue | None = None
+    perpendicular: MeasuredValue | None = Field(None, description="velocity perpendicular to the table at the take-off")
+    speed_20_m: MeasuredValue | None = Field(None, description="speed 20 m behind the edge")
+    angle_of_attack: MeasuredValue | None = Field(None, description="0.5 s after the take-off")
+    ski_to_body: MeasuredValue | None = Field(None, description="alpha, 0.5 s after the take-off")

@@ -1,0 +1,180 @@
+"""The state of a running service, in the form that the REST API gives to people and programs.
+
+The service makes these objects; the REST API sends them as JSON and refuses unknown fields in those that it receives.
+Texts for people come with a `code`, so that the page can say the same in another language.
+"""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Literal
+
+from pydantic import Field
+
+from rig.api.fields import Model, WholeNumber
+from rig.api.jump import LastJump
+from rig.api.recordings import NextJumper, Recording
+from rig.api.statement import Statement
+from rig.phrase import Value
+
+
+class State(StrEnum):
+    """What the service is doing: `idle -> arming -> armed <-> recording`, `fault` from anywhere, `disarming`."""
+
+    IDLE = "idle"
+    ARMING = "arming"
+    ARMED = "armed"
+    RECORDING = "recording"
+    DISARMING = "disarming"
+    FAULT = "fault"
+
+
+class CameraState(StrEnum):
+    """State of a camera's connection."""
+
+    OFF = "off"  #: the rig is not armed
+    CONNECTING = "connecting"
+    READY = "ready"  #: connected and set up; frames come when pulses come
+    SILENT = "silent"  #: connected, but frames fail to come while the other cameras deliver
+    ABSENT = "absent"
+
+
+class CameraStatus(Model):
+    """One camera, in the order of the triplet, left to right."""
+
+    name: str
+    backend: str
+    address: str
+    state: CameraState
+    statement: Statement
+    frames_per_s: float | None = Field(None, description="frames of the last second")
+    frames: int = Field(0, description="whole frames since arming")
+    damaged: int = Field(0, description="damaged frames since arming")
+    resent_packets: int = 0
+    reconnects: int = 0
+    temperature_c: float | None = None
+    clock_offset_us: float | None = Field(None, description="trigger time minus the pulse's, median of late")
+    columns: tuple[int, int] | None = Field(None, description="first and one past the last column in the triplet")
+
+
+class PulseStatus(Model):
+    """The trigger pulses of the last second."""
+
+    arriving: bool
+    rate_hz: float | None = None
+    spread_us: float | None = Field(None, description="median spread of the trigger times within a pulse")
+    number: int = Field(0, description="pulses seen since arming")
+
+
+class DiskStatus(Model):
+    """Room for recordings."""
+
+    free_gb: float
+    trash_gb: float = Field(0.0, description="held by the trash; it is made free when the room is needed")
+    reserve_gb: float = Field(description="recording stops before less than this is free")
+    seconds_left: float = Field(description="so much can still be recorded, with the room of the trash")
+    jumps_left: int = Field(description="so many jumps of `jump_s` seconds")
+    jump_s: float
+
+
+class PrerollStatus(Model):
+    """The triplets kept in memory while armed."""
+
+    seconds: float = Field(description="held now")
+    limit_s: float = Field(description="held at most")
+    memory_mb: float = Field(description="memory taken for it")
+
+
+class ProcessStatus(Model):
+    """One row of the process table."""
+
+    name: str
+    pid: int | None
+    restarts: int = 0
+    statement: Statement | None = None
+
+
+class ArmOrder(Model):
+    """How the rig is to be armed."""
+
+    min_cameras: WholeNumber | None = Field(
+        None,
+        ge=1,
+        le=8,
+        description="so many cameras are enough this time, until the rig is disarmed; left out: as the rig file says",
+        examples=[None],
+    )
+
+
+class Event(Model):
+    """One event of the live log."""
+
+    number: int = Field(description="counts up by one; a gap means that events were dropped")
+    time: datetime
+    level: Literal["debug", "info", "warning", "error", "fatal"]
+    name: str = Field(description="who or what it is about, e.g. `recorder`, `K2`")
+    message: str = Field(description="what happened, in English")
+    code: str = Field("", description="stable name of the message, for translation; empty: there is none")
+    values: dict[str, Value] = Field({}, description="names and numbers in the message, for translation")
+
+
+class TapGuard(Model):
+    """What keeps a second tap from undoing the first: see `seen` of the commands."""
+
+    number: int = Field(description="of the present state; counts up with every change of state")
+    hold_s: float = Field(description="so long from now calls with `seen` are refused, because the state is new")
+    confirm_s: float = Field(description="so long from now the recording is stopped with `confirm` only")
+
+
+class AutomaticStatus(Model):
+    """Whether recordings begin by themselves when something moves."""
+
+    on: bool = Field(description="whether they do at present")
+    camera: str = Field(description="whose images are watched")
+
+
+class Status(Model):
+    """Everything about the running service at one moment."""
+
+    state: State
+    since: datetime = Field(description="when this state began, UTC")
+    statement: Statement = Field(description="the state in plain words, and what to do next")
+    notice: Statement | None = Field(None, description="what befell the last recording, until the next one")
+    guard: TapGuard
+    rig: str
+    version: str
+    cameras: tuple[CameraStatus, ...]
+    pulses: PulseStatus
+    preroll: PrerollStatus
+    disk: DiskStatus
+    recording: Recording | None = Field(description="the recording in progress")
+    last_recording: str | None = Field(description="id of the recording that ended last")
+    last_jump: LastJump | None = Field(None, description="the jump that the analysis measured last")
+    next_jumper: NextJumper = Field(NextJumper(), description="whom the next recording is of")
+    automatic: AutomaticStatus | None = Field(None, description="null: the rig file has no [automatic.motion]")
+    processes: tuple[ProcessStatus, ...]
+
+
+class Finding(Model):
+    """One finding of the doctor."""
+
+    level: Literal["PASS", "WARN", "FAIL"]
+    topic: str
+    code: str = Field(description="stable name of the finding, for translation; empty: there is none")
+    what: str = Field(description="what was found, in English")
+    remedy: str = Field(description="what to do about it, in English; empty if nothing")
+    values: dict[str, Value] = Field({}, description="names and numbers in both texts, for translation")
+
+
+class DoctorReport(Model):
+    """All findings of the doctor."""
+
+    worst: Literal["PASS", "WARN", "FAIL"]
+    findings: tuple[Finding, ...]
+
+
+class RigView(Model):
+    """The rig file in use."""
+
+    name: str
+    toml: str = Field(description="the file as it was read")
+    settings: dict[str, object] = Field(description="the settings with all defaults filled in")

@@ -37,6 +37,7 @@ from service.status.event_hub import EventHub
 from service.supervision.commands import at_once
 from service.supervision.rig_session import StartHill
 from service.supervision.supervisor import Supervisor, WarmUp
+from triggering.sources.choice import trigger_source
 
 T = TypeVar("T")
 #: Shows progress: called with label and number of steps, gives a function to call with the number of steps done.
@@ -126,7 +127,7 @@ class HeadlessRig:
                 if now > complete_since + settle_s:
                     raise CameraError(
                         f"all cameras are ready, but no complete triplet came within {settle_s:g} s: "
-                        "check the pulse generator, the trigger cables and trigger.rate_hz in the rig file"
+                        f"{trigger_source(self._rig.trigger).advice}"
                     )
                 time.sleep(_POLL_S)
                 continue

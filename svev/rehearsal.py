@@ -101,6 +101,7 @@ def rehearse(
 
     Raises:
         SvevError: a camera does not answer, no pulses come, the disk has no room, is too slow or fails, a process died.
+        KeyboardInterrupt: Ctrl-C or SIGTERM has ended the recording before its time; it is deleted.
     """
     name = new_log_path(directory).name
     # What fails here is to be seen, so nothing goes on elsewhere.
@@ -114,6 +115,8 @@ def rehearse(
             result, disk_error = record(running, rig, log, seconds, session={"session": "rehearsal"}, progress=progress)
         if disk_error is not None:
             raise disk_error
+        if result["stopped_early"]:
+            raise KeyboardInterrupt  # what was recorded until then bears no verdict
         report, timing = verify(log), _Timing.of(log)
     findings += judge_pulses(rig, result["alarms"], report)
     findings += _judge_timing(rig, timing)

@@ -33,7 +33,7 @@ def rehearse_command(
 
     Exit codes: 0 ready, 2 bad input, or a camera does not answer, 3 something speaks against it: the lines with FAIL
     say what and what to do, 4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but
-    no pulses come, 6 the recorder died.
+    no pulses come, 6 the recorder died, 130 interrupted, with no verdict.
 
     Example: svev rehearse --rig config/rigs/sim.toml
     """

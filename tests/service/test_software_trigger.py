@@ -41,6 +41,17 @@ def test_three_cameras_are_recorded_unmixed_and_their_spread_is_told(
     assert "trigger software trigger, frames of a pulse lie up to" in said
 
 
+def test_cameras_that_do_not_keep_up_are_no_fault_of_a_generator(tmp_path: Path, loopback: Loopback) -> None:
+    """K1 answers, but no frame of it arrives."""
+    faults = [{"kind": "lost_frame", "camera": "K1", "at_pulse": pulse} for pulse in range(3000)]
+    path = write_rig(tmp_path, "aravis", loopback, source="software", faults=faults, names=("K1",))
+    path.write_text(path.read_text().replace("[trigger]\n", "[trigger]\nsettle_s = 0.5\n"))
+    code, _, said = _record(path, tmp_path / "logs", 1)
+    assert code == 5
+    assert "lower trigger.rate_hz in the rig file" in said
+    assert "generator" not in said
+
+
 @contextmanager
 def _fake_camera() -> Iterator[None]:
     """Aravis's own simulated camera, which takes the loopback interface's first address."""

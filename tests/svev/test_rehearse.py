@@ -1,6 +1,7 @@
 """`svev rehearse`: real processes record to the real disk; what is wrong fails it, and nothing is left behind."""
 
 import json
+import signal
 import subprocess
 import sys
 from ipaddress import IPv4Address, IPv4Network
@@ -20,6 +21,7 @@ from svev.rehearsal import Rehearsed, headroom_of, judge_pulses
 from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, OK, write_log
 from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
 
 ABSENT, LOST = FrameStatus.ABSENT, FrameStatus.LOST
 
@@ -48,6 +50,21 @@ def test_a_rig_that_works_is_ready_and_the_disk_is_as_before(
     assert set(found["latency_ms"]) == {"K1", "K2", "K3"}
     codes = {finding["code"] for finding in found["findings"]}
     assert {"check_disk_speed", "check_room", "check_read_back", "check_dead_time", "check_spread"} <= codes
+    assert list(out.iterdir()) == []
+
+
+def test_one_that_is_interrupted_gives_no_verdict(tmp_path: Path, loopback: Loopback) -> None:
+    out = tmp_path / "recordings"
+    rig = write_rig(tmp_path, "sim", loopback)
+    command = [sys.executable, "-m", "svev", "rehearse", "--rig", str(rig), "--seconds", "60", "--out", str(out)]
+    with subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as rehearsing:
+        try:
+            wait_until(lambda: any(out.glob(".rehearsal-*/*.mcap")), "a log", timeout_s=60)
+            rehearsing.send_signal(signal.SIGTERM)
+            said, complaint = rehearsing.communicate(timeout=30)
+        finally:
+            rehearsing.kill()
+    assert (rehearsing.returncode, said) == (130, b""), complaint
     assert list(out.iterdir()) == []
 
 

@@ -8,6 +8,7 @@ class ExternalPulses:
 
     spread_ns = 0
     set_up_only = False
+    advice = "check the pulse generator, the trigger cables and trigger.rate_hz in the rig file"
 
     def commands(self, origin: HostNs) -> None:
         """No camera is told anything: `origin` has no meaning."""

@@ -46,6 +46,11 @@ class TriggerSource(Protocol):
         """Whether its frames are good for setting up cameras, but not for measuring."""
         ...
 
+    @property
+    def advice(self) -> str:
+        """What to do if all cameras are ready, but its pulses give no complete triplet."""
+        ...
+
     def commands(self, origin: HostNs) -> CommandTrain | None:
         """The pulses at which a camera is to be told to expose; None: it sees them by itself.
 

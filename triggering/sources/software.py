@@ -50,6 +50,7 @@ class SoftwarePulses:
     """
 
     set_up_only = True
+    advice = "commands or frames come too late; lower trigger.rate_hz in the rig file, and close other programs"
 
     def __init__(self, settings: SoftwareTrigger) -> None:
         self._settings = settings

@@ -24,36 +24,36 @@ from typer._completion_classes import completion_init
 
 from rig.errors import BadInputError, SvevError
 from svev import console
-from svev.commands.completion import COMPLETE_VARIABLE
+from svev.commands.computer.completion import COMPLETE_VARIABLE
 
 #: Commands in the order of the help: module in `svev.commands`, function in it, one line of help. Only the module of
 #: the called command is imported, so that `svev ctl` starts at once, and `record` and `serve` load no analysis.
 _COMMANDS: Final = {
-    "demo": ("demo", "demo", "Record jumps on the simulated hill; needs no camera."),
-    "record": ("record", "record", "Record once with the cameras of a rig file."),
-    "rehearse": ("rehearse", "rehearse_command", "Rehearse a recording to the real disk."),
-    "serve": ("serve", "serve", "Run the rig as a service, with a control panel."),
-    "ctl": ("ctl", "app", "Operate a running service: arm, record, stop, list."),
-    "completion": ("completion", "completion", "Have the shell complete commands and options."),
-    "doctor": ("setup", "doctor", "Examine computer, network, disk and cameras."),
-    "cameras": ("cameras", "app", "Find GigE Vision cameras, give them addresses."),
-    "keys": ("setup", "keys", "Make keys that protect published images."),
-    "certificate": ("certificate", "certificate", "Make a certificate for HTTPS."),
-    "info": ("logs", "info_command", "Say what a log holds."),
-    "export": ("export", "export_command", "Make a video, pictures or a table of a log."),
-    "recover": ("logs", "recover_command", "Repair a log that was not closed or is damaged."),
-    "replay": ("replay", "replay_command", "Publish a log again, as it was published live."),
-    "worker": ("worker", "worker_command", "Measure the jumper from published triplets."),
-    "schema": ("setup", "schema", "Print the JSON schema of rig files."),
-    "verify": ("logs", "verify_command", "Check every byte of a log."),
-    "adjust": ("adjust", "adjust", "Adjust a network of images (bundle adjustment)."),
-    "calibrate": ("calibrate", "calibrate", "Calibrate cameras with images of a 3D frame."),
-    "orient": ("orient", "orient", "Estimate the poses of the cameras on the hill."),
-    "analyze": ("analyze", "analyze_command", "Measure the jumps of a recording."),
-    "compare": ("compare", "compare", "Compare two measured jumps."),
-    "network": ("network", "app", "Make a network out of files of other programs."),
-    "plan": ("plan", "plan", "Predict the accuracy of planned cameras."),
-    "bench": ("bench", "bench", "Measure how fast this computer records."),
+    "demo": ("rig.demo", "demo", "Record jumps on the simulated hill; needs no camera."),
+    "record": ("rig.record", "record", "Record once with the cameras of a rig file."),
+    "rehearse": ("rig.rehearse", "rehearse_command", "Rehearse a recording to the real disk."),
+    "serve": ("rig.serve", "serve", "Run the rig as a service, with a control panel."),
+    "ctl": ("rig.ctl", "app", "Operate a running service: arm, record, stop, list."),
+    "completion": ("computer.completion", "completion", "Have the shell complete commands and options."),
+    "doctor": ("computer.setup", "doctor", "Examine computer, network, disk and cameras."),
+    "cameras": ("computer.cameras", "app", "Find GigE Vision cameras, give them addresses."),
+    "keys": ("computer.setup", "keys", "Make keys that protect published images."),
+    "certificate": ("computer.certificate", "certificate", "Make a certificate for HTTPS."),
+    "info": ("logs.contents", "info_command", "Say what a log holds."),
+    "export": ("logs.export", "export_command", "Make a video, pictures or a table of a log."),
+    "recover": ("logs.contents", "recover_command", "Repair a log that was not closed or is damaged."),
+    "replay": ("logs.replay", "replay_command", "Publish a log again, as it was published live."),
+    "worker": ("jumps.worker", "worker_command", "Measure the jumper from published triplets."),
+    "schema": ("computer.setup", "schema", "Print the JSON schema of rig files."),
+    "verify": ("logs.contents", "verify_command", "Check every byte of a log."),
+    "adjust": ("networks.adjust", "adjust", "Adjust a network of images (bundle adjustment)."),
+    "calibrate": ("networks.calibrate", "calibrate", "Calibrate cameras with images of a 3D frame."),
+    "orient": ("networks.orient", "orient", "Estimate the poses of the cameras on the hill."),
+    "analyze": ("jumps.analyze", "analyze_command", "Measure the jumps of a recording."),
+    "compare": ("jumps.compare", "compare", "Compare two measured jumps."),
+    "network": ("networks.network", "app", "Make a network out of files of other programs."),
+    "plan": ("networks.plan", "plan", "Predict the accuracy of planned cameras."),
+    "bench": ("computer.bench", "bench", "Measure how fast this computer records."),
 }
 
 

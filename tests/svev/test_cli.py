@@ -44,7 +44,7 @@ def test_the_version_says_where_it_is_installed(capsys: pytest.CaptureFixture[st
 
 def test_recording_loads_nothing_that_measures() -> None:
     """Its processes start at once, and a library that only the analysis needs cannot prevent a recording."""
-    loaded = "import sys, svev.commands.record, svev.commands.serve; print(*sys.modules)"
+    loaded = "import sys, svev.commands.rig.record, svev.commands.rig.serve; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, timeout=60, check=True)
     assert not {"analysis.procedure.analyze", "photogrammetry", "scipy"} & set(done.stdout.split())
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from svev import console
-from svev.commands.record import aside, causes
+from svev.commands.rig.record import aside, causes
 from svev.demo import Bus, run_demo
 
 

@@ -12,7 +12,7 @@ from photogrammetry.procedures.orientation import orient as orient_network
 from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import orientation_lines, orientation_report, orientation_to_json
 from photogrammetry.reports.result_extras import named_points
-from svev.commands.delivery import (
+from svev.commands.networks.delivery import (
     CovarianceOption,
     DetectableOption,
     JsonOption,

@@ -10,7 +10,7 @@ from photogrammetry.procedures.calibration import calibrate as calibrate_network
 from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import calibration_lines, calibration_report, calibration_to_json
 from photogrammetry.reports.result_extras import named_points
-from svev.commands.delivery import (
+from svev.commands.networks.delivery import (
     CovarianceOption,
     DetectableOption,
     JsonOption,

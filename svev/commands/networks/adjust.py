@@ -20,7 +20,7 @@ from photogrammetry.reports.result_file import outcome_to_json
 from photogrammetry.reports.summary import summarise
 from photogrammetry.start_values.search import complete
 from svev import console
-from svev.commands.delivery import (
+from svev.commands.networks.delivery import (
     CovarianceOption,
     DetectableOption,
     JsonOption,

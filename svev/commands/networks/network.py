@@ -8,7 +8,7 @@ import typer
 from photogrammetry.exchange.importing import import_network
 from photogrammetry.network.file_writer import write_network
 from svev import console
-from svev.commands.delivery import refuse_overwriting
+from svev.commands.networks.delivery import refuse_overwriting
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 

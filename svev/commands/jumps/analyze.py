@@ -14,8 +14,8 @@ from analysis.report.course import course_of
 from analysis.report.figures import five_figures, plus_minus
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
-from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE, PosesOption, SurveyOption
-from svev.commands.logs import AlsoJson, LogPath
+from svev.commands.logs.contents import AlsoJson, LogPath
+from svev.commands.networks.delivery import NOT_CONVERGED, NOT_SOLVABLE, PosesOption, SurveyOption
 
 
 class Alternative(StrEnum):

@@ -15,7 +15,7 @@ from photogrammetry.planning.simulated import simulated_network
 from photogrammetry.reports.document import as_text
 from photogrammetry.reports.plan import plan_report, plan_to_json
 from svev import console
-from svev.commands.delivery import NOT_CONVERGED, NOT_SOLVABLE, refuse_overwriting, written
+from svev.commands.networks.delivery import NOT_CONVERGED, NOT_SOLVABLE, refuse_overwriting, written
 
 _SEED: Final = 2009
 

@@ -10,7 +10,7 @@ from recorder.publishing.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError, LogDamagedError
 from rig.topics import DEFAULT_PUBLISH
 from svev import console
-from svev.commands.logs import AlsoJson, LogPath, truncated
+from svev.commands.logs.contents import AlsoJson, LogPath, truncated
 
 _INTERRUPTED = 130
 _SLOWEST, _FASTEST = 0.1, 10.0

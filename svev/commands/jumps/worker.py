@@ -22,8 +22,8 @@ from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 from rig.topics import DEFAULT_PUBLISH, JUMPER
 from svev import console
-from svev.commands.delivery import PosesOption, SurveyOption
-from svev.commands.logs import AlsoJson
+from svev.commands.logs.contents import AlsoJson
+from svev.commands.networks.delivery import PosesOption, SurveyOption
 
 _TOPIC: Final = live_topic(JUMPER)
 #: Topic of whole jumps; who subscribes to `jumper` gets them too.

@@ -12,7 +12,7 @@ from analysis.film.shots import Recording
 from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
 from rig.errors import BadInputError
 from svev import console
-from svev.commands.logs import AlsoJson, LogPath
+from svev.commands.logs.contents import AlsoJson, LogPath
 
 _FILES: Final = {".mp4": Kind.H264, ".mkv": Kind.FFV1, ".csv": Kind.CSV}
 _VIDEOS: Final = (Kind.H264, Kind.FFV1)

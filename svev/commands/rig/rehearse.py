@@ -8,7 +8,7 @@ import typer
 from recorder.publishing.keys import check_publication
 from rig.settings.file import load_rig
 from svev import console
-from svev.commands.record import aside
+from svev.commands.rig.record import aside
 from svev.doctor.finding import Topic
 from svev.doctor.printing import counts_of, end_with, print_findings
 from svev.rehearsal import rehearse

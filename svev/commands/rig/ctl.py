@@ -11,7 +11,7 @@ from rig.errors import BadInputError, CameraError, SvevError
 from svev import console
 from svev.answers import jumper_lines, recording_lines, recordings_lines, start_list_lines, status_lines
 from svev.calling import AnywhereGroup, Json, call, client_of, path_of, show
-from svev.commands.ctl_watching import doctor, log
+from svev.commands.rig.ctl_watching import doctor, log
 from svev.fetch import fetch
 from svev.rest_client import RestClient, read_token
 

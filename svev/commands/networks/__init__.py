@@ -1,0 +1,1 @@
+"""Commands of photogrammetry: adjust, calibrate, orient, plan, import."""

@@ -1,0 +1,1 @@
+"""Commands that run a rig: record, rehearse, serve, operate a running service."""

@@ -31,12 +31,14 @@ from svev.doctor.disk import look_at_disk
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.doctor.network import gige_cameras, look_at_interfaces
 from svev.gige.interfaces import interface_to
+from triggering.sources.choice import trigger_source
 
 #: A spread of the trigger times within a pulse of more than this share of the period is odd, or an alarm.
 _ODD_SPREAD, _WRONG_SPREAD = 0.05, 0.25
 #: Of each packet of `network.packet_size` bytes, IP, UDP and GVSP headers; and on the wire, beside it: preamble,
 #: Ethernet header, checksum, gap between packets.
 _HEADERS, _FRAMING = 20 + 8 + 8, 8 + 14 + 4 + 12
+_SET_UP_ONLY: Final = "check_set_up_only"
 #: Folder of a rehearsal in that of the recordings, with the number of its process behind it.
 _FOLDER: Final = ".rehearsal-"
 
@@ -79,6 +81,8 @@ class Rehearsed:
         parts.append(f"room for {self.jumps} jumps")
         if self.spread_us is not None:
             parts.append(f"spread within a pulse {self.spread_us['median']:.0f} us")
+        if any(finding.code == _SET_UP_ONLY for finding in self.findings):
+            parts.append("for set-up only")
         return ", ".join(parts)
 
     def to_json(self) -> dict[str, Any]:
@@ -119,6 +123,7 @@ def rehearse(
             raise KeyboardInterrupt  # what was recorded until then bears no verdict
         report, timing = verify(log), _Timing.of(log)
     findings += judge_pulses(rig, result["alarms"], report)
+    findings += judge_source(rig)
     findings += _judge_timing(rig, timing)
     return Rehearsed(
         pulses=report.ledger.pulses,
@@ -223,6 +228,14 @@ def judge_pulses(rig: RigSettings, alarms: list[str], report: VerifyReport) -> I
         remedy = "look for a trigger input that bounces, and for clocks that are set while pulses come"
         why = report.recounted.differences[0].in_words()
         yield failure(Topic.CAMERAS, "check_ledger", what, remedy, why=why)
+
+
+def judge_source(rig: RigSettings) -> Iterator[Finding]:
+    """Are the pulses good enough to measure with?"""
+    if trigger_source(rig.trigger).set_up_only:
+        what = "the cameras are triggered by software: for set-up only, not to measure in"
+        remedy = 'to measure, connect a pulse generator and set source = "external" under [trigger] in the rig file'
+        yield warning(Topic.TIME, "check_set_up_only", what, remedy)
 
 
 def _judge_timing(rig: RigSettings, timing: _Timing) -> Iterator[Finding]:

@@ -17,7 +17,7 @@ from rig.settings.model import RigSettings
 from svev.cli import main
 from svev.doctor.finding import Level
 from svev.gige.interfaces import Interface
-from svev.rehearsal import Rehearsed, headroom_of, judge_pulses
+from svev.rehearsal import Rehearsed, headroom_of, judge_pulses, judge_source
 from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, OK, write_log
 from tests.support.loopback import Loopback
@@ -104,6 +104,18 @@ def test_a_camera_that_is_not_needed_fails_no_rehearsal(
     rig = rig.model_copy(update={"trigger": rig.trigger.model_copy(update={"min_cameras": least})})
     first = next(judge_pulses(rig, [], verify(tmp_path / "log.mcap")))
     assert first.level is level, first
+
+
+@pytest.mark.parametrize(("source", "codes"), [("external", []), ("software", ["check_set_up_only"])])
+def test_what_is_good_for_set_up_only_is_called_so(
+    tmp_path: Path, loopback: Loopback, source: str, codes: list[str]
+) -> None:
+    findings = tuple(judge_source(load_rig(write_rig(tmp_path, "aravis", loopback, source=source))))
+    assert [finding.code for finding in findings] == codes
+    done = Rehearsed(
+        pulses=90, complete=90, causes={}, headroom={}, jumps=143, spread_us=None, latency_ms={}, findings=findings
+    )
+    assert done.verdict == "room for 143 jumps" + (", for set-up only" if codes else "")
 
 
 def test_the_verdict_is_one_line_of_figures() -> None:

@@ -115,6 +115,7 @@ export const findings = {
   check_ledger: ["regnskapet stemmer ikke når det regnes ut på nytt: {why}", "se etter en triggerinngang som preller, og etter klokker som stilles mens pulsene går"],
   check_exposes_on: ["{camera}: eksponerer i {exposure} ms, pulsene kommer hvert {period} ms", "gjør exposure_us kortere, eller senk trigger.rate_hz"],
   check_dead_time: ["{camera}: eksponering, utlesing og overføring tar {busy} ms, pulsene kommer hvert {period} ms", "det må eksponere mens det sender: mister det pulser, gjør exposure_us kortere eller utsnittet mindre"],
+  check_set_up_only: ["kameraene trigges av programvare: bare til oppsett, ikke til måling", "koble til en pulsgenerator for å måle, og sett source = \"external\" under [trigger] i riggfilen"],
   check_spread: ["triggertidene innen en puls ligger {typical} us fra hverandre, høyst {largest} us", "se på triggerkabler og -innganger, og på triggerforsinkelser i kameraene"],
 
   check_clock: ["klokken er synkronisert, høyst {ms} ms feil"],

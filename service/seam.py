@@ -165,7 +165,7 @@ class RigService(Protocol):
         ...
 
     def arm(self, order: ArmOrder) -> Status:
-        """Begin to arm. While arming or armed, nothing else changes; while disarming, StateForbidsError."""
+        """Begin to arm. While arming only `min_cameras` counts, while armed nothing; disarming: StateForbidsError."""
         ...
 
     def disarm(self) -> Status:

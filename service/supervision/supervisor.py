@@ -160,12 +160,12 @@ class Supervisor:
 
         Args:
             min_cameras: so many cameras are enough until the rig is disarmed; None: as many as before, or as the rig
-                file says.
+                file says. A tap that comes when the rig is armed already lowers nothing.
         """
         state = self._machine.state
         if state is State.DISARMING:
             raise StateForbidsError(FORBIDDEN["arm", state])
-        if min_cameras is not None:
+        if min_cameras is not None and state not in {State.ARMED, State.RECORDING}:
             self._least = min(min_cameras, len(self.rig.cameras))
         if state is State.FAULT and self._enough():
             self._judge()

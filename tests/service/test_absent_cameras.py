@@ -61,6 +61,7 @@ def test_a_rig_that_loses_all_cameras_is_armed_again_when_enough_are_back(
 ) -> None:
     with _hill_and_service(tmp_path, loopback, "K3", least=2) as (hill, service):
         service.arm()
+        service.post("/api/arm", {"min_cameras": 1})  # a late tap: while armed it changes nothing
         hill.kill("K1")
         hill.kill("K2")
         fault = service.await_state("fault")["statement"]

@@ -6,11 +6,11 @@ Texts for people come with a `code`, so that the page can say the same in anothe
 
 from datetime import datetime
 from enum import StrEnum
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rig.api.fields import Model, WholeNumber
+from rig.api.fields import WHOLE, Model
 from rig.api.jump import LastJump
 from rig.api.recordings import NextJumper, Recording
 from rig.api.statement import Statement
@@ -96,10 +96,8 @@ class ProcessStatus(Model):
 class ArmOrder(Model):
     """How the rig is to be armed."""
 
-    min_cameras: WholeNumber | None = Field(
+    min_cameras: Annotated[int, Field(ge=1, le=8), WHOLE] | None = Field(
         None,
-        ge=1,
-        le=8,
         description="so many cameras are enough this time, until the rig is disarmed; left out: as the rig file says",
         examples=[None],
     )

@@ -42,8 +42,9 @@ def test_systemd_finds_nothing_wrong_with_the_unit(prefix: Path) -> None:
 
 def test_the_sandbox_is_tight(prefix: Path) -> None:
     unit = prefix / "lib/systemd/system/svev.service"
-    # Exposure is given in tenths, from 0 (closed) to 100 (open); ours is 22, a unit without a sandbox has 96.
-    _analyze("security", "--offline=true", "--threshold=25", "--no-pager", unit)
+    # Exposure is given in tenths, from 0 (closed) to 100 (open); ours is 27, of which 5 are ProtectClock=, which
+    # would forbid to ask how well the kernel knows UTC; a unit without a sandbox has 96.
+    _analyze("security", "--offline=true", "--threshold=28", "--no-pager", unit)
 
 
 def test_users_and_directories_are_understood(prefix: Path, tmp_path: Path) -> None:

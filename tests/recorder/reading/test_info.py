@@ -21,7 +21,12 @@ def test_a_log_says_what_it_is(tmp_path: Path) -> None:
         "causes": {"lost": 1, "missed": 0, "damaged": 0, "absent": 3}, "missing_pulses": 0, "pauses": [],
         "trouble": "", "bytes": path.stat().st_size, "recording": "r1", "start_ns": str(START + PERIOD_NS),
         "offset_us": {"median": 0.5, "max": 1.5}, "shape": [24, 90], "cameras": ["K1", "K2", "K3"],
-        "session": SESSION, "rig": RIG,
+        "ledger": {
+            "K1": {"ok": 3, "lost": 0, "missed": 0, "damaged": 0, "absent": 1},
+            "K2": {"ok": 2, "lost": 1, "missed": 0, "damaged": 0, "absent": 1},
+            "K3": {"ok": 3, "lost": 0, "missed": 0, "damaged": 0, "absent": 1},
+        },
+        "utc": None, "session": SESSION, "rig": RIG,
         "messages": {"/events": 2, "/triplet": 3, "/triplet/tag": 4, "/health": 1},
     }  # fmt: skip
 

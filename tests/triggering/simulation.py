@@ -136,6 +136,8 @@ class _Camera:
             self.see(pulse, time, outage)
         for outage in pending:
             self.back(outage)
+        if self.scenario.latch_every_s is not None:  # a grabber goes on reading the clock when the pulses have ended
+            self.latch_burst(HostNs(self.last_arrival + NS_PER_S // 4), 1, self.link_rng)
         return sorted(self.records, key=lambda entry: entry[0])  # clock readings between the frames
 
     def connect(self, host: HostNs) -> None:

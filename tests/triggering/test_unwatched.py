@@ -1,12 +1,13 @@
 """While no camera is there, the rhythm of the train says which pulses fired; they are tagged absent in all cameras."""
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rig.clocks import NS_PER_S
-from rig.frame import FrameStatus
+from rig.clocks import NS_PER_S, HostNs
+from rig.frame import FrameStatus, Record, RecordKind
 from tests.triggering.feed import HOLD, PERIOD, Feed
-from tests.triggering.oracle import ABSENT, LOST, OK, check, check_no_pulse_is_mixed
+from tests.triggering.oracle import ABSENT, DAMAGED, LOST, OK, check, check_no_pulse_is_mixed
 from tests.triggering.simulation import MS, Hill, Outage, Run, Scenario
 from tests.triggering.test_records import running_train
 
@@ -58,6 +59,19 @@ def test_one_camera_that_is_there_shows_that_the_train_paused() -> None:
     feed.all_cameras(200, [None, None, 21])
     feed.all_cameras(201, [None, None, 22])
     assert fates(feed) == [{OK}] * 20 + [{ABSENT, OK}] * 2
+
+
+@pytest.mark.parametrize("late_ms", [6, 40, 110])
+def test_a_frame_that_was_cut_off_with_its_camera_stops_no_train(late_ms: int) -> None:
+    """Power goes while a frame is being sent: what comes of it, soon or when the rest is given up, is damaged."""
+    feed = running_train(20)
+    feed.pairer.damaged(2, Record(RecordKind.DAMAGED, 1, HostNs(feed.time_of(20) + late_ms * MS)))
+    all_gone(feed, 25)
+    feed.advance(feed.time_of(60) + HOLD + MS)
+    assert len(feed.closed) == 61
+    assert fates(feed)[:20] == [{OK}] * 20
+    assert all(found <= {ABSENT, DAMAGED} for found in fates(feed)[20:])
+    assert sum(DAMAGED in found for found in fates(feed)) == 1
 
 
 def test_a_train_that_paused_before_the_cameras_were_unplugged_is_not_continued() -> None:

@@ -14,6 +14,7 @@ from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record
 from rig.health import CameraCounters
 from triggering.pairing.belief import Witness
+from triggering.pairing.frame_ids import id_step, overruns_between
 from triggering.pairing.gaps import DamageMatcher, Gap
 from triggering.pairing.outcomes import NO_FRAME, Outcome
 from triggering.timeline.device_clock import DeviceClock
@@ -112,10 +113,10 @@ class CameraTrack:
         """End the epoch: frames that have not come by now never will."""
         if not self.connected:
             return
-        start = self._since if self._last is None else self._last[1]
+        start = self._last_whole
         self._gaps.append(Gap(start, host, damaged=self._damaged, broken=True, anchored=False))
         self._known_until = max(self._known_until, host)
-        self._left = max(self._left, self.alive if self.silent else self._seen)
+        self._left = max(self._left, start if self.silent else self._seen)
         self.connected = self.silent = False
         self._damaged = []
 
@@ -150,8 +151,8 @@ class CameraTrack:
             del self._damaged[0]
             self.counters.unassigned += 1
         self._damaged.append(host)
+        # It says nothing of `_seen`: what is left of a frame may be given up long after its camera went.
         self.alive = max(self.alive, HostNs(round(self._matcher.trigger_of(host))))
-        self._seen = max(self._seen, self.alive)
         self._stirs()
 
     def note_damage(self, record: Record) -> None:
@@ -214,7 +215,7 @@ class CameraTrack:
                 return False
             taken = self._taken_since(last, last_time, record, time)
             gap = self._end_running_gap(last_time, time, taken, anchored=not self._broken)
-            gap.overruns = _overruns(last, record, taken + 1) if gap.anchored else 0
+            gap.overruns = overruns_between(last, record, taken + 1) if gap.anchored else 0
             self.counters.overruns += gap.overruns
             self._gaps.append(gap)
         self._last = record, time
@@ -276,7 +277,7 @@ class CameraTrack:
         if time <= self._left or not self.connected:
             return time > self._left
         if self.silent:  # that it answers proves nothing: it does so while pulses come
-            return time > self.alive
+            return time > self._last_whole
         return time < (self._since + FIRST_NS if self._first is None else self._first - self._train.tolerance_ns)
 
     def settle_unwatched(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
@@ -306,6 +307,11 @@ class CameraTrack:
     def has_damaged(self) -> bool:
         """Whether there are damaged arrivals that are not assigned to a pulse yet."""
         return bool(self._damaged) or any(gap.damaged for gap in self._gaps)
+
+    @property
+    def _last_whole(self) -> HostNs:
+        """Trigger time of the last whole frame, or the time of the connection before the first one."""
+        return self._since if self._last is None else self._last[1]
 
     # -- details -------------------------------------------------------------------------------------------------
 
@@ -367,33 +373,3 @@ class CameraTrack:
     def _most_steps(self, span_ns: int) -> float:
         """Upper limit of the frames that a camera can take in a time, even if the rate is off."""
         return 1.5 * span_ns / self._train.period_ns + 1.5
-
-
-def _overruns(last: Record, record: Record, frames: int) -> int:
-    """Triggers between two whole frames at which the camera took no frame, when it took `frames` in all."""
-    if record.trigger_count < 0 or last.trigger_count < 0:
-        return 0
-    return max(0, record.trigger_count - last.trigger_count - frames)
-
-
-def id_step(previous: int, current: int, modulus: int) -> int:
-    """Number of frames that the camera took from `previous` (excluded) to `current` (included).
-
-    GigE Vision counts the frames that a camera took (block id): 16-bit ids run 1..65535 and skip 0; 64-bit ids and the
-    frame counters of IIDC cameras never wrap in practice. A frame lost in transfer leaves a hole in the ids, a pulse
-    that the camera did not see leaves none.
-
-    Args:
-        previous: id of the earlier frame.
-        current: id of the later frame.
-        modulus: how many different ids there are (65535 for 16-bit block ids), 0 if they never wrap.
-
-    Returns:
-        1 for neighbours, 0 for the same id, negative if the ids went back. Ids that wrap are taken the short way
-        round, so a step is at most half the modulus either way.
-    """
-    step = current - previous
-    if modulus == 0:
-        return step
-    step %= modulus
-    return step - modulus if step > modulus // 2 else step

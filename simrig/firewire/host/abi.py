@@ -10,9 +10,9 @@ from typing import Final
 from simrig.firewire.camera.marlin import Rcode
 
 KERNEL_VERSION: Final = 5  #: FW_CDEV_VERSION that a kernel since 3.4 reports
-DROPS_HEADERS_BELOW: Final = (
-    5  #: a program of an older version loses headers that do not fit; a newer one gets more events
-)
+#: A file whose program has named an older version, or none, loses headers that do not fit; a newer one gets more events
+#: (core-cdev.c, ioctl_create_iso_context: `client->version`, which ioctl_get_info alone sets).
+DROPS_HEADERS_BELOW: Final = 5
 PAGE: Final = 4096  #: the kernel keeps so many bytes of packet headers until an interrupt
 
 

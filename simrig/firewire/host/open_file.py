@@ -74,7 +74,7 @@ class OpenFile:
         self._connection, self._events = connection, events
         self._events.setblocking(False)
         self._unsent: deque[bytes] = deque()
-        self._version = abi.KERNEL_VERSION
+        self._version = 0  # until GET_INFO, for which libdc1394 never asks through the file that it captures with
         self._reset_closure = 0
         self._iso = IsoFile(bus.resources, self._tell)
         self._gone = False

@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from simrig.firewire.host.abi import PAGE
 from simrig.firewire.isochronous import CYCLE_NS, Transmission
 
 _INTERRUPT, _WAIT = 1 << 16, 1 << 17  # in the control word of struct fw_cdev_iso_packet
-_HEADER_BYTES: Final = 8  # the controller stores so many, whatever part of them the program asked for
 
 
 @dataclass(slots=True)
@@ -77,7 +75,7 @@ class ReceiveContext:
         channel: isochronous channel it listens on.
         header_bytes: header bytes of each packet that the program wants: 4, or 8 with the cycle stamp.
         on_interrupt: called with the cycle stamp of the last packet and all headers.
-        drops_headers: whether headers beyond a page are dropped; if not, they cause an interrupt.
+        drops_headers: whether headers beyond a page are dropped (the frame is not); if not, they cause an interrupt.
     """
 
     def __init__(
@@ -152,8 +150,7 @@ class ReceiveContext:
                     self._interrupt()
 
     def _keep(self, headers: NDArray[np.uint32]) -> None:
-        kept = sum(map(len, self._headers)) * _HEADER_BYTES
-        room = (PAGE - kept) // _HEADER_BYTES
+        room = PAGE // self.header_bytes - sum(map(len, self._headers))
         self._headers.append(headers[:room])
         if len(headers) > room and not self._drops_headers:
             self._interrupt()

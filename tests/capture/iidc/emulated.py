@@ -52,10 +52,12 @@ def visible(hill: SimulatedHill) -> Iterator[SimulatedHill]:
 
 
 @contextmanager
-def emulated_bus(*names: str, rate_hz: float = 30.0, **options: Any) -> Iterator[SimulatedHill]:
-    """A bus with cameras of the training scenario, seen by this process."""
+def emulated_bus(
+    *names: str, rate_hz: float = 30.0, scenario: Path = SCENARIO, **options: Any
+) -> Iterator[SimulatedHill]:
+    """A bus with cameras of the training scenario, or of one made from it, seen by this process."""
     cameras = {name: GUIDS[name] for name in names or ("K1",)}
-    with SimulatedHill(SCENARIO, {}, rate_hz, firewire=cameras, **options) as hill, visible(hill):
+    with SimulatedHill(scenario, {}, rate_hz, firewire=cameras, **options) as hill, visible(hill):
         yield hill
 
 

@@ -25,6 +25,7 @@ from rig.transport.ring import CameraRing
 from simrig.images import stamp
 from simrig.world.faults import Fault, FaultKind
 from tests.capture.iidc.emulated import GUIDS, camera_ring, emulated_bus, settings
+from tests.capture.rigs import SCENARIO
 
 PERIOD_NS = 33_333_333
 RATE_HZ = 30.0
@@ -105,6 +106,40 @@ def test_at_half_the_rate_packets_are_half_as_large() -> None:
         assert "652 bandwidth units" in made.description
         made.start()
         assert all(arrival.whole for arrival in collect(made, ring, 3))
+
+
+def test_a_slow_frame_of_more_packets_than_the_kernel_keeps_headers_of_is_one_frame() -> None:
+    camera = settings()
+    with emulated_bus(rate_hz=7.0), camera_ring(camera) as ring, closing(IidcCamera(camera, ring, 7.0)) as made:
+        assert made.transport_ns == 960 * 125_000
+        made.start()
+        arrivals = collect(made, ring, 4)
+    assert all(arrival.whole for arrival in arrivals)
+    assert [b.frame_id - a.frame_id for a, b in pairwise(arrivals)] == [1, 1, 1]
+
+
+def test_pulses_of_a_hand_about_one_a_second(tmp_path: Path) -> None:
+    presses = [pulse + 30 * turn for turn in range(8) for pulse in (0, 4, 10, 14, 19, 25)]  # 0.8 to 1.2 s apart
+    pauses = [[a + 1, b] for a, b in pairwise(presses)]
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(f'base = "{SCENARIO}"\nname = "hand"\npauses = {pauses}\n')
+    camera, seen, triggers = settings(), [], []
+    with (
+        emulated_bus(rate_hz=5.0, scenario=scenario) as hill,
+        camera_ring(camera) as ring,
+        closing(IidcCamera(camera, ring, 1.0)) as made,
+    ):
+        made.start()
+        for _ in range(5):
+            (arrival,) = collect(made, ring, 1)
+            assert arrival.whole
+            pulse = stamp.read(ring.frame(arrival.slot).reshape(480, 640))
+            assert pulse is not None
+            seen.append(pulse.pulse)
+            latch = made.latch()
+            triggers.append(latch.host + arrival.device_time - latch.device - hill.train.time(pulse.pulse))
+    assert seen == presses[presses.index(seen[0]) :][:5], "every press a frame"
+    assert max(map(abs, triggers)) < 1_000_000
 
 
 def test_frames_are_signed_and_the_signed_pixels_are_named() -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 import msgspec
 from msgspec import Meta
 
+from rig.action import ActionCounts
 from rig.clocks import DecimalNs
 from rig.frame import FrameStatus
 from rig.topics import HEALTH
@@ -33,6 +34,7 @@ class CameraHealth(msgspec.Struct, frozen=True):
     temperature_mdeg: Annotated[int, Meta(description="thousandths of a degree, 0 where the camera does not tell")]
     queue_overflows: Annotated[int, Meta(description="records that found their queue full")]
     slots_queued: Annotated[int, Meta(description="slots of the ring that wait for the recorder")]
+    actions: Annotated[ActionCounts | None, Meta(description="answers to action commands; null: it gets none")] = None
 
 
 class CameraCounters(msgspec.Struct):

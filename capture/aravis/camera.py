@@ -8,9 +8,11 @@ The ids of a buffer whose status is not SUCCESS mean nothing: they may be those 
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import Final
 
 import gi
 
+from capture.aravis.action import lock_clock
 from capture.aravis.clock import CameraClock
 from capture.aravis.configuration import SOFTWARE_TRIGGER, configure
 from capture.aravis.features import Features
@@ -18,10 +20,11 @@ from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_soc
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
 from capture.command_times import CommandTimes
 from capture.seam import Arrival
+from rig.action import ActionKeys
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.settings.model import CameraSettings, NetworkSettings
-from rig.settings.trigger import SoftwareTrigger
+from rig.settings.trigger import ActionTrigger, ExternalTrigger, SoftwareTrigger, Trigger
 from rig.transport.ring import CameraRing
 
 gi.require_version("Aravis", "0.8")
@@ -38,10 +41,19 @@ _RETENTION_US = 50_000  # enough to ask for lost packets several times and to re
 _QUEUE_S = 0.5
 _QUEUE_BYTES = 24 << 20
 _QUEUE_LEAST = 8
+_BY_CABLE: Final = ExternalTrigger()
 
 
 class AravisCamera:
-    """One GigE Vision camera, triggered by its input line or, if `software` is given, by commands (`fire`).
+    """One GigE Vision camera, triggered by its input, by commands (`fire`), or by action commands of another process.
+
+    Args:
+        settings: of the camera in the rig file.
+        network: of the rig file.
+        ring: where the frames go.
+        period_ns: time between two pulses.
+        trigger: of the rig file.
+        origin: time of a pulse, the same for all programs of the rig; it makes the keys of action commands.
 
     Raises:
         CameraNotFoundError: nobody answers at the address.
@@ -54,10 +66,13 @@ class AravisCamera:
         network: NetworkSettings,
         ring: CameraRing,
         period_ns: int,
-        software: SoftwareTrigger | None = None,
+        trigger: Trigger = _BY_CABLE,
+        origin: HostNs = HostNs(0),
     ) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
-        self._software = software
+        self._software = trigger if isinstance(trigger, SoftwareTrigger) else None
+        self._action = trigger if isinstance(trigger, ActionTrigger) else None
+        self._keys = None if self._action is None else ActionKeys.of(origin)
         self._commands: CommandTimes | None = None
         self._lost = False
         self._plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
@@ -205,7 +220,9 @@ class AravisCamera:
     def _configure(self, settings: CameraSettings, network: NetworkSettings) -> None:
         """Set everything that must be set before the stream is made."""
         # No local names for Aravis objects: the traceback of an error would keep the camera's sockets open.
-        self._notices += configure(self._features, settings, software=self._software is not None)
+        self._notices += configure(self._features, settings, software=self._software is not None, action=self._keys)
+        if self._action is not None and self._action.scheduled:
+            lock_clock(self._features, settings.name)
         self._camera.gv_set_packet_size(network.packet_size)
         if self._plain_socket:
             self._camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)

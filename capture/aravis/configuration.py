@@ -8,7 +8,9 @@ pixel format or input, a camera that cannot be triggered frame by frame.
 from collections.abc import Sequence
 from typing import Final
 
+from capture.aravis.action import set_action_trigger
 from capture.aravis.features import Features
+from rig.action import ActionKeys
 from rig.errors import CameraError
 from rig.settings.model import CameraSettings
 
@@ -42,13 +44,16 @@ _LEAST: Final = -1e9
 SOFTWARE_TRIGGER: Final = "TriggerSoftware"
 
 
-def configure(features: Features, settings: CameraSettings, *, software: bool) -> list[str]:
+def configure(
+    features: Features, settings: CameraSettings, *, software: bool, action: ActionKeys | None = None
+) -> list[str]:
     """Set everything but the packets, in the order that cameras accept.
 
     Args:
         features: of the camera.
         settings: of the camera in the rig file.
         software: it exposes at commands, not at pulses of its input.
+        action: keys of the action commands at which it exposes; None: at none.
 
     Returns:
         What could not be set and what that costs, a sentence each.
@@ -64,7 +69,7 @@ def configure(features: Features, settings: CameraSettings, *, software: bool) -
         if features.has(name) and not features.switch(name, on=False)
     ]
     _set_image(features, settings)
-    notices += _set_trigger(features, settings, software=software)
+    notices += _set_trigger(features, settings, software=software, action=action)
     notices += _set_exposure(features, settings.exposure_us)
     notices += _set_gain(features, settings.gain_db)
     return [f"camera {settings.name}: {notice}" for notice in notices]
@@ -99,7 +104,9 @@ def _set_image(features: Features, settings: CameraSettings) -> None:
         raise CameraError(f"camera {name} takes no frames one after the other (AcquisitionMode Continuous)")
 
 
-def _set_trigger(features: Features, settings: CameraSettings, *, software: bool) -> list[str]:
+def _set_trigger(
+    features: Features, settings: CameraSettings, *, software: bool, action: ActionKeys | None
+) -> list[str]:
     name = settings.name
     selectors = features.entries("TriggerSelector")
     for selector in selectors:
@@ -111,7 +118,7 @@ def _set_trigger(features: Features, settings: CameraSettings, *, software: bool
         raise CameraError(f"camera {name} has no trigger that takes one frame per pulse (it has {_list(selectors)})")
     if chosen == "AcquisitionStart" and not features.has(_ONE_FRAME[chosen]):
         raise CameraError(f"camera {name} has a trigger that starts it, but none that takes one frame per pulse")
-    notices = [] if software else _set_input(features, settings)
+    notices = [] if software or action else _set_input(features, settings)
     for divider in ("TriggerDivider", "TriggerMultiplier"):
         if features.set_number(divider, 1) not in {None, 1.0}:
             notices.append(f"{divider} stays {features.number(divider):g}: it does not take one frame per pulse")
@@ -121,6 +128,8 @@ def _set_trigger(features: Features, settings: CameraSettings, *, software: bool
     features.choose("TriggerOverlap", "ReadOut", "PreviousFrame")  # else pulses during the readout are ignored
     if features.choose("TriggerMode", "On") is None:
         raise CameraError(f"camera {name} cannot be triggered (TriggerMode): use a camera with a trigger input")
+    if action is not None:
+        set_action_trigger(features, name, action)
     if software and (features.choose("TriggerSource", "Software") is None or not features.has(SOFTWARE_TRIGGER)):
         sources = _list(features.entries("TriggerSource"))
         raise CameraError(

@@ -102,6 +102,20 @@ class Features:
         except GLib.Error:
             return None
 
+    def write(self, name: str, value: int) -> bool:
+        """Write an integer as it is, without reading it back: keys can only be written with some makers.
+
+        Returns:
+            Whether the camera has taken it.
+        """
+        try:
+            if not self.has(name):
+                return False
+            self._device.set_integer_feature_value(name, value)
+        except GLib.Error:
+            return False
+        return True
+
     def number(self, name: str) -> float | None:
         """Present value of a number; None if it cannot be read."""
         try:

@@ -124,7 +124,7 @@ class Assembler:
         period = rig.trigger.period_ns
         self.hold_ns = hold_ns(period)
         source = trigger_source(rig.trigger)
-        commands = source.commands(epoch)
+        commands = source.commands(epoch) or source.sent(epoch)
         self.pairer = Pairer(
             len(rings),
             period,

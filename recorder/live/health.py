@@ -8,6 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
+from rig.action import ActionCounts
 from rig.clocks import NS_PER_S, NS_PER_US
 from rig.disk import free_bytes
 from rig.health import CameraHealth, DiskHealth, Health, Latency
@@ -93,14 +94,17 @@ class HealthMonitor:
         """Frames that have found no free slot in their camera's ring so far, in all cameras."""
         return sum(ring.counters()["underruns"] for ring in self._rings)
 
-    def record(self, connected: Sequence[bool], **others: Any) -> Health:
+    def record(self, connected: Sequence[bool], actions: Sequence[ActionCounts] | None = None, **others: Any) -> Health:
         """The record for the second that ends now.
 
         Args:
             connected: for each camera, whether it is connected.
+            actions: what each camera has answered to action commands; None: they get none.
             others: the fields of `rig.health.Health` that other objects measure.
         """
-        cameras = tuple(self._camera(index, is_there) for index, is_there in enumerate(connected))
+        answers = [None] * len(connected) if actions is None else actions
+        told = enumerate(zip(connected, answers, strict=True))
+        cameras = tuple(self._camera(index, is_there, counts) for index, (is_there, counts) in told)
         disk = DiskHealth(self._room.free_bytes)
         return Health(cameras=cameras, disk=disk, latency=self.latency.figures(), **others)
 
@@ -108,7 +112,7 @@ class HealthMonitor:
         """End the thread that asks the disk."""
         self._room.close()
 
-    def _camera(self, index: int, connected: bool) -> CameraHealth:
+    def _camera(self, index: int, connected: bool, actions: ActionCounts | None) -> CameraHealth:
         counters = self._rings[index].counters()
         # A grabber that was started again counts from zero.
         rate = max(0, counters["frames"] - self._frames_before[index])
@@ -120,5 +124,6 @@ class HealthMonitor:
             frames_per_s=rate,
             clock_offset_us=round(median(offsets) / NS_PER_US, 3) if offsets and connected else None,
             temperature_c=millidegrees / 1000 if millidegrees else None,
+            actions=actions,
             **counters,
         )

@@ -16,6 +16,7 @@ from recorder.log.mcap_layout import SlotLayout
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.keys import check_publication, load_keys
 from recorder.publishing.publisher import Publisher
+from rig.action import ActionCounts
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
 from rig.events import PAIRING, TRIGGER, Event, Level
@@ -37,6 +38,7 @@ from rig.transport.messages import (
     RecorderWarm,
     StartRecording,
     StopRecording,
+    TellActions,
     TellEvent,
     TellResult,
 )
@@ -84,6 +86,7 @@ class RecorderLoop:
         self._alarmed: set[tuple[str, object]] = set()
         self._source = trigger_source(rig.trigger)
         self._spread = SpreadTeller(self._source)
+        self._actions: tuple[ActionCounts, ...] | None = None
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -163,6 +166,8 @@ class RecorderLoop:
                 self._recordings.happened(command.event)
             case TellResult():
                 self._recordings.result(command)
+            case TellActions():
+                self._actions = command.counts
             case Quit():
                 self._quit = True
 
@@ -175,6 +180,7 @@ class RecorderLoop:
         """Report, publish and write the health record of the last second."""
         health = self._health.record(
             self._assembler.connected,
+            self._actions,
             pairing=self._assembler.pairer.health(),
             free_triplets=self._buffers.free_count,
             unpublished=self._publisher.dropped,

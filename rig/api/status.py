@@ -38,6 +38,15 @@ class CameraState(StrEnum):
     ABSENT = "absent"
 
 
+class ActionAnswers(Model):
+    """What a camera has answered to action commands since arming, while it was connected."""
+
+    acknowledged: int = Field(description="commands that it took")
+    late: int = Field(description="commands whose time was past when they came")
+    refused: int = Field(description="commands that it did not take, e.g. without a reference time")
+    unanswered: int = Field(description="commands that it did not answer in time, whether it took them or not")
+
+
 class CameraStatus(Model):
     """One camera, in the order of the triplet, left to right."""
 
@@ -54,6 +63,9 @@ class CameraStatus(Model):
     temperature_c: float | None = None
     clock_offset_us: float | None = Field(None, description="trigger time minus the pulse's, median of late")
     columns: tuple[int, int] | None = Field(None, description="first and one past the last column in the triplet")
+    actions: ActionAnswers | None = Field(
+        None, description='answers to action commands; null: trigger.source is not "action"'
+    )
 
 
 class PulseStatus(Model):

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from rig.pixels import FORMATS, PixelFormat, PixelFormatName, Pixels
 from rig.settings.strict_toml import StrictModel
-from rig.settings.trigger import ExternalTrigger, SoftwareTrigger, Trigger
+from rig.settings.trigger import ActionTrigger, ExternalTrigger, SoftwareTrigger, Trigger, check_takes_actions
 from rig.settings.webhook import WebhookSettings
 from rig.topics import DEFAULT_PUBLISH
 
@@ -278,9 +278,10 @@ class RigSettings(StrictModel):
 
     @model_validator(mode="after")
     def _cameras_take_commands(self) -> "RigSettings":
-        if not isinstance(self.trigger, SoftwareTrigger):
-            return self
-        for camera in self.cameras:
+        if isinstance(self.trigger, ActionTrigger):
+            for camera in self.cameras:
+                check_takes_actions(camera.name, camera.backend, camera.address)
+        for camera in self.cameras if isinstance(self.trigger, SoftwareTrigger) else ():
             if camera.backend not in COMMANDED:
                 raise ValueError(
                     f'trigger.source "software" is a command to each camera, and {camera.name} with backend '

@@ -1,8 +1,9 @@
 """The settings of the trigger: who makes the pulses. One class for each source; `[trigger] source` names it."""
 
+from ipaddress import IPv4Address
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from rig.settings.strict_toml import StrictModel
 
@@ -10,6 +11,12 @@ from rig.settings.strict_toml import StrictModel
 _LATEST: Final = 0.1
 #: It may be so long on its way, or its moment is not known.
 _LONGEST: Final = 0.1
+#: So many scheduled actions may wait in every camera: the fewest that a maker names (Opto Engineering Itala).
+_ACTION_QUEUE: Final = 4
+
+
+def _ipv4(text: str) -> str:
+    return str(IPv4Address(text))
 
 
 class TriggerSettings(StrictModel):
@@ -33,10 +40,8 @@ class ExternalTrigger(TriggerSettings):
     source: Literal["external"] = Field("external", description="a generator that svev knows nothing of")
 
 
-class SoftwareTrigger(TriggerSettings):
-    """Commands from this computer, one to each camera for each pulse: without a cable, for set-up only."""
-
-    source: Literal["software"] = Field(description="commands to each camera, for set-up only")
+class CommandedTrigger(TriggerSettings):
+    """What sources have in common whose pulses are commands from this computer."""
 
     @property
     def latest_ns(self) -> int:
@@ -49,6 +54,64 @@ class SoftwareTrigger(TriggerSettings):
         return round(_LONGEST * self.period_ns)
 
 
+class SoftwareTrigger(CommandedTrigger):
+    """Commands from this computer, one to each camera for each pulse: without a cable, for set-up only."""
+
+    source: Literal["software"] = Field(description="commands to each camera, for set-up only")
+
+
+class ActionTrigger(CommandedTrigger):
+    """GigE Vision action commands: the pulse comes by the network, and PTP makes it as exact as one by cable."""
+
+    source: Literal["action"] = Field(description="GigE Vision action commands over the network")
+    broadcast: tuple[Annotated[str, AfterValidator(_ipv4)], ...] = Field(
+        (),
+        max_length=8,
+        description="broadcast address of each network with cameras, e.g. 192.168.8.255: one command exposes them all; "
+        "left out: each camera gets a command of its own",
+    )
+    scheduled: bool = Field(
+        False, description="cameras expose at a time of their PTP clocks, not when the command comes: they need PTP"
+    )
+    lead_ms: float = Field(10.0, gt=0, le=1000, description="scheduled commands are sent so long before their time")
+
+    @property
+    def lead_ns(self) -> int:
+        """The same, ns."""
+        return round(self.lead_ms * 1e6)
+
+    @model_validator(mode="after")
+    def _cameras_hold_the_scheduled(self) -> "ActionTrigger":
+        waiting = self.lead_ms / 1000 * self.rate_hz
+        if self.scheduled and waiting > _ACTION_QUEUE:
+            most = 1000 * _ACTION_QUEUE / self.rate_hz
+            raise ValueError(
+                f"trigger.lead_ms = {self.lead_ms:g} has cameras hold {waiting:.0f} commands at {self.rate_hz:g} Hz, "
+                f"and some hold only {_ACTION_QUEUE}: make it {most:g} or less"
+            )
+        return self
+
+
+def check_takes_actions(name: str, backend: str, address: str) -> None:
+    """Check that action commands reach a camera, and that its answers can be known for its own.
+
+    Raises:
+        ValueError: they do not, or cannot.
+    """
+    if backend != "aravis":
+        raise ValueError(
+            f'trigger.source "action" is a command to GigE Vision cameras, and {name} has backend "{backend}": use '
+            'source = "external"'
+        )
+    try:
+        _ipv4(address)
+    except ValueError:
+        raise ValueError(
+            f'trigger.source "action" needs the IPv4 address of {name}, by which its answers are known, and '
+            f'"{address}" is none: svev cameras list shows it'
+        ) from None
+
+
 def _external_unless_said(table: Any) -> Any:
     """A table that names no source means `external`."""
     return {"source": "external", **table} if isinstance(table, dict) else table
@@ -56,6 +119,6 @@ def _external_unless_said(table: Any) -> Any:
 
 #: The `[trigger]` table: one of the sources, told by `source`.
 Trigger = Annotated[
-    Annotated[ExternalTrigger | SoftwareTrigger, Field(discriminator="source")],
+    Annotated[ExternalTrigger | SoftwareTrigger | ActionTrigger, Field(discriminator="source")],
     BeforeValidator(_external_unless_said),
 ]

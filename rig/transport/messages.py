@@ -12,6 +12,7 @@ from typing import ClassVar, Final
 import msgspec
 
 from rig import errors
+from rig.action import ActionCounts
 from rig.api.jump import LastJump
 from rig.api.recordings import Counts
 from rig.clocks import HostNs, UtcNs
@@ -183,6 +184,17 @@ class TellEvent(Message):
     event: Event
 
 
+class TellActions(Message):
+    """From the process that sends action commands, by way of the service, to the recorder: what has been answered.
+
+    Attributes:
+        counts: of each camera.
+    """
+
+    is_state: ClassVar[bool] = True
+    counts: tuple[ActionCounts, ...]
+
+
 class TellResult(Message):
     """To the recorder: a result of the analysis, for the log if that recording still runs, and for subscribers.
 
@@ -201,7 +213,7 @@ class TellResult(Message):
     data: bytes
 
 
-RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | TellResult | Quit
+RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | TellActions | TellResult | Quit
 
 
 # The analysis

@@ -17,11 +17,11 @@ from service.processes.replayed_log import ReplayedLog, check_replay
 _Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
 
 
-def _aravis(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:
+def _aravis(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:
     from capture.aravis.camera import AravisCamera  # noqa: PLC0415
 
-    software = rig.trigger if isinstance(rig.trigger, SoftwareTrigger) else None
-    return lambda: AravisCamera(rig.cameras[index], rig.network, ring, rig.trigger.period_ns, software)
+    trigger = rig.trigger
+    return lambda: AravisCamera(rig.cameras[index], rig.network, ring, trigger.period_ns, trigger, epoch)
 
 
 def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:

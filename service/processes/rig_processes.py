@@ -1,5 +1,7 @@
 """Runs the processes of one rig: rings, one grabber process per camera, one recorder process, one for the analysis.
 
+Where the pulses are action commands, one more process sends them.
+
 The owner calls `turn` again and again; it passes on the recorder's reports, keeps track of the cameras, and starts dead
 grabbers again. The owner decides what happens when the recorder dies.
 """
@@ -18,6 +20,7 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
+from rig.settings.trigger import ActionTrigger
 from rig.transport.messages import (
     AnalysisConfig,
     AnalysisReport,
@@ -35,15 +38,20 @@ from rig.transport.messages import (
     RecorderReady,
     RecorderReport,
     RecorderWarm,
+    TellActions,
     TellResult,
 )
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
 from rig.transport.ring import CameraRing
+from rig.transport.trigger_messages import CamerasSeen, TriggerConfig, TriggerReport, TriggerTold
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
 
 RECORDER: Final = "recorder"
 ANALYSIS: Final = "analysis"
+TRIGGER: Final = "trigger"
+#: Reports that are dealt with here.
+_FORWARDED: Final = TellResult | AnalysisTold | TellActions | TriggerTold
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +119,8 @@ class RigProcesses:
         self._doorbell = -1
         self._epoch = host_now() if epoch is None else epoch
         self._names = [camera.name for camera in rig.cameras]
-        self._helpers = [*self._names, *([] if rig.analysis is None else [ANALYSIS])]
+        sent = [TRIGGER] if isinstance(rig.trigger, ActionTrigger) else []
+        self._helpers = [*self._names, *sent, *([] if rig.analysis is None else [ANALYSIS])]
         self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
         self.cameras = [CameraPresence()] * len(rig.cameras)
@@ -145,7 +154,7 @@ class RigProcesses:
 
     @property
     def restarts(self) -> dict[str, int]:
-        """How many times each grabber, by camera, and the analysis died."""
+        """How many times each grabber, by camera, the analysis and the process that sends pulses died."""
         return {name: back_off.deaths for name, back_off in self._back_offs.items()}
 
     @property
@@ -169,7 +178,7 @@ class RigProcesses:
     def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
 
-        Results of the analysis go on to the recorder.
+        Results of the analysis, and what cameras have answered to action commands, go on to the recorder.
 
         Args:
             timeout_s: longest wait for the first report, s.
@@ -184,10 +193,10 @@ class RigProcesses:
         reports = [message for _, message in self._processes.receive(timeout_s, wake)]
         for report in reports:
             match report:
-                case TellResult():
+                case TellResult() | TellActions():
                     if not self.recorder_died:
                         self.tell(report)
-                case AnalysisTold():
+                case AnalysisTold() | TriggerTold():
                     self._on_event(report.event)
                 case CameraChanged():
                     self._note_camera(report)
@@ -199,9 +208,11 @@ class RigProcesses:
                     self._on_event(report.event)
                 case RecorderHealth():
                     self.health = report.health
+                    if TRIGGER in self._helpers:
+                        self._processes[TRIGGER].control.send(CamerasSeen.of(report.health))
                     self._note_recovered(report.health)
         self._tend()
-        return [report for report in reports if not isinstance(report, TellResult | AnalysisTold)]
+        return [report for report in reports if not isinstance(report, _FORWARDED)]
 
     def restart_recorder(self) -> None:
         """Start a recorder in place of the dead one; it takes over cameras that are still streaming at once."""
@@ -236,7 +247,7 @@ class RigProcesses:
         name, now = child.spec.name, time.monotonic()
         if child not in self._again:
             how = child.ending() or ""
-            if name == ANALYSIS:
+            if name not in self._names:
                 reason = phrase("why_process_ended", "process ended ({how})", how=how)
             else:
                 reason = phrase("why_grabber_ended", "grabber process ended ({how})", how=how)
@@ -245,16 +256,21 @@ class RigProcesses:
             text = "{why}; starting it again in {seconds:g} s"
             said = phrase("event_process_again", text, why=reason, seconds=wait_s)
             self._on_event(Event.now(Level.ERROR, name, said))
-            if name != ANALYSIS:
+            if name in self._names:
                 self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
         elif now >= self._again[child]:
             del self._again[child]
             self._start(name)
 
     def _start(self, name: str) -> None:
-        """Start a grabber, by the name of its camera, or the analysis."""
+        """Start a grabber, by the name of its camera, or another helper."""
         if name == ANALYSIS:
             self._start_analysis()
+        elif name == TRIGGER:
+            config = TriggerConfig(rig=self._rig, epoch=self._epoch)
+            self._processes.start(
+                ProcessSpec(TRIGGER, "service.processes.trigger_process", config, reports=TriggerReport)
+            )
         else:
             self._start_grabber(self._names.index(name))
 

@@ -10,7 +10,7 @@ from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 from rig.settings.model import CameraSettings, RigSettings
-from rig.settings.trigger import SoftwareTrigger
+from rig.settings.trigger import ActionTrigger, SoftwareTrigger
 from simrig.programs.recording_truth import RecordingTruth, gige_sensor
 from simrig.programs.scene import SimScene
 from simrig.programs.simulated_hill import SimulatedHill
@@ -57,6 +57,7 @@ def simulated_hill(
         height=height,
         prerendered=prerendered,
         link_mbit_s=link_mbit_s,
+        broadcast=next(iter(rig.trigger.broadcast), None) if isinstance(rig.trigger, ActionTrigger) else None,
     )
 
 

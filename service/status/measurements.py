@@ -52,6 +52,15 @@ def _of_cameras(status: Status, health: Health | None) -> Iterator[Metric]:
     yield _gauges("svev_ring_frames_queued", "Frames that wait in the camera's ring.", "camera", queued)
     warmth = {c.name: c.temperature_c for c in status.cameras if c.temperature_c is not None}
     yield _gauges("svev_camera_temperature_celsius", "Inside the camera.", "camera", warmth)
+    answers = [(camera.name, camera.actions) for camera in status.cameras if camera.actions is not None]
+    for name, field, text in (
+        ("svev_actions_acknowledged", "acknowledged", "Action commands that the camera took."),
+        ("svev_actions_late", "late", "Action commands whose time was past when they came."),
+        ("svev_actions_refused", "refused", "Action commands that the camera did not take."),
+        ("svev_actions_unanswered", "unanswered", "Action commands that the camera did not answer in time."),
+    ):
+        if answers:
+            yield _counters(name, text, "camera", {camera: getattr(counts, field) for camera, counts in answers})
     offsets = {c.name: c.clock_offset_us / 1e6 for c in status.cameras if c.clock_offset_us is not None}
     yield _gauges("svev_clock_offset_seconds", "Trigger time minus the pulse's.", "camera", offsets)
 

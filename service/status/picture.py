@@ -5,10 +5,22 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
 
+import msgspec
+
+from rig.action import ActionCounts
 from rig.api.jump import LastJump
 from rig.api.recordings import NextJumper, Recording
 from rig.api.statement import Level, Statement
-from rig.api.status import CameraStatus, DiskStatus, PrerollStatus, ProcessStatus, PulseStatus, State, Status
+from rig.api.status import (
+    ActionAnswers,
+    CameraStatus,
+    DiskStatus,
+    PrerollStatus,
+    ProcessStatus,
+    PulseStatus,
+    State,
+    Status,
+)
 from rig.health import Health
 from rig.settings.model import RigSettings
 from service.processes.rig_processes import CameraPresence
@@ -145,10 +157,15 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
                 state=state,
                 statement=about_camera(camera, state, presence.said, overloaded=bool(facts.overloaded)),
                 columns=columns,
+                actions=None if report is None else _answers(report.actions),
                 **({} if report is None else {name: getattr(report, name) for name in _MEASURED}),
             )
         )
     return tuple(found)
+
+
+def _answers(counts: ActionCounts | None) -> ActionAnswers | None:
+    return None if counts is None else ActionAnswers(**msgspec.structs.asdict(counts))
 
 
 def _preroll(facts: Facts) -> PrerollStatus:

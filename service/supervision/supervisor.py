@@ -21,7 +21,7 @@ from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderHealth, RecorderOptions, RecorderReport
 from service.jumpers.book import JumperBook
-from service.processes.rig_processes import ANALYSIS, RECORDER, CameraPresence
+from service.processes.rig_processes import ANALYSIS, RECORDER, TRIGGER, CameraPresence
 from service.recordings import live_results
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
@@ -300,7 +300,7 @@ class Supervisor:
     def _look_for_overload(self, health: Health, pids: dict[str, int]) -> None:
         """Look whether the computer is too slow, and say so when that begins."""
         before = self._overload.cameras
-        fetching = {name: pid for name, pid in pids.items() if name != ANALYSIS}
+        fetching = {name: pid for name, pid in pids.items() if name not in {ANALYSIS, TRIGGER}}
         self._overload.look(health, fetching, time.monotonic())
         if self._overload.cameras and not before:
             late = ", ".join(self.rig.cameras[index].name for index in self._overload.cameras)

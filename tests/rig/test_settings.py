@@ -174,7 +174,7 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'hand'\n",
-            "key \"trigger.source\" = 'hand': there is \"external\", \"software\"; correct it",
+            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\"; correct it",
             id="unknown source",
         ),
         pytest.param(
@@ -188,6 +188,27 @@ def test_the_schema_is_a_schema() -> None:
             'trigger.source "software" is a command to each camera, and K1 with backend "sim" takes none: '
             'use source = "external"',
             id="cameras that take no commands",
+        ),
+        pytest.param(
+            HEAD + CAMERA.replace("aravis", "iidc").replace("192.168.11.2", "000a4701011b0001")
+            + "[trigger]\nsource = 'action'\n",
+            'trigger.source "action" is a command to GigE Vision cameras, and K1 has backend "iidc"',
+            id="action commands on FireWire",
+        ),
+        pytest.param(
+            HEAD + CAMERA.replace("192.168.11.2", "K1.local") + "[trigger]\nsource = 'action'\n",
+            'trigger.source "action" needs the IPv4 address of K1, by which its answers are known',
+            id="action commands to a name",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'action'\nscheduled = true\nrate_hz = 500\nlead_ms = 20\n",
+            '"trigger": trigger.lead_ms = 20 has cameras hold 10 commands at 500 Hz, and some hold only 4: make it ',
+            id="too many scheduled commands",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'action'\nbroadcast = ['192.168.8']\n",
+            '"trigger.broadcast.1": Expected 4 octets in',
+            id="half an address",
         ),
         pytest.param(
             HEAD + CAMERA.replace("aravis", "iidc").replace("192.168.11.2", "000a4701011b0001")

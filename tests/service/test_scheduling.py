@@ -8,7 +8,7 @@ import pytest
 
 _PROGRAM = """
 import os, sys, threading
-from service.processes.grabber_process import allowed_priority, prefer_this_process
+from service.processes.priority import allowed_priority, prefer_this_process
 allowed = allowed_priority() if sys.argv[1] == "limit" else int(sys.argv[1])
 try:
     done = prefer_this_process(allowed)

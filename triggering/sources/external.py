@@ -13,3 +13,7 @@ class ExternalPulses:
     def commands(self, origin: HostNs) -> None:
         """No camera is told anything: `origin` has no meaning."""
         del origin
+
+    def sent(self, origin: HostNs) -> None:
+        """Nobody here sends the pulses: `origin` has no meaning."""
+        del origin

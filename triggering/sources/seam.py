@@ -9,7 +9,7 @@ from rig.clocks import HostNs
 
 
 class CommandTrain(Protocol):
-    """The pulses of a source that tells each camera to expose. It serves one camera, and waits for nothing itself."""
+    """The pulses of a source that tells cameras to expose. It serves one sender, and waits for nothing itself."""
 
     def until_next_ns(self, now: HostNs) -> int:
         """Time from `now` to the next pulse, ns; 0 or more."""
@@ -52,9 +52,17 @@ class TriggerSource(Protocol):
         ...
 
     def commands(self, origin: HostNs) -> CommandTrain | None:
-        """The pulses at which a camera is to be told to expose; None: it sees them by itself.
+        """The pulses at which a camera is to be told to expose by its grabber; None: it sees them by itself.
 
         Args:
             origin: time of a pulse, the same for all cameras of the rig.
+        """
+        ...
+
+    def sent(self, origin: HostNs) -> CommandTrain | None:
+        """The pulses that a process of its own sends to the cameras at known times of the host's clock; None: no such.
+
+        Args:
+            origin: as for `commands`.
         """
         ...

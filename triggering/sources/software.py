@@ -6,40 +6,7 @@ cameras are the same because all count from the same origin.
 
 from rig.clocks import HostNs
 from rig.settings.trigger import SoftwareTrigger
-
-
-class SoftwareTrain:
-    """The commands to one camera.
-
-    Args:
-        origin: time of a pulse.
-        period_ns: time between two.
-        latest_ns: a command that would begin later than this after its pulse is not given.
-        spread_ns: so long after its pulse a camera exposes at the latest.
-    """
-
-    def __init__(self, origin: HostNs, period_ns: int, latest_ns: int, spread_ns: int) -> None:
-        self._origin, self._period_ns = origin, period_ns
-        self._latest_ns, self._spread_ns = latest_ns, spread_ns
-        self._done: int | None = None
-
-    def until_next_ns(self, now: HostNs) -> int:
-        """See `triggering.sources.seam.CommandTrain.until_next_ns`."""
-        return (self._origin - now) % self._period_ns
-
-    def is_due(self, now: HostNs) -> bool:
-        """See `triggering.sources.seam.CommandTrain.is_due`; only pulses since the first call are due."""
-        pulse, late_ns = divmod(now - self._origin, self._period_ns)
-        if self._done is None:
-            self._done = pulse
-        if pulse == self._done:
-            return False
-        self._done = pulse
-        return late_ns <= self._latest_ns
-
-    def exposes(self, time: HostNs, within_ns: float) -> bool:
-        """See `triggering.sources.seam.CommandTrain.exposes`."""
-        return (time - self._origin + within_ns) % self._period_ns <= self._spread_ns + 2 * within_ns
+from triggering.sources.even_train import EvenTrain
 
 
 class SoftwarePulses:
@@ -60,6 +27,10 @@ class SoftwarePulses:
         """A command may begin late, and may be on its way for some time."""
         return self._settings.latest_ns + self._settings.longest_ns
 
-    def commands(self, origin: HostNs) -> SoftwareTrain:
+    def commands(self, origin: HostNs) -> EvenTrain:
         """See `triggering.sources.seam.TriggerSource.commands`."""
-        return SoftwareTrain(origin, self._settings.period_ns, self._settings.latest_ns, self.spread_ns)
+        return EvenTrain(origin, self._settings.period_ns, self._settings.latest_ns, self.spread_ns)
+
+    def sent(self, origin: HostNs) -> None:
+        """No command is for all cameras: `origin` has no meaning."""
+        del origin

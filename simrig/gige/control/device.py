@@ -125,12 +125,16 @@ class Device:
             sensor.trigger(TriggerSource.ACTION0, now)
             return Status.SUCCESS
         if clock.ptp_status(now) is not PtpStatus.SLAVE:
-            return Status.NO_REFERENCE_TIME
+            return self._extended(Status.NO_REFERENCE_TIME)
         if sensor.waiting_triggers >= _ACTION_QUEUE:
-            return Status.OVERFLOW
+            return self._extended(Status.OVERFLOW)
         time = clock.host_of(action.time)
         sensor.trigger(TriggerSource.ACTION0, max(time, now))
-        return Status.SUCCESS if time >= now else Status.ACTION_LATE
+        return Status.SUCCESS if time >= now else self._extended(Status.ACTION_LATE)
+
+    def _extended(self, status: Status) -> Status:
+        """A status of GigE Vision 2.0, or what a camera says that was not told to use these."""
+        return status if self._registers.number("GevGVCPExtendedStatusCodes") else Status.ERROR
 
     def silent_at(self) -> HostNs | None:
         """When the controller's silence will have lasted too long; None if it may last for ever."""

@@ -51,6 +51,7 @@ class Status(IntEnum):
     NO_REFERENCE_TIME = 0x8013
     OVERFLOW = 0x8015
     ACTION_LATE = 0x8016
+    ERROR = 0x8FFF
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,6 +94,7 @@ _PLAIN: tuple[tuple[Node, str, str], ...] = (
     (Node.INTEGER, _ACTIONS, "ActionDeviceKey ActionGroupKey ActionGroupMask"),
     (Node.INTEGER, _TRANSPORT, "PayloadSize GevTimestampTickFrequency GevTimestampValue GevCCP GevHeartbeatTimeout"),
     (Node.INTEGER, _TRANSPORT, "GevSCPD GevCurrentIPAddress"),
+    (Node.BOOLEAN, _TRANSPORT, "GevGVCPExtendedStatusCodes"),
     (Node.BOOLEAN, "PtpControl", "PtpEnable"),
     (Node.COMMAND, "PtpControl", "PtpDataSetLatch"),
     (Node.INTEGER, "PtpControl", "PtpOffsetFromMaster"),

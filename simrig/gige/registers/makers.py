@@ -84,13 +84,15 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
         without=_SHORT_IDS | _COUNTERS | {"Gain", "PtpEnable", "PtpStatus", "DeviceTemperature"},
         entries={
-            "TriggerSelector": ("FrameStart", "AcquisitionStart"), "TriggerSource": ("Line1", "Line3", "Software"),
+            "TriggerSelector": ("FrameStart", "AcquisitionStart"),
+            "TriggerSource": ("Line1", "Line3", "Software", "Action1"),
         },
         extra=(
             Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
             Extra("GainSelector", 0, ("All",)), Extra("GainRaw", 40, maximum=500),
             Extra("TriggerDelayAbs", 100.0, real=True), Extra("AcquisitionFrameCount", 5, maximum=255),
-            Extra("ExposureTimeRaw", 2000), Extra("TestImageSelector", 1, ("Off", "Testimage1")),
+            Extra("ExposureTimeRaw", 2000), Extra("ActionSelector", 0, maximum=1),
+            Extra("TestImageSelector", 1, ("Off", "Testimage1")),
             Extra("LineSelector", 0, ("Line1", "Out1")), Extra("LineDebouncerTimeAbs", 10.0, real=True),
         ),
     ),

@@ -206,4 +206,5 @@ def _settings() -> list[Register]:
         Register("PtpStatus", next(place), default=PtpStatus.DISABLED),
         command("PtpDataSetLatch"),
         Register("PtpOffsetFromMaster", next(place), 8, Kind.INT),
+        choice("GevGVCPExtendedStatusCodes", 0, 1),
     ]

@@ -105,7 +105,11 @@ def _frames(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], li
 @pytest.mark.parametrize(
     ("made", "settings", "told"),
     [
-        (Maker.BASLER, {"trigger_input": "Line0"}, 'has no trigger input "Line0" (it has Line1, Line3, Software)'),
+        (
+            Maker.BASLER,
+            {"trigger_input": "Line0"},
+            'has no trigger input "Line0" (it has Line1, Line3, Software, Action1)',
+        ),
         (
             Maker.HIKROBOT,
             {"pixel_format": "Mono10p"},

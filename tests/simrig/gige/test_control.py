@@ -223,6 +223,8 @@ def test_scheduled_actions(make_camera: MakeCamera) -> None:
     offset_ns = 1_700_000_000_000_000_000
     simulated = make_camera(ptp_offset_ns=offset_ns)
     with action_receiver(simulated) as receiver, GvcpClient(simulated.address) as client:
+        assert act(simulated, client, at=offset_ns) is Status.ERROR, "what is wrong was not asked for"
+        receiver.device.set_boolean_feature_value("GevGVCPExtendedStatusCodes", True)
         assert act(simulated, client, at=offset_ns) is Status.NO_REFERENCE_TIME
         settle(receiver)
         begin = host_now() + offset_ns + 100_000_000

@@ -120,6 +120,7 @@ export const en = {
   "camera.offset": "{offset} µs beside the pulse",
   "camera.damaged": "{count} damaged",
   "camera.resent": "{count} resent",
+  "camera.actions": "commands: {late} late, {refused} refused, {unanswered} unanswered",
   "camera.reconnects": "{count} × reconnected",
 
   "last.title": "Last jump",

@@ -147,5 +147,12 @@ export const events = {
   pairing_spread: ["bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "sjekk triggerkabler og forsinkelser i kameraene"],
   pairing_double: ["to pulser kom med {apart_ms} ms mellomrom, og ingen av kameraene har begge", "sjekk om triggersignalet preller"],
   trigger_software: ["programvaretrigger: bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "bare til oppsett, ikke til måling"],
+  action_late: ["{camera} får aksjonskommandoer etter tiden deres", "øk trigger.lead_ms i riggfilen, lukk andre programmer"],
+  action_no_reference_time: ["{camera} har ingen referansetid, så det eksponerer ikke", "sjekk PTP-masteren og svitsjen"],
+  action_overflow: ["{camera} har ikke plass til flere planlagte aksjonskommandoer", "senk trigger.lead_ms i riggfilen"],
+  action_refused: ["{camera} avviser aksjonskommandoer (status {status})", "se i håndboken hva de krever, eller bruk en annen kilde"],
+  action_unanswered: ["{camera} svarer ikke på aksjonskommandoer", "sjekk trigger.broadcast i riggfilen og brannmuren; kommer bildene likevel, er det bare svaret som mangler"],
+  action_not_sent: ["aksjonskommandoer kan ikke sendes til {address} ({why})", "sjekk nettverksporten og trigger.broadcast"],
+  action_other_time: ["PTP-klokken i {camera} går {seconds} s feil i forhold til de andre", "koble alle kameraene til én PTP-master og ett PTP-domene"],
   trigger_software_one: ["kameraet trigges av programvare", "bare til oppsett, ikke til måling"],
 };

@@ -120,6 +120,7 @@ export const nb = {
   "camera.offset": "{offset} µs fra pulsen",
   "camera.damaged": "{count} skadet",
   "camera.resent": "{count} sendt på nytt",
+  "camera.actions": "kommandoer: {late} for sent, {refused} avvist, {unanswered} ubesvart",
   "camera.reconnects": "koblet til på nytt {count} ×",
 
   "last.title": "Siste hopp",

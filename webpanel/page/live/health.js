@@ -72,5 +72,7 @@ function factsOf(camera) {
   if (camera.damaged) facts.push(t("camera.damaged", { count: camera.damaged }));
   if (camera.resent_packets) facts.push(t("camera.resent", { count: camera.resent_packets }));
   if (camera.reconnects) facts.push(t("camera.reconnects", { count: camera.reconnects }));
+  const { late = 0, refused = 0, unanswered = 0 } = camera.actions ?? {};
+  if (late || refused || unanswered) facts.push(t("camera.actions", { late, refused, unanswered }));
   return facts.join("  ·  ") || camera.address;
 }

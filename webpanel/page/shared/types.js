@@ -31,6 +31,13 @@
  * @property {number|null} temperature_c
  * @property {number|null} clock_offset_us
  * @property {[number, number]|null} columns
+ * @property {ActionAnswers|null} actions
+ *
+ * @typedef {object} ActionAnswers
+ * @property {number} acknowledged
+ * @property {number} late
+ * @property {number} refused
+ * @property {number} unanswered
  *
  * @typedef {object} PulseStatus
  * @property {boolean} arriving

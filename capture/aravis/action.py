@@ -1,0 +1,86 @@
+"""Sets up a GigE Vision camera that exposes at action commands, and has PTP lock its clock where they are scheduled.
+
+Names are those of the GenICam Standard Features Naming Convention (SFNC 2.7, chapters 2, 16 and 27).
+"""
+
+import re
+import time
+from typing import Final
+
+from capture.aravis.features import Features
+from rig.action import ActionKeys
+from rig.clocks import NS_PER_S
+from rig.errors import CameraError
+
+#: Features that switch PTP on, and those that say what has become of it.
+_PTP: Final = (("PtpEnable", "PtpStatus"), ("GevIEEE1588", "GevIEEE1588Status"))
+#: Its clock is that of all cameras: it follows the master, or is the master itself.
+_LOCKED: Final = frozenset({"Slave", "Master"})
+#: A camera whose clock is not locked after so long is tried again later.
+_LOCK_S: Final = 3.0
+_LOOK_S: Final = 0.05
+
+
+def set_action_trigger(features: Features, name: str, keys: ActionKeys) -> None:
+    """Have a camera, whose trigger is selected, expose at action commands.
+
+    Args:
+        features: of the camera.
+        name: of the camera.
+        keys: of the commands.
+
+    Raises:
+        CameraError: it has no such trigger, or does not take the keys.
+    """
+    sources = features.entries("TriggerSource")
+    source = features.choose("TriggerSource", *sorted(each for each in sources if re.fullmatch(r"Action\d+", each)))
+    if source is None:
+        raise CameraError(
+            f"camera {name} has no action trigger (its TriggerSource has {', '.join(sources) or 'none'}): use "
+            '[trigger] source = "external"'
+        )
+    signal = int(source.removeprefix("Action"))
+    if features.has("ActionSelector") and features.set_number("ActionSelector", signal) != signal:
+        raise CameraError(f"camera {name} does not let {source} be set up (ActionSelector): use its newest firmware")
+    for feature, key in (
+        ("ActionDeviceKey", keys.device), ("ActionGroupKey", keys.group), ("ActionGroupMask", keys.mask),
+    ):  # fmt: skip
+        if not features.write(feature, key):
+            raise CameraError(
+                f"camera {name} does not take the keys of action commands ({feature}): use its newest firmware, or "
+                '[trigger] source = "external"'
+            )
+    # Without it a camera calls whatever goes wrong by the same status.
+    features.choose("GevGVCPExtendedStatusCodesSelector", "Version2_0")
+    features.switch("GevGVCPExtendedStatusCodes", on=True)
+
+
+def lock_clock(features: Features, name: str) -> None:
+    """Switch PTP on, and wait until the camera's clock is locked.
+
+    Args:
+        features: of the camera.
+        name: of the camera.
+
+    Raises:
+        CameraError: it has no PTP, or its clock is not locked after some seconds.
+    """
+    enable, status = next(((enable, status) for enable, status in _PTP if features.has(enable)), ("", ""))
+    if not enable or not features.switch(enable, on=True):
+        raise CameraError(
+            f"camera {name} has no PTP, which scheduled action commands need: set trigger.scheduled = false, or use "
+            '[trigger] source = "external"'
+        )
+    end = time.monotonic() + _LOCK_S
+    while (state := features.chosen(status)) not in _LOCKED:
+        if time.monotonic() > end:
+            raise CameraError(
+                f"camera {name} has no PTP lock ({status} is {state or 'unknown'}): check the PTP master and the "
+                "switch; it is tried again"
+            )
+        time.sleep(_LOOK_S)
+    tick_hz = features.number("GevTimestampTickFrequency")
+    if tick_hz not in {None, float(NS_PER_S)}:
+        raise CameraError(
+            f"camera {name} counts {tick_hz:g} ticks per second though PTP is on, not ns: use its newest firmware"
+        )

@@ -1,0 +1,56 @@
+"""The messages between the service and the process that sends the pulses, where svev makes them.
+
+What the recorder is told of the pulses goes by way of the service.
+"""
+
+from typing import ClassVar
+
+from rig.clocks import HostNs
+from rig.events import Event
+from rig.health import Health
+from rig.settings.model import RigSettings
+from rig.transport.messages import Message, Quit, TellActions
+
+
+class TriggerConfig(Message):
+    """Configuration of the process that sends the pulses.
+
+    Attributes:
+        rig: the rig.
+        epoch: as the grabbers have it.
+    """
+
+    rig: RigSettings
+    epoch: HostNs
+
+
+class CamerasSeen(Message):
+    """To the process that sends the pulses: what the recorder knows of the cameras.
+
+    Attributes:
+        connected: whether each is.
+        offsets_ns: device minus host time of each, None: not known.
+    """
+
+    is_state: ClassVar[bool] = True
+    connected: tuple[bool, ...]
+    offsets_ns: tuple[int | None, ...]
+
+    @classmethod
+    def of(cls, health: Health) -> "CamerasSeen":
+        """What a health record says of the cameras."""
+        cameras = health.pairing.cameras
+        return cls(
+            connected=tuple(camera.connected for camera in cameras),
+            offsets_ns=tuple(-camera.clock_offset_ns if camera.clock_known else None for camera in cameras),
+        )
+
+
+class TriggerTold(Message):
+    """Something that people should know of the pulses that are sent."""
+
+    event: Event
+
+
+TriggerCommand = CamerasSeen | Quit
+TriggerReport = TellActions | TriggerTold

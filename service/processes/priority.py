@@ -1,0 +1,34 @@
+"""Lets a process come before ordinary ones: those that fetch frames, and those that make pulses."""
+
+import os
+import resource
+from typing import Final
+
+_PRIORITY: Final = 10  #: above everything ordinary, below the kernel's own interrupt threads at 50
+
+
+def allowed_priority() -> int:
+    """The highest real-time priority that the resource limit allows; 0: none.
+
+    The limit decides for root, too, who would not need it: a program that was started from a shell must never take a
+    core from the desktop.
+    """
+    return resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
+
+
+def prefer_this_process(allowed: int) -> bool:
+    """Give this process, with all threads that it will start, a real-time priority.
+
+    A frame that the grabber does not fetch in time is lost, while everything behind the grabber can wait in buffers.
+
+    Args:
+        allowed: the highest priority to take, 0: none.
+
+    Returns:
+        Whether the process has a real-time priority now.
+    """
+    if allowed == 0:
+        return False
+    priority = _PRIORITY if allowed == resource.RLIM_INFINITY else min(allowed, _PRIORITY)
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    return True

@@ -1,0 +1,37 @@
+"""Pulses that are commands at even times of the host's clock, which all programs of a computer share."""
+
+from rig.clocks import HostNs
+
+
+class EvenTrain:
+    """Pulses at even times, each of which is a command to one camera or to all. See `seam.CommandTrain`.
+
+    Args:
+        origin: time of a pulse.
+        period_ns: time between two.
+        latest_ns: a command that would begin later than this after its pulse is not given.
+        spread_ns: so long after its pulse a camera exposes at the latest.
+    """
+
+    def __init__(self, origin: HostNs, period_ns: int, latest_ns: int, spread_ns: int) -> None:
+        self._origin, self._period_ns = origin, period_ns
+        self._latest_ns, self._spread_ns = latest_ns, spread_ns
+        self._done: int | None = None
+
+    def until_next_ns(self, now: HostNs) -> int:
+        """See `triggering.sources.seam.CommandTrain.until_next_ns`."""
+        return (self._origin - now) % self._period_ns
+
+    def is_due(self, now: HostNs) -> bool:
+        """See `triggering.sources.seam.CommandTrain.is_due`; only pulses since the first call are due."""
+        pulse, late_ns = divmod(now - self._origin, self._period_ns)
+        if self._done is None:
+            self._done = pulse
+        if pulse == self._done:
+            return False
+        self._done = pulse
+        return late_ns <= self._latest_ns
+
+    def exposes(self, time: HostNs, within_ns: float) -> bool:
+        """See `triggering.sources.seam.CommandTrain.exposes`."""
+        return (time - self._origin + within_ns) % self._period_ns <= self._spread_ns + 2 * within_ns

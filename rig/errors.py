@@ -102,6 +102,10 @@ class StateForbidsError(SvevError):
     """The service refuses the call in its present state; the message says what to do instead."""
 
 
+class RehearsingError(StateForbidsError):
+    """A rehearsal has the cameras; arming ends it."""
+
+
 class StillRecordingError(StateForbidsError):
     """The caller asked for the log of a recording in progress."""
 

@@ -13,6 +13,7 @@ from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.looking import Moment, Note, VoiceNote
 from rig.api.recordings import Pulses, Recording, RecordingOrder, RecordingQuery, SessionChange, StopOrder, Trash
+from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
 from rig.frame import FrameStatus
@@ -165,7 +166,22 @@ class RigService(Protocol):
         ...
 
     def arm(self, order: ArmOrder) -> Status:
-        """Begin to arm. While arming only `min_cameras` counts, while armed nothing; disarming: StateForbidsError."""
+        """Begin to arm; a rehearsal that runs is ended first.
+
+        While arming only `min_cameras` counts, while armed nothing; disarming: StateForbidsError.
+        """
+        ...
+
+    def rehearsals(self) -> Rehearsals:
+        """The rehearsal that runs, and what the last one showed."""
+        ...
+
+    def rehearse(self, order: RehearsalOrder) -> Rehearsals:
+        """Begin a rehearsal; if one runs, nothing changes. StateForbidsError: the rig is not idle, or is examined."""
+        ...
+
+    def end_rehearsal(self) -> Rehearsals:
+        """End the rehearsal that runs, without a verdict; returns when the cameras are free."""
         ...
 
     def disarm(self) -> Status:

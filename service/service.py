@@ -15,9 +15,10 @@ from recorder.catalogue.folder import Catalogue
 from rig import events
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
+from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
-from rig.errors import BadInputError, StateForbidsError, SvevError, UnknownRecordingError
+from rig.errors import BadInputError, RehearsingError, StateForbidsError, SvevError, UnknownRecordingError
 from rig.phrase import Phrase, phrase
 from rig.picture import shown
 from rig.pixels import MONO8
@@ -29,8 +30,10 @@ from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
 from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
+from service.rehearsals import Rehearser
 from service.seam import Preview
 from service.status.measurements import measurements
+from service.status.statements import FORBIDDEN, rehearsing
 from service.supervision.commands import at_once
 from service.supervision.supervisor import Supervisor
 
@@ -56,6 +59,7 @@ class Service(Archive):
         exports: of these recordings.
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
+        rehearser: makes rehearsals of the rig.
         examine: the doctor; examines what disturbs nothing in the given state.
     """
 
@@ -67,11 +71,14 @@ class Service(Archive):
         exports: Exports,
         keeper: TrashKeeper,
         slot: PreviewSlot,
+        rehearser: Rehearser,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
         super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
-        self._slot, self._examine = slot, examine
+        self._slot, self._rehearser, self._examine = slot, rehearser, examine
+        #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
+        self._idle, self._examining = threading.Lock(), threading.Lock()
         self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
         self._watch = None
         if motion is not None:
@@ -87,6 +94,9 @@ class Service(Archive):
         if self._watch is not None and motion is not None:
             automatic = AutomaticStatus(on=self._watch.on, camera=motion.camera)
             status = status.model_copy(update={"automatic": automatic})
+        if (progress := self._rehearser.progress) is not None:
+            said = rehearsing() if status.state is State.IDLE else status.statement
+            status = status.model_copy(update={"rehearsal": progress, "statement": said})
         return self._keeper.counted_in(status)
 
     @property
@@ -95,8 +105,38 @@ class Service(Archive):
         return self._jumpers
 
     def arm(self, order: ArmOrder) -> Status:
-        """Begin to arm."""
+        """Begin to arm; a rehearsal gives way."""
+        with self._idle:
+            if self._rehearser.end():
+                text = "the rehearsal is ended without a verdict: the rig is armed"
+                self.tell("info", "rehearsal", phrase("event_rehearsal_ended", text))
+            return self._begin_to_arm(order)
+
+    def _begin_to_arm(self, order: ArmOrder) -> Status:
         return self._supervisor.commands.ask(at_once(partial(self._supervisor.arm, order.min_cameras)), _SOON_S)
+
+    def rehearsals(self) -> Rehearsals:
+        """The rehearsal that runs, and what the last one showed."""
+        return self._rehearser.view()
+
+    def rehearse(self, order: RehearsalOrder) -> Rehearsals:
+        """Begin a rehearsal; if one runs, nothing changes."""
+        with self._idle:
+            if self._rehearser.progress is None:
+                if (state := self.status().state) is not State.IDLE:
+                    raise StateForbidsError(FORBIDDEN["rehearse", state])
+                if not self._examining.acquire(blocking=False):
+                    raise StateForbidsError("the rig is being checked: wait until that is done, then rehearse")
+                try:
+                    self._rehearser.begin(order.seconds)
+                finally:
+                    self._examining.release()
+        return self._rehearser.view()
+
+    def end_rehearsal(self) -> Rehearsals:
+        """End the rehearsal that runs, without a verdict; returns when the cameras are free."""
+        self._rehearser.end()
+        return self._rehearser.view()
 
     def disarm(self) -> Status:
         """Begin to disarm."""
@@ -104,8 +144,10 @@ class Service(Archive):
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
-        supervisor = self._supervisor
-        if self.status().state is State.ARMED:
+        supervisor, status = self._supervisor, self.status()
+        if status.rehearsal is not None and status.state is State.IDLE:
+            raise RehearsingError("a rehearsal has the cameras: arm the rig, which ends it, then start recording")
+        if status.state is State.ARMED:
             self.exports.tidy()
             self._keeper.make_room(supervisor.rig.recorder.jump_s if order.duration_s is None else order.duration_s)
 
@@ -225,7 +267,8 @@ class Service(Archive):
 
     def doctor(self) -> DoctorReport:
         """Run the doctor, except for probes that would disturb the present state."""
-        return self._examine(self.status())
+        with self._examining:
+            return self._examine(self.status())
 
     def metrics(self) -> Iterable[Metric]:
         """The metric families of what has been measured so far."""

@@ -30,7 +30,7 @@ uses it, and `docs/hill-pc.md` says how phones come to trust it.
 Every error is a problem (RFC 9457, `application/problem+json`): `code` is stable, `detail` says what to do.
 """
 _TAGS: Final = {
-    "Rig": "The rig as a whole: its state, arming, the rig file, the doctor.",
+    "Rig": "The rig as a whole: its state, arming, the rig file, the doctor, rehearsals.",
     "Recordings": "Starting and stopping, and what was recorded: list, session fields, pictures, files, the trash.",
     "Jumpers": "The start list and the next jumper, whom every recording takes at its start.",
     "Exports": "Videos, pictures and tables of recordings, made by the service beside its work.",

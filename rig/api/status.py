@@ -142,6 +142,22 @@ class AutomaticStatus(Model):
     camera: str = Field(description="whose images are watched")
 
 
+class RehearsalStage(StrEnum):
+    """What a rehearsal is doing."""
+
+    CONNECTING = "connecting"  #: cameras are connected, and pulses awaited
+    RECORDING = "recording"
+    READING = "reading"  #: the log is read back and judged
+
+
+class RehearsalProgress(Model):
+    """How far a rehearsal is."""
+
+    stage: RehearsalStage
+    done: int = Field(0, description="pulses that are recorded")
+    pulses: int = Field(0, description="pulses to record; 0: not known yet")
+
+
 class Status(Model):
     """Everything about the running service at one moment."""
 
@@ -161,6 +177,7 @@ class Status(Model):
     last_jump: LastJump | None = Field(None, description="the jump that the analysis measured last")
     next_jumper: NextJumper = Field(NextJumper(), description="whom the next recording is of")
     automatic: AutomaticStatus | None = Field(None, description="null: the rig file has no [automatic.motion]")
+    rehearsal: RehearsalProgress | None = Field(None, description="the rehearsal that runs; null: none")
     processes: tuple[ProcessStatus, ...]
 
 

@@ -112,6 +112,13 @@ def about_state(
             return _working("state_armed", f"armed, {pulses}", cameras, states, overloaded, rate_hz)
 
 
+def rehearsing() -> Statement:
+    """The state of a rig that is not armed and rehearses."""
+    return Statement(
+        code="state_rehearsing", text="not armed; a rehearsal is running", advice="to jump now, arm: that ends it"
+    )
+
+
 def _working(
     code: str,
     text: str,
@@ -316,6 +323,11 @@ def process_restarted(name: str, restarts: int) -> Statement:
 #: Why a state forbids a call, and what to do, by call and state.
 FORBIDDEN: dict[tuple[str, State], str] = {
     ("arm", State.DISARMING): "the rig is being disarmed: wait until that is done, then arm",
+    ("rehearse", State.ARMING): "the rig is being armed: disarm it, then rehearse",
+    ("rehearse", State.ARMED): "the rig is armed, and a rehearsal needs the cameras for itself: disarm, then rehearse",
+    ("rehearse", State.RECORDING): "a recording is running: stop it and disarm, then rehearse",
+    ("rehearse", State.DISARMING): "the rig is being disarmed: wait until that is done, then rehearse",
+    ("rehearse", State.FAULT): "the rig has a fault: disarm it, then rehearse",
     ("disarm", State.RECORDING): "a recording is running: stop it, then disarm",
     ("start", State.IDLE): "the rig is not armed: arm it, then start recording",
     ("start", State.ARMING): "the rig is being armed: wait until it is armed, then start recording",

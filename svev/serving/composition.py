@@ -2,6 +2,7 @@
 
 import logging
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
@@ -29,6 +30,7 @@ from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.storage import usable_bytes
 from service.recordings.trash_keeper import TrashKeeper
+from service.rehearsals import Rehearser
 from service.service import Service
 from service.status.event_hub import EventHub
 from service.supervision.supervisor import Supervisor
@@ -42,6 +44,8 @@ from webpanel.door.tls import Tls
 from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
+#: The program that makes a rehearsal.
+REHEARSE: Final = (sys.executable, "-m", "svev.serving.rehearsal_program")
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
 _ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -92,7 +96,9 @@ def serve(settings: ServiceSettings) -> None:
         supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)
         keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
         exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
-        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, PanelDoctor(rig, data).report)
+        rehearser = stack.enter_context(closing(Rehearser(REHEARSE, rig, rig_toml, data, hub.tell, hub.wake)))
+        examine = PanelDoctor(rig, data).report
+        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, examine)
         server = make_server(create_app(service, settings.access), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report

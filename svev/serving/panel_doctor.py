@@ -1,4 +1,4 @@
-"""Runs the doctor for the panel: one examination at a time, which disturbs nothing while the rig is armed."""
+"""Runs the doctor for the panel: one examination at a time, which disturbs no armed rig and no rehearsal."""
 
 import threading
 import time
@@ -39,7 +39,7 @@ class PanelDoctor:
             status: present status of the service.
         """
         with self._lock:
-            idle = status.state is State.IDLE
+            idle = status.state is State.IDLE and status.rehearsal is None
             kept_idle, until = self._key
             if self._report is not None and kept_idle == idle and time.monotonic() < until:
                 return self._report
@@ -53,11 +53,14 @@ class PanelDoctor:
         for probe in probes(self._rig, self._data):
             if idle or probe.name not in _ONLY_IDLE:
                 yield from run_probe(probe)
-            elif probe.name == "cameras":
+            elif probe.name == "cameras" and status.rehearsal is None:
                 yield from _cameras_of(status)
             elif probe.name == "disk":
                 yield _room_of(status)
-        if not idle:
+        if status.rehearsal is not None:
+            what = "what would disturb the rehearsal is not examined while it runs"
+            yield passed(Topic.CAMERAS, "check_rehearsing", what)
+        elif not idle:
             what = "what would disturb the rig is not examined while it is armed: disarm for that"
             yield passed(Topic.CAMERAS, "check_armed", what)
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import jump, recordings, start_list, statement, status
+from rig.api import jump, recordings, rehearsal, start_list, statement, status
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"
@@ -28,6 +28,7 @@ COMPOSED = (
     "status.",
     "field.",
     "doctor.",
+    "rehearsal.",
     "list.",
     "export.",
     "log.is_",
@@ -40,7 +41,11 @@ SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 
 
 def _words(language: str) -> dict[str, str]:
-    return dict(WORDS.findall((PAGE / "i18n" / f"{language}.js").read_text()))
+    return {
+        key: text
+        for name in (language, f"{language}-check")
+        for key, text in WORDS.findall((PAGE / "i18n" / f"{name}.js").read_text())
+    }
 
 
 def _placeholders(text: str) -> set[str]:
@@ -48,7 +53,7 @@ def _placeholders(text: str) -> set[str]:
 
 
 def _sources() -> str:
-    own_words = {PAGE / "i18n" / "en.js", PAGE / "i18n" / "nb.js"}
+    own_words = {PAGE / "i18n" / f"{name}.js" for name in ("en", "en-check", "nb", "nb-check")}
     return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
 
 
@@ -195,7 +200,7 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    rooms = (start_list, recordings, statement, jump, status)
+    rooms = (start_list, recordings, rehearsal, statement, jump, status)
     model: type[Any] = next(getattr(room, name) for room in rooms if hasattr(room, name))
     fields = (
         list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]

@@ -17,6 +17,7 @@ from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.jump import LastJump
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
+from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals
 from rig.api.statement import Level, Statement
 from rig.api.status import (
     ArmOrder,
@@ -30,6 +31,8 @@ from rig.api.status import (
     PrerollStatus,
     ProcessStatus,
     PulseStatus,
+    RehearsalProgress,
+    RehearsalStage,
     RigView,
     State,
     Status,
@@ -67,6 +70,7 @@ class MemoryService(Archive):
         notice: what befell the last recording, set by tests.
         fault: what it says in a fault, set by tests.
         automatic: whether recordings begin by themselves, set by tests.
+        rehearsal: how far a rehearsal is, and `rehearsed`, what the last one showed; set by tests.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -80,6 +84,8 @@ class MemoryService(Archive):
         self.notice: Statement | None = None
         self.fault: Statement | None = None
         self.automatic: AutomaticStatus | None = None
+        self.rehearsal: RehearsalProgress | None = None
+        self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
         self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
@@ -122,14 +128,34 @@ class MemoryService(Archive):
                 last_jump=self.last_jump,
                 notice=self.notice,
                 automatic=self.automatic,
+                rehearsal=self.rehearsal,
                 processes=(ProcessStatus(name="recorder", pid=1),),
             )
 
     def arm(self, order: ArmOrder | None = None) -> Status:
         if self.state is State.IDLE or (order is not None and order.min_cameras):
-            self._armed_at = time.monotonic()
+            self.rehearsal, self._armed_at = None, time.monotonic()
             self._become(State.ARMED)
         return self.status()
+
+    def rehearsals(self) -> Rehearsals:
+        return Rehearsals(running=self.rehearsal, last=self.rehearsed)
+
+    def rehearse(self, order: RehearsalOrder) -> Rehearsals:
+        del order
+        if self.state is not State.IDLE:
+            raise StateForbidsError(f"the rig is {self.state.value}: disarm it, then rehearse")
+        self.show_rehearsal(self.rehearsal or RehearsalProgress(stage=RehearsalStage.CONNECTING))
+        return self.rehearsals()
+
+    def end_rehearsal(self) -> Rehearsals:
+        self.show_rehearsal(None)
+        return self.rehearsals()
+
+    def show_rehearsal(self, progress: RehearsalProgress | None) -> None:
+        """Set how far the rehearsal is."""
+        self.rehearsal = progress
+        self._wake()
 
     def disarm(self) -> Status:
         if self.state is State.RECORDING:

@@ -16,6 +16,7 @@ from webpanel.door.access import Access
 #: The calls of the contract, and those that the page needs beyond it.
 CALLS = {
     "POST /api/mark", "PUT /api/automatic",
+    "GET /api/rehearsal", "POST /api/rehearsal", "DELETE /api/rehearsal",
     "GET /api/status", "POST /api/arm", "POST /api/disarm", "GET /api/rig", "GET /api/doctor", "GET /api/events",
     "GET /api/preview.jpg", "GET /api/preview.mjpg", "GET /api/recordings", "POST /api/recordings",
     "GET /api/recordings/{recording_id}", "PATCH /api/recordings/{recording_id}",
@@ -99,6 +100,7 @@ def test_bodies_have_examples(schema: dict[str, Any]) -> None:
     schemas = schema["components"]["schemas"]
     for name in (
         "RecordingOrder",
+        "RehearsalOrder",
         "StopOrder",
         "SessionFields",
         "SessionChange",

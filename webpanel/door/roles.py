@@ -32,6 +32,8 @@ _ADMINISTERING: Final = (
 _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     (r"POST /api/arm", lambda: phrase("act_armed", "armed the rig")),
     (r"POST /api/disarm", lambda: phrase("act_disarmed", "disarmed the rig")),
+    (r"POST /api/rehearsal", lambda: phrase("act_rehearsed", "asked for a rehearsal")),
+    (r"DELETE /api/rehearsal", lambda: phrase("act_rehearsal_ended", "ended the rehearsal")),
     (r"POST /api/recordings", lambda: phrase("act_started", "started a recording")),
     (r"POST /api/mark", lambda: phrase("act_marked", "marked a jump")),
     (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),

@@ -22,6 +22,7 @@ import { startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
 import * as doctor from "./system/doctor.js";
 import { startLog } from "./system/log.js";
+import * as rehearsal from "./system/rehearsal.js";
 import * as rig from "./system/rig.js";
 import { drawChoices, startComparing } from "./viewing/comparing.js";
 import { drawNotes, startNotes } from "./viewing/notes.js";
@@ -31,7 +32,7 @@ import { drawVoices, startVoice } from "./viewing/voice.js";
 /** Draw every part anew, after the language was changed. */
 function redraw() {
   update({});
-  for (const part of [recordings, recording, doctor, rig]) part.draw();
+  for (const part of [recordings, recording, doctor, rehearsal, rig]) part.draw();
   scrubber.drawWords();
   drawNotes();
   drawVoices();
@@ -45,14 +46,17 @@ function entered({ view, id }) {
   scrubber.clearScrubber();
   if (view === "recordings") recordings.enterRecordings();
   if (view === "recording") void recording.enterRecording(id);
-  if (view === "doctor") doctor.draw();
+  if (view === "doctor") {
+    doctor.draw();
+    rehearsal.enterRehearsal();
+  }
   if (view === "rig") void rig.enterRig();
 }
 
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

@@ -6,6 +6,7 @@ import anyio
 from anyio.to_thread import run_sync
 from fastapi import APIRouter
 
+from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, RigView, Status
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
@@ -26,6 +27,8 @@ def rig_router(service: RigService) -> APIRouter:
     def arm(order: ArmOrder | None = None) -> Status:
         """Begin to arm: connect the cameras and keep the last seconds from then on. While armed it changes nothing.
 
+        A rehearsal that runs is ended first, without a verdict.
+
         In a fault because too few cameras answer, `min_cameras` arms without the others, until the rig is disarmed.
         """
         return service.arm(order or ArmOrder())
@@ -44,5 +47,25 @@ def rig_router(service: RigService) -> APIRouter:
     async def examine() -> DoctorReport:
         """Check everything that a recording depends on, and say what to do; takes some seconds."""
         return await run_sync(service.doctor, limiter=one_at_a_time)
+
+    @router.get("/rehearsal")
+    def get_rehearsal() -> Rehearsals:
+        """The rehearsal that runs, and what the last one showed."""
+        return service.rehearsals()
+
+    @router.post("/rehearsal", status_code=HTTPStatus.ACCEPTED, responses=CHANGING)
+    def rehearse(order: RehearsalOrder | None = None) -> Rehearsals:
+        """Begin a rehearsal: record for some seconds with everything that a recording needs, read back, judge, delete.
+
+        Only while the rig is idle: a rehearsal has the cameras for itself, and nothing of it is kept but the verdict.
+        If one runs already, this changes nothing. `rehearsal` in the status says how far it is; then ask for
+        `GET /rehearsal`. Arming ends it, without a verdict.
+        """
+        return service.rehearse(order or RehearsalOrder())
+
+    @router.delete("/rehearsal", responses=CHANGING)
+    def end_rehearsal() -> Rehearsals:
+        """End the rehearsal that runs, without a verdict; answers when the cameras are free."""
+        return service.end_rehearsal()
 
     return router

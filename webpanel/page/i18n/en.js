@@ -1,5 +1,10 @@
 /** English. Every key stands in nb.js too (a test looks). */
+
+import { check } from "./en-check.js";
+
 export const en = {
+  ...check,
+
   "skip": "Skip to the content",
   "close": "Close",
   "cancel": "Cancel",

@@ -6,6 +6,7 @@
 export const findings = {
   check_broken: ["{probe} kan ikke undersøkes: {why}", "meld fra med denne linjen"],
   check_hangs: ["{probe} svarte ikke innen {seconds} s", "se om disken, nettverket eller kameraet bak henger: se i `dmesg`"],
+  check_rehearsing: ["det som ville forstyrre generalprøven, undersøkes ikke mens den går"],
   check_armed: ["det som ville forstyrre riggen, undersøkes ikke mens den er klar: slå av for å undersøke det"],
 
   check_python: ["Python {version} fra distribusjonen"],

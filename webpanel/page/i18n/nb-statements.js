@@ -5,6 +5,12 @@
  * @type {Record<string, [string, string?]>}
  */
 export const statements = {
+  state_rehearsing: ["kameraene er opptatt med en generalprøve", "skal noen hoppe nå, gjør riggen klar: det avbryter prøven"],
+  rehearsal_ready: ["klar til opptak"],
+  rehearsal_warned: ["det går, men det er advarsler", "se på advarslene"],
+  rehearsal_not_ready: ["ikke klar: {why}", "rett det, og kjør prøven igjen"],
+  rehearsal_failed: ["ingen dom: {why}", "rett det, og kjør prøven igjen"],
+  rehearsing: ["en generalprøve har kameraene: gjør riggen klar, som avbryter den, og start så opptaket"],
   state_idle: ["kameraene er av", "gjør riggen klar for å koble dem til"],
   state_arming: ["kobler til {cameras}"],
   state_disarming: ["kobler fra kameraene"],

@@ -1,5 +1,10 @@
 /** Norsk bokmål. De samme nøklene som i en.js. */
+
+import { check } from "./nb-check.js";
+
 export const nb = {
+  ...check,
+
   "skip": "Hopp til innholdet",
   "close": "Lukk",
   "cancel": "Avbryt",

@@ -175,6 +175,11 @@
  * @property {NextJumper} next
  * @property {Statement|null} undo
  *
+ * @typedef {object} RehearsalProgress
+ * @property {"connecting"|"recording"|"reading"} stage
+ * @property {number} done
+ * @property {number} pulses
+ *
  * @typedef {object} Status
  * @property {State} state
  * @property {string} since
@@ -192,6 +197,7 @@
  * @property {LastJump|null} last_jump
  * @property {NextJumper} next_jumper
  * @property {{ on: boolean, camera: string }|null} automatic
+ * @property {RehearsalProgress|null} rehearsal
  * @property {ProcessStatus[]} processes
  *
  * @typedef {object} Finding
@@ -204,6 +210,19 @@
  *
  * @typedef {object} DoctorReport
  * @property {"PASS"|"WARN"|"FAIL"} worst
+ * @property {Finding[]} findings
+ *
+ * @typedef {object} Rehearsal
+ * @property {"ready"|"warned"|"not_ready"|"failed"} verdict
+ * @property {Statement} statement
+ * @property {string} line
+ * @property {string} ended
+ * @property {number} seconds
+ * @property {number} pulses
+ * @property {number} complete
+ * @property {Record<string, number>} headroom
+ * @property {number|null} jumps
+ * @property {number|null} spread_us
  * @property {Finding[]} findings
  *
  * @typedef {object} RigView

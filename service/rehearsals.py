@@ -1,0 +1,260 @@
+"""The rehearsals of the service: one program at a time, which has the cameras while the rig is not armed.
+
+A rehearsal is what `svev rehearse` does: it needs processes and signals of its own, so a program makes it. Its last
+verdict stays in a file of the recordings' folder, so that it is known after a restart of the service.
+"""
+
+import json
+import os
+import subprocess
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from select import select
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from rig.api.rehearsal import Rehearsal, Rehearsals, RehearsalVerdict
+from rig.api.statement import Level, Statement
+from rig.api.status import Finding, RehearsalProgress, RehearsalStage
+from rig.events import Event
+from rig.events import Level as EventLevel
+from rig.phrase import Phrase, phrase
+from rig.settings.model import RigSettings
+
+NAME: Final = ".svev-rehearsal.json"
+_LOOK_S: Final = 0.1
+#: A program that is told to end has closed cameras and log after so long; else it is killed.
+_END_S: Final = 5.0
+_PIECE: Final = 1 << 16
+
+
+class Rehearser:
+    """Any thread may call any method.
+
+    Args:
+        program: command line of the program that rehearses.
+        rig: the rig.
+        rig_toml: the rig file's text.
+        folder: of the recordings.
+        tell: takes an event about what a rehearsal showed.
+        changed: called when progress or verdict have changed.
+    """
+
+    def __init__(
+        self,
+        program: Sequence[str],
+        rig: RigSettings,
+        rig_toml: str,
+        folder: Path,
+        tell: Callable[[Event], None],
+        changed: Callable[[], None],
+    ) -> None:
+        self._program, self._rig, self._rig_toml, self._folder = tuple(program), rig, rig_toml, folder
+        self._tell, self._changed = tell, changed
+        self._lock = threading.Lock()
+        self._progress: RehearsalProgress | None = None
+        self._last = _load(folder / NAME)
+        self._unwanted = threading.Event()
+        self._worker: threading.Thread | None = None
+
+    @property
+    def progress(self) -> RehearsalProgress | None:
+        """How far the rehearsal is that runs, None if none does."""
+        return self._progress
+
+    def view(self) -> Rehearsals:
+        """The rehearsal that runs, and what the last one showed."""
+        return Rehearsals(running=self._progress, last=self._last)
+
+    def begin(self, seconds: float) -> None:
+        """Begin a rehearsal; if one runs, nothing changes.
+
+        Args:
+            seconds: how much is recorded.
+        """
+        with self._lock:
+            if self._progress is None:
+                self._unwanted.clear()
+                self._progress = RehearsalProgress(stage=RehearsalStage.CONNECTING)
+                self._worker = threading.Thread(target=self._rehearse, args=(seconds,), name="rehearsal", daemon=True)
+                self._worker.start()
+        self._changed()
+
+    def end(self) -> bool:
+        """End the rehearsal that runs, without a verdict; returns when the cameras are free.
+
+        Returns:
+            Whether there was one.
+        """
+        with self._lock:
+            worker, ran = self._worker, self._progress is not None
+            self._unwanted.set()
+        if worker is not None:
+            worker.join()
+        return ran
+
+    def close(self) -> None:
+        """End the rehearsal that runs."""
+        self.end()
+
+    def _rehearse(self, seconds: float) -> None:
+        asked = {
+            "rig": self._rig.model_dump(mode="json", exclude_unset=True),
+            "toml": self._rig_toml,
+            "directory": str(self._folder),
+            "seconds": seconds,
+        }
+        try:
+            self._conclude(self._made(json.dumps(asked).encode() + b"\n", seconds))
+        finally:
+            with self._lock:
+                self._progress = None
+            self._changed()
+
+    def _made(self, asked: bytes, seconds: float) -> Rehearsal | None:
+        """Run the program."""
+        try:
+            child = subprocess.Popen(self._program, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        except OSError as error:
+            why = error.strerror or str(error)
+            return _failed(phrase("why_no_program", "no program can be started ({why})", why=why), seconds)
+        try:
+            return self._follow(child, asked, seconds)
+        finally:
+            _dismiss(child)
+
+    def _follow(self, child: "subprocess.Popen[bytes]", asked: bytes, seconds: float) -> Rehearsal | None:
+        """Hear what the program says.
+
+        Returns:
+            What the rehearsal showed; None if it is not wanted any more.
+        """
+        if child.stdin is None or child.stdout is None:
+            raise TypeError("the program that rehearses has no standard input or output")
+        said = b""
+        try:
+            child.stdin.write(asked)
+            child.stdin.flush()
+            while not self._unwanted.is_set():
+                if not select([child.stdout], [], [], _LOOK_S)[0]:
+                    continue
+                piece = os.read(child.stdout.fileno(), _PIECE)
+                *lines, said = (said + piece).split(b"\n")
+                for line in lines:
+                    if (verdict := self._hear(json.loads(line), seconds)) is not None:
+                        return verdict
+                if not piece:
+                    break
+        except BrokenPipeError:  # it has ended before it knew what to do
+            pass
+        if self._unwanted.is_set():
+            return None
+        return _failed(phrase("why_rehearsal_ended", "the program that rehearses has ended by itself"), seconds)
+
+    def _hear(self, news: dict[str, Any], seconds: float) -> Rehearsal | None:
+        if "stage" in news:
+            self._progress = RehearsalProgress.model_validate(news)
+            self._changed()
+            return None
+        if "problem" in news:
+            return _failed(Phrase(**news["problem"]), seconds)
+        return _judged(news["rehearsed"], seconds)
+
+    def _conclude(self, found: Rehearsal | None) -> None:
+        """Remember a verdict, if there is one, and say it."""
+        if found is None:
+            return
+        self._last = found
+        said = phrase("event_rehearsed", "rehearsal: {verdict}", verdict=found.statement.said)
+        good = found.verdict in {RehearsalVerdict.READY, RehearsalVerdict.WARNED}
+        self._tell(Event.now(EventLevel.INFO if good else EventLevel.WARNING, "rehearsal", said))
+        try:
+            _keep(self._folder / NAME, found)
+        except OSError as error:
+            text = "{path}: the verdict cannot be kept ({why}); a restart of the service loses it"
+            why = error.strerror or str(error)
+            lost = phrase("event_verdict_not_kept", text, path=str(self._folder / NAME), why=why)
+            self._tell(Event.now(EventLevel.WARNING, "rehearsal", lost))
+
+
+def _dismiss(child: "subprocess.Popen[bytes]") -> None:
+    """Have the program end: the end of its standard input tells it to. If it does not, it is killed."""
+    if child.stdin is not None:
+        child.stdin.close()
+    try:
+        child.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        with suppress(subprocess.TimeoutExpired):  # the disk holds it: it ends when that answers
+            child.wait(_END_S)
+    if child.stdout is not None:
+        child.stdout.close()
+
+
+def _failed(why: Phrase, seconds: float) -> Rehearsal:
+    statement = Statement(
+        level=Level.ERROR,
+        code="rehearsal_failed",
+        text=f"no verdict: {why}",
+        advice="put that right, and rehearse again",
+        values={"why": why},
+    )
+    return Rehearsal(
+        verdict=RehearsalVerdict.FAILED, statement=statement, line=statement.text, ended=datetime.now(UTC),
+        seconds=seconds,
+    )  # fmt: skip
+
+
+def _judged(rehearsed: dict[str, Any], seconds: float) -> Rehearsal:
+    """What the program's result says, see `svev.rehearsal.Rehearsed.to_json`."""
+    findings = tuple(Finding.model_validate(finding) for finding in rehearsed["findings"])
+    wrong = next((finding for finding in findings if finding.level == "FAIL"), None)
+    if wrong is not None:
+        verdict = RehearsalVerdict.NOT_READY
+        why = Phrase(wrong.code, wrong.what, wrong.values)
+        statement = Statement(
+            level=Level.ERROR, code="rehearsal_not_ready", text=f"not ready: {why}", advice=wrong.remedy,
+            values={"why": why},
+        )  # fmt: skip
+    elif any(finding.level == "WARN" for finding in findings):
+        verdict = RehearsalVerdict.WARNED
+        text, advice = "it will work, but there are warnings", "look at the warnings"
+        statement = Statement(level=Level.WARNING, code="rehearsal_warned", text=text, advice=advice)
+    else:
+        verdict = RehearsalVerdict.READY
+        statement = Statement(level=Level.GOOD, code="rehearsal_ready", text="ready to record")
+    spread = rehearsed["spread_us"]
+    return Rehearsal(
+        verdict=verdict,
+        statement=statement,
+        line=rehearsed["verdict"],
+        ended=datetime.now(UTC),
+        seconds=seconds,
+        pulses=rehearsed["pulses"],
+        complete=rehearsed["complete"],
+        headroom=rehearsed["headroom"],
+        jumps=rehearsed["jumps"],
+        spread_us=None if spread is None else spread["median"],
+        findings=findings,
+    )
+
+
+def _load(path: Path) -> Rehearsal | None:
+    """The verdict that was kept; None if there is none, or if another version of the service has kept it."""
+    try:
+        return Rehearsal.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def _keep(path: Path, found: Rehearsal) -> None:
+    new = path.with_suffix(".new")
+    with new.open("wb") as file:
+        file.write(found.model_dump_json(indent=1).encode())
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)

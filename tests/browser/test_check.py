@@ -1,0 +1,102 @@
+"""The view that checks the rig: rehearsals from several phones, and what they showed."""
+
+import re
+from dataclasses import asdict
+from datetime import UTC, datetime
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals, RehearsalVerdict
+from rig.api.statement import Level, Statement
+from rig.api.status import Finding, RehearsalProgress, RehearsalStage
+from rig.phrase import Phrase
+from svev.doctor.finding import Topic, failure, passed
+from tests.browser.conftest import Open
+from tests.browser.test_layout import BROKEN
+from tests.browser.test_page import SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.serving import Panel
+
+GOOD = Rehearsal(
+    verdict=RehearsalVerdict.READY,
+    statement=Statement(level=Level.GOOD, code="rehearsal_ready", text="ready to record"),
+    line="headroom 2.1x (disk), room for 143 jumps, spread within a pulse 12 us",
+    ended=datetime(2026, 2, 14, 9, 5, tzinfo=UTC), seconds=5, pulses=150, complete=150,
+    headroom={"disk": 2.1, "enp2s0": 3.4}, jumps=143, spread_us=12.0,
+    findings=(Finding.model_validate(asdict(passed(Topic.DISK, "check_read_back", "{mb:.1f} MB read", mb=138.2))),),
+)  # fmt: skip
+WRONG = failure(
+    Topic.CAMERAS, "check_exposes_on", "{camera}: it exposes for {exposure:.1f} ms, pulses come every {period:.1f} ms",
+    "shorten exposure_us, or lower trigger.rate_hz", camera="K3", exposure=40.0, period=33.3,
+)  # fmt: skip
+BAD = GOOD.model_copy(
+    update={
+        "verdict": RehearsalVerdict.NOT_READY,
+        "statement": Statement(
+            level=Level.ERROR, code="rehearsal_not_ready", text=f"not ready: {WRONG.what}", advice=WRONG.remedy,
+            values={"why": Phrase(WRONG.code, WRONG.what, WRONG.values)},
+        ),
+        "headroom": {"disk": 0.8},
+        "findings": (*GOOD.findings, Finding.model_validate(asdict(WRONG))),
+    }
+)  # fmt: skip
+
+
+def test_two_phones_have_one_rehearsal_and_the_same_verdict(
+    panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[RehearsalOrder] = []
+    rehearse = service.rehearse
+
+    def counted(order: RehearsalOrder) -> Rehearsals:
+        begun.append(order)
+        return rehearse(order)
+
+    monkeypatch.setattr(service, "rehearse", counted)
+    first = open_page(f"{panel.url}/#/doctor", width=360, height=780)
+    second = open_page(f"{panel.url}/#/doctor", width=360, height=780, locale="nb-NO")
+    first.locator("#rehearse").dblclick()
+    for page in (first, second):
+        expect(page.locator("#rehearsal-running")).to_be_visible()
+        expect(page.locator("#rehearse")).to_be_hidden()
+    assert len(begun) == 1
+    service.show_rehearsal(RehearsalProgress(stage=RehearsalStage.RECORDING, done=60, pulses=150))
+    expect(first.locator("#rehearsal-stage")).to_have_text("Recording: 60 of 150 pulses")
+    expect(second.locator("#rehearsal-bar")).to_have_js_property("value", 60)
+
+    service.rehearsed = GOOD
+    service.show_rehearsal(None)
+    for page, word in ((first, "Ready"), (second, "Klar")):
+        expect(page.locator("#rehearsal-word")).to_have_text(word)
+        expect(page.locator("#rehearsal-time")).to_have_attribute("datetime", "2026-02-14T09:05:00Z")
+        expect(page.locator("#rehearsal-figures div")).to_have_count(4)
+    assert _figures(first) == ["2.1 \N{MULTIPLICATION SIGN}", "143", "12 µs", "150 / 150"]
+
+    second.locator("#rehearse").click()
+    expect(first.locator("#rehearse-end")).to_be_visible()
+    first.locator("#rehearse-end").click()
+    expect(second.locator("#rehearsal-word")).to_have_text("Klar")  # one that was ended has no verdict
+
+    service.arm()
+    for page in (first, second):
+        expect(page.locator("#rehearse")).to_be_disabled()
+        expect(page.locator("#rehearse-why")).to_be_visible()
+
+
+def _figures(page: Page) -> list[str]:
+    return [re.sub(r"\s", " ", text) for text in page.locator("#rehearsal-figures dd").all_inner_texts()]
+
+
+def test_what_is_wrong_comes_first_with_what_to_do(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    service.rehearsed = BAD
+    page = open_page(f"{panel.url}/#/doctor", width=360, height=780, locale="nb-NO")
+    expect(page.locator("#rehearsal-word")).to_have_text("Ikke klar")
+    expect(page.locator("#rehearsal-text")).to_contain_text("K3: eksponerer i 40 ms")
+    expect(page.locator("#rehearsal-advice")).to_have_text("gjør exposure_us kortere, eller senk trigger.rate_hz")
+    expect(page.locator("#rehearsal-figures [data-level=error] dd")).to_have_count(1)
+    page.locator("#rehearsal-everything summary").click()
+    expect(page.locator("#rehearsal-findings .finding").first).to_have_attribute("data-level", "error")
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    assert page.evaluate(BROKEN) == []
+    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)

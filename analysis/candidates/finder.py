@@ -17,7 +17,7 @@ from analysis.candidates.background import Background, Region
 from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs, half_size
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
-from analysis.candidates.traces import find_traces
+from analysis.candidates.traces import find_expected_traces, find_traces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets, triplets
@@ -88,7 +88,9 @@ class Finder:
                 parts += [_moved(part, columns[-1]) for part in _around(regions, place)]
             names.append(camera.name)
             columns.append(columns[-1] + block.shape[1])
-            traces.append(tuple(trace for region in regions for trace in find_traces(region)))
+            skis = () if place is None else place.skis
+            known = tuple(trace for region in regions for trace in find_expected_traces(region, skis))
+            traces.append(known or tuple(trace for region in regions for trace in find_traces(region)))
         spots = find_expected(parts, columns) if parts else [Spots.none() for _ in names]
         return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
 

@@ -120,6 +120,21 @@ class PulseCandidates:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ExpectedSki:
+    """Where an image is expected to show a ski, so nearly that a fit can start from there.
+
+    Attributes:
+        ends: (2, 2) ends of its axis, px.
+        width: px, from edge to edge.
+        brighter: than what is behind it.
+    """
+
+    ends: Floats
+    width: float
+    brighter: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Expected:
     """Where an image is expected to show a jumper.
 
@@ -127,11 +142,13 @@ class Expected:
         markers: (n, 2) places of his markers, px.
         reach: (n,) px by which each may be off, with its own size.
         box: (2, 2) smallest and largest column and row (in this order) in which he and his skis may be, px.
+        skis: both; empty if they are not known so nearly that they need not be sought.
     """
 
     markers: Floats
     reach: Floats
     box: Floats
+    skis: tuple[ExpectedSki, ...] = ()
 
 
 class SecondLook(Protocol):

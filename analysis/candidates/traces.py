@@ -16,7 +16,7 @@ from analysis.candidates.background import Region
 from analysis.candidates.bar_model import Bar
 from analysis.candidates.bars import Bars, find_bars
 from analysis.candidates.median import median
-from analysis.candidates.model import Trace
+from analysis.candidates.model import ExpectedSki, Trace
 from analysis.candidates.ski_fit import FittedBar, fit_bars
 from rig.arrays import Flags, Floats, Integers
 
@@ -40,6 +40,7 @@ _COVERING = 0.97  # cosine of the angle between skis that may nearly cover each 
 _NARROWER = 0.75  # a ski's width over that of two which cover each other, to start from
 _APART = 0.06  # share of their length by which two skis that cover each other may be apart at their ends
 _POINTS = 24  # of a trace
+_BOTH = 2  # skis
 _ENDS = 0.05  # share of the length at each end that is not measured: tips are bent, tails are round
 
 
@@ -91,12 +92,52 @@ def find_traces(region: Region) -> tuple[Trace, ...]:
         for sign in (1, -1):
             lines = _lines(bars.only(np.sign(bars.contrast) == sign), grey.shape[0])
             found += [replace(line, ends=line.ends[:, ::-1].copy()) if steep else line for line in lines]
+    return _fitted(region, [(group, _explanations(_bars(group))) for group in _groups(_distinct(found))])
+
+
+def find_expected_traces(region: Region, skis: Sequence[ExpectedSki]) -> tuple[Trace, ...]:
+    """Traces of skis that are expected in a region, in px of the image, the longest first.
+
+    The fit starts from where they are expected, which takes a fraction of the time of a search.
+    """
+    lines = [line for ski in skis if (line := _part_inside(ski, region)) is not None]
+    if len(lines) == _BOTH and _covers(*lines):
+        return _fitted(region, [(lines, [_bars(lines), _bars(lines[:1])])])
+    return _fitted(region, [(group, [_bars(group)]) for group in _groups(lines)])
+
+
+def _bars(lines: Sequence[_Line]) -> list[Bar]:
+    return [Bar(line.ends, line.width) for line in lines]
+
+
+def _fitted(region: Region, groups: Sequence[tuple[Sequence[_Line], list[list[Bar]]]]) -> tuple[Trace, ...]:
+    """Traces of lines that are near each other, with what they may be; the longest first."""
     traces: list[Trace] = []
-    for group in _groups(_distinct(found)):
-        start = [Bar(line.ends, line.width) for line in group]
-        fitted = fit_bars(region, _explanations(start), group[0].sign > 0, _POINTS)
+    for lines, starts in groups:
+        fitted = fit_bars(region, starts, lines[0].sign > 0, _POINTS)
         traces += [trace for bar in fitted if (trace := _trace_of(bar, region)) is not None]
     return tuple(sorted(traces, key=lambda trace: -float(np.hypot(*(trace.ends[1] - trace.ends[0])))))
+
+
+def _part_inside(ski: ExpectedSki, region: Region) -> _Line | None:
+    """The part of an expected ski that lies in a region, in its px; None if it is too short to be measured."""
+    begin, step = ski.ends[0] - (region.x, region.y), ski.ends[1] - ski.ends[0]
+    size = np.array(region.grey.shape[::-1], float) - 1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        borders = np.sort(np.stack((-begin, size - begin)) / step, axis=0)
+    first, last = max(0.0, float(np.nanmax(borders[0]))), min(1.0, float(np.nanmin(borders[1])))
+    line = _Line(begin + np.array((first, last))[:, None] * step, ski.width, 1 if ski.brighter else -1)
+    return line if last > first and line.length > max(_SHORTEST, _SLENDER * ski.width) else None
+
+
+def _covers(one: _Line, other: _Line) -> bool:
+    """Whether two lines lie so near each other along half of the shorter one that they look like one."""
+    short, long = sorted((one, other), key=lambda line: line.length)
+    along = (long.ends[1] - long.ends[0]) / long.length
+    from_end = short.ends[0] + np.linspace(0, 1, 15)[:, None] * (short.ends[1] - short.ends[0]) - long.ends[0]
+    place, aside = from_end @ along, np.abs(from_end @ np.array((-along[1], along[0])))
+    near = (place > 0) & (place < long.length) & (aside < (one.width + other.width) / 2)
+    return bool(np.count_nonzero(near) > len(near) / 2)
 
 
 def _explanations(bars: list[Bar]) -> list[list[Bar]]:

@@ -49,6 +49,10 @@ class Sight:
         """(n, 2, 2) px^2, by the camera and by the size of a marker; without spot and object point."""
         return np.asarray(self.pose + MARKER_SIGMA_M**2 * self.by_point @ self.by_point.transpose(0, 2, 1))
 
+    def only(self, chosen: slice) -> "Sight":
+        """Some of the points."""
+        return Sight(self.xy[chosen], self.by_point[chosen], self.pose[chosen], self.inside[chosen])
+
 
 class Views:
     """The cameras of a recording, in their order.

@@ -26,6 +26,7 @@ from analysis.measurements.model import SIDES, JumpMeasurements, MeasuredCamera,
 from analysis.motion.causal import CausalFilter
 from analysis.result.model import SmoothedState, Status
 from analysis.scene.camera_system import CameraSystem
+from analysis.worker.ski_images import SkiImages
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
 
@@ -65,6 +66,7 @@ class Follower:
     def __init__(self, system: CameraSystem, cameras: Mapping[str, MeasuredCamera], rate_hz: float) -> None:
         self._views = Views(system, {name: camera.exposure_s for name, camera in cameras.items()})
         self._filter = CausalFilter(system, cameras, rate_hz)
+        self._skis = SkiImages(len(self._views))
         self._rate_hz = rate_hz
         self._appearance: Appearance | None = None
         self._next: tuple[UtcNs, SmoothedState | None] = UtcNs(0), None
@@ -91,17 +93,21 @@ class Follower:
         state = self._predicted(time)
         xyz = np.array([_known(point).xyz for point in state.points.values()])
         covariance = np.array([_known(point).covariance for point in state.points.values()])
+        places = np.concatenate((xyz, state.origin.value[None], self._skis.places(state)))
         radius = 0.0 if self._appearance is None else self._appearance.radius
         found = {}
         for k, name in enumerate(self._views.names):
             scale = float(self._views.scale[k])
-            sight = self._views.see(k, np.concatenate((xyz, state.origin.value[None])))
-            spread = sight.by_point[:-1] @ covariance @ sight.by_point[:-1].swapaxes(-1, -2) + sight.noise[:-1]
+            moved = state.velocity.value * self._views.late_s[k]
+            whole = self._views.see(k, places + moved)
+            sight, of_skis = whole.only(slice(len(xyz))), whole.only(slice(len(xyz) + 1, None))
+            spread = sight.by_point @ covariance @ sight.by_point.swapaxes(-1, -2) + sight.noise
             sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(spread, nan=1e6))[:, -1])
             reach = _SIGMAS * sigma + _RADII * radius * scale
-            middle, half = sight.xy[-1], REACH_M * scale
-            if np.isfinite(sight.xy).all():
-                found[name] = Expected(sight.xy[:-1], reach, np.stack((middle - half, middle + half)))
+            middle, half = whole.xy[len(xyz)], REACH_M * scale
+            if np.isfinite(sight.xy).all() and np.isfinite(middle).all():
+                box = np.stack((middle - half, middle + half))
+                found[name] = Expected(sight.xy, reach, box, self._skis.expected(k, state, of_skis))
         return found
 
     def follow(self, candidates: PulseCandidates) -> Followed:
@@ -113,6 +119,9 @@ class Follower:
         points = [_known(point) for point in state.points.values()]
         places = Prediction(np.array([[p.xyz for p in points]]), np.array([[p.covariance for p in points]]))
         assigned = assign(views, window, places, flight.axes)
+        for k in range(len(views)):
+            if traces := window.traces(0, k):
+                window.put_traces(0, k, self._skis.told_apart(k, traces))
         lines = straight_traces(views, window)
         bindings = Markers(assigned, places).places(BINDINGS)
         skis = assign_skis(views, lines, window.delivered, flight, bindings, _angles(state, flight))
@@ -120,6 +129,10 @@ class Follower:
         found = self._filter.update(measured)
         if found is None:
             raise AssertionError("the filter has begun")
+        for k in range(len(views)):
+            own = {i: lines[0][k][int(line)].parts for i, line in enumerate(skis[0, :, k]) if line >= 0}
+            traces = window.traces(0, k)
+            self._skis.learn(k, {i: [traces[part] for part in parts] for i, parts in own.items()})
         if any(part is not None and part.status is not Status.PREDICTED for part in found.points.values()):
             self.last = candidates.pulse
         return Followed(candidates.pulse, candidates.time, found)

@@ -11,11 +11,11 @@ from analysis.candidates.background import Background, Region
 from analysis.candidates.bar_model import Bar, pixels_around
 from analysis.candidates.bar_model import modelled as model_of_bars
 from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs
-from analysis.candidates.model import Trace
+from analysis.candidates.model import ExpectedSki, Trace
 from analysis.candidates.ski_fit import fit_bars
 from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
 from analysis.candidates.soft_discs import fit_soft_discs
-from analysis.candidates.traces import find_traces
+from analysis.candidates.traces import find_expected_traces, find_traces
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Floats
 from tests.analysis.scene.rendering import Spot, clean_image
@@ -150,6 +150,33 @@ def test_skis_that_hide_each_others_edges_are_placed_by_their_width(apart: float
             after.append(min((_normalized(trace, line) for trace in told), key=lambda z: abs(z[0])))
     assert np.mean(np.square(before)) > 4.0, "a fit that estimates the width too"
     assert np.mean(np.square(after)) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("begin", "end"), [((14.0, 44.0), (99.0, 36.0)), ((11.0, 36.0), (97.0, 21.0)), ((13.0, 31.4), (96.0, 12.6))]
+)
+def test_skis_are_fitted_from_where_they_are_expected(begin: tuple[float, float], end: tuple[float, float]) -> None:
+    """Apart, crossing, nearly covering each other: a start that is off by a ski's width or less spoils nothing."""
+    rng = np.random.default_rng(29)
+    lines = [np.array(((10.0, 30.0), (95.0, 12.0))), np.array((begin, end))]
+    clean = np.full((60, 110), 70.0)
+    for a, b in lines:
+        clean += _capsule(clean.shape, a, b, 2.2) * (200.0 - clean)
+    clean = gaussian_filter(clean, 0.5)
+    normalized = []
+    for _ in range(6):
+        region = _region(clean + NOISE * rng.standard_normal(clean.shape), np.full(clean.shape, 70.0))
+        off = rng.normal(0.0, (3.0, 0.7), (2, 2, 2))  # px along and across, about
+        traces = find_expected_traces(
+            region, [ExpectedSki(line + o, 4.2, True) for line, o in zip(lines, off, strict=True)]
+        )
+        for line in lines:
+            normalized.append(
+                min((_normalized(trace, line) for trace in told_apart(traces, 4.4, 0.02)), key=lambda z: abs(z[0]))
+            )
+    assert np.mean(np.square(normalized)) < 2.0
+    nothing = _region(70.0 + NOISE * rng.standard_normal(clean.shape), np.full(clean.shape, 70.0))
+    assert not find_expected_traces(nothing, [ExpectedSki(lines[0], 4.2, True)])
 
 
 def test_a_ski_of_another_width_has_an_edge_that_is_not_its_own() -> None:

@@ -13,15 +13,18 @@ import pytest
 from rig.errors import BadInputError
 from simrig.firewire.host import build, wire
 from simrig.firewire.host.abi import Ioctl
+from simrig.gpio import build as gpio_build
+from simrig.preload.build import COMMON, OPTIONS
 from tests.simrig.firewire.conftest import Program, StartHill, StartProgram
 
 #: How the kernel's header makes the code of an ioctl: direction, size of the argument, '#', number.
 WRITES = 1 << 30
 
 
-def test_it_compiles_without_a_warning(tmp_path: Path) -> None:
-    for source in sorted(build.SOURCES.glob("*.c")):
-        command = ["gcc", *build.OPTIONS, "-Wshadow", "-Wconversion", "-Wno-sign-conversion", "-c", str(source)]
+@pytest.mark.parametrize("sources", [build.SOURCES, gpio_build.SOURCES, COMMON], ids=["firewire", "gpio", "common"])
+def test_it_compiles_without_a_warning(sources: Path, tmp_path: Path) -> None:
+    for source in sorted(sources.glob("*.c")):
+        command = ["gcc", *OPTIONS, "-Wshadow", "-Wconversion", "-Wno-sign-conversion", "-c", str(source)]
         done = subprocess.run([*command, "-o", str(tmp_path / "out.o")], capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (0, ""), source.name
 
@@ -40,7 +43,7 @@ def test_many_ask_for_it_at_once_and_it_is_compiled_whole(tmp_path: Path, monkey
 def test_a_missing_compiler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(BadInputError, match=r"^the emulated FireWire bus needs a C compiler.*apt install gcc linux"):
+    with pytest.raises(BadInputError, match=r"^emulated devices need a C compiler.*apt install gcc linux"):
         build.shim()
 
 

@@ -1,6 +1,6 @@
 /* libc's own functions, behind those of the same name that the shim interposes. */
-#ifndef SVEV_FIREWIRE_REAL_H
-#define SVEV_FIREWIRE_REAL_H
+#ifndef SVEV_REAL_H
+#define SVEV_REAL_H
 
 #include <stdatomic.h>
 

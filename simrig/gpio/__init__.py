@@ -1,0 +1,1 @@
+"""An emulated GPIO chip, which the unmodified libgpiod opens as `/dev/gpiochipN` of the kernel."""

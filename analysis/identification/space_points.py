@@ -13,7 +13,7 @@ from scipy.special import chdtri
 from analysis.candidates.model import PulseCandidates, Spots
 from analysis.identification.views import Views, gate
 from photogrammetry.intersection.point_intersection import intersect_points
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 
 _LIGHT = 0.25  #: standard deviation of a marker's contrast, share of it: light, background and direction change it
 _SIZE = 0.35  #: standard deviation of the logarithm of a spot's radius
@@ -44,6 +44,20 @@ class SpacePoints:
     def count(self) -> Integers:
         """(n,) number of rays."""
         return np.asarray((self.rays >= 0).sum(axis=1))
+
+    def only(self, chosen: Integers | Flags) -> "SpacePoints":
+        """Some of them."""
+        return SpacePoints(self.xyz[chosen], self.covariance[chosen], self.rays[chosen], self.misfit[chosen])
+
+    def joined(self, other: "SpacePoints") -> "SpacePoints":
+        """These, then others."""
+        pairs = zip(
+            (self.xyz, self.covariance, self.rays, self.misfit),
+            (other.xyz, other.covariance, other.rays, other.misfit),
+            strict=True,
+        )
+        xyz, covariance, rays, misfit = (np.concatenate(pair) for pair in pairs)
+        return SpacePoints(xyz, covariance, rays, misfit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,35 +156,35 @@ def find_space_points(views: Views, pulses: Sequence[Sequence[Rays]]) -> list[Sp
         return [SpacePoints(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, m), int), np.empty(0)) for _ in pulses]
     solved = _solve(views, pulses, of_pulse, pairs)
     good = np.isfinite(solved.misfit)
-    of_pulse, pairs = of_pulse[good], pairs[good]
-    full = _extended(views, pulses, of_pulse, pairs, solved.xyz[good], solved.covariance[good])
-    fits = _solve(views, pulses, of_pulse, full).misfit
+    solved, of_pulse = solved.only(good), of_pulse[good]
+    full = _solve(views, pulses, of_pulse, _extended(views, pulses, of_pulse, solved))
     allowed = np.array([np.inf, np.inf, *(gate(2 * count - 3) for count in range(2, m + 1))])
-    rays = np.where((fits <= allowed[(full >= 0).sum(axis=1)])[:, None], full, pairs)
-    both = np.unique(np.column_stack((of_pulse, rays)), axis=0)
-    both = np.unique(np.concatenate((both, _without_one(views, pulses, both))), axis=0)
-    of_pulse, rays = both[:, 0], both[:, 1:]
-    solved = _solve(views, pulses, of_pulse, rays)
-    points = []
-    for pulse in range(len(pulses)):
-        own = np.flatnonzero((of_pulse == pulse) & np.isfinite(solved.misfit))
-        points.append(SpacePoints(solved.xyz[own], solved.covariance[own], rays[own], solved.misfit[own]))
-    return points
+    better = full.misfit <= allowed[full.count]
+    solved = solved.joined(full).only(np.where(better, len(solved), 0) + np.arange(len(solved)))
+    both, first = np.unique(np.column_stack((of_pulse, solved.rays)), axis=0, return_index=True)
+    solved, less = solved.only(first), np.unique(_without_one(both, solved.only(first).misfit), axis=0)
+    solved = solved.joined(_solve(views, pulses, less[:, 0], less[:, 1:])) if len(less) else solved
+    both, first = np.unique(np.concatenate((both, less)), axis=0, return_index=True)
+    solved, of_pulse = solved.only(first), both[:, 0]
+    return [solved.only((of_pulse == pulse) & np.isfinite(solved.misfit)) for pulse in range(len(pulses))]
 
 
-def _without_one(views: Views, pulses: Sequence[Sequence[Rays]], points: Integers) -> Integers:
+def _without_one(points: Integers, misfit: Floats) -> Integers:
     """Points (n, 1 + m), pulse and rays, of three rays or more, without a ray that may be wrong.
 
     The marker may be hidden in one of the images, and what hides it may show a spot near its place. So rays are left
     out whose spot another point of as many rays has too, and of points that fit badly each one in turn.
+
+    Args:
+        points: with all their rays.
+        misfit: (n,) of these.
     """
     count = (points[:, 1:] >= 0).sum(axis=1)
     several = points[count > 2]
     if not len(several):
         return np.asarray(several)
     left_out = []
-    misfit = _solve(views, pulses, several[:, 0], several[:, 1:]).misfit
-    doubtful = misfit > chdtri(2 * count[count > 2] - 3, 1 - _DOUBTFUL)
+    doubtful = misfit[count > 2] > chdtri(2 * count[count > 2] - 3, 1 - _DOUBTFUL)
     for k in range(points.shape[1] - 1):
         spot = several[:, [0, k + 1]]
         _, of_spot, uses = np.unique(spot, axis=0, return_inverse=True, return_counts=True)
@@ -225,15 +239,13 @@ def _solve(views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, r
     return SpacePoints(meet.X, meet.covariance, rays, np.where(meet.ok & usable, misfit, np.nan))
 
 
-def _extended(
-    views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, pairs: Integers, xyz: Floats, covariance: Floats
-) -> Integers:
+def _extended(views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, pairs: SpacePoints) -> Integers:
     """Rays (n, m) of points seen by pairs, with the nearest spot in the gate of every other camera."""
-    full = pairs.copy()
+    full = pairs.rays.copy()
     for k in range(len(views)):
-        sight = views.see(k, xyz)
-        spread = sight.by_point @ covariance @ sight.by_point.transpose(0, 2, 1) + sight.noise
-        other = np.asarray((pairs[:, k] < 0) & sight.inside)
+        sight = views.see(k, pairs.xyz)
+        spread = sight.by_point @ pairs.covariance @ sight.by_point.transpose(0, 2, 1) + sight.noise
+        other = np.asarray((pairs.rays[:, k] < 0) & sight.inside)
         for p in np.unique(of_pulse[other]):
             rays = pulses[p][k]
             if not len(rays.xy):

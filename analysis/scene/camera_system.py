@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.solution.adjustment import Adjustment
-from photogrammetry.geometry.camera_model import camera_coordinates, image_point, linearise, undistort
+from photogrammetry.geometry.camera_model import Lens, camera_coordinates, image_point, linearise, undistort
 from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.file import pixel_to_metric
@@ -85,16 +85,10 @@ class PlacedCamera:
             v: (n, 2) computed - observed; derivatives by the object point (n, 2, 3), and by the camera's parameters
             (n, 2, 6 + k) in the order of `columns`.
         """
-        n = len(xyz)
         lens = self.camera.lens()
-        lens = replace(
-            lens,
-            interior=np.broadcast_to(lens.interior, (n, len(self.camera.interior))),
-            balance=np.broadcast_to(lens.balance, (n,)),
-            measured=np.broadcast_to(lens.measured, (n,)),
-        )
-        there = np.broadcast_to(self.position, (n, 3)), np.broadcast_to(self.rotation, (n, 3, 3))
-        equations = linearise(lens, there[1], there[0], xyz, pixel_to_metric(np.asarray(xy, float), self.size))
+        lens = Lens(lens.interior[None], np.asarray(lens.balance)[None], np.asarray(lens.measured)[None])
+        metric = pixel_to_metric(np.asarray(xy, float), self.size)
+        equations = linearise(lens, self.rotation[None], self.position[None], xyz, metric)
         by_parameters = np.concatenate((equations.by_pose, equations.by_interior[..., self.interior]), axis=-1)
         mirror = _MIRROR[:, None]
         return equations.v * _MIRROR, equations.by_point * mirror, by_parameters * mirror

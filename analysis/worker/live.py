@@ -165,7 +165,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         follower = recording.follower
         if follower is None:
             recording.keep(finder.find(tag, image))
-            self._seek(recording, finder)
+            self._seek(recording)
             self._look_at_balls(recording, tag, image)
         elif follower.lost(tag.pulse, tag.time):
             recording.follower = None
@@ -193,7 +193,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.wait_anew()
             self._finder = self._watch = None
 
-    def _seek(self, recording: Streamed, finder: Finder) -> None:
+    def _seek(self, recording: Streamed) -> None:
         """Begin to follow a jumper if one is in sight."""
         rate, newest = recording.rate_hz, recording.candidates[-1]
         showing = sum(bool(len(image.spots)) for image in newest.images.values())
@@ -203,7 +203,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recent = recording.between(max(newest.pulse - _SOUGHT_S * rate, recording.told + 1), newest.pulse)
         cameras = recording.cameras(self._exposures)
         exposures = {name: camera.exposure_s for name, camera in cameras.items()}
-        found = identify(recent, self._scene.system, rate, exposures, finder)
+        found = identify(recent, self._scene.system, rate, exposures)
         if not found or len(found[-1].pulses) < _BEGIN:
             return
         follower = Follower(self._scene.system, cameras, rate)

@@ -24,7 +24,14 @@ from typing import Any, Final, Self, TypeVar
 
 from rig.api.recordings import Counts, Recording, SessionFields
 from rig.api.status import State
-from rig.errors import CameraError, CameraNotFoundError, ProcessDiedError, StorageError, UnknownRecordingError
+from rig.errors import (
+    BadInputError,
+    CameraError,
+    CameraNotFoundError,
+    ProcessDiedError,
+    StorageError,
+    UnknownRecordingError,
+)
 from rig.events import PAIRING, Event
 from rig.settings.model import RigSettings
 from rig.transport import wire
@@ -112,6 +119,7 @@ class HeadlessRig:
         Raises:
             CameraNotFoundError: too few cameras answer in time.
             CameraError: all cameras are connected, but no complete triplet came.
+        BadInputError: pulses come at another rate than the rig file names.
             SvevError: the rig cannot be set up.
         """
         began = complete_since = time.monotonic()
@@ -123,6 +131,8 @@ class HeadlessRig:
             now = time.monotonic()
             if seen.cameras is None:
                 began = now  # the simulated hill and the processes are still being started
+            elif seen.fault is not None and seen.fault.code == "fault_wrong_rate":
+                raise BadInputError(f"{seen.fault.text}: {seen.fault.advice}")
             elif all(camera.present for camera in seen.cameras):
                 if now > complete_since + settle_s:
                     raise CameraError(

@@ -5,6 +5,7 @@ The commands are `rig.transport.messages.RecorderCommand`, the reports `Recorder
 
 import os
 import select
+from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -47,10 +48,13 @@ from rig.transport.ring import CameraRing
 from triggering.pairing.alarms import alarms
 from triggering.sources.choice import trigger_source
 from triggering.sources.telling import SpreadTeller
+from triggering.timeline.steady_rate import steady_rate
 
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000
 _WARM_PULSES: Final = 3
+#: Their rate is measured from so many, and told again; at first from those that there are.
+_RATE_PULSES: Final = 17
 #: How long the recorder waits for the disk when it is told to quit; less than its parent waits for its end.
 _WIND_UP_S: Final = 6.0
 
@@ -83,6 +87,7 @@ class RecorderLoop:
         )
         self._quit = False
         self._warm = self._unreported = 0
+        self._times: deque[HostNs] = deque(maxlen=_RATE_PULSES)
         self._alarmed: set[tuple[str, object]] = set()
         self._source = trigger_source(rig.trigger)
         self._spread = SpreadTeller(self._source)
@@ -147,8 +152,10 @@ class RecorderLoop:
             self._preview.write(triplet.pulse.number, triplet.pulse.time, statuses, pixels, now, bits)
         if not self._recordings.running:  # whole triplets show that all cameras see the same pulses
             self._warm = self._warm + 1 if triplet.pulse.complete else 0
-            if self._warm == _WARM_PULSES:
-                self._tell(RecorderWarm())
+            self._times.append(triplet.pulse.time)
+            if self._warm in {_WARM_PULSES, _RATE_PULSES}:
+                rate = steady_rate(self._times)
+                self._tell(RecorderWarm() if rate is None else RecorderWarm(rate_hz=rate.hz, rate_error=rate.error))
         self._recordings.take(triplet)
 
     def _obey(self, command: RecorderCommand) -> None:

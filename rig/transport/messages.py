@@ -284,7 +284,15 @@ class RecorderReady(Message):
 
 
 class RecorderWarm(Message):
-    """Several complete triplets have come one after the other: the cameras work together."""
+    """Several complete triplets have come one after the other: the cameras work together.
+
+    Attributes:
+        rate_hz: rate of the pulses, measured; None: they do not come evenly.
+        rate_error: share by which it can be wrong.
+    """
+
+    rate_hz: float | None = None
+    rate_error: float = 0.0
 
 
 class CameraChanged(Message):

@@ -46,6 +46,8 @@ from rig.transport.ring import CameraRing
 from rig.transport.trigger_messages import CamerasSeen, TriggerConfig, TriggerReport, TriggerTold
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
+from triggering.timeline.pulse_train import RHYTHM, RHYTHM_LEAST
+from triggering.timeline.steady_rate import SteadyRate, rhythm
 
 RECORDER: Final = "recorder"
 ANALYSIS: Final = "analysis"
@@ -95,6 +97,7 @@ class RigProcesses:
         ready: whether the recorder has started.
         recorder_died: whether the recorder is dead; the presence of cameras is not known then.
         health: the recorder's last health record.
+        rate: of the pulses, as measured last; None: not known.
 
     Raises:
         BadInputError: libdc1394 is missing, or a log that is to be replayed does not fit.
@@ -126,6 +129,7 @@ class RigProcesses:
         self.cameras = [CameraPresence()] * len(rig.cameras)
         self.warm = self.ready = self.recorder_died = False
         self.health: Health | None = None
+        self.rate: SteadyRate | None = None
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -202,15 +206,13 @@ class RigProcesses:
                     self._note_camera(report)
                 case RecorderWarm():
                     self.warm = True
+                    self.rate = self.rate if report.rate_hz is None else SteadyRate(report.rate_hz, report.rate_error)
                 case RecorderReady():
                     self.ready = True
                 case RecorderEvent():
                     self._on_event(report.event)
                 case RecorderHealth():
-                    self.health = report.health
-                    if TRIGGER in self._helpers:
-                        self._processes[TRIGGER].control.send(CamerasSeen.of(report.health))
-                    self._note_recovered(report.health)
+                    self._note_health(report.health)
         self._tend()
         return [report for report in reports if not isinstance(report, _FORWARDED)]
 
@@ -223,6 +225,13 @@ class RigProcesses:
         if change.news is not CameraNews.NOTICE:
             self.cameras[change.camera] = CameraPresence(change.news, change.said)
         self._on_event(change.event(self._names[change.camera]))
+
+    def _note_health(self, health: Health) -> None:
+        self.health = health
+        self.rate = rhythm(health.pairing, RHYTHM_LEAST, RHYTHM) or self.rate
+        self._note_recovered(health)
+        if TRIGGER in self._helpers:
+            self._processes[TRIGGER].control.send(CamerasSeen.of(health))
 
     def _note_recovered(self, health: Health) -> None:
         """Note which silent cameras deliver again, by the frames in their health records: no report says so."""
@@ -239,6 +248,7 @@ class RigProcesses:
                 self._tend_helper(child)
             elif child.control.ended and not self.recorder_died:
                 self.recorder_died, self.ready, self.warm, self.health = True, False, False, None
+                self.rate = None
                 self.cameras = [CameraPresence()] * len(self._names)
                 text = "the recorder process ended ({how}): if it recurs, run svev doctor"
                 raise ProcessDiedError(phrase("why_recorder_ended", text, how=child.ending() or ""))

@@ -215,6 +215,22 @@ def too_few_cameras(cameras: Sequence[CameraSettings], heard: Sequence[CameraPre
     )
 
 
+def wrong_rate(measured_hz: float, rate_hz: float) -> Statement:
+    """The fault that pulses come at another rate than the rig file says.
+
+    Args:
+        measured_hz: their rate.
+        rate_hz: that of the rig file.
+    """
+    return Statement(
+        level=Level.ERROR,
+        code="fault_wrong_rate",
+        text=f"not armed: pulses come at {measured_hz:.1f} Hz, the rig file says rate_hz = {rate_hz:g}",
+        advice="set the generator right, and the rig is armed by itself; or correct [trigger] rate_hz and start again",
+        values={"measured": round(measured_hz, 1), "rate_hz": rate_hz},
+    )
+
+
 def failed(error: SvevError, again_in_s: float) -> Statement:
     """The fault that arming failed or a process died.
 

@@ -60,8 +60,8 @@ class Fault:
             return phrase("event_starting_at_once", "{why}; starting again at once", why=why)
         return phrase("event_starting_again", "{why}; starting again in {seconds:g} s", why=why, seconds=wait_s)
 
-    def lack_cameras(self, statement: Statement) -> None:
-        """Note that too few cameras answer, as `statement` says; the grabbers go on trying."""
+    def refuse(self, statement: Statement) -> None:
+        """Note why the rig is not armed, as `statement` says, although its processes run; they go on trying."""
         self.statement = statement
 
     def clear(self) -> None:

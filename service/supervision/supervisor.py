@@ -7,11 +7,12 @@ never waits for anything but the next report or command.
 import select
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from rig.api.jump import LastJump
+from rig.api.statement import Statement
 from rig.api.status import State, Status
 from rig.disk import free_bytes
 from rig.errors import ProcessDiedError, StateForbidsError, SvevError
@@ -28,13 +29,13 @@ from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.picture import Facts, picture
-from service.status.statements import FORBIDDEN, moved, too_few_cameras
+from service.status.statements import FORBIDDEN, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.overload import Overload
 from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.state_machine import StateMachine
-from service.supervision.watching import STUCK_S, RecorderWatch, Settling
+from service.supervision.watching import STUCK_S, RecorderWatch, Settling, why_not_armed
 
 _TURN_S: Final = 0.2
 _PICTURE_S: Final = 1.0
@@ -51,11 +52,13 @@ class WarmUp:
         state: the state of the service.
         cameras: presence of each camera; None while there are no processes.
         warm: whether complete triplets have come.
+        fault: why the rig is not armed; None in any other state.
     """
 
     state: State
     cameras: tuple[CameraPresence, ...] | None
     warm: bool
+    fault: Statement | None
 
 
 class Supervisor:
@@ -112,7 +115,7 @@ class Supervisor:
         self._fault = Fault()
         self._wanted = False
         self._least = rig.least_cameras
-        self._settling, self._watch = Settling(), RecorderWatch()
+        self._settling, self._watch = Settling(rig), RecorderWatch()
         self._overload = Overload(rig.trigger.period_ns)
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
@@ -167,7 +170,7 @@ class Supervisor:
             raise StateForbidsError(FORBIDDEN["arm", state])
         if min_cameras is not None and state not in {State.ARMED, State.RECORDING}:
             self._least = min(min_cameras, len(self.rig.cameras))
-        if state is State.FAULT and self._enough():
+        if state is State.FAULT and self._why_not() is None:
             self._judge()
         elif state in {State.IDLE, State.FAULT}:
             self._wanted = True
@@ -186,7 +189,8 @@ class Supervisor:
         """Command: say how far the rig has come since it was armed."""
         processes = self._session.processes
         cameras = None if processes is None else tuple(processes.cameras)
-        return WarmUp(self._machine.state, cameras, processes is not None and processes.warm)
+        refused = self._fault.statement if self._machine.state is State.FAULT else None
+        return WarmUp(self._machine.state, cameras, processes is not None and processes.warm, refused)
 
     def disarm(self) -> Status:
         """Command: begin to disarm."""
@@ -320,24 +324,23 @@ class Supervisor:
         processes, state = self._session.processes, self._machine.state
         if processes is None or not self._wanted or self.recordings.current is not None:
             return
-        enough = self._enough()
+        fault = self._why_not()
         match state:
             case State.ARMING if self._settling.settled(processes):
                 self.recordings.armed_at = self.recordings.emptied_at = time.monotonic()
-                self._machine.move(State.ARMED) if enough else self._lack_cameras(processes.cameras)
-            case State.ARMED if not any(camera.present for camera in processes.cameras):
-                self._lack_cameras(processes.cameras)
-            case State.FAULT if enough:
+                self._machine.move(State.ARMED) if fault is None else self._refuse(fault)
+            case State.ARMED if fault is not None and not any(camera.present for camera in processes.cameras):
+                self._refuse(fault)
+            case State.FAULT if fault is None:
                 self._fault.clear()
                 self._machine.move(State.ARMED)
 
-    def _enough(self) -> bool:
-        """Whether so many cameras answer that the rig can be armed."""
-        processes = self._session.processes
-        return processes is not None and sum(camera.present for camera in processes.cameras) >= self._least
+    def _why_not(self) -> Statement | None:
+        """Why the rig cannot be armed, in words; None: it can."""
+        return why_not_armed(self.rig, self._session.processes, self._least)
 
-    def _lack_cameras(self, heard: Sequence[CameraPresence]) -> None:
-        self._fault.lack_cameras(too_few_cameras(self.rig.cameras, heard, self._least))
+    def _refuse(self, fault: Statement) -> None:
+        self._fault.refuse(fault)
         self._machine.move(State.FAULT)
 
     def _rig_failed(self, error: SvevError) -> None:

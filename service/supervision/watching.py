@@ -3,8 +3,13 @@
 import time
 from typing import Final
 
+from rig.api.statement import Statement
+from rig.settings.model import RigSettings
+from rig.settings.trigger import ExternalTrigger
 from rig.transport.messages import RecorderHealth, RecorderReport
 from service.processes.rig_processes import RigProcesses
+from service.status.statements import no_camera, too_few_cameras, wrong_rate
+from triggering.timeline.steady_rate import SteadyRate
 
 #: Between reports farther apart than this the rate is not known.
 _STALE_S: Final = 3.0
@@ -93,11 +98,15 @@ _WARM_S: Final = 2.0
 class Settling:
     """Decides when arming is done.
 
+    Args:
+        rig: the rig.
+
     Attributes:
         began: when arming began, on the monotonic clock, s.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rig: RigSettings) -> None:
+        self._rig = rig
         self.began = 0.0
         self._tried_at: float | None = None
 
@@ -106,7 +115,10 @@ class Settling:
         self.began, self._tried_at = now, None
 
     def settled(self, processes: RigProcesses) -> bool:
-        """Whether every camera has answered or failed, and the connected ones have had time for their first frames."""
+        """Whether every camera has answered or failed, and the connected ones have had time for their first frames.
+
+        Pulses that seem to come at another rate than the rig file names get time, too, to be measured better.
+        """
         now = time.monotonic()
         tried = all(camera.tried for camera in processes.cameras) or now > self.began + _ANSWER_S
         if not processes.ready or not tried:
@@ -114,4 +126,37 @@ class Settling:
         if self._tried_at is None:
             self._tried_at = now
         lacking = not any(camera.present for camera in processes.cameras)
-        return lacking or processes.warm or now > self._tried_at + _WARM_S
+        sure = _contradicts(self._rig, processes.rate) is not None  # else the rate is told again soon
+        return lacking or (processes.warm and sure) or now > self._tried_at + _WARM_S
+
+
+#: Pulses whose rate differs from the rig file's by more than this share are those of another generator or another file.
+_RATE: Final = 0.02
+
+
+def why_not_armed(rig: RigSettings, processes: RigProcesses | None, least: int) -> Statement | None:
+    """What keeps a rig from being armed: too few cameras, or pulses at another rate than the rig file names.
+
+    A generator that stands still is none of it: it may be started later.
+
+    Args:
+        rig: the rig.
+        processes: its processes; None: there are none.
+        least: so many cameras are needed.
+    """
+    if processes is None:
+        return no_camera()
+    if sum(camera.present for camera in processes.cameras) < least:
+        return too_few_cameras(rig.cameras, processes.cameras, least)
+    trigger, rate = rig.trigger, processes.rate
+    if rate is not None and _contradicts(rig, rate):
+        return wrong_rate(rate.hz, trigger.rate_hz)
+    return None
+
+
+def _contradicts(rig: RigSettings, rate: SteadyRate | None) -> bool | None:
+    """Whether pulses of a generator come at another rate than the rig file names; None: it is not measured well."""
+    trigger = rig.trigger
+    if rate is None or not isinstance(trigger, ExternalTrigger) or "rate_hz" not in trigger.model_fields_set:
+        return False
+    return rate.contradicts(trigger.rate_hz, _RATE)

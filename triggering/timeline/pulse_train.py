@@ -8,13 +8,13 @@ from statistics import median_low
 from typing import Final
 
 from rig.clocks import HostNs
+from triggering.timeline.steady_rate import AGREE
 
 _RECENT: Final = 256
 _PERIOD_GAIN: Final = 0.02
-#: The rhythm is known if, of so many intervals, at least half agree with their median to this share of it.
-_RHYTHM: Final = 64
-_RHYTHM_LEAST: Final = 4
-_AGREE: Final = 0.05
+#: The rhythm is known if, of so many intervals, at least half agree with their median to `AGREE`.
+RHYTHM: Final = 64
+RHYTHM_LEAST: Final = 4
 #: A rhythm is measured, or has changed, if so many intervals in a row agree with one another.
 _CHANGE: Final = 4
 #: Two pulses that are closer than this share of the period, and that no camera saw both of, may have been one.
@@ -62,7 +62,7 @@ class PulseTrain:
         self._least_ns = CLOCKS_NS + spread_ns
         self.tolerance_ns = min(max(_SPREAD_NS, self._least_ns), self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
-        self._intervals: deque[int] = deque(maxlen=_RHYTHM)
+        self._intervals: deque[int] = deque(maxlen=RHYTHM)
         self._delivered = 0
         self._beat: HostNs | None = None  # the last pulse that was not the second half of one
         self._learn_in = _LEARN_EVERY
@@ -73,10 +73,10 @@ class PulseTrain:
 
         The mean of the recent intervals is nearer to it than `period_ns`, which follows slowly.
         """
-        if len(self._intervals) < _RHYTHM_LEAST:
+        if len(self._intervals) < RHYTHM_LEAST:
             return None
         usual = median_low(self._intervals)
-        agreeing = [interval for interval in self._intervals if abs(interval - usual) < _AGREE * usual]
+        agreeing = [interval for interval in self._intervals if abs(interval - usual) < AGREE * usual]
         return sum(agreeing) / len(agreeing) if 2 * len(agreeing) >= len(self._intervals) else None
 
     @property
@@ -128,13 +128,13 @@ class PulseTrain:
     def _follow(self, interval: int) -> None:
         """Follow the rhythm slowly while it goes on, and take the new one where it has changed."""
         deviation = interval - self.period_ns
-        if self.steady and abs(deviation) < _AGREE * self.period_ns:
+        if self.steady and abs(deviation) < AGREE * self.period_ns:
             self.period_ns += _PERIOD_GAIN * deviation
             return
         recent = list(self._intervals)[-_CHANGE:]
-        if len(recent) == _CHANGE and max(recent) - min(recent) < _AGREE * min(recent):
-            if abs(min(recent) - self.period_ns) > _AGREE * self.period_ns:
-                self._intervals = deque(recent, maxlen=_RHYTHM)  # those before are of another rhythm
+        if len(recent) == _CHANGE and max(recent) - min(recent) < AGREE * min(recent):
+            if abs(min(recent) - self.period_ns) > AGREE * self.period_ns:
+                self._intervals = deque(recent, maxlen=RHYTHM)  # those before are of another rhythm
             self._measured(sum(recent) / _CHANGE)
             return
         if self.steady and self.rhythm_ns is None:

@@ -29,6 +29,7 @@ export const statements = {
 
   fault_no_camera: ["ingen av kameraene svarer", "sjekk strøm og kabler; de kobles til av seg selv når de svarer"],
   fault_too_few: ["{present} av {cameras} kameraer svarer, {least} må til: uten {missing}", "sjekk strøm og kabler: når nok svarer, blir riggen klar av seg selv; eller gjør klar uten {missing}"],
+  fault_wrong_rate: ["ikke klar: pulsene kommer med {measured} Hz, riggfilen sier rate_hz = {rate_hz}", "still generatoren riktig, så blir riggen klar av seg selv; eller rett [trigger] rate_hz og start på nytt"],
   fault_failed: ["{reason}", "det prøves igjen om {again_in_s} s; gjør klar for å prøve med en gang, slå av for å la være"],
   recording_continued: ["opptaket {recording} fortsetter i {log}: {reason}", "se etter disken før neste opptak"],
   recording_ended: ["opptaket {recording} tok slutt for tidlig: {reason}", "det som ble tatt opp til da, er tatt vare på; se hva opptaket sier"],

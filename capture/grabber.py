@@ -22,6 +22,8 @@ _COUNT_EVERY_NS: Final = NS_PER_S
 _QUIET_NS: Final = NS_PER_S
 _RECEIVE_S: Final = 0.05
 _RETRY_S: Final = 0.5
+#: Commands that were not given are told of so often at most.
+_TELL_WITHHELD_NS: Final = 10 * NS_PER_S
 
 
 class Grabber:
@@ -56,6 +58,7 @@ class Grabber:
         self._frames = self._damaged = 0
         self._told = True  # the camera had reason to send a frame while it was last waited for
         self._last_failure = ""
+        self._withheld, self._tell_withheld_at = 0, HostNs(0)
 
     def run(self) -> None:
         """Fetch frames until told to stop."""
@@ -83,6 +86,8 @@ class Grabber:
         for _ in range(_LATCHES_AT_START):
             self._put_latch(camera.latch())
         camera.start()
+        if self._commands is not None:
+            self._commands.begin()
         reading = ClockReading()
         next_count = last_arrival = host_now()
         while not self._stopping():
@@ -113,6 +118,7 @@ class Grabber:
                 reading.done(now)
             elif now >= next_count:
                 self._count(camera)
+                self._tell_withheld(now)
                 next_count = HostNs(now + _COUNT_EVERY_NS)
 
     def _receive(self, camera: Camera, timeout_s: float) -> Arrival | None:
@@ -133,6 +139,19 @@ class Grabber:
             now = host_now()
             if arrival is not None or now >= end:
                 return arrival
+
+    def _tell_withheld(self, now: HostNs) -> None:
+        """Say that commands would have come too late: their pulses are missed, and no camera or cable is to blame."""
+        if self._commands is None:
+            return
+        self._withheld += self._commands.withheld()
+        if self._withheld and now >= self._tell_withheld_at:
+            text = (
+                f"{self._withheld} pulses had no command, which would have come too late: "
+                "this computer is too slow for them; lower trigger.rate_hz in the rig file, or close other programs"
+            )
+            self._put(RecordKind.NOTICE, text=text)
+            self._withheld, self._tell_withheld_at = 0, HostNs(now + _TELL_WITHHELD_NS)
 
     def _put_arrival(self, arrival: Arrival) -> None:
         if not arrival.whole:

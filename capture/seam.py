@@ -114,6 +114,14 @@ class Commands(Protocol):
         """Whether the camera is to be told now; once for each pulse."""
         ...
 
+    def begin(self) -> None:
+        """Note that the camera has just become ready: no pulse before is due any more."""
+        ...
+
+    def withheld(self) -> int:
+        """How many pulses since the last call had no command, because it would have come too late."""
+        ...
+
 
 #: Connects and configures a camera from scratch.
 #: Raises CameraNotFoundError if it does not answer, CameraError if it refuses.

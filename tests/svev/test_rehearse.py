@@ -68,6 +68,24 @@ def test_one_that_is_interrupted_gives_no_verdict(tmp_path: Path, loopback: Loop
     assert list(out.iterdir()) == []
 
 
+def test_one_that_is_ended_before_its_recording_begins_leaves_nothing_behind(
+    tmp_path: Path, loopback: Loopback
+) -> None:
+    out = tmp_path / "recordings"
+    rig = write_rig(tmp_path, "sim", loopback, scenario="pauses = [[0, 100000]]")
+    rig.write_text(rig.read_text().replace("rate_hz = 30.0", "rate_hz = 30.0\nsettle_s = 60.0"))
+    command = [sys.executable, "-m", "svev", "rehearse", "--rig", str(rig), "--out", str(out), "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as rehearsing:
+        try:
+            wait_until(lambda: any(out.glob(".rehearsal-*")), "the folder", timeout_s=60)
+            rehearsing.send_signal(signal.SIGTERM)
+            said, complaint = rehearsing.communicate(timeout=30)
+        finally:
+            rehearsing.kill()
+    assert (rehearsing.returncode, said) == (130, b""), complaint
+    assert list(out.iterdir()) == []
+
+
 def test_what_is_wrong_is_named_with_what_to_do(
     tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,20 +17,32 @@ class EvenTrain:
         self._origin, self._period_ns = origin, period_ns
         self._latest_ns, self._spread_ns = latest_ns, spread_ns
         self._done: int | None = None
+        self._withheld = 0
 
     def until_next_ns(self, now: HostNs) -> int:
         """See `triggering.sources.seam.CommandTrain.until_next_ns`."""
         return (self._origin - now) % self._period_ns
 
     def is_due(self, now: HostNs) -> bool:
-        """See `triggering.sources.seam.CommandTrain.is_due`; only pulses since the first call are due."""
+        """See `triggering.sources.seam.CommandTrain.is_due`; only pulses since the first call after `begin` are due."""
         pulse, late_ns = divmod(now - self._origin, self._period_ns)
         if self._done is None:
             self._done = pulse
         if pulse == self._done:
             return False
+        in_time = late_ns <= self._latest_ns
+        self._withheld += pulse - self._done - in_time
         self._done = pulse
-        return late_ns <= self._latest_ns
+        return in_time
+
+    def begin(self) -> None:
+        """See `triggering.sources.seam.CommandTrain.begin`."""
+        self._done, self._withheld = None, 0
+
+    def withheld(self) -> int:
+        """See `triggering.sources.seam.CommandTrain.withheld`."""
+        withheld, self._withheld = self._withheld, 0
+        return withheld
 
     def exposes(self, time: HostNs, within_ns: float) -> bool:
         """See `triggering.sources.seam.CommandTrain.exposes`."""

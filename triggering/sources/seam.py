@@ -23,6 +23,14 @@ class CommandTrain(Protocol):
         """
         ...
 
+    def begin(self) -> None:
+        """Note that the camera has just become ready, or all are: no pulse before is due any more."""
+        ...
+
+    def withheld(self) -> int:
+        """How many pulses since the last call had no command, because it would have come too late."""
+        ...
+
     def exposes(self, time: HostNs, within_ns: float) -> bool:
         """Whether a camera that was told in time can have exposed at `time`.
 

@@ -17,7 +17,10 @@ class SoftwarePulses:
     """
 
     set_up_only = True
-    advice = "commands or frames come too late; lower trigger.rate_hz in the rig file, and close other programs"
+    advice = (
+        "commands or frames come too late, or the cameras stamp their frames at the end of a long exposure; lower "
+        "trigger.rate_hz or exposure_us in the rig file, and close other programs"
+    )
 
     def __init__(self, settings: SoftwareTrigger) -> None:
         self._settings = settings

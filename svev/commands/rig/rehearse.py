@@ -1,5 +1,8 @@
 """`svev rehearse`: some seconds through the whole chain to the real disk, judged and deleted."""
 
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -39,12 +42,22 @@ def rehearse_command(
     """
     settings = load_rig(rig)
     check_publication(settings.network)
-    done = rehearse(
-        settings, rig.read_text(encoding="utf-8"), out or settings.recorder.directory, seconds, aside, console.progress
-    )
+    folder = out or settings.recorder.directory
+    with _terminated_as_interrupted():
+        done = rehearse(settings, rig.read_text(encoding="utf-8"), folder, seconds, aside, console.progress)
     if as_json:
         console.print_json(done.to_json() | {"counts": counts_of(done.findings)})
     else:
         print_findings(sorted(done.findings, key=lambda finding: _TOPICS.index(finding.topic)))
         console.say(done.verdict)
     end_with(done.findings)
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Within, SIGTERM ends what is done as Ctrl-C does, at any time, so that what was recorded is cleared away."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -19,6 +19,7 @@ from tests.capture.rigs import SCENARIO, make_rig
 from tests.capture.station import Station
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+from triggering.sources.even_train import EvenTrain
 from triggering.sources.software import SoftwarePulses
 
 _FRAMES = 12
@@ -88,6 +89,34 @@ class _FewCommands:
         del now
         self.left -= 1
         return self.left >= 0
+
+    def begin(self) -> None:
+        pass
+
+    def withheld(self) -> int:
+        return 0
+
+
+class _LateCommands(EvenTrain):
+    """Commands of a grabber that wakes up two tenths of the period after most pulses."""
+
+    def until_next_ns(self, now: HostNs) -> int:
+        return super().until_next_ns(now) + 20_000_000
+
+
+def test_commands_that_come_too_late_are_told_of(tmp_path: Path, loopback: Loopback) -> None:
+    rig = make_rig(tmp_path, "aravis", loopback, names=["K2"], source="software", rate_hz=10.0)
+    trigger = rig.trigger
+    assert isinstance(trigger, SoftwareTrigger)
+    commands = _LateCommands(host_now(), trigger.period_ns, trigger.latest_ns, trigger.latest_ns)
+
+    def opened(ring: CameraRing) -> AravisCamera:
+        return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)
+
+    with _camera(rig) as ring, Station(opened, ring, commands) as station:
+        station.await_records(RecordKind.NOTICE, 1)
+    (notice,) = [record.text for record in station.records if record.kind is RecordKind.NOTICE]
+    assert "pulses had no command, which would have come too late: this computer is too slow for them" in notice
 
 
 def test_a_camera_that_was_not_told_to_expose_is_not_silent(tmp_path: Path, loopback: Loopback) -> None:

@@ -23,7 +23,9 @@ from rig.tag import CameraTag, TripletTag
 from rig.transport.messages import CameraNews
 
 #: News after which numbers and clock of a camera prove nothing about the frames before it.
-_BREAKS: Final = frozenset({CameraNews.CONNECTED.value, CameraNews.SILENT.value, CameraNews.GONE.value})
+_BREAKS: Final = frozenset(
+    {CameraNews.CONNECTED.value, CameraNews.SILENT.value, CameraNews.GONE.value, FrameStatus.ABSENT.value}
+)
 #: 16-bit block ids run from 1 to this and skip 0.
 _IDS_16_BIT: Final = 65535
 #: The rate of a camera's clock is known from frames that are at least so far apart.

@@ -34,8 +34,13 @@ def apply_extent(metadata: Mapping[str, Mapping[str, str]], ledger: Ledger) -> N
         ledger: of the log.
     """
     ledger.follows(last_before(metadata))
+    ledger.lasted(*times_of(metadata), _period_ns(metadata.get(RIG_METADATA, {})))
+
+
+def times_of(metadata: Mapping[str, Mapping[str, str]]) -> tuple[UtcNs | None, UtcNs | None]:
+    """When a recording began and ended, UTC, as its log says; None where it does not."""
     fields = metadata.get(RECORDING_METADATA, {})
-    ledger.lasted(_time(fields, "begin_ns"), _time(fields, "end_ns"), _period_ns(metadata.get(RIG_METADATA, {})))
+    return _time(fields, "begin_ns"), _time(fields, "end_ns")
 
 
 def forgotten_s(metadata: Mapping[str, Mapping[str, str]]) -> float:

@@ -1,5 +1,6 @@
 """Says in a moment what a log holds: reads its tags and events, no pixels."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import tag_of
 from rig.tag import TripletTag
-from rig.topics import RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
+from rig.topics import MERGE_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
 from rig.transport import wire
 from rig.utc_clock import UtcState
 from triggering.ledger import Ledger, runs_from_text
@@ -33,6 +34,7 @@ class LogInfo:
         session: fields of the last session record, with the changes that were made after the recording.
         rig: fields of the last rig record.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
+        merged: of a log that was made of two: fields that say which, and how their clocks differed; empty otherwise.
         trouble: what went wrong with the disk while the log was written, in one line; empty if nothing.
         forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
         messages: number of messages per topic.
@@ -50,6 +52,7 @@ class LogInfo:
     session: dict[str, str]
     rig: dict[str, str]
     known_lost: tuple[tuple[int, int], ...]
+    merged: dict[str, str]
     trouble: str
     forgotten_s: float
     messages: dict[str, int]
@@ -103,6 +106,7 @@ class LogInfo:
             "session": self.session,
             "rig": self.rig,
             "utc": None if self.utc is None else asdict(self.utc),
+            "merged": self.merged,
             "trouble": self.trouble,
             "messages": self.messages,
             "library": self.library,
@@ -142,7 +146,7 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
         session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
         return LogInfo(
             path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
-            reader.metadata.get(RIG_METADATA, {}), known_lost(reader),
+            reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
             "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata), messages,
             reader.library,
         )  # fmt: skip
@@ -151,3 +155,12 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
 def known_lost(reader: LogReader) -> tuple[tuple[int, int], ...]:
     """Runs of pulses of which a log, read to its end, says that they were lost when it was recovered."""
     return tuple(runs_from_text(reader.metadata.get(RECOVERY_METADATA, {}).get("lost_pulses", "")))
+
+
+def merged_in_words(merged: Mapping[str, str]) -> str:
+    """What a log says of the logs that it was merged from, in one line."""
+    shown = {key: merged.get(key, "?") for key in ("source_1", "source_2", "common", "offset_ms", "offset_sigma_us")}
+    return (
+        "merged from {source_1} and {source_2}: {common} pulses are in both; the clock of the second was put on by "
+        "{offset_ms} ms +- {offset_sigma_us} us"
+    ).format(**shown)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from recorder.checking.verify import VerifyReport, verify
-from recorder.reading.info import LogInfo, info
+from recorder.reading.info import LogInfo, info, merged_in_words
 from recorder.recovering.recover import RecoverReport, recover
 from rig.clocks import NS_PER_S
 from rig.errors import LedgerDiffersError, LogDamagedError, LogTruncatedError
@@ -146,8 +146,8 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
         yield "ledger", f"{camera} " + ", ".join(f"{count} {state}" for state, count in states.items())
     if found.missing_pulses:
         yield "no tag", f"{found.missing_pulses} pulses"
-    if found.trouble:
-        yield "trouble", found.trouble
+    told = ("merged", merged_in_words(found.merged) if found.merged else ""), ("trouble", found.trouble)
+    yield from ((name, text) for name, text in told if text)
     for pause in ledger.pauses()[:_LINES_MAX]:
         yield "pause", pause.in_words()
     if spread is not None:

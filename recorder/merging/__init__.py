@@ -1,0 +1,1 @@
+"""Joins logs that several computers recorded of the same pulses."""

@@ -98,6 +98,10 @@ class UnknownExportError(SvevError):
     """The service has no such export, or has removed it."""
 
 
+class UnknownCameraError(SvevError):
+    """The rig has no such camera."""
+
+
 class StateForbidsError(SvevError):
     """The service refuses the call in its present state; the message says what to do instead."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from prometheus_client.metrics_core import Metric
 
+from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.looking import Moment, Note, VoiceNote
@@ -36,6 +37,23 @@ class Preview:
     pixels: NDArray[np.uint8]
     columns: tuple[tuple[int, int], ...]
     statuses: tuple[FrameStatus, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CloseUp:
+    """The newest frame of one camera, for setting it up.
+
+    Attributes:
+        pulse: number of its pulse since the recorder was started.
+        status: what became of the frame.
+        pixels: (rows, columns), uint8, or blue, green, red, (rows, columns, 3); the caller owns it.
+        sharp: where it is in focus, (rows, columns); None: nobody asked.
+    """
+
+    pulse: RigPulse
+    status: FrameStatus
+    pixels: NDArray[np.uint8]
+    sharp: NDArray[np.bool_] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,6 +326,14 @@ class RigService(Protocol):
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
         """Wait for a triplet of another pulse than `newer_than`; None if none came in time."""
+        ...
+
+    def camera_aids(self, camera: str, newer_than: RigPulse, timeout_s: float) -> CameraAids | None:
+        """How sharp and how bright the picture of a camera is; waits as `preview`. UnknownCameraError: no such one."""
+        ...
+
+    def close_up(self, camera: str, newer_than: RigPulse, timeout_s: float, *, peaking: bool) -> CloseUp | None:
+        """The whole picture of a camera; waits as `preview`. UnknownCameraError: no such one."""
         ...
 
     def events(self, after: int) -> list[Event]:

@@ -13,17 +13,25 @@ from prometheus_client.metrics_core import Metric
 
 from recorder.catalogue.folder import Catalogue
 from rig import events
+from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
-from rig.errors import BadInputError, RehearsingError, StateForbidsError, SvevError, UnknownRecordingError
+from rig.errors import (
+    BadInputError,
+    RehearsingError,
+    StateForbidsError,
+    SvevError,
+    UnknownCameraError,
+    UnknownRecordingError,
+)
 from rig.phrase import Phrase, phrase
 from rig.picture import shown
-from rig.pixels import MONO8
 from rig.pulse import RigPulse
-from rig.transport.preview import PreviewSlot
+from rig.transport.preview import PreviewImage, PreviewSlot
+from service.aids import aids_of, close_up_of, shown_as
 from service.automatic.watch import MotionWatch
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
@@ -31,7 +39,7 @@ from service.recordings.archive import Archive, as_recording
 from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
 from service.rehearsals import Rehearser
-from service.seam import Preview
+from service.seam import CloseUp, Preview
 from service.status.measurements import measurements
 from service.status.statements import FORBIDDEN, rehearsing
 from service.supervision.commands import at_once
@@ -235,16 +243,39 @@ class Service(Archive):
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
         """Wait for a triplet of another pulse than `newer_than`; None if none came in time."""
+        image = self._awaited(newer_than, timeout_s)
+        if image is None:
+            return None
+        rig = self._supervisor.rig
+        return Preview(image.pulse, shown(image.pixels, shown_as(rig), coloured=True), rig.columns(), image.statuses)
+
+    def camera_aids(self, camera: str, newer_than: RigPulse, timeout_s: float) -> CameraAids | None:
+        """Wait as `preview` does; how sharp and how bright the picture of a camera is."""
+        index = self._index(camera)
+        image = self._awaited(newer_than, timeout_s)
+        return None if image is None else aids_of(image, self._supervisor.rig, index)
+
+    def close_up(self, camera: str, newer_than: RigPulse, timeout_s: float, *, peaking: bool) -> CloseUp | None:
+        """Wait as `preview` does; the whole picture of a camera."""
+        index = self._index(camera)
+        image = self._awaited(newer_than, timeout_s)
+        return None if image is None else close_up_of(image, self._supervisor.rig, index, peaking=peaking)
+
+    def _index(self, camera: str) -> int:
+        names = [each.name for each in self._supervisor.rig.cameras]
+        if camera not in names:
+            raise UnknownCameraError(f"no camera {camera}: the rig has {', '.join(names)}")
+        return names.index(camera)
+
+    def _awaited(self, newer_than: RigPulse, timeout_s: float) -> PreviewImage | None:
+        """Wait for the image of another pulse than `newer_than`; None if none came in time."""
         deadline = time.monotonic() + timeout_s
         while True:
             self._slot.want(_LEASE_S)
             if self.status().state is not State.IDLE and self._slot.newest() not in {0, newer_than}:
                 image = self._slot.read()
                 if image is not None and image.pulse != newer_than:
-                    rig = self._supervisor.rig
-                    # Deeper pixels have been made eight bits by the recorder.
-                    pixels = shown(image.pixels, rig.pixels if rig.pixels.is_mosaic else MONO8, coloured=True)
-                    return Preview(image.pulse, pixels, rig.columns(), image.statuses)
+                    return image
             if time.monotonic() > deadline or self._closing.wait(_POLL_S):
                 return None
 

@@ -18,6 +18,7 @@ from rig.errors import (
     StateForbidsError,
     StorageError,
     SvevError,
+    UnknownCameraError,
     UnknownExportError,
     UnknownLineError,
     UnknownRecordingError,
@@ -45,6 +46,7 @@ MEDIA_TYPE = "application/problem+json"
 _STATUSES: tuple[tuple[type[SvevError], HTTPStatus], ...] = (
     (UnknownRecordingError, HTTPStatus.NOT_FOUND),
     (UnknownExportError, HTTPStatus.NOT_FOUND),
+    (UnknownCameraError, HTTPStatus.NOT_FOUND),
     (UnknownLineError, HTTPStatus.NOT_FOUND),
     (StateForbidsError, HTTPStatus.CONFLICT),
     (BadInputError, HTTPStatus.UNPROCESSABLE_ENTITY),

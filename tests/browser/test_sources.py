@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import jump, recordings, rehearsal, start_list, statement, status
+from rig.api import aids, jump, recordings, rehearsal, start_list, statement, status
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"
@@ -200,7 +200,7 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    rooms = (start_list, recordings, rehearsal, statement, jump, status)
+    rooms = (aids, start_list, recordings, rehearsal, statement, jump, status)
     model: type[Any] = next(getattr(room, name) for room in rooms if hasattr(room, name))
     fields = (
         list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]

@@ -107,6 +107,12 @@ def test_the_panel_shows_colours(tmp_path: Path, loopback: Loopback) -> None:
             httpx.get(address, timeout=60, trust_env=False).raise_for_status().content
             for address in (f"{service.url}/api/preview.jpg", f"{path}.jpg", f"{path}.png")
         ]
+        aids = service.get("/api/cameras/K3/aids")
+        close_up = httpx.get(f"{service.url}/api/cameras/K3/picture.jpg?peaking=true", timeout=60, trust_env=False)
+    assert (aids["status"], sum(aids["histogram"]), aids["focus"] > 0) == ("ok", 48 * 300, True)
+    picture = cv2.imdecode(np.frombuffer(close_up.content, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert picture is not None
+    assert picture.shape == (300, 48, 3)
     for data in pictures:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
         assert picture is not None

@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 
+from analysis.images.aids import exposure, focus, sharp
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
+from rig.api.aids import BINS, CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.jump import LastJump
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
@@ -38,14 +41,14 @@ from rig.api.status import (
     Status,
 )
 from rig.clocks import NS_PER_S, UtcNs
-from rig.errors import StateForbidsError, UnknownRecordingError
+from rig.errors import StateForbidsError, UnknownCameraError, UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
-from service.seam import Preview
+from service.seam import CloseUp, Preview
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
 from svev.doctor.finding import Topic, passed, warning
@@ -71,6 +74,7 @@ class MemoryService(Archive):
         fault: what it says in a fault, set by tests.
         automatic: whether recordings begin by themselves, set by tests.
         rehearsal: how far a rehearsal is, and `rehearsed`, what the last one showed; set by tests.
+        through_the_lens: what the lens makes of the picture of a camera, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -87,6 +91,7 @@ class MemoryService(Archive):
         self.rehearsal: RehearsalProgress | None = None
         self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
+        self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
         self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
         self._lock = threading.RLock()
@@ -236,6 +241,26 @@ class MemoryService(Archive):
         pulse = self._pulse()
         pixels = np.random.default_rng(pulse).integers(0, 256, SHAPE, dtype=np.uint8)
         return Preview(pulse, pixels, COLUMNS, ALL_OK)
+
+    def camera_aids(self, camera: str, newer_than: RigPulse, timeout_s: float) -> CameraAids | None:
+        frame = self.close_up(camera, newer_than, timeout_s, peaking=False)
+        if frame is None:
+            return None
+        light = exposure(frame.pixels, BINS)
+        return CameraAids(
+            camera=camera, pulse=frame.pulse, status=frame.status, focus=100 * focus(frame.pixels, mosaic=False),
+            mean=100 * light.mean, clipped=100 * light.clipped, black=100 * light.black, histogram=light.histogram,
+        )  # fmt: skip
+
+    def close_up(self, camera: str, newer_than: RigPulse, timeout_s: float, *, peaking: bool) -> CloseUp | None:
+        if camera not in CAMERAS:
+            raise UnknownCameraError(f"no camera {camera}: the rig has {', '.join(CAMERAS)}")
+        found = self.preview(newer_than, timeout_s)
+        if found is None:
+            return None
+        left, right = COLUMNS[CAMERAS.index(camera)]
+        pixels = np.ascontiguousarray(self.through_the_lens(found.pixels[:, left:right]))
+        return CloseUp(found.pulse, FrameStatus.OK, pixels, sharp(pixels, mosaic=False) if peaking else None)
 
     def events(self, after: int) -> list[Event]:
         with self._lock:

@@ -16,6 +16,7 @@ from webpanel.door.access import Access
 #: The calls of the contract, and those that the page needs beyond it.
 CALLS = {
     "POST /api/mark", "PUT /api/automatic",
+    "GET /api/cameras/{camera}/aids", "GET /api/cameras/{camera}/picture.jpg",
     "GET /api/rehearsal", "POST /api/rehearsal", "DELETE /api/rehearsal",
     "GET /api/status", "POST /api/arm", "POST /api/disarm", "GET /api/rig", "GET /api/doctor", "GET /api/events",
     "GET /api/preview.jpg", "GET /api/preview.mjpg", "GET /api/recordings", "POST /api/recordings",
@@ -139,7 +140,7 @@ def test_chapters_and_server_are_described(schema: dict[str, Any]) -> None:
 def test_head_answers_wherever_get_does(panel: Panel, service: MemoryService) -> None:
     service.arm()
     write_recording(service.catalogue.directory, "jump")
-    values = {"recording_id": "jump", "pulse": "1", "export_id": "1", "line": "1", "number": "1"}
+    values = {"recording_id": "jump", "pulse": "1", "export_id": "1", "line": "1", "number": "1", "camera": "K1"}
     with panel.client() as client:
         for name, _ in operations(client.get("/openapi.json").json()):
             path = name.partition(" ")[2].format(**values)

@@ -20,6 +20,7 @@ import * as recordings from "./recordings/recordings.js";
 import { connect, startBanner } from "./shared/connection.js";
 import { startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
+import { startAim } from "./system/aim.js";
 import * as doctor from "./system/doctor.js";
 import { startLog } from "./system/log.js";
 import * as rehearsal from "./system/rehearsal.js";
@@ -56,7 +57,7 @@ function entered({ view, id }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startAim, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

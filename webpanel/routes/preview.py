@@ -1,4 +1,7 @@
-"""Routes that show the rig live: the newest triplet as JPEG, single or as a stream, encoded once for all viewers."""
+"""Routes that show the rig live: the newest triplet as JPEG, single or as a stream, encoded once for all viewers.
+
+And single cameras, for those who set them up: whole pictures, and figures of focus and exposure.
+"""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -10,13 +13,14 @@ import anyio
 import cv2
 import numpy as np
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
 
+from rig.api.aids import CameraAids
 from rig.errors import SvevError
 from rig.pulse import RigPulse
-from service.seam import RigService
+from service.seam import CloseUp, RigService
 from webpanel.door.streams import OpenStreams, Streams
 from webpanel.problems import ProblemError
 from webpanel.routes.common import Responses, jpeg_answer, refusals, strict_router
@@ -32,6 +36,12 @@ _BOUNDARY = "svev-triplet"
 _PATIENCE_S = 30
 _CONTENT = {"multipart/x-mixed-replace": {"schema": {"type": "string", "format": "binary"}}}
 _NOTHING_NEW: Responses = {204: {"description": "No other pulse has come within a second."}}
+_Camera = Annotated[str, Path(pattern="^[A-Za-z][A-Za-z0-9_-]{0,15}$", description="name of a camera", examples=["K1"])]
+_After = Annotated[int, Query(ge=-1, lt=2**63, description="pulse seen last; -1: none yet")]
+#: Where a picture is in focus it is painted so (blue, green, red): no snow, sky or suit has this colour.
+_PEAKING_COLOUR = (255, 0, 255)
+#: Of those who set up cameras so many are served at once; they must not keep others from stopping a recording.
+_SETTING_UP = 4
 _STREAM: Responses = {200: {"description": "Pictures, one after the other.", "content": _CONTENT}}
 
 
@@ -165,7 +175,60 @@ def preview_router(service: RigService, streams: OpenStreams) -> APIRouter:
             _parts(feed, streams.previews), media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}"
         )
 
+    at_once = anyio.CapacityLimiter(_SETTING_UP)
+
+    def wait_for_aids(camera: str, after: int) -> CameraAids | None:
+        return service.camera_aids(camera, RigPulse(after), _WAIT_S)
+
+    def wait_for_picture(camera: str, after: int, peaking: bool) -> tuple[CloseUp, bytes] | None:
+        found = service.close_up(camera, RigPulse(after), _WAIT_S, peaking=peaking)
+        return None if found is None else (found, to_jpeg(_painted(found)))
+
+    @router.get(
+        "/cameras/{camera}/aids",
+        response_model=CameraAids,
+        dependencies=[Depends(streams.pictures.place)],
+        responses=_NOTHING_NEW | refusals(404, 503),
+    )
+    async def get_camera_aids(camera: _Camera, after: _After = -1) -> CameraAids | Response:
+        """How sharp and how well exposed the newest frame of a camera is, for turning its lens.
+
+        Waits up to a second for another pulse than `after`; 204 if none has come. Made of what the preview shows: of
+        pixels of 10 and 12 bits the highest eight.
+        """
+        found = await run_sync(wait_for_aids, camera, after, limiter=at_once)
+        return Response(status_code=HTTPStatus.NO_CONTENT) if found is None else found
+
+    @router.get(
+        "/cameras/{camera}/picture.jpg",
+        response_class=Response,
+        dependencies=[Depends(streams.pictures.place)],
+        responses=jpeg_answer("The frame.") | _NOTHING_NEW | refusals(404, 503),
+    )
+    async def get_camera_picture(
+        camera: _Camera,
+        after: _After = -1,
+        peaking: Annotated[bool, Query(description="paint what is in focus magenta")] = False,
+    ) -> Response:
+        """The newest frame of a camera in its full size. Waits as `/cameras/{camera}/aids` does."""
+        found = await run_sync(wait_for_picture, camera, after, peaking, limiter=at_once)
+        if found is None:
+            return Response(status_code=HTTPStatus.NO_CONTENT)
+        frame, jpeg = found
+        headers = {"X-Svev-Pulse": str(frame.pulse), "X-Svev-Statuses": frame.status.value}
+        return Response(jpeg, media_type="image/jpeg", headers=headers)
+
     return router
+
+
+def _painted(frame: CloseUp) -> NDArray[np.uint8]:
+    """The picture; where it is in focus, painted."""
+    if frame.sharp is None:
+        return frame.pixels
+    coloured = frame.pixels if frame.pixels.ndim > 2 else cv2.cvtColor(frame.pixels, cv2.COLOR_GRAY2BGR)
+    picture = np.array(coloured, np.uint8)
+    picture[frame.sharp] = _PEAKING_COLOUR
+    return picture
 
 
 async def _parts(feed: PreviewFeed, streams: Streams) -> AsyncIterator[bytes]:

@@ -1,4 +1,4 @@
-/** English words of the view that checks the rig. Every key stands in nb-check.js too (a test looks). */
+/** English words of the views that check and set up the rig. Every key stands in nb-check.js too (a test looks). */
 export const check = {
   "rehearsal.title": "Rehearsal",
   "rehearsal.lead": "Records for five seconds with everything that a jump needs, reads it back, says whether it will do, and deletes it. The cameras must be off.",
@@ -21,4 +21,24 @@ export const check = {
   "rehearsal.spread": "Spread within a pulse",
   "rehearsal.pulses": "Pulses, complete",
   "rehearsal.everything": "Everything that was examined",
+
+  "aim.open": "Focus and exposure",
+  "aim.title": "Focus",
+  "aim.back": "Back to the live view",
+  "aim.when_armed": "Arm the rig: then the pictures come.",
+  "aim.no_pulses": "No pulses arrive: no pictures.",
+  "aim.missing": "This camera's frame did not come.",
+  "aim.peaking": "Paint what is in focus",
+  "aim.picture": "Picture of {camera}",
+  "aim.focus": "Turn the lens until this is largest",
+  "aim.bar": "Sharpness, percent of the best",
+  "aim.share": "{percent} % of the best",
+  "aim.again": "Forget the best",
+  "aim.hint": "Gradient of the brightness, percent per pixel. Only to be compared with itself: point the camera, let nothing move, then turn.",
+  "aim.exposure": "Exposure",
+  "aim.dark": "black",
+  "aim.bright": "white",
+  "aim.clipped": "Clipped to white",
+  "aim.black": "Clipped to black",
+  "aim.mean": "Mean brightness",
 };

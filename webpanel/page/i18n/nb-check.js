@@ -1,4 +1,4 @@
-/** Norwegian words of the view that checks the rig. */
+/** Norwegian words of the views that check and set up the rig. */
 export const check = {
   "rehearsal.title": "Generalprøve",
   "rehearsal.lead": "Tar opp i fem sekunder med alt som et hopp trenger, leser det tilbake, sier om det holder, og sletter det. Kameraene må være av.",
@@ -21,4 +21,24 @@ export const check = {
   "rehearsal.spread": "Spredning innen en puls",
   "rehearsal.pulses": "Pulser, fullstendige",
   "rehearsal.everything": "Alt som ble undersøkt",
+
+  "aim.open": "Fokus og eksponering",
+  "aim.title": "Fokus",
+  "aim.back": "Tilbake til direktevisningen",
+  "aim.when_armed": "Gjør riggen klar: da kommer bildene.",
+  "aim.no_pulses": "Det kommer ingen pulser, og derfor ingen bilder.",
+  "aim.missing": "Bildet fra dette kameraet kom ikke.",
+  "aim.peaking": "Fargelegg det som er i fokus",
+  "aim.picture": "Bilde fra {camera}",
+  "aim.focus": "Drei på objektivet til dette er størst",
+  "aim.bar": "Skarphet, prosent av den beste",
+  "aim.share": "{percent} % av det beste",
+  "aim.again": "Glem det beste",
+  "aim.hint": "Lysstyrkens gradient, prosent per piksel. Kan bare sammenlignes med seg selv: sikt inn kameraet, la ingenting bevege seg, og drei så.",
+  "aim.exposure": "Eksponering",
+  "aim.dark": "svart",
+  "aim.bright": "hvitt",
+  "aim.clipped": "Klippet til hvitt",
+  "aim.black": "Klippet til svart",
+  "aim.mean": "Midlere lysstyrke",
 };

@@ -3,7 +3,10 @@
 import { $ } from "./dom.js";
 import { update } from "./store.js";
 
-const VIEWS = ["live", "recordings", "recording", "log", "doctor", "rig"];
+const VIEWS = ["live", "recordings", "recording", "log", "doctor", "aim", "rig"];
+
+/** Views that one comes to from another, whose place in the navigation they share. @type {Record<string, string>} */
+const UNDER = { recording: "recordings", aim: "live" };
 
 /** @typedef {{ view: string, id: string, trash: boolean }} Place */
 
@@ -31,7 +34,7 @@ export function startRouter(entered, leaving) {
   const show = () => {
     const now = place();
     for (const name of VIEWS) $(name).hidden = name !== now.view;
-    const tab = now.view === "recording" ? "recordings" : now.view;
+    const tab = UNDER[now.view] ?? now.view;
     for (const link of document.querySelectorAll(".nav a")) {
       if (link.getAttribute("href") === `#/${tab}`) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");

@@ -1,0 +1,80 @@
+"""The view that sets up a camera: its bar holds the best sharpness, and its figures are those of the camera chosen."""
+
+import cv2
+import httpx
+import numpy as np
+from numpy.typing import NDArray
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import Open
+from tests.browser.test_layout import BROKEN
+from tests.browser.test_page import SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.support.waiting import wait_until
+from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService
+from tests.webpanel.serving import Panel, refused
+
+_MAGENTA = np.array([255, 0, 255])
+_LEFT, _RIGHT = 60, 100
+#: Columns around the edges of the bar that may be painted; a JPEG of colours spreads what is painted.
+_AROUND = 12
+
+
+def lens(spread_px: float, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A black bar before white snow, through a lens that spreads points by so much."""
+    scene = np.full(image.shape, 255, np.uint8)
+    scene[:, _LEFT:_RIGHT] = 40
+    return np.asarray(cv2.GaussianBlur(scene, (0, 0), spread_px), np.uint8)
+
+
+def share(page: Page) -> int:
+    """What the bar says, percent of the best."""
+    return int(page.locator("#aim-bar").get_attribute("aria-valuenow") or 0)
+
+
+def test_the_bar_falls_behind_its_best_when_the_lens_is_turned_too_far(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    page = open_page(f"{panel.url}/#/aim", width=360, height=780, color_scheme="dark")
+    expect(page.locator("#aim-empty")).to_have_text("Arm the rig: then the pictures come.")
+    service.through_the_lens = lambda image: lens(3.0, image)
+    service.arm()
+    wait_until(lambda: share(page) == 100, "the first picture is the best so far", 20, 0.05)
+    first = page.locator("#aim-value").inner_text()
+    service.through_the_lens = lambda image: lens(0.5, image)
+    wait_until(lambda: page.locator("#aim-value").inner_text() > first, "it is sharper", 20, 0.05)
+    service.through_the_lens = lambda image: lens(3.0, image)
+    wait_until(lambda: 40 < share(page) < 70, "it is behind its best", 20, 0.05)
+    expect(page.locator("#aim-focus")).to_have_attribute("data-level", "warning")
+    page.locator("#aim-cameras button").nth(1).click()
+    wait_until(lambda: share(page) == 100, "another camera has its own best", 20, 0.05)
+    page.locator("#aim-cameras button").nth(0).click()
+    wait_until(lambda: 40 < share(page) < 70, "this one has kept its", 20, 0.05)
+    page.locator("#aim-again").click()
+    wait_until(lambda: share(page) == 100, "it is forgotten", 20, 0.05)
+    expect(page.locator("#aim-figures [data-level=warning] dd")).to_contain_text("%")  # the snow is clipped
+    expect(page.locator("#aim-image")).to_have_js_property("naturalWidth", COLUMNS[0][1])
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    assert page.evaluate(BROKEN) == []
+    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+
+
+def test_pictures_are_whole_and_painted_where_they_are_in_focus(client: httpx.Client, service: MemoryService) -> None:
+    service.through_the_lens = lambda image: lens(0.5, image)
+    service.arm()
+    plain = _picture(client.get("/api/cameras/K3/picture.jpg"))
+    assert plain.shape[:2] == (SHAPE[0], COLUMNS[2][1] - COLUMNS[2][0])
+    painted = _picture(client.get("/api/cameras/K3/picture.jpg", params={"peaking": True}))
+    marked = np.flatnonzero((np.abs(painted - _MAGENTA).sum(axis=2) < 100).any(axis=0))
+    distance = np.minimum(np.abs(marked - _LEFT), np.abs(marked - _RIGHT))
+    assert (marked.size > 0, distance.max() < _AROUND) == (True, True)
+    aids = client.get("/api/cameras/K3/aids").json()
+    assert (aids["status"], sum(aids["histogram"])) == ("ok", plain.shape[0] * plain.shape[1])
+    assert refused(client.get("/api/cameras/K9/aids"), 404).code == "unknown_camera"
+    service.disarm()
+    assert client.get("/api/cameras/K3/aids").status_code == 204
+
+
+def _picture(answer: httpx.Response) -> NDArray[np.int64]:
+    assert answer.status_code == 200, answer.text
+    image = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
+    return np.asarray(image, np.int64)

@@ -106,7 +106,8 @@ def fit_bars(region: Region, starts: Sequence[Sequence[Bar]], brighter: bool, po
         fits[-1].round()
         if fits[0].misfit > _HOPELESS:
             return []
-        fits[-1].round()
+        if len(starts) > 1:  # to be compared
+            fits[-1].round()
     unit = max(1.0, min(fit.misfit for fit in fits)) ** 2
     price = unit * OF_BAR * float(np.log(len(few)))
     chosen = min(fits, key=lambda fit: fit.cost + price * fit.count)

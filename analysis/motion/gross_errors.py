@@ -13,16 +13,21 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtri
 
+from analysis.measurements.model import POINTS, SIDES
 from analysis.motion.bundle import MEDIAN, Adjusted, rows_by_shared, settled
 from analysis.motion.channels import CHANNELS
 from analysis.motion.lasting import LASTING_S, pulls, runs
+from analysis.motion.observations import GROUPS
 from analysis.motion.prior import STATE
 from rig.arrays import Flags, Floats, Integers
 
-#: Probability that a jump without gross errors loses any measurement.
+#: Probability that a jump without gross errors loses any measurement that others of the pulse control.
 FALSE_REMOVAL_P: Final = 0.05
+_ALONE_P: Final = 0.01  # that a right ray which is alone is lost
 _SIGNIFICANT: Final = 3.1  # sigmas; right ones are held for too small with a probability of 0.001
 _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
+_PSEUDO: Final = 10.0  #: observations that a factor of 1 counts as
+_POINTS, _SKIS = slice(0, len(POINTS)), slice(len(POINTS), len(GROUPS))
 _RIVAL_P: Final = 1e-3  # a suspect that is not that unlikely beside another one has a rival in it
 
 
@@ -43,27 +48,50 @@ def fitting_sigmas(adjusted: Adjusted, most: int) -> tuple[Adjusted, Floats]:
         if (step == 1.0).all():
             break
         factors *= step
-        model = replace(adjusted.model, observed=adjusted.model.observed.scaled(step))
+        model = replace(adjusted.model, observed=adjusted.model.observed.scaled(np.stack((step, step), axis=-1)))
         adjusted = settled(replace(adjusted, model=model), 2)
     return adjusted, factors
+
+
+def with_factors(adjusted: Adjusted) -> Adjusted:
+    """The bundle with sigmas as large as its residuals, gross errors left out, say: smaller ones, too.
+
+    What an image tells of its own sigma is right in proportion, but how much a model of grey values errs depends on the
+    hill. Variance components: the square sum of the residuals over their redundancy, for all points, and apart from
+    each other for shifts and turns of the axes of skis, since what both edges do in common shifts an axis and does not
+    turn it (Helmert's estimator, as in `prior`).
+    """
+    observed, used = adjusted.model.observed, adjusted.used
+    turned = observed.to_mean_and_difference()
+    free = np.eye(2) - turned @ _of_adjusted(adjusted) @ turned.swapaxes(-1, -2)
+    square = np.where(used[..., None], (turned @ adjusted.equations.v[..., None])[..., 0] ** 2, 0.0).sum(axis=(0, 1))
+    redundancy = np.where(used[..., None], np.diagonal(free, axis1=-2, axis2=-1), 0.0).sum(axis=(0, 1))
+    of_points = (square[_POINTS].sum() + _PSEUDO) / (redundancy[_POINTS].sum() + _PSEUDO)
+    of_skis = (square[_SKIS].sum(axis=0) + _PSEUDO) / (redundancy[_SKIS].sum(axis=0) + _PSEUDO)
+    factors = np.sqrt(np.concatenate((np.full((len(POINTS), 2), of_points), np.tile(of_skis, (len(SIDES), 1)))))
+    model = replace(adjusted.model, observed=observed.scaled(factors))
+    return settled(replace(adjusted, model=model), 2)
 
 
 def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
     """Leave out measurements that contradict all others, the worst around first; take back those that no longer do.
 
     Where two of a point's rays had to go and a single one is left, nothing tells that it is the right one: it goes too.
-    Errors that last are looked for when single ones are gone; what they take is not taken back.
+    A point that one camera alone sees in a pulse is judged more severely: nothing else of that pulse controls it, so a
+    wrong one does harm, and a right one is of little use. Errors that last are looked for when single ones are gone;
+    what they take is not taken back.
     """
     seen = adjusted.model.observed.seen
-    limit = float(chdtri(2, FALSE_REMOVAL_P / max(int(seen.sum()), 1)))
+    alone = (seen.sum(axis=1, keepdims=True) == 1) & (np.arange(len(GROUPS)) < len(POINTS))
+    limit = chdtri(2, np.where(alone, _ALONE_P, FALSE_REMOVAL_P / max(int(seen.sum()), 1)))
     doubtful = np.zeros(seen.shape, bool)
     for _ in range(most):
-        tests = statistics(adjusted).test
-        worst = np.where(adjusted.used, tests, 0.0).max(axis=(1, 2))
+        excess = statistics(adjusted).test / limit
+        worst = np.where(adjusted.used, excess, 0.0).max(axis=(1, 2))
         around = np.lib.stride_tricks.sliding_window_view(np.pad(worst, 1), 3).max(axis=1)
-        leave = adjusted.used & (tests > limit) & (tests >= around[:, None, None])
+        leave = adjusted.used & (excess > 1) & (excess >= around[:, None, None])
         kept = adjusted.used & ~leave
-        used = kept | (seen & ~adjusted.used & (tests < limit))
+        used = kept | (seen & ~adjusted.used & (excess < 1))
         lone = (used.sum(axis=1, keepdims=True) == 1) & ((seen & ~used).sum(axis=1, keepdims=True) >= 2)
         doubtful |= lone
         used &= ~doubtful
@@ -94,6 +122,17 @@ class Statistics:
 
 def statistics(adjusted: Adjusted) -> Statistics:
     """Residuals, redundancies and tests of all groups."""
+    spread = _of_adjusted(adjusted)
+    v, unit = adjusted.equations.v, np.eye(2)
+    used = adjusted.used[..., None, None]
+    free = np.where(used, unit * (1 + _FLOOR) - spread, unit + spread)
+    test = np.einsum("...a,...ab,...b->...", v, np.linalg.inv(free), v)
+    redundancy = np.where(adjusted.used, 2.0 - np.trace(spread, axis1=-2, axis2=-1), 0.0)
+    return Statistics((v**2).sum(axis=-1), redundancy, test)
+
+
+def _of_adjusted(adjusted: Adjusted) -> Floats:
+    """Covariances (n, m, 6, 2, 2) of the adjusted observations, divided by those of the measurements."""
     solution, instants = adjusted.solution, adjusted.instants
     rows, border = adjusted.equations.by_channels, rows_by_shared(adjusted)
     n, m = adjusted.used.shape[:2]
@@ -109,12 +148,7 @@ def statistics(adjusted: Adjusted) -> Statistics:
         whole += half + half.transpose(0, 3, 4, 1, 2)
         whole += (shared @ solution.shared_covariance @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
         spread[:, i] = np.einsum("ngagb->ngab", whole)
-    v, unit = adjusted.equations.v, np.eye(2)
-    used = adjusted.used[..., None, None]
-    free = np.where(used, unit * (1 + _FLOOR) - spread, unit + spread)
-    test = np.einsum("...a,...ab,...b->...", v, np.linalg.inv(free), v)
-    redundancy = np.where(adjusted.used, 2.0 - np.trace(spread, axis1=-2, axis2=-1), 0.0)
-    return Statistics((v**2).sum(axis=-1), redundancy, test)
+    return spread
 
 
 def lasting_errors(adjusted: Adjusted) -> Flags:

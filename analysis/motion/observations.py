@@ -22,6 +22,7 @@ from rig.clocks import NS_PER_S
 GROUPS: Final = (*POINTS, *SIDES)
 _POINTS = len(POINTS)
 _BINDINGS = slice(2, 4)  # P3 and P4 lie on the right and on the left ski
+_MEAN_AND_DIFFERENCE: Final = np.sqrt(0.5) * np.array(((1.0, 1.0), (1.0, -1.0)))
 _SCATTER_P = 1e-3  # points of a ski that scatter more about their line than with this probability: sigma grows
 _FOOT_STEPS = 3  # iterations for the point of a ski that is nearest to a measured one
 _FARTHEST_M = 5.0  # along a ski; its points are within half its length of the binding
@@ -63,9 +64,24 @@ class Observations:
         }
         return replace(self, **arrays)
 
+    def to_mean_and_difference(self) -> Floats:
+        """Rotations (n, m, 6, 2, 2) of whitened observations to their normalized mean and difference.
+
+        These are independent where two observations have equal variances, as those of a ski have.
+        """
+        white = np.where(self.seen[..., None, None], self.whitener, np.eye(2))
+        apart = _MEAN_AND_DIFFERENCE @ np.linalg.inv(white)
+        return np.asarray(apart / np.linalg.norm(apart, axis=-1, keepdims=True))
+
     def scaled(self, factors: Floats) -> "Observations":
-        """The same with the standard deviations of each kind of group (6,) times a factor."""
-        return replace(self, whitener=self.whitener / factors[:, None, None], lasting=self.lasting * factors)
+        """The same with other standard deviations.
+
+        Args:
+            factors: (6, 2) of each kind of group, for the mean and for the difference of its two observations: by how
+                much a ski's axis is shifted, and turned.
+        """
+        inverse = np.einsum("ab,gb,cb->gac", _MEAN_AND_DIFFERENCE, 1 / factors, _MEAN_AND_DIFFERENCE)
+        return replace(self, whitener=self.whitener @ inverse, lasting=self.lasting * factors[:, 0])
 
 
 def observations(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Observations:

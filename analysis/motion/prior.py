@@ -83,11 +83,14 @@ class Prior:
         return weight.ravel()
 
 
-def prior(times: Floats, unit: float, takeoff: float | None, density: Floats) -> Prior:
-    """The prior between pulses at `times` (n,), s, with the take-off at `takeoff`; without one everything is flight."""
+def prior(times: Floats, unit: float, takeoff: float | None, density: Floats, airborne: float = -np.inf) -> Prior:
+    """The prior between pulses at `times` (n,), s, with the take-off at `takeoff`.
+
+    Without one everything from `airborne` on is flight; before, he may have passed the edge at any time.
+    """
     start, end = times[:-1], times[1:]
     if takeoff is None:
-        bounds = np.stack((start, start, start, end))
+        bounds = np.clip(np.array((-np.inf, -np.inf, airborne, np.inf))[:, None], start, end)
     else:
         bounds = np.clip(np.array((-np.inf, takeoff, takeoff + EDGE_S, np.inf))[:, None], start, end)
     after = end - bounds[1:]  # time left at the end of each regime's part

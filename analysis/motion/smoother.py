@@ -17,15 +17,15 @@ from analysis.motion.bundle import (
     settled,
     with_prior,
 )
-from analysis.motion.gross_errors import fitting_sigmas, statistics, without_gross_errors
+from analysis.motion.gross_errors import fitting_sigmas, statistics, with_factors, without_gross_errors
 from analysis.motion.lasting import lasting_covariance
 from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
-from analysis.motion.prior import prior, re_estimated, start_densities
+from analysis.motion.prior import Prior, prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import FEWEST, Start, start_values
 from analysis.motion.synchrony import Synchrony, judged
 from analysis.motion.table import TableMotion, table_motion
-from analysis.motion.takeoff import Break, find_break, passing
+from analysis.motion.takeoff import Break, airborne, find_break, passing
 from analysis.result.model import CameraOffset, Phase, RayTest, SmoothedState, TakeOff, phase_at
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
@@ -182,16 +182,23 @@ def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:
 
 def _with_takeoff(adjusted: Adjusted, known: Floats | None) -> tuple[Adjusted, Break | None]:
     """Take-off and densities of the motion, in turn; then gross errors once more."""
-    times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
     densities = start_densities()
     edge = None
     for _ in range(_ROUNDS):
         edge = find_break(adjusted, densities) if known is None else passing(adjusted, known)
         for _ in range(_COMPONENT_STEPS):
-            adjusted = with_prior(adjusted, prior(times, unit, edge.seconds if edge else None, densities))
+            adjusted = with_prior(adjusted, _prior(adjusted, edge, densities))
             densities = _components(adjusted)
-    adjusted = with_prior(adjusted, prior(times, unit, edge.seconds if edge else None, densities))
+        adjusted = with_factors(adjusted)
+    adjusted = with_prior(adjusted, _prior(adjusted, edge, densities))
     return without_gross_errors(settled(adjusted, 2), _REMOVALS), edge
+
+
+def _prior(adjusted: Adjusted, edge: Break | None, densities: Floats) -> Prior:
+    times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
+    if edge is None:
+        return prior(times, unit, None, densities, airborne(adjusted))
+    return prior(times, unit, edge.seconds, densities)
 
 
 def _components(adjusted: Adjusted) -> Floats:
@@ -227,7 +234,8 @@ def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
     model, used = adjusted.model, adjusted.used
     rank = model.root.shape[1]
     states, covariance, cross = _over_takeoff(adjusted, edge)
-    covariance = covariance + lasting_covariance(adjusted)
+    fit = statistics(adjusted)
+    covariance = covariance + lasting_covariance(adjusted, fit.square, fit.redundancy)
     by_hand = [dict(zip(GROUPS, row, strict=True)) for row in np.asarray((model.observed.by_hand & used).any(axis=1))]
     return smoothed_states(
         model.frame,

@@ -13,7 +13,9 @@ import numpy as np
 
 from analysis.motion.bundle import Adjusted
 from analysis.motion.channels import CHANNELS, ORIGIN, SLOPE, START_SIGMA
+from analysis.motion.observations import GROUPS
 from analysis.motion.prior import Prior, prior
+from analysis.result.model import EDGE_S
 from rig.arrays import Floats
 
 _COARSE_S: Final = 1 / 60  # steps of the search
@@ -23,7 +25,8 @@ _SUPPORT: Final = 8.0  # of log-likelihood below the greatest: less likely times
 #: Acceleration of O in the first pulse, m/s^2 (Z up): of a table, and of a flight. Their spread covers any in-run.
 _ON_TABLE: Final = (np.array((0.0, 0.0, 0.0)), np.array((5.0, 3.0, 3.0)))
 _IN_FLIGHT: Final = (np.array((-2.0, 0.0, -6.0)), np.array((3.0, 3.0, 3.0)))
-_AT_END: Final = 2.0  # pulses: a break nearer to the first or last intersected binding is none
+_AT_END: Final = 2.0  # pulses: a break nearer to the first or last intersected binding or ski is none
+_BELOW: Final = slice(GROUPS.index("P3"), len(GROUPS))  # bindings and skis
 _LOOSE: Final = 1e4  # m or rad: weak weight that keeps undetermined pulses solvable
 #: Channels that the table guides: O and the slope of the skis.
 _SELECTED: Final = (*range(ORIGIN.start, ORIGIN.stop), SLOPE)
@@ -55,8 +58,7 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
     """
     times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
     path = _path(adjusted)
-    bindings = (adjusted.used[:, :, 2:4].sum(axis=1) >= 2).any(axis=1)
-    known = times[bindings] if bindings.any() else times
+    known = _known(adjusted)
     first, last = known[0] + _AT_END * unit, known[-1] - _AT_END * unit
     coarse = np.arange(times[0], times[-1], max(_COARSE_S, unit / 2))
     likelihood = _log_likelihood(path, times, [prior(times, unit, t, densities) for t in coarse], _ON_TABLE)
@@ -73,6 +75,18 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
         return None
     sigma = float(np.sqrt(weight @ (fine - mean) ** 2 + (fine[1] - fine[0]) ** 2 / 12))
     return Break(mean, sigma, *_three_nodes(mean, sigma, float(weight @ (fine - mean) ** 3)))
+
+
+def airborne(adjusted: Adjusted) -> float:
+    """Since when he flies for sure, s, if no take-off was found: it may be older than the first known place of O."""
+    return float(_known(adjusted)[0]) + _AT_END * adjusted.model.prior.unit + EDGE_S
+
+
+def _known(adjusted: Adjusted) -> Floats:
+    """Times of the pulses in which a binding or a ski was intersected; all of them if none was."""
+    times = adjusted.model.observed.times
+    place = (adjusted.used[:, :, _BELOW].sum(axis=1) >= 2).any(axis=1)
+    return times[place] if place.any() else times
 
 
 def passing(adjusted: Adjusted, edge: Floats) -> Break | None:

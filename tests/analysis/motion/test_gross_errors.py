@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.measurements.model import ImageMeasurements, SkiMeasurement
+from analysis.measurements.model import ImageMeasurements, PointMeasurement, SkiMeasurement
 from analysis.motion.smoother import smooth
 from tests.analysis.simulated import drawn, simulated_measurements, true_cameras, true_jump
 
 SEED, RATE_HZ = 11, 100.0
 HIDDEN_S, SHADOW_S = -0.03, -0.1  # since the take-off: P4 is half hidden until, the ski not seen from, until
 LARGEST = 4.5  # sigmas
+RENDERED_HZ, LONE_PX = 30.0, 0.4
+SEEN_S = {"P3": -0.04, "P4": 0.1}  # since the take-off: when they come into sight
+LONE_S = -0.07
 
 
 def _half_hidden(image: ImageMeasurements, camera: str, off: float | None) -> ImageMeasurements:
@@ -43,4 +46,36 @@ def test_a_binding_is_not_where_a_wrong_ski_says(off: float) -> None:
         state = motion.states[k]
         if state is not None and (binding := state.points["P4"]) is not None:
             error = binding.xyz - truth.pose(pulses[k].pulse).markers[3]
+            assert error @ np.linalg.solve(binding.covariance, error) < LARGEST**2
+
+
+def _late_bindings(image: ImageMeasurements, camera: str, since: float, off: float) -> ImageMeasurements:
+    """The bindings come into sight one at the edge, one behind it; K3 saw the latter once before, `off` px aside."""
+    points = {name: point for name, point in image.points.items() if since > SEEN_S.get(name, -np.inf)}
+    if camera == "K3" and abs(since - LONE_S) < 0.5 / RENDERED_HZ and (binding := image.points.get("P4")) is not None:
+        points["P4"] = PointMeasurement(binding.xy + np.array((off, 0.0)), LONE_PX**2 * np.eye(2))
+    return ImageMeasurements(points, image.skis)
+
+
+def test_a_lone_ray_that_is_wrong_does_not_bend_what_was_not_seen() -> None:
+    """The take-off is found by the skis where the bindings are seen from the edge on only."""
+    rng, truth = np.random.default_rng(SEED), true_jump(SEED, RENDERED_HZ)
+    measured = simulated_measurements(truth, true_cameras(), rng)
+    pulses = [
+        replace(
+            pulse,
+            images={
+                name: _late_bindings(image, name, truth.since_takeoff(pulse.pulse), -9 * LONE_PX)
+                for name, image in pulse.images.items()
+            },
+        )
+        for pulse in measured.jumps[0].pulses
+    ]
+    motion = smooth(replace(measured.jumps[0], pulses=tuple(pulses)), measured, drawn(true_cameras(), rng))
+    assert motion.takeoff is not None
+    assert abs(motion.takeoff.pulse - truth.takeoff_pulse) < LARGEST * motion.takeoff.sigma_pulses
+    assert {(test.camera, test.what) for test in motion.removed} == {("K3", "P4")}
+    for pulse, state in zip(pulses, motion.states, strict=True):
+        if state is not None and (binding := state.points["P4"]) is not None:
+            error = binding.xyz - truth.pose(pulse.pulse).markers[3]
             assert error @ np.linalg.solve(binding.covariance, error) < LARGEST**2

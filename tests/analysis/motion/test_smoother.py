@@ -239,6 +239,22 @@ def test_sigmas_that_are_too_small_are_found_and_enlarged() -> None:
         assert _distance(state.origin.value - expected, state.origin.covariance) < LARGEST
 
 
-def _surer(image: ImageMeasurements, factor: float) -> ImageMeasurements:
+def test_sigmas_that_are_too_large_make_no_vague_result(clean: tuple[TrueJump, JumpMeasurements, Motion]) -> None:
+    """What images tell of their own sigmas counts in proportion; how large they are, the residuals tell."""
+    truth, jump, sharp = clean
+    rng = np.random.default_rng(SEED)
+    measured = simulated_measurements(truth, true_cameras(), rng)
+    pulses = [
+        replace(pulse, images={name: _surer(image, 0.5, skis=0.4) for name, image in pulse.images.items()})
+        for pulse in jump.pulses
+    ]
+    motion = smooth(replace(jump, pulses=tuple(pulses)), measured, drawn(true_cameras(), rng))
+    assert motion.scale == {"points": 1.0, "skis": 1.0}
+    for name in ("beta", "gamma", "dphi"):
+        wide, narrow = (np.mean([_quantity(state, name)[1] for _, state in _states(m)]) for m in (motion, sharp))
+        assert wide == pytest.approx(narrow, rel=0.15)  # 500 degrees of freedom of points, 200 of skis: 3 and 5 %
+
+
+def _surer(image: ImageMeasurements, factor: float, skis: float = 1.0) -> ImageMeasurements:
     points = {name: replace(point, covariance=point.covariance / factor**2) for name, point in image.points.items()}
-    return replace(image, points=points)
+    return replace(image, points=points, skis={s: replace(k, sigma=k.sigma / skis) for s, k in image.skis.items()})

@@ -280,7 +280,7 @@ class _Aligning:
     def _within(self) -> str:
         """What UTC says, in words."""
         if self._window is None:
-            return " (of the clock of one computer nobody knows how right it was)"
+            return " (the clock of one computer is not known to be synchronized)"
         return f" within the {(self._window - self._near) / 1e6:.3g} ms to which both clocks were known"
 
 

@@ -159,8 +159,11 @@ def known_lost(reader: LogReader) -> tuple[tuple[int, int], ...]:
 
 def merged_in_words(merged: Mapping[str, str]) -> str:
     """What a log says of the logs that it was merged from, in one line."""
-    shown = {key: merged.get(key, "?") for key in ("source_1", "source_2", "common", "offset_ms", "offset_sigma_us")}
+    one, two, common, offset, sigma = (
+        merged.get(key, "?") for key in ("source_1", "source_2", "common", "offset_ms", "offset_sigma_us")
+    )
+    where = "ahead of" if offset.startswith("-") else "behind"
     return (
-        "merged from {source_1} and {source_2}: {common} pulses are in both; the clock of the second was put on by "
-        "{offset_ms} ms +- {offset_sigma_us} us"
-    ).format(**shown)
+        f"merged from {one} and {two}: {common} pulses are in both; the clock of the second was "
+        f"{offset.lstrip('-')} ms (+- {sigma} us) {where} that of the first"
+    )

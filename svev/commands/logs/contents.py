@@ -146,7 +146,10 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
         yield "ledger", f"{camera} " + ", ".join(f"{count} {state}" for state, count in states.items())
     if found.missing_pulses:
         yield "no tag", f"{found.missing_pulses} pulses"
-    told = ("merged", merged_in_words(found.merged) if found.merged else ""), ("trouble", found.trouble)
+    told = (
+        ("merged", merged_in_words(found.merged).removeprefix("merged ") if found.merged else ""),
+        ("trouble", found.trouble),
+    )
     yield from ((name, text) for name, text in told if text)
     for pause in ledger.pauses()[:_LINES_MAX]:
         yield "pause", pause.in_words()

@@ -48,9 +48,10 @@ def _print(report: MergeReport) -> None:
     console.say(
         f"{alignment.common} pulses are in both logs, {report.alone[0]} in {one} only, {report.alone[1]} in {two} only"
     )
+    where, went = "ahead of" if alignment.offset_ns < 0 else "behind", "fast" if alignment.drift_ppm < 0 else "slow"
     console.say(
-        f"the clock of {two} was put on by {alignment.offset_ns / 1e6:.3f} ms +- {alignment.sigma_ns / 1e3:.1f} us, "
-        f"and runs {alignment.drift_ppm:.2f} ppm slower; after that the times of a pulse differ by "
-        f"{alignment.residual_ns / 1e3:.1f} us (1 sigma)"
+        f"the clock of {two} was {abs(alignment.offset_ns) / 1e6:.3f} ms (+- {alignment.sigma_ns / 1e3:.1f} us) "
+        f"{where} that of {one}, and ran {abs(alignment.drift_ppm):.2f} ppm {went}; "
+        f"without that the times of a pulse differ by {alignment.residual_ns / 1e3:.1f} us (1 sigma)"
     )
     console.say(f"check it: svev verify --ledger {report.path}")

@@ -146,14 +146,14 @@ def test_the_result_is_sound_and_says_where_it_comes_from(
 ) -> None:
     out = tmp_path / "both.mcap"
     assert main(["merge", *map(str, parts), "-o", str(out), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["pulses"], said["complete"], said["common"], said["alone"]) == (150, 85, 86, [33, 31])
-    assert said["causes"] == {"lost": 1, "missed": 0, "damaged": 0, "absent": 33 + 2 * 31}
+    report = json.loads(capsys.readouterr().out)
+    assert (report["pulses"], report["complete"], report["common"], report["alone"]) == (150, 85, 86, [33, 31])
+    assert report["causes"] == {"lost": 1, "missed": 0, "damaged": 0, "absent": 33 + 2 * 31}
     assert main(["verify", "--ledger", str(out)]) == 0, capsys.readouterr()
-    report = verify(out)
-    assert (report.verdict, report.findings, report.every_byte) == (Verdict.PARTIAL, (), True)
-    assert report.ledger.pauses() == ()
-    spoken = {(event.name, event.message) for event in report.events}
+    found = verify(out)
+    assert (found.verdict, found.findings, found.every_byte) == (Verdict.PARTIAL, (), True)
+    assert found.ledger.pauses() == ()
+    spoken = {(event.name, event.message) for event in found.events}
     assert {
         ("K3", "absent: its log knows nothing of pulses 61-63"),
         ("K1", "absent: its log knows nothing of pulse 51"),
@@ -162,7 +162,9 @@ def test_the_result_is_sound_and_says_where_it_comes_from(
     } <= spoken
     capsys.readouterr()
     assert main(["info", str(out)]) == 0
-    assert "merged from left.mcap and right.mcap: 86 pulses are in both" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "from left.mcap and right.mcap: 86 pulses are in both; the clock of the second was 2.3" in said
+    assert "ahead of that of the first" in said
     about = info(out)
     assert (about.rig["name"], about.rig["cameras"]) == ("left + right", "K1, K2, K3")
     assert about.session["athlete"] == SESSION["athlete"]

@@ -36,6 +36,12 @@ class CameraError(SvevError):
     exit_code = 5
 
 
+class TriggerError(SvevError):
+    """The device that makes the trigger pulses is missing or fails. It is tried again."""
+
+    exit_code = 5
+
+
 class PulsesPausedError(SvevError):
     """A recording is whole, but for a while no pulses came in it."""
 

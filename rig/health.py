@@ -82,6 +82,19 @@ class CameraPairing(CameraCounters, kw_only=True):
     clock_set: Annotated[bool, Meta(description="the device clock was set in the last ten seconds")] = False
 
 
+class SourcePairing(msgspec.Struct, frozen=True):
+    """What the source of the pulses says it has fired, against what the cameras saw, since the recorder was started."""
+
+    fired: Annotated[int, Meta(description="pulses that the source says it has fired")]
+    unseen: Annotated[int, Meta(description="of them, no camera delivered a frame; they have tags")]
+    untagged: Annotated[int, Meta(description="of them, so many have no tag, since the source told of them too late")]
+    unfired: Annotated[int, Meta(description="pulses that cameras saw, and that the source did not fire")]
+    period_us: Annotated[float | None, Meta(description="between pulses, on the host's clock, as the source tells")]
+    uncertainty_us: Annotated[float, Meta(description="largest error of the source's times")]
+    unseen_lately: Annotated[bool, Meta(description="unseen or untagged ones in the last ten seconds")]
+    unfired_lately: Annotated[bool, Meta(description="unfired ones in the last ten seconds")]
+
+
 class PairingHealth(msgspec.Struct, frozen=True):
     """The pulses and the cameras' clocks."""
 
@@ -103,6 +116,9 @@ class PairingHealth(msgspec.Struct, frozen=True):
         float | None,
         Meta(description="distance of two pulses of the last ten seconds of which no camera has both; null: none"),
     ] = None
+    source: Annotated[SourcePairing | None, Meta(description="null where the source does not tell of its pulses")] = (
+        None
+    )
 
     @property
     def seen(self) -> int:

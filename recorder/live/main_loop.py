@@ -28,6 +28,7 @@ from rig.transport.channel import ControlChannel
 from rig.transport.messages import (
     CameraChanged,
     GrabberDied,
+    PulsesFired,
     Quit,
     RecorderCommand,
     RecorderConfig,
@@ -171,6 +172,10 @@ class RecorderLoop:
                 self._assembler.disconnected(command.camera, command.reason, host_now())
             case TellEvent():
                 self._recordings.happened(command.event)
+            case PulsesFired():
+                for number, time in enumerate(command.times, start=command.first):
+                    self._assembler.pairer.fired(number, time, command.uncertainty_ns)
+                self._assembler.pairer.fired_until(command.until)
             case TellResult():
                 self._recordings.result(command)
             case TellActions():

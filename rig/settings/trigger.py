@@ -112,6 +112,18 @@ def check_takes_actions(name: str, backend: str, address: str) -> None:
         ) from None
 
 
+class TriggerBoxTrigger(TriggerSettings):
+    """A trigger box on a serial line, set and watched by svev: its cable leads to all cameras."""
+
+    source: Literal["triggerbox"] = Field(description="a strawlab trigger box (protocol 14) on a serial line")
+    rate_hz: float = Field(30.0, ge=3.82, le=1000, description="pulses per second; the nearest that the box can make")
+    settle_s: float = Field(15.0, gt=0, le=120, description="wait at most this long for the first pulses")
+    port: str = Field(
+        "/dev/svev-trigger", min_length=1, max_length=200,
+        description="device file of the serial line; where svev is installed, a rule for devices makes this link",
+    )  # fmt: skip
+
+
 def _external_unless_said(table: Any) -> Any:
     """A table that names no source means `external`."""
     return {"source": "external", **table} if isinstance(table, dict) else table
@@ -119,6 +131,6 @@ def _external_unless_said(table: Any) -> Any:
 
 #: The `[trigger]` table: one of the sources, told by `source`.
 Trigger = Annotated[
-    Annotated[ExternalTrigger | SoftwareTrigger | ActionTrigger, Field(discriminator="source")],
+    Annotated[ExternalTrigger | SoftwareTrigger | ActionTrigger | TriggerBoxTrigger, Field(discriminator="source")],
     BeforeValidator(_external_unless_said),
 ]

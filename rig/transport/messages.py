@@ -213,7 +213,25 @@ class TellResult(Message):
     data: bytes
 
 
-RecorderCommand = StartRecording | StopRecording | GrabberDied | TellEvent | TellActions | TellResult | Quit
+class PulsesFired(Message):
+    """From the process that drives a trigger box, by way of the service, to the recorder: what the box has fired.
+
+    Attributes:
+        first: number of the first pulse, as the box counts since its start.
+        times: when the pulses fired; none: there were no more.
+        uncertainty_ns: largest error of the times.
+        until: all pulses up to this time have been told.
+    """
+
+    first: int
+    times: tuple[HostNs, ...]
+    uncertainty_ns: int
+    until: HostNs
+
+
+RecorderCommand = (
+    StartRecording | StopRecording | GrabberDied | TellEvent | TellActions | PulsesFired | TellResult | Quit
+)
 
 
 # The analysis

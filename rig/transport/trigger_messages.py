@@ -1,4 +1,4 @@
-"""The messages between the service and the process that sends the pulses, where svev makes them.
+"""The messages between the service and the process that makes the pulses, where svev makes them.
 
 What the recorder is told of the pulses goes by way of the service.
 """
@@ -9,11 +9,23 @@ from rig.clocks import HostNs
 from rig.events import Event
 from rig.health import Health
 from rig.settings.model import RigSettings
-from rig.transport.messages import Message, Quit, TellActions
+from rig.transport.messages import Message, PulsesFired, Quit, TellActions
+
+
+class TriggerBoxConfig(Message):
+    """Configuration of the process that drives a trigger box.
+
+    Attributes:
+        rig: the rig.
+        port: device file of the serial line: the rig file's, or that of an emulated box.
+    """
+
+    rig: RigSettings
+    port: str
 
 
 class TriggerConfig(Message):
-    """Configuration of the process that sends the pulses.
+    """Configuration of the process that sends action commands.
 
     Attributes:
         rig: the rig.
@@ -53,4 +65,4 @@ class TriggerTold(Message):
 
 
 TriggerCommand = CamerasSeen | Quit
-TriggerReport = TellActions | TriggerTold
+TriggerReport = TellActions | PulsesFired | TriggerTold

@@ -1,6 +1,6 @@
 """Runs the processes of one rig: rings, one grabber process per camera, one recorder process, one for the analysis.
 
-Where the pulses are action commands, one more process sends them.
+Where svev makes the pulses, one more process sends the action commands, or drives the trigger box.
 
 The owner calls `turn` again and again; it passes on the recorder's reports, keeps track of the cameras, and starts dead
 grabbers again. The owner decides what happens when the recorder dies.
@@ -20,7 +20,7 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.settings.trigger import ActionTrigger
+from rig.settings.trigger import ActionTrigger, TriggerBoxTrigger
 from rig.transport.messages import (
     AnalysisConfig,
     AnalysisReport,
@@ -30,6 +30,7 @@ from rig.transport.messages import (
     GrabberConfig,
     GrabberDied,
     JumpMeasured,
+    PulsesFired,
     RecorderCommand,
     RecorderConfig,
     RecorderEvent,
@@ -43,7 +44,7 @@ from rig.transport.messages import (
 )
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
 from rig.transport.ring import CameraRing
-from rig.transport.trigger_messages import CamerasSeen, TriggerConfig, TriggerReport, TriggerTold
+from rig.transport.trigger_messages import CamerasSeen, TriggerBoxConfig, TriggerConfig, TriggerReport, TriggerTold
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
 from triggering.timeline.pulse_train import RHYTHM, RHYTHM_LEAST
@@ -52,8 +53,10 @@ from triggering.timeline.steady_rate import SteadyRate, rhythm
 RECORDER: Final = "recorder"
 ANALYSIS: Final = "analysis"
 TRIGGER: Final = "trigger"
+#: Variable in which the simulated hill names the port of its trigger box.
+TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
 #: Reports that are dealt with here.
-_FORWARDED: Final = TellResult | AnalysisTold | TellActions | TriggerTold
+_FORWARDED: Final = TellResult | AnalysisTold | TellActions | PulsesFired | TriggerTold
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,7 @@ class RigProcesses:
         on_event: called for each camera that comes or goes and each process that is started again.
         epoch: host time of pulse 0 of the simulated hill, the replayed log or the commands; now if left out.
         recorder: what the recorder does beside recording.
-        environment: variables that grabbers of simulated FireWire cameras need in their environment.
+        environment: what simulated devices are found by: variables for grabbers of FireWire cameras, `TRIGGER_PORT`.
 
     Attributes:
         cameras: presence of each camera.
@@ -122,8 +125,8 @@ class RigProcesses:
         self._doorbell = -1
         self._epoch = host_now() if epoch is None else epoch
         self._names = [camera.name for camera in rig.cameras]
-        sent = [TRIGGER] if isinstance(rig.trigger, ActionTrigger) else []
-        self._helpers = [*self._names, *sent, *([] if rig.analysis is None else [ANALYSIS])]
+        making = [TRIGGER] if isinstance(rig.trigger, ActionTrigger | TriggerBoxTrigger) else []
+        self._helpers = [*self._names, *making, *([] if rig.analysis is None else [ANALYSIS])]
         self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
         self.cameras = [CameraPresence()] * len(rig.cameras)
@@ -158,7 +161,7 @@ class RigProcesses:
 
     @property
     def restarts(self) -> dict[str, int]:
-        """How many times each grabber, by camera, the analysis and the process that sends pulses died."""
+        """How many times each grabber, by camera, the analysis and the process that makes pulses died."""
         return {name: back_off.deaths for name, back_off in self._back_offs.items()}
 
     @property
@@ -182,7 +185,7 @@ class RigProcesses:
     def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
 
-        Results of the analysis, and what cameras have answered to action commands, go on to the recorder.
+        Results of the analysis, answers to action commands, and what a trigger box has fired, go on to the recorder.
 
         Args:
             timeout_s: longest wait for the first report, s.
@@ -197,7 +200,7 @@ class RigProcesses:
         reports = [message for _, message in self._processes.receive(timeout_s, wake)]
         for report in reports:
             match report:
-                case TellResult() | TellActions():
+                case TellResult() | TellActions() | PulsesFired():
                     if not self.recorder_died:
                         self.tell(report)
                 case AnalysisTold() | TriggerTold():
@@ -230,7 +233,7 @@ class RigProcesses:
         self.health = health
         self.rate = rhythm(health.pairing, RHYTHM_LEAST, RHYTHM) or self.rate
         self._note_recovered(health)
-        if TRIGGER in self._helpers:
+        if isinstance(self._rig.trigger, ActionTrigger):
             self._processes[TRIGGER].control.send(CamerasSeen.of(health))
 
     def _note_recovered(self, health: Health) -> None:
@@ -277,10 +280,7 @@ class RigProcesses:
         if name == ANALYSIS:
             self._start_analysis()
         elif name == TRIGGER:
-            config = TriggerConfig(rig=self._rig, epoch=self._epoch)
-            self._processes.start(
-                ProcessSpec(TRIGGER, "service.processes.trigger_process", config, reports=TriggerReport)
-            )
+            self._start_trigger()
         else:
             self._start_grabber(self._names.index(name))
 
@@ -289,6 +289,18 @@ class RigProcesses:
         self._processes.start(
             ProcessSpec(ANALYSIS, "service.processes.analysis_process", config, reports=AnalysisReport)
         )
+
+    def _start_trigger(self) -> None:
+        trigger = self._rig.trigger
+        if isinstance(trigger, TriggerBoxTrigger):
+            config = TriggerBoxConfig(rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port))
+            box = ProcessSpec(TRIGGER, "service.processes.trigger_box_process", config, reports=TriggerReport)
+            self._processes.start(box)
+        else:
+            actions = TriggerConfig(rig=self._rig, epoch=self._epoch)
+            self._processes.start(
+                ProcessSpec(TRIGGER, "service.processes.trigger_process", actions, reports=TriggerReport)
+            )
 
     def _start_recorder(self) -> None:
         fds, options = tuple(ring.fd for ring in self._rings), self._options
@@ -307,7 +319,7 @@ class RigProcesses:
     def _start_grabber(self, index: int) -> None:
         ring = self._rings[index].fd
         config = GrabberConfig(rig=self._rig, camera=index, ring=ring, doorbell=self._doorbell, epoch=self._epoch)
-        # Only libdc1394 needs the variables, to see the emulated bus.
+        # Only libdc1394 needs variables, to see the emulated bus.
         more = self._environment if self._rig.cameras[index].backend == "iidc" else {}
         self._processes.start(
             ProcessSpec(

@@ -2,18 +2,23 @@
 
 import ipaddress
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from capture.sim.camera import Scene
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 from rig.settings.model import CameraSettings, RigSettings
-from rig.settings.trigger import ActionTrigger, SoftwareTrigger
+from rig.settings.trigger import ActionTrigger, SoftwareTrigger, TriggerBoxTrigger
+from service.processes.rig_processes import TRIGGER_PORT
 from simrig.programs.recording_truth import RecordingTruth, gige_sensor
 from simrig.programs.scene import SimScene
 from simrig.programs.simulated_hill import SimulatedHill
+from simrig.triggerbox.box import EmulatedBox
+from simrig.triggerbox.timer import HillTimer
+from simrig.world.pulses import PulseTrain
 from simrig.world.scenario import load_scenario
 
 #: Writes the truth of a recording into a file; called with its path, and number and host time of each pulse.
@@ -63,16 +68,22 @@ def simulated_hill(
 
 @contextmanager
 def hill_environment(rig: RigSettings, epoch: HostNs) -> Iterator[Mapping[str, str]]:
-    """Run the simulated cameras of a rig, if it has any.
+    """Run the simulated cameras of a rig, if it has any, and its trigger box, if it has one.
 
     Yields:
-        Environment variables that grabber processes need to see the FireWire cameras among them.
+        Environment variables that grabber processes need to see the FireWire cameras among them, and `TRIGGER_PORT`.
 
     Raises:
         BadInputError: as `simulated_hill`; or there is no C compiler for the shim that shows the FireWire cameras.
     """
-    with simulated_hill(rig, epoch) as hill:
-        yield {} if hill is None else hill.environment
+    with ExitStack() as stack:
+        hill = stack.enter_context(simulated_hill(rig, epoch))
+        variables = {} if hill is None else hill.environment
+        if rig.simulation is not None and isinstance(rig.trigger, TriggerBoxTrigger):
+            port = Path(stack.enter_context(TemporaryDirectory(prefix="svev-trigger-"))) / "box"
+            stack.enter_context(EmulatedBox(port, HillTimer(PulseTrain(epoch, rig.trigger.rate_hz))))
+            variables[TRIGGER_PORT] = str(port)
+        yield variables
 
 
 def sim_scene(rig: RigSettings, index: int, epoch: HostNs) -> Scene:

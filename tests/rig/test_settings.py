@@ -174,7 +174,8 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'hand'\n",
-            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\"; correct it",
+            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\", \"triggerbox\"; "
+            "correct it",
             id="unknown source",
         ),
         pytest.param(

@@ -29,6 +29,13 @@ def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float, *, one_e
                 "the clock of {camera} was set while pulses came, some of its frames are not used: let PTP lock first"
             )
             yield phrase("pairing_clock", text, camera=name)
+    if health.source is not None and health.source.unseen_lately:
+        count = health.source.unseen + health.source.untagged
+        text = "the source has fired {count} pulses that no camera saw: check the trigger cable from it to the cameras"
+        yield phrase("pairing_unseen", text, count=count)
+    if health.source is not None and health.source.unfired_lately:
+        text = "cameras saw {count} pulses that the source did not fire: check the trigger cable for other signals"
+        yield phrase("pairing_unfired", text, count=health.source.unfired)
     if not one_edge:
         return
     if health.alarm:

@@ -1,12 +1,13 @@
-"""What the health record says of one camera's pairing."""
+"""What the health record says of each camera's pairing, and of the source of the pulses."""
 
 from typing import Final
 
 import msgspec
 
 from rig.clocks import NS_PER_S, DecimalNs, HostNs
-from rig.health import CameraPairing
+from rig.health import CameraPairing, SourcePairing
 from triggering.pairing.camera_track import CameraTrack
+from triggering.timeline.fired import FiredPulses
 
 #: What happened is told for so long.
 _RECENT_NS: Final = 10 * NS_PER_S
@@ -35,4 +36,25 @@ def camera_health(track: CameraTrack, last: HostNs | None) -> CameraPairing:
         latency_ms=round(track.latency_ns / 1e6, 3),
         clock_set=track.set_at is not None and is_recent(track.set_at, last),
         **msgspec.structs.asdict(track.counters),
+    )
+
+
+def source_health(fired: FiredPulses, last: HostNs | None) -> SourcePairing | None:
+    """The part of the health record about the source of the pulses; None: it does not tell of them.
+
+    Args:
+        fired: what it told.
+        last: time of the last decided pulse.
+    """
+    if not fired.active:
+        return None
+    return SourcePairing(
+        fired=fired.told,
+        unseen=fired.unseen,
+        untagged=fired.untagged,
+        unfired=fired.unfired,
+        period_us=None if fired.period_ns is None else round(fired.period_ns / 1000, 3),
+        uncertainty_us=fired.uncertainty_ns / 1000,
+        unseen_lately=fired.unseen_at is not None and is_recent(fired.unseen_at, last),
+        unfired_lately=fired.unfired_at is not None and is_recent(fired.unfired_at, last),
     )

@@ -272,6 +272,11 @@ class CameraTrack:
             self.delivers and not self.silent and self._first is not None and last is not None and self._first <= last
         )
 
+    def was_there(self, time: HostNs) -> bool:
+        """Whether the camera was connected and set up at `time`, and has been since."""
+        ready = self._since + FIRST_NS if self._first is None else self._since
+        return self.connected and time >= ready
+
     def was_away(self, time: HostNs) -> bool:
         """Whether the camera was not there at `time`: it was disconnected, or not set up yet."""
         if time <= self._left or not self.connected:
@@ -290,6 +295,21 @@ class CameraTrack:
         gap = self.gap_after(time)
         outcome = NO_FRAME[FrameStatus.ABSENT] if gap is None else gap.settle(time, rivals, self._matcher)
         return NO_FRAME[FrameStatus.ABSENT] if outcome.status is FrameStatus.MISSED else outcome
+
+    def settle_fired(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
+        """Decide what became of a pulse that the source fired, and of which no camera delivered a frame.
+
+        A camera whose clock was read after the pulse was there. If its ids cannot tell, the pulse did not reach it:
+        what keeps a pulse from all cameras is the cable, and what keeps a frame back is mostly one camera's own.
+
+        Args:
+            time: time of the pulse.
+            rivals: as for `settle`.
+        """
+        ids_tell = self.gap_after(time) is not None or self._damaged
+        if not ids_tell and self.was_there(time) and time <= self._seen:
+            return NO_FRAME[FrameStatus.MISSED]
+        return self.settle(time, rivals)
 
     def gap_after(self, time: HostNs) -> Gap | None:
         """The gap in which `time` lies, None if its end is not known yet. Earlier gaps are dropped."""

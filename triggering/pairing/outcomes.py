@@ -21,11 +21,20 @@ class OpenPulse:
         delivered: the cameras whose frames have come, one bit each.
         proven_by_ids: no camera delivered a frame, but the frame ids prove that the pulse fired.
         unwatched: no camera was there; the rhythm of the train tells that the pulse was due.
+        fired: no camera delivered a frame, but the source says that it fired the pulse.
     """
 
-    __slots__ = ("cargo", "delivered", "frames", "missing", "proven_by_ids", "time", "times", "unwatched")
+    __slots__ = ("cargo", "delivered", "fired", "frames", "missing", "proven_by_ids", "time", "times", "unwatched")
 
-    def __init__(self, cameras: int, time: HostNs, *, proven_by_ids: bool = False, unwatched: bool = False) -> None:
+    def __init__(
+        self,
+        cameras: int,
+        time: HostNs,
+        *,
+        proven_by_ids: bool = False,
+        unwatched: bool = False,
+        fired: bool = False,
+    ) -> None:
         self.cargo: object | None = None
         self.time = time
         self.frames: list[Record | None] = [None] * cameras
@@ -34,6 +43,7 @@ class OpenPulse:
         self.delivered = 0
         self.proven_by_ids = proven_by_ids
         self.unwatched = unwatched
+        self.fired = fired
 
     def add(self, camera: int, record: Record, time: HostNs) -> None:
         """Add a camera's frame, triggered at `time`."""

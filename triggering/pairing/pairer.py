@@ -16,13 +16,13 @@ from rig.errors import BadInputError
 from rig.frame import FrameStatus, Record, RecordKind
 from rig.health import CameraCounters, PairingHealth
 from rig.pulse import RigPulse
-from triggering.pairing.camera_health import camera_health, is_recent
+from triggering.pairing.camera_health import camera_health, is_recent, source_health
 from triggering.pairing.camera_track import CameraTrack
 from triggering.pairing.held import HeldFrames, Released
 from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
 from triggering.pairing.silence import SILENT_PERIODS, Silence
-from triggering.pairing.undelivered import undelivered_times
-from triggering.pairing.unwatched import unwatched_time
+from triggering.pairing.unseen import UnseenPulses
+from triggering.timeline.fired import FiredPulses
 from triggering.timeline.pulse_train import CLOCKS_NS, PulseTrain
 
 __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
@@ -80,8 +80,11 @@ class Pairer:
         self._tracks = [CameraTrack(self._train) for _ in range(cameras)]
         self._held = HeldFrames(cameras)
         self._silence = Silence(self._tracks, self._held, self._train)
+        self._fired = FiredPulses(self._train)
         self._open: list[OpenPulse] = []
-        self._examined: OpenPulse | None = None
+        self._unseen = UnseenPulses(
+            self._open, self._tracks, self._held, self._train, self._fired, self._deadline, self._hold_ns
+        )
         self._hurry_until = HostNs(0)
         self._open_most = max(SILENT_PERIODS, hold_ns // period_ns)
         self._closed = 0
@@ -141,6 +144,20 @@ class Pairer:
         while agrees and self._held.is_read(camera, latch):
             self._release(camera)
 
+    def fired(self, number: int, time: HostNs, uncertainty_ns: int) -> None:
+        """Enter a pulse that the source says it has fired: it gets a tag even if no camera saw it.
+
+        Args:
+            number: as the source counts; where it does not follow on the last one, some were not told.
+            time: when it fired, by the source's clock; with a largest error of `uncertainty_ns`.
+            uncertainty_ns: ns.
+        """
+        self._fired.add(number, time, uncertainty_ns)
+
+    def fired_until(self, time: HostNs) -> None:
+        """Note that the source has told of all pulses up to a time."""
+        self._fired.until(time)
+
     def connected(self, camera: int, epoch: int, host: HostNs) -> None:
         """Begin an epoch of a camera: pulses from now on wait for its frames."""
         self._refuse_held(camera)
@@ -165,11 +182,7 @@ class Pairer:
                 self._refuse_held(camera)
         while True:
             due = bool(self._open) and self._is_due(self._open[0], now)
-            if due:
-                self._insert_undelivered()
-            if not (due and self._open[0].proven_by_ids):
-                self._insert_unwatched(now, due=due)
-            if not (due or (self._open and self._open[0].unwatched)):
+            if not self._unseen.insert(now, due=due):
                 return closed
             closed.append(self._close(self._open.pop(0)))
 
@@ -183,7 +196,10 @@ class Pairer:
     @property
     def oldest(self) -> HostNs | None:
         """Time of the oldest pulse that is not decided yet; None if there is none."""
-        return self._open[0].time if self._open else None
+        fired = self._fired.oldest
+        if not self._open:
+            return fired
+        return self._open[0].time if fired is None else min(fired, self._open[0].time)
 
     def hurry(self, until: HostNs) -> None:
         """Let no pulse up to a time wait longer than the hold for what later ones may tell: a recording ends."""
@@ -199,7 +215,7 @@ class Pairer:
         This comes sooner than `silent` and is only a suspicion: pulses wait for their frames all the same, up to the
         deadline. Frames that are on their way, or held back behind a damaged one, cause no suspicion.
         """
-        return tuple(self._silence.overdue(self._open, now, self._hold_ns))
+        return tuple(self._silence.overdue(self._open, now, self._hold_ns()))
 
     def slow(self, now: HostNs) -> tuple[int, ...]:
         """The cameras whose frames come so late, at host time `now`, that their pulses are decided already."""
@@ -229,6 +245,7 @@ class Pairer:
             cameras=tuple(camera_health(track, train.last) for track in self._tracks),
             rate_hz=NS_PER_S / train.period_ns if train.steady else None,
             split_us=None if split is None or not is_recent(split[0], train.last) else split[1] / 1000,
+            source=source_health(self._fired, train.last),
         )
 
     # -- details -------------------------------------------------------------------------------------------------
@@ -243,7 +260,6 @@ class Pairer:
         track.counters.stale += 1
         return False
 
-    @property
     def _hold_ns(self) -> int:
         """How long after a pulse its frames may come; longer where the pulses are far slower than the rig file says."""
         times = self._train.period_ns / self._nominal_ns
@@ -334,7 +350,7 @@ class Pairer:
         they do not keep it waiting too long; so there are never more open pulses than in a rhythm.
         """
         pulse = self._open[0]
-        hold = HostNs(pulse.time + self._hold_ns)
+        hold = HostNs(pulse.time + self._hold_ns())
         if self._held.count:
             hold = max(hold, self._held.last_end(pulse))
         if pulse.time <= self._hurry_until or self._train.rhythm_ns is not None:
@@ -349,32 +365,13 @@ class Pairer:
     def _lacking(self, pulse: OpenPulse) -> Iterable[CameraTrack]:
         return (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)
 
-    def _insert_undelivered(self) -> None:
-        """Insert the pulses that no camera delivered before the one that is about to be decided."""
-        pulse = self._open[0]
-        if pulse.proven_by_ids or pulse is self._examined:
-            return
-        self._examined = pulse
-        times = undelivered_times(self._open, self._tracks, self._train)
-        self._open[:0] = [OpenPulse(len(self._tracks), time, proven_by_ids=True) for time in times]
-
-    def _insert_unwatched(self, now: HostNs, *, due: bool) -> None:
-        """Insert the pulse that was expected before the next one, if no camera was there to see it.
-
-        That is certain only when frames of it cannot come any more: like those of the next one, if it is `due`.
-        """
-        following = self._open[0] if self._open else None
-        time = unwatched_time(self._train, self._tracks, None if following is None else following.time)
-        if time is not None and (due or now >= time + self._hold_ns):
-            self._open.insert(0, OpenPulse(len(self._tracks), time, unwatched=True))
-
     def _close(self, pulse: OpenPulse) -> ClosedPulse:
         outcomes = []
         for camera, track in enumerate(self._tracks):
             record, time = pulse.frames[camera], pulse.times[camera]
             if record is None or time is None:
                 settle = track.settle_unwatched if pulse.unwatched else track.settle
-                outcome = settle(pulse.time, self._rivals(camera, track))
+                outcome = (track.settle_fired if pulse.fired else settle)(pulse.time, self._rivals(camera, track))
             else:
                 track.forget_until(time)
                 offset = time - pulse.time
@@ -385,6 +382,8 @@ class Pairer:
             self._train.go_on(pulse.time)
         else:
             self._train.advance(pulse.time, pulse.spread_ns, pulse.delivered)
+        missed = pulse.fired and any(outcome.status is FrameStatus.MISSED for outcome in outcomes)
+        self._fired.decided(pulse.time, inserted=pulse.fired, seen=pulse.delivered > 0, missed=missed)
         self._closed += 1
         self._proven_by_ids += pulse.proven_by_ids
         self._unwatched += pulse.unwatched

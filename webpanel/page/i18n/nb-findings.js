@@ -117,6 +117,8 @@ export const findings = {
   check_exposes_on: ["{camera}: eksponerer i {exposure} ms, pulsene kommer hvert {period} ms", "gjør exposure_us kortere, eller senk trigger.rate_hz"],
   check_dead_time: ["{camera}: eksponering, utlesing og overføring tar {busy} ms, pulsene kommer hvert {period} ms", "det må eksponere mens det sender: mister det pulser, gjør exposure_us kortere eller utsnittet mindre"],
   check_set_up_only: ["kameraene trigges av programvare: bare til oppsett, ikke til måling", "koble til en pulsgenerator for å måle, og sett source = \"external\" under [trigger] i riggfilen"],
+  check_trigger_box: ["porten til triggerboksen, {port}, er der og kan åpnes"],
+  check_trigger_box_away: ["{why}", "uten den kommer det ingen pulser"],
   check_spread: ["triggertidene innen en puls ligger {typical} us fra hverandre, høyst {largest} us", "se på triggerkabler og -innganger, og på triggerforsinkelser i kameraene"],
 
   check_clock: ["klokken er synkronisert, høyst {ms} ms feil"],

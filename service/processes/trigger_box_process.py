@@ -1,0 +1,60 @@
+"""The program of the process that drives a trigger box: keeps its pulses going, and tells which have fired."""
+
+import select
+import time
+from typing import Final
+
+from rig.errors import BadInputError
+from rig.events import TRIGGER, Event, Level
+from rig.phrase import Phrase
+from rig.transport.child import ChildContext, begin
+from rig.transport.messages import PulsesFired, Quit
+from rig.transport.trigger_messages import TriggerBoxConfig, TriggerTold
+from triggering.sources.choice import trigger_source
+from triggering.sources.triggerbox.keeper import Fired, TrainKeeper
+from triggering.sources.triggerbox.source import TriggerBoxPulses
+
+#: Time to stop the pulses.
+_GRACE_S: Final = 3.0
+
+
+def _wait(child: ChildContext[TriggerBoxConfig], seconds: float) -> bool:
+    """Wait, but not beyond a `Quit`; whether to stop."""
+    end = time.monotonic() + seconds
+    while not child.stopping():
+        left = end - time.monotonic()
+        if left <= 0:
+            return False
+        select.select([child.control], [], [], left)
+    return True
+
+
+def main() -> None:
+    """Make pulses until told to quit.
+
+    Raises:
+        BadInputError: the rig has no trigger box.
+    """
+    child = begin(TriggerBoxConfig, Quit, _GRACE_S)
+    trigger = child.config.rig.trigger
+    source = trigger_source(trigger)
+    if not isinstance(source, TriggerBoxPulses):
+        raise BadInputError('the rig has no trigger box: set trigger.source = "triggerbox" in the rig file')
+
+    def tell(level: Level, said: Phrase) -> None:
+        child.control.send(TriggerTold(event=Event.now(level, TRIGGER, said)))
+
+    def fired(pulses: Fired) -> None:
+        child.control.send(
+            PulsesFired(
+                first=pulses.first, times=pulses.times, uncertainty_ns=pulses.uncertainty_ns, until=pulses.until
+            )
+        )
+
+    TrainKeeper(
+        child.config.port, source.rate, trigger.rate_hz, tell=tell, fired=fired, wait=lambda s: _wait(child, s)
+    ).run()
+
+
+if __name__ == "__main__":
+    main()

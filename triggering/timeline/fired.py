@@ -1,0 +1,207 @@
+"""What the source of the pulses says it has fired, beside what the cameras saw of it.
+
+The source is a further witness. A pulse of which no camera has a frame is in the log all the same if the source fired
+it, and each decided pulse is compared with the source's word. Its word comes some time after a pulse, so a pulse
+behind a gap waits for it; in an unbroken train nothing waits.
+
+Source and cameras do not time the same thing: exposure may begin later than the edge of the pulse. That offset is
+learned from the pulses that both tell of. Two pulses are the same if no other pulse of the source is nearer. Nothing is
+said of times for which the source has not told its pulses, or has told them too inexactly.
+"""
+
+from collections import deque
+from typing import Final
+
+from rig.clocks import NS_PER_S, HostNs
+from triggering.timeline.pulse_train import PulseTrain
+
+#: A source that has said nothing for so long is not waited for.
+_SILENT_NS: Final = NS_PER_S
+#: Decided pulses that wait for the source's word; older ones are forgotten.
+_WAITING: Final = 1024
+#: Weight of a pulse in the offset.
+_GAIN: Final = 0.05
+#: Half of the distance at which two pulses are the same is left to the source's clock, the rest to the cameras'.
+_SHARE: Final = 0.5
+#: Between pulses further apart than so many periods there is room for another.
+_GAP_PERIODS: Final = 1.5
+
+
+class FiredPulses:
+    """Compares the pulses of the source with the decided ones; times are on the common time line.
+
+    Args:
+        train: the rhythm of the decided pulses.
+
+    Attributes:
+        told: pulses that the source says it has fired.
+        unseen: of them, no camera delivered a frame, and one that was there took none.
+        untagged: of them, the log has none: the source's word came too late.
+        unfired: decided pulses that the source did not fire.
+        unseen_at, unfired_at: times of the last of these; an untagged one counts as unseen.
+        uncertainty_ns: largest error of the last pulse's time.
+    """
+
+    def __init__(self, train: PulseTrain) -> None:
+        self._train = train
+        self._queue: deque[HostNs] = deque()
+        self._decided: deque[HostNs] = deque(maxlen=_WAITING)
+        self._number: int | None = None
+        self._last: HostNs | None = None
+        self._until: HostNs | None = None
+        self._since = 0.0  # before this the source has left out pulses
+        self._trusted = False
+        self._first: HostNs | None = None  # of the decided pulses
+        self._intervals: deque[int] = deque(maxlen=2)
+        self._before: HostNs | None = None  # the last decided pulse when the source began to tell
+        self._offset_ns: float | None = None
+        self.told = self.unseen = self.untagged = self.unfired = 0
+        self.uncertainty_ns = 0
+        self.unseen_at: HostNs | None = None
+        self.unfired_at: HostNs | None = None
+
+    @property
+    def period_ns(self) -> float | None:
+        """Time between the last two pulses by the source's clock; None: it has not told of two."""
+        return float(self._intervals[-1]) if self._intervals else None
+
+    @property
+    def oldest(self) -> HostNs | None:
+        """Time of the first pulse of the source that is not decided; None: there is none."""
+        return HostNs(round(self._on_line(self._queue[0]))) if self._queue else None
+
+    @property
+    def active(self) -> bool:
+        """Whether there is a source that tells of its pulses."""
+        return self._until is not None
+
+    def add(self, number: int, time: HostNs, uncertainty_ns: int) -> None:
+        """Enter a pulse.
+
+        Args:
+            number: one more than that of the pulse before it; any other: the source has not told of some in between.
+            time: when it fired.
+            uncertainty_ns: largest error of the time.
+        """
+        self.told += 1
+        self.uncertainty_ns = uncertainty_ns
+        follows = self._number is not None and number == self._number + 1 and self._last is not None
+        if follows and self._last is not None:
+            self._intervals.append(time - self._last)
+        self._number, self._last = number, time
+        reach, place = self._reach_ns, self._on_line(time)
+        self._trusted = uncertainty_ns <= _SHARE * reach
+        if not self._trusted:
+            self._decided.clear()
+            return
+        if self._until is None:
+            self._until = time
+        if follows:
+            self._forget_before(place - reach)
+        else:
+            self._before, self._since = self._train.last, place - reach
+        while self._decided and self._decided[0] < place - reach:
+            self._decided.popleft()  # the source tells nothing of that time
+        if self._decided and self._decided[0] <= place + reach:
+            self._learn(self._decided.popleft() - time)
+        elif self._train.last is not None and place <= self._train.last + reach:
+            self._pass_over(time)
+        else:
+            self._queue.append(time)
+
+    def until(self, time: HostNs) -> None:
+        """Say that all pulses up to `time` have been told."""
+        if self._trusted:
+            self._until = time
+            self._forget_before(self._on_line(time) - self._reach_ns)
+
+    def covers(self, time: HostNs) -> bool:
+        """Whether the source has told of all pulses up to a time: there were no others."""
+        return self._trusted and self._until is not None and self._on_line(self._until) >= time
+
+    def waits(self, before: HostNs, now: HostNs) -> bool:
+        """Whether a pulse behind a gap is to wait, since the source has not told of all pulses before it.
+
+        Args:
+            before: time of the pulse.
+            now: present time.
+        """
+        last = self._train.last
+        if self._until is None or last is None or now >= self._until + _SILENT_NS:
+            return False
+        return before - last > _GAP_PERIODS * self._train.period_ns and self._on_line(self._until) < before
+
+    def next_unseen(self, before: HostNs | None) -> HostNs | None:
+        """Time of the next pulse of the source that is surely none of the open ones; None: there is none.
+
+        Args:
+            before: time of the first open pulse; None: there is none.
+        """
+        last = self._train.last
+        while self._queue and last is not None and self._on_line(self._queue[0]) <= last + self._reach_ns:
+            self._pass_over(self._queue.popleft())
+        if not self._queue:
+            return None
+        place = self._on_line(self._queue[0])
+        return None if before is not None and before <= place + self._reach_ns else HostNs(round(place))
+
+    def skip(self) -> None:
+        """Leave out the pulse of `next_unseen`: no camera has been there yet."""
+        self._queue.popleft()
+
+    def decided(self, time: HostNs, *, inserted: bool, seen: bool, missed: bool) -> None:
+        """Enter a pulse that is decided.
+
+        Args:
+            time: of the pulse.
+            inserted: it is the one that `next_unseen` told of.
+            seen: a camera delivered a frame of it.
+            missed: a camera that was there took none.
+        """
+        if inserted:
+            self._queue.popleft()
+            if missed:
+                self.unseen += 1
+                self.unseen_at = time
+            return
+        self._first = self._first or time
+        if self._until is None:
+            self._decided.append(time)
+            return
+        reach = self._reach_ns
+        while self._queue and self._on_line(self._queue[0]) < time - reach:
+            self._pass_over(self._queue.popleft())
+        if self._queue and self._on_line(self._queue[0]) <= time + reach:
+            fired = self._queue.popleft()
+            if seen:
+                self._learn(time - fired)
+            return
+        if time >= self._since:
+            self._decided.append(time)
+
+    @property
+    def _reach_ns(self) -> float:
+        """Pulses of source and cameras that are this close are the same."""
+        return min(self._intervals, default=self._train.period_ns) / 2
+
+    def _on_line(self, time: HostNs) -> float:
+        return time + (self._offset_ns or 0.0)
+
+    def _learn(self, offset_ns: int) -> None:
+        if self._offset_ns is None:
+            self._offset_ns = float(offset_ns)
+        else:
+            self._offset_ns += _GAIN * (offset_ns - self._offset_ns)
+
+    def _pass_over(self, time: HostNs) -> None:
+        """Count a pulse that has no tag, unless the source or the cameras have only just begun."""
+        place = self._on_line(time)
+        if self._first is not None and place > max(self._first, self._before or self._first):
+            self.untagged += 1
+            self.unseen_at = HostNs(round(place))
+
+    def _forget_before(self, time: float) -> None:
+        """Count the decided pulses that the source has passed over."""
+        while self._decided and self._decided[0] < time:
+            self.unfired_at = self._decided.popleft()
+            self.unfired += 1

@@ -38,7 +38,7 @@ READY = {
     "recordings/jump-2": "#frame-slider",
     "log": "#log-list li, #log-empty",
     "doctor": "#doctor-run",
-    "aim": "#aim-empty",
+    "aim": "#aim-cameras button",
     "rig": "#rig-facts div",
 }
 SMALLEST_TOUCH_PX = 44

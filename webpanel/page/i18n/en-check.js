@@ -22,8 +22,8 @@ export const check = {
   "rehearsal.pulses": "Pulses, complete",
   "rehearsal.everything": "Everything that was examined",
 
-  "aim.open": "Focus and exposure",
-  "aim.title": "Focus",
+  "aim.open": "Focus",
+  "aim.title": "Focus and exposure",
   "aim.back": "Back to the live view",
   "aim.when_armed": "Arm the rig: then the pictures come.",
   "aim.no_pulses": "No pulses arrive: no pictures.",

@@ -22,8 +22,8 @@ export const check = {
   "rehearsal.pulses": "Pulser, fullstendige",
   "rehearsal.everything": "Alt som ble undersøkt",
 
-  "aim.open": "Fokus og eksponering",
-  "aim.title": "Fokus",
+  "aim.open": "Fokus",
+  "aim.title": "Fokus og eksponering",
   "aim.back": "Tilbake til direktevisningen",
   "aim.when_armed": "Gjør riggen klar: da kommer bildene.",
   "aim.no_pulses": "Det kommer ingen pulser, og derfor ingen bilder.",

@@ -1,16 +1,19 @@
 """The view that sets up a camera: its bar holds the best sharpness, and its figures are those of the camera chosen."""
 
+import re
+
 import cv2
 import httpx
 import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
+from rig.frame import FrameStatus
 from tests.browser.conftest import Open
 from tests.browser.test_layout import BROKEN
 from tests.browser.test_page import SMALLEST_TOUCH_PX, TOO_SMALL
 from tests.support.waiting import wait_until
-from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService
+from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused
 
 _MAGENTA = np.array([255, 0, 255])
@@ -56,6 +59,34 @@ def test_the_bar_falls_behind_its_best_when_the_lens_is_turned_too_far(
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     assert page.evaluate(BROKEN) == []
     assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+
+
+def test_an_earlier_picture_of_the_camera_lies_over_the_live_one(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    write_recording(service.catalogue.directory, "yesterday", ((FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK),) * 3)
+    service.arm()
+    page = open_page(f"{panel.url}/#/aim", width=360, height=780)
+    ghost = page.locator("#aim-ghost")
+    expect(page.locator("#aim-image")).not_to_have_js_property("naturalWidth", 0)
+    expect(ghost).to_be_hidden()
+    page.locator("#aim-earlier").select_option("yesterday")
+    expect(ghost).to_have_attribute("src", "./api/recordings/yesterday/pulses/1.jpg?camera=K1")
+    expect(ghost).to_have_js_property("naturalWidth", COLUMNS[0][1])
+    expect(ghost).to_be_visible()
+    page.locator("#aim-mix").fill("80")
+    expect(ghost).to_have_css("opacity", "0.8")
+    live, over = page.locator("#aim-image").bounding_box(), ghost.bounding_box()
+    assert live == over
+    page.locator("#aim-cameras button").nth(1).click()
+    expect(page.locator("#aim-earlier-not")).to_have_text("K2 has no picture in that recording.")
+    expect(ghost).to_be_hidden()
+    page.locator("#aim-cameras button").nth(2).click()
+    expect(ghost).to_have_attribute("src", re.compile("camera=K3$"))
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    assert page.evaluate(BROKEN) == []
+    page.locator("#aim-earlier").select_option("")
+    expect(ghost).to_be_hidden()
 
 
 def test_pictures_are_whole_and_painted_where_they_are_in_focus(client: httpx.Client, service: MemoryService) -> None:

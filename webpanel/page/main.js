@@ -22,6 +22,7 @@ import { startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
 import { startAim } from "./system/aim.js";
 import * as doctor from "./system/doctor.js";
+import { drawEarlier, enterEarlier, startEarlier } from "./system/earlier.js";
 import { startLog } from "./system/log.js";
 import * as rehearsal from "./system/rehearsal.js";
 import * as rig from "./system/rig.js";
@@ -39,6 +40,7 @@ function redraw() {
   drawVoices();
   drawChoices();
   drawExports();
+  drawEarlier();
   drawKeys();
 }
 
@@ -51,13 +53,14 @@ function entered({ view, id }) {
     doctor.draw();
     rehearsal.enterRehearsal();
   }
+  if (view === "aim") void enterEarlier();
   if (view === "rig") void rig.enterRig();
 }
 
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startAim, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

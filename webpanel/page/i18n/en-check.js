@@ -23,7 +23,7 @@ export const check = {
   "rehearsal.everything": "Everything that was examined",
 
   "aim.open": "Focus",
-  "aim.title": "Focus and exposure",
+  "aim.title": "Focus",
   "aim.back": "Back to the live view",
   "aim.when_armed": "Arm the rig: then the pictures come.",
   "aim.no_pulses": "No pulses arrive: no pictures.",
@@ -41,4 +41,9 @@ export const check = {
   "aim.clipped": "Clipped to white",
   "aim.black": "Clipped to black",
   "aim.mean": "Mean brightness",
+  "aim.earlier": "Compare with an earlier picture",
+  "aim.nothing": "no earlier picture",
+  "aim.mix": "Live – earlier",
+  "aim.not_there": "{camera} has no picture in that recording.",
+  "aim.other_size": "That picture has another size: the camera's region was changed since.",
 };

@@ -23,7 +23,7 @@ export const check = {
   "rehearsal.everything": "Alt som ble undersøkt",
 
   "aim.open": "Fokus",
-  "aim.title": "Fokus og eksponering",
+  "aim.title": "Fokus",
   "aim.back": "Tilbake til direktevisningen",
   "aim.when_armed": "Gjør riggen klar: da kommer bildene.",
   "aim.no_pulses": "Det kommer ingen pulser, og derfor ingen bilder.",
@@ -41,4 +41,9 @@ export const check = {
   "aim.clipped": "Klippet til hvitt",
   "aim.black": "Klippet til svart",
   "aim.mean": "Midlere lysstyrke",
+  "aim.earlier": "Sammenlign med et tidligere bilde",
+  "aim.nothing": "ikke noe tidligere bilde",
+  "aim.mix": "Nå – tidligere",
+  "aim.not_there": "{camera} har ikke noe bilde i det opptaket.",
+  "aim.other_size": "Det bildet har en annen størrelse: kameraets utsnitt er endret siden.",
 };

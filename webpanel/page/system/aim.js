@@ -6,6 +6,7 @@ import { $, fillList, make, setText } from "../shared/dom.js";
 import { number, quantity } from "../shared/format.js";
 import { tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
+import { earlierOf } from "./earlier.js";
 
 /** After a failed call. */
 const PAUSE_MS = 2000;
@@ -92,6 +93,7 @@ function draw() {
   if ([...buttons.children].map((button) => button.textContent).join() !== names.join()) {
     buttons.replaceChildren(...names.map((name) => make("button", { type: "button", onclick: () => choose(name) }, name)));
   }
+  earlierOf(camera);
   for (const button of buttons.children) button.setAttribute("aria-pressed", String(button.textContent === camera));
   const on = ["armed", "recording"].includes(status?.state ?? "");
   const shown = on && aids?.camera === camera ? aids : null;

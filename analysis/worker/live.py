@@ -203,7 +203,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recent = recording.between(max(newest.pulse - _SOUGHT_S * rate, recording.told + 1), newest.pulse)
         cameras = recording.cameras(self._exposures)
         exposures = {name: camera.exposure_s for name, camera in cameras.items()}
-        found = identify(recent, self._scene.system, rate, exposures)
+        found = identify(recent, self._scene.system, rate, exposures, on_time=True)  # as he is followed
         if not found or len(found[-1].pulses) < _BEGIN:
             return
         follower = Follower(self._scene.system, cameras, rate)

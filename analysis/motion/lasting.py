@@ -28,10 +28,10 @@ from rig.arrays import Floats, Integers
 LASTING_S: Final = 0.2
 _RUN_S: Final = LASTING_S / 2  # in so short a time a lasting error is one number
 _POINTS, _SKIS = range(len(POINTS)), range(len(POINTS), len(GROUPS))
-#: Variances of lasting errors before a jump tells them: of points in those of single ones; of the axes of skis a shift
-#: and a turn, px^2, and a factor for what their images tell. Half of each fades, half stays.
+#: Variances of lasting errors before a jump tells them: of points in those of single ones; of the axes of skis besides
+#: `AXIS_PX` a factor for what their images tell. Half of each fades, half stays.
 _OF_POINTS: Final = (0.01, 0.01)
-_OF_SKIS: Final = (AXIS_PX**2, AXIS_PX**2, 1.0)
+_TOLD: Final = 1.0
 _PSEUDO: Final = 1.0  # observations that they count as
 _STEPS, _SETTLED = 12, 0.02  # of the iteration of variances, and the relative change that ends it
 _RANK: Final = 1e-9  # of the greatest eigenvalue
@@ -98,7 +98,8 @@ def lasting_covariance(adjusted: Adjusted, square: Floats, redundancy: Floats) -
         redundancy: (n, m, 6) their shares in the degrees of freedom.
     """
     total = np.zeros((len(adjusted.used), STATE, STATE))
-    for things, start in ((_POINTS, _OF_POINTS), (_SKIS, _OF_SKIS)):
+    shift, turn = AXIS_PX**2 * adjusted.model.observed.factors[_SKIS.start] ** 2
+    for things, start in ((_POINTS, _OF_POINTS), (_SKIS, (shift, turn, _TOLD))):
         series = [
             own
             for camera in range(adjusted.used.shape[1])

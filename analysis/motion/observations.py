@@ -41,6 +41,7 @@ class Observations:
         seen: (n, m, 6) which groups were measured.
         by_hand: (n, m, 6) which of them a person measured.
         lasting: (n, m, 6) px, standard deviation of a shift of both points of a ski that neighbouring pulses share.
+        factors: (6, 2) by which the standard deviations of the measurements were changed, see `scaled`.
     """
 
     names: tuple[str, ...]
@@ -51,6 +52,7 @@ class Observations:
     seen: Flags
     by_hand: Flags
     lasting: Floats
+    factors: Floats
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -81,7 +83,12 @@ class Observations:
                 much a ski's axis is shifted, and turned.
         """
         inverse = np.einsum("ab,gb,cb->gac", _MEAN_AND_DIFFERENCE, 1 / factors, _MEAN_AND_DIFFERENCE)
-        return replace(self, whitener=self.whitener @ inverse, lasting=self.lasting * factors[:, 0])
+        return replace(
+            self,
+            whitener=self.whitener @ inverse,
+            lasting=self.lasting * factors[:, 0],
+            factors=self.factors * factors,
+        )
 
 
 def observations(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Observations:
@@ -97,6 +104,7 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
         np.zeros((n, m, 6), bool),
         np.zeros((n, m, 6), bool),
         np.zeros((n, m, 6)),
+        np.ones((6, 2)),
     )
     for i, name in enumerate(names):
         skis: list[tuple[tuple[int, int, int], SkiMeasurement]] = []

@@ -40,6 +40,8 @@ _ANCHORS: Final = 256
 #: Offsets at which fewer pulses are the same than this share of the most are no rivals: they join the logs at an end.
 _SHARE: Final = 0.5
 _LEAST: Final = 3
+#: Trying an offset takes some milliseconds.
+_MOST: Final = 20_000
 #: The offset is followed along the recording in steps of so many pulses.
 _STEP: Final = 64
 #: Beyond so many standard deviations the times of a pulse are no longer of the same one; never below the clocks' error.
@@ -195,11 +197,18 @@ class _Aligning:
             return
         width = self._near / 2
         places, votes = np.unique(np.floor(apart / width).astype(np.int64), return_counts=True)
-        enough = votes >= max(1.0, _SHARE / 2 * votes.max())
+        joined = np.diff(places) == 1
+        before, after = np.append(0, votes[:-1] * joined), np.append(votes[1:] * joined, 0)
+        enough = (votes >= _SHARE / 2 * votes.max()) & (votes > before) & (votes >= after)
+        if np.sum(enough) > _MOST:
+            raise BadInputError(
+                f"their pulses could be the same at more than {_MOST} offsets{self._within()}: keep the clocks of both "
+                "computers right by NTP or PTP"
+            )
         apart.sort()
         for place in places[enough]:
-            # the middle of what lies in two neighbouring bins, so that none is cut in two
-            inside = apart[slice(*np.searchsorted(apart, (place * width, (place + 2) * width)))]
+            # the middle of what lies in neighbouring bins, so that none is cut in two
+            inside = apart[slice(*np.searchsorted(apart, ((place - 1) * width, (place + 2) * width)))]
             yield float(np.median(inside))
 
     def _fit(self, offset: float) -> _Fit | None:
@@ -213,6 +222,9 @@ class _Aligning:
             offset, rate = offset + shift, rate + more
             if abs(rate) > _RATE_MAX:
                 return None
+            if abs(shift) + abs(more) * self._b[-1] < self._near / 10:
+                residuals = residuals - shift - more * self._b[second]  # the same pulses are near enough
+                break
             first, second, residuals = self._matched(offset, rate)
         if len(first) < _LEAST or not self._is_allowed(offset, rate):
             return None

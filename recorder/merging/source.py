@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Self
 
@@ -75,6 +76,8 @@ def look_at(path: Path) -> Part:
                     _check_cameras(path, about.first, tag)
                     times.append(tag.time)
                     seen.append(any(camera.status is FrameStatus.OK for camera in tag.cameras))
+        if any(later <= time for time, later in pairwise(times)):
+            raise LogDamagedError(f"{path}: a pulse is not later than the one before it; look at `svev verify`")
         begin, end = times_of(reader.metadata)
         metadata, own_topics = dict(reader.metadata), reader.has_camera_topics
     utc = about.utc

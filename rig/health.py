@@ -126,6 +126,17 @@ class PairingHealth(msgspec.Struct, frozen=True):
         return self.pulses - self.unwatched
 
 
+class PulsesMade(msgspec.Struct, frozen=True):
+    """The pulses that a line of the computer has made since arming; how late they were against even times."""
+
+    made: Annotated[int, Meta(description="pulses")]
+    skipped: Annotated[int, Meta(description="pulses that were left out, since they would have come late")]
+    late_median_us: Annotated[float | None, Meta(description="of the last thousand pulses; null: none was made yet")]
+    late_p99_us: Annotated[float | None, Meta(description="likewise; 1 of 100 was later")]
+    late_max_us: Annotated[float | None, Meta(description="the latest of all")]
+    realtime: Annotated[bool, Meta(description="whether the thread that makes them has a real-time priority")]
+
+
 class PrerollHealth(msgspec.Struct, frozen=True):
     """Triplets that are held in memory for a recording that begins in the past."""
 
@@ -172,6 +183,7 @@ class Health(msgspec.Struct, frozen=True):
     recording: Annotated[WritingHealth | None, Meta(description="null without a recording")]
     disk: DiskHealth
     latency: Latency
+    made: Annotated[PulsesMade | None, Meta(description='null: trigger.source is not "gpio"')] = None
 
 
 #: The JSON schema of a health record.

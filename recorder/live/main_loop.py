@@ -21,7 +21,7 @@ from rig.action import ActionCounts
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
 from rig.events import PAIRING, TRIGGER, Event, Level
-from rig.health import PairingHealth
+from rig.health import PairingHealth, PulsesMade
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
@@ -42,6 +42,7 @@ from rig.transport.messages import (
     StopRecording,
     TellActions,
     TellEvent,
+    TellPulses,
     TellResult,
 )
 from rig.transport.preview import PreviewSlot
@@ -93,6 +94,7 @@ class RecorderLoop:
         self._source = trigger_source(rig.trigger)
         self._spread = SpreadTeller(self._source)
         self._actions: tuple[ActionCounts, ...] | None = None
+        self._made: PulsesMade | None = None
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -180,6 +182,8 @@ class RecorderLoop:
                 self._recordings.result(command)
             case TellActions():
                 self._actions = command.counts
+            case TellPulses():
+                self._made = command.made
             case Quit():
                 self._quit = True
 
@@ -193,6 +197,7 @@ class RecorderLoop:
         health = self._health.record(
             self._assembler.connected,
             self._actions,
+            made=self._made,
             pairing=self._assembler.pairer.health(),
             free_triplets=self._buffers.free_count,
             unpublished=self._publisher.dropped,

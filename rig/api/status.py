@@ -68,6 +68,17 @@ class CameraStatus(Model):
     )
 
 
+class MadePulses(Model):
+    """The pulses that a line of this computer has made since arming; how late they were against even times."""
+
+    made: int = Field(description="pulses")
+    skipped: int = Field(description="pulses that were left out, since they would have come late")
+    late_median_us: float | None = Field(description="of the last thousand pulses; null: none was made yet")
+    late_p99_us: float | None = Field(description="likewise; 1 of 100 was later")
+    late_max_us: float | None = Field(description="the latest of all")
+    realtime: bool = Field(description="whether the thread that makes them has a real-time priority")
+
+
 class PulseStatus(Model):
     """The trigger pulses of the last second."""
 
@@ -75,6 +86,7 @@ class PulseStatus(Model):
     rate_hz: float | None = None
     spread_us: float | None = Field(None, description="median spread of the trigger times within a pulse")
     number: int = Field(0, description="pulses seen since arming")
+    made: MadePulses | None = Field(None, description='null: trigger.source is not "gpio"')
 
 
 class DiskStatus(Model):

@@ -15,6 +15,10 @@ _LONGEST: Final = 0.1
 _ACTION_QUEUE: Final = 4
 
 
+#: A line of a GPIO chip, by number or name.
+GpioLine = Annotated[int, Field(ge=0, le=1023)] | Annotated[str, Field(min_length=1, max_length=31)]
+
+
 def _ipv4(text: str) -> str:
     return str(IPv4Address(text))
 
@@ -92,6 +96,32 @@ class ActionTrigger(CommandedTrigger):
         return self
 
 
+class GpioTrigger(TriggerSettings):
+    """A line of this computer: its cable leads to all cameras, and a process of svev makes the pulses."""
+
+    source: Literal["gpio"] = Field(description="a line of this computer, set through libgpiod")
+    chip: str = Field(
+        "gpiochip0", min_length=1, max_length=200, description="GPIO chip: device file, number, or label (gpiodetect)"
+    )
+    line: GpioLine = Field(description="line of the pulses: its number on the chip, or its name (gpioinfo)")
+    active_low: bool = Field(False, description="the line is low during a pulse")
+    pulse_ms: float = Field(1.0, ge=0.05, le=100, description="length of a pulse; at most half of the period")
+
+    @property
+    def width_ns(self) -> int:
+        """Length of a pulse, ns."""
+        return round(self.pulse_ms * 1e6)
+
+    @model_validator(mode="after")
+    def _pulses_end(self) -> "GpioTrigger":
+        if 2 * self.width_ns > self.period_ns:
+            raise ValueError(
+                f"trigger.pulse_ms = {self.pulse_ms:g} is more than half of the time between two pulses at "
+                f"{self.rate_hz:g} Hz: make it {self.period_ns / 2e6:.3g} or less"
+            )
+        return self
+
+
 def check_takes_actions(name: str, backend: str, address: str) -> None:
     """Check that action commands reach a camera, and that its answers can be known for its own.
 
@@ -131,6 +161,9 @@ def _external_unless_said(table: Any) -> Any:
 
 #: The `[trigger]` table: one of the sources, told by `source`.
 Trigger = Annotated[
-    Annotated[ExternalTrigger | SoftwareTrigger | ActionTrigger | TriggerBoxTrigger, Field(discriminator="source")],
+    Annotated[
+        ExternalTrigger | SoftwareTrigger | ActionTrigger | TriggerBoxTrigger | GpioTrigger,
+        Field(discriminator="source"),
+    ],
     BeforeValidator(_external_unless_said),
 ]

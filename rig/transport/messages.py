@@ -18,7 +18,7 @@ from rig.api.recordings import Counts
 from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.events import Event, Level
-from rig.health import Health
+from rig.health import Health, PulsesMade
 from rig.phrase import Phrase, phrase
 from rig.pulse import Pause, PulseNumber
 from rig.settings.model import RigSettings
@@ -195,6 +195,17 @@ class TellActions(Message):
     counts: tuple[ActionCounts, ...]
 
 
+class TellPulses(Message):
+    """From the process that makes the pulses of a line, by way of the service, to the recorder: what has been made.
+
+    Attributes:
+        made: the pulses.
+    """
+
+    is_state: ClassVar[bool] = True
+    made: PulsesMade
+
+
 class TellResult(Message):
     """To the recorder: a result of the analysis, for the log if that recording still runs, and for subscribers.
 
@@ -230,7 +241,15 @@ class PulsesFired(Message):
 
 
 RecorderCommand = (
-    StartRecording | StopRecording | GrabberDied | TellEvent | TellActions | PulsesFired | TellResult | Quit
+    StartRecording
+    | StopRecording
+    | GrabberDied
+    | TellEvent
+    | TellActions
+    | TellPulses
+    | PulsesFired
+    | TellResult
+    | Quit
 )
 
 

@@ -9,7 +9,7 @@ from rig.clocks import HostNs
 from rig.events import Event
 from rig.health import Health
 from rig.settings.model import RigSettings
-from rig.transport.messages import Message, PulsesFired, Quit, TellActions
+from rig.transport.messages import Message, PulsesFired, Quit, TellActions, TellPulses
 
 
 class TriggerBoxConfig(Message):
@@ -25,7 +25,7 @@ class TriggerBoxConfig(Message):
 
 
 class TriggerConfig(Message):
-    """Configuration of the process that sends action commands.
+    """Configuration of the process that sends action commands, or makes the pulses of a line.
 
     Attributes:
         rig: the rig.
@@ -65,4 +65,4 @@ class TriggerTold(Message):
 
 
 TriggerCommand = CamerasSeen | Quit
-TriggerReport = TellActions | PulsesFired | TriggerTold
+TriggerReport = TellActions | TellPulses | PulsesFired | TriggerTold

@@ -4,7 +4,10 @@ import os
 import resource
 from typing import Final
 
-_PRIORITY: Final = 10  #: above everything ordinary, below the kernel's own interrupt threads at 50
+#: Above everything ordinary, below the kernel's own interrupt threads at 50.
+FETCHING_FRAMES: Final = 10
+#: Above those, too: a frame waits in a buffer, a pulse nowhere.
+MAKING_PULSES: Final = 15
 
 
 def allowed_priority() -> int:
@@ -16,19 +19,20 @@ def allowed_priority() -> int:
     return resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
 
 
-def prefer_this_process(allowed: int) -> bool:
+def prefer_this_process(allowed: int, wanted: int = FETCHING_FRAMES) -> bool:
     """Give this process, with all threads that it will start, a real-time priority.
 
     A frame that the grabber does not fetch in time is lost, while everything behind the grabber can wait in buffers.
 
     Args:
         allowed: the highest priority to take, 0: none.
+        wanted: the priority to take if that is allowed.
 
     Returns:
         Whether the process has a real-time priority now.
     """
     if allowed == 0:
         return False
-    priority = _PRIORITY if allowed == resource.RLIM_INFINITY else min(allowed, _PRIORITY)
+    priority = wanted if allowed == resource.RLIM_INFINITY else min(allowed, wanted)
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     return True

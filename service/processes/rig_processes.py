@@ -1,6 +1,7 @@
 """Runs the processes of one rig: rings, one grabber process per camera, one recorder process, one for the analysis.
 
-Where svev makes the pulses, one more process sends the action commands, or drives the trigger box.
+Where svev makes the pulses, one more process sends the action commands, drives the trigger box,
+or makes the pulses of a line.
 
 The owner calls `turn` again and again; it passes on the recorder's reports, keeps track of the cameras, and starts dead
 grabbers again. The owner decides what happens when the recorder dies.
@@ -20,7 +21,7 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.settings.trigger import ActionTrigger, TriggerBoxTrigger
+from rig.settings.trigger import ActionTrigger, GpioTrigger, TriggerBoxTrigger
 from rig.transport.messages import (
     AnalysisConfig,
     AnalysisReport,
@@ -40,6 +41,7 @@ from rig.transport.messages import (
     RecorderReport,
     RecorderWarm,
     TellActions,
+    TellPulses,
     TellResult,
 )
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
@@ -56,7 +58,7 @@ TRIGGER: Final = "trigger"
 #: Variable in which the simulated hill names the port of its trigger box.
 TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
 #: Reports that are dealt with here.
-_FORWARDED: Final = TellResult | AnalysisTold | TellActions | PulsesFired | TriggerTold
+_FORWARDED: Final = TellResult | AnalysisTold | TellActions | TellPulses | PulsesFired | TriggerTold
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +127,7 @@ class RigProcesses:
         self._doorbell = -1
         self._epoch = host_now() if epoch is None else epoch
         self._names = [camera.name for camera in rig.cameras]
-        making = [TRIGGER] if isinstance(rig.trigger, ActionTrigger | TriggerBoxTrigger) else []
+        making = [TRIGGER] if isinstance(rig.trigger, ActionTrigger | TriggerBoxTrigger | GpioTrigger) else []
         self._helpers = [*self._names, *making, *([] if rig.analysis is None else [ANALYSIS])]
         self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
@@ -185,7 +187,7 @@ class RigProcesses:
     def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
 
-        Results of the analysis, answers to action commands, and what a trigger box has fired, go on to the recorder.
+        Results of the analysis, answers to action commands, and what pulses were made, go on to the recorder.
 
         Args:
             timeout_s: longest wait for the first report, s.
@@ -200,7 +202,7 @@ class RigProcesses:
         reports = [message for _, message in self._processes.receive(timeout_s, wake)]
         for report in reports:
             match report:
-                case TellResult() | TellActions() | PulsesFired():
+                case TellResult() | TellActions() | TellPulses() | PulsesFired():
                     if not self.recorder_died:
                         self.tell(report)
                 case AnalysisTold() | TriggerTold():
@@ -297,10 +299,10 @@ class RigProcesses:
             box = ProcessSpec(TRIGGER, "service.processes.trigger_box_process", config, reports=TriggerReport)
             self._processes.start(box)
         else:
-            actions = TriggerConfig(rig=self._rig, epoch=self._epoch)
-            self._processes.start(
-                ProcessSpec(TRIGGER, "service.processes.trigger_process", actions, reports=TriggerReport)
-            )
+            by_line = isinstance(trigger, GpioTrigger)
+            program = "service.processes.gpio_process" if by_line else "service.processes.trigger_process"
+            even = TriggerConfig(rig=self._rig, epoch=self._epoch)
+            self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport))
 
     def _start_recorder(self) -> None:
         fds, options = tuple(ring.fd for ring in self._rings), self._options

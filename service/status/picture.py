@@ -15,13 +15,14 @@ from rig.api.status import (
     ActionAnswers,
     CameraStatus,
     DiskStatus,
+    MadePulses,
     PrerollStatus,
     ProcessStatus,
     PulseStatus,
     State,
     Status,
 )
-from rig.health import Health
+from rig.health import Health, PulsesMade
 from rig.settings.model import RigSettings
 from service.processes.rig_processes import CameraPresence
 from service.recordings.storage import Room
@@ -112,6 +113,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
             rate_hz=rate and round(rate, 2),
             spread_us=None if pairing is None else pairing.spread_median_us,
             number=0 if pairing is None else pairing.seen,
+            made=None if facts.health is None else _made(facts.health.made),
         ),
         preroll=_preroll(facts),
         disk=DiskStatus(
@@ -166,6 +168,10 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
 
 def _answers(counts: ActionCounts | None) -> ActionAnswers | None:
     return None if counts is None else ActionAnswers(**msgspec.structs.asdict(counts))
+
+
+def _made(pulses: PulsesMade | None) -> MadePulses | None:
+    return None if pulses is None else MadePulses(**msgspec.structs.asdict(pulses))
 
 
 def _preroll(facts: Facts) -> PrerollStatus:

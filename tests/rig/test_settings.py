@@ -174,8 +174,8 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'hand'\n",
-            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\", \"triggerbox\"; "
-            "correct it",
+            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\", \"triggerbox\", "
+            '"gpio"; correct it',
             id="unknown source",
         ),
         pytest.param(
@@ -205,6 +205,11 @@ def test_the_schema_is_a_schema() -> None:
             HEAD + CAMERA + "[trigger]\nsource = 'action'\nscheduled = true\nrate_hz = 500\nlead_ms = 20\n",
             '"trigger": trigger.lead_ms = 20 has cameras hold 10 commands at 500 Hz, and some hold only 4: make it ',
             id="too many scheduled commands",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'gpio'\nline = 18\nrate_hz = 200\npulse_ms = 3\n",
+            '"trigger": trigger.pulse_ms = 3 is more than half of the time between two pulses at 200 Hz: make it 2.5',
+            id="pulses without an end",
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'action'\nbroadcast = ['192.168.8']\n",

@@ -56,6 +56,7 @@ def test_users_and_directories_are_understood(prefix: Path, tmp_path: Path) -> N
     members = dict(line.split(":", 1) for line in (root / "etc/group").read_text().splitlines())
     assert members["video"].endswith(":svev")
     assert members["dialout"].endswith(":svev")
+    assert members["gpio"].endswith(":svev")
     described = _run("systemd-tmpfiles", "--cat-config", f"--root={prefix}", prefix / "lib/tmpfiles.d/svev.conf")
     assert "/var/lib/svev/recordings" in described
 

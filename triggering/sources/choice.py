@@ -1,8 +1,9 @@
 """Makes the source of pulses that a rig file names."""
 
-from rig.settings.trigger import ActionTrigger, SoftwareTrigger, Trigger, TriggerBoxTrigger
+from rig.settings.trigger import ActionTrigger, GpioTrigger, SoftwareTrigger, Trigger, TriggerBoxTrigger
 from triggering.sources.action import ActionPulses
 from triggering.sources.external import ExternalPulses
+from triggering.sources.gpio.source import GpioPulses
 from triggering.sources.seam import TriggerSource
 from triggering.sources.software import SoftwarePulses
 from triggering.sources.triggerbox.source import TriggerBoxPulses
@@ -21,5 +22,7 @@ def trigger_source(settings: Trigger) -> TriggerSource:
             return ActionPulses(settings)
         case TriggerBoxTrigger():
             return TriggerBoxPulses(settings)
+        case GpioTrigger():
+            return GpioPulses()
         case _:
             return ExternalPulses()

@@ -22,6 +22,7 @@ TABLES: dict[str, dict[str, Any]] = {
     "action by broadcast": {"source": "action", "broadcast": ["192.168.8.255"]},
     "action by PTP": {"source": "action", "scheduled": True, "lead_ms": 5.0},
     "triggerbox": {"source": "triggerbox"},
+    "gpio": {"source": "gpio", "line": 18},
 }
 SOURCES = list(TABLES)
 #: Those whose pulses are commands at times that the host chooses; of them, those that grabbers give.

@@ -44,6 +44,15 @@
  * @property {number|null} rate_hz
  * @property {number|null} spread_us
  * @property {number} number
+ * @property {MadePulses|null} made
+ *
+ * @typedef {object} MadePulses
+ * @property {number} made
+ * @property {number} skipped
+ * @property {number|null} late_median_us
+ * @property {number|null} late_p99_us
+ * @property {number|null} late_max_us
+ * @property {boolean} realtime
  *
  * @typedef {object} DiskStatus
  * @property {number} free_gb

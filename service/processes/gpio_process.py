@@ -1,0 +1,118 @@
+"""The program of the process that makes the pulses of a line of the computer."""
+
+import gc
+import select
+import sys
+import threading
+from typing import Final
+
+from rig.clocks import NS_PER_S, HostNs, host_now
+from rig.errors import TriggerError
+from rig.events import TRIGGER, Event, Level
+from rig.phrase import Phrase, phrase
+from rig.settings.trigger import GpioTrigger
+from rig.transport.child import ChildContext, begin
+from rig.transport.messages import Quit, TellPulses
+from rig.transport.trigger_messages import TriggerCommand, TriggerConfig, TriggerTold
+from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
+from triggering.sources.gpio.lines import OutputLine
+from triggering.sources.gpio.pulser import Pulser
+from triggering.sources.gpio.telling import LatenessTeller
+from triggering.sources.gpio.timer import Timer
+
+#: A pulse and the line that is made inactive.
+_GRACE_S: Final = 2.0
+_TURN_MS: Final = 250
+_REPORT_EVERY_NS: Final = NS_PER_S // 2
+_RETRY_NS: Final = 2 * NS_PER_S
+#: Python hands over to a thread that waits for it after so long: a pulse does not wait longer for a report.
+_SWITCH_S: Final = 1e-4
+
+
+def main() -> None:
+    """Make pulses until told to quit; a line that cannot be had is tried again."""
+    child = begin(TriggerConfig, TriggerCommand, _GRACE_S)
+    trigger = child.config.rig.trigger
+    if not isinstance(trigger, GpioTrigger):
+        raise SystemExit(f'trigger: source "{trigger.source}" is no line of the computer')
+    sys.setswitchinterval(_SWITCH_S)
+    gc.freeze()  # a collection looks only at what comes from now on
+    realtime = prefer_this_process(allowed_priority(), MAKING_PULSES)
+    if not realtime:
+        text = (
+            "pulses are made without real-time priority, so other programs delay them: run svev as a service, or "
+            "allow it in this shell with sudo prlimit --rtprio=20 --pid $$"
+        )
+        _tell(child, Level.WARNING, phrase("gpio_no_realtime", text))
+    said = ""
+    while True:
+        try:
+            with OutputLine(trigger.chip, trigger.line, active_low=trigger.active_low) as line, Timer() as timer:
+                maker = _Maker(line, timer, trigger, child.config.epoch)
+                maker.make(child, realtime=realtime)
+                return
+        except TriggerError as error:
+            if str(error) != said:
+                said = str(error)
+                _tell(child, Level.ERROR, error.said)
+        if _stops_before(child, HostNs(host_now() + _RETRY_NS)):
+            return
+
+
+class _Maker:
+    """A line and the thread that makes its pulses."""
+
+    def __init__(self, line: OutputLine, timer: Timer, trigger: GpioTrigger, origin: HostNs) -> None:
+        self._line, self._timer = line, timer
+        self._pulser = Pulser(line.set, timer, origin, trigger.rate_hz, trigger.width_ns)
+        self._failure: TriggerError | None = None
+
+    def make(self, child: ChildContext[TriggerConfig], *, realtime: bool) -> None:
+        """Make pulses until told to quit.
+
+        Raises:
+            TriggerError: the line fails.
+        """
+        thread = threading.Thread(target=self._run, name="pulses")
+        thread.start()
+        teller, stopping = LatenessTeller(self._line.name), False
+        try:
+            while not stopping and thread.is_alive():
+                stopping = _stops_before(child, HostNs(host_now() + _REPORT_EVERY_NS))
+                made = self._pulser.figures(realtime=realtime)
+                child.control.send(TellPulses(made=made))
+                for level, said in teller.tell(made):
+                    _tell(child, level, said)
+        finally:
+            self._timer.end()
+            thread.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def _run(self) -> None:
+        try:
+            self._pulser.run()
+        except TriggerError as error:
+            self._failure = error
+
+
+def _stops_before(child: ChildContext[TriggerConfig], time: HostNs) -> bool:
+    """Wait until a time, or until told to quit; whether it is that."""
+    poll = select.poll()
+    poll.register(child.control, select.POLLIN)
+    while not (child.control.ended or child.terminated()):
+        left_ms = (time - host_now()) // 1_000_000
+        if left_ms <= 0:
+            return False
+        poll.poll(min(left_ms, _TURN_MS))
+        if any(isinstance(command, Quit) for command in child.control.receive(0)):
+            return True
+    return True
+
+
+def _tell(child: ChildContext[TriggerConfig], level: Level, said: Phrase) -> None:
+    child.control.send(TriggerTold(event=Event.now(level, TRIGGER, said)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""When the pulses of a line come, on a clock of the test's own that stalls as a busy computer does."""
+
+import random
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from rig.clocks import HostNs
+from triggering.sources.gpio.pulser import LATEST, Pulser
+
+US = 1_000
+ORIGIN = HostNs(7_000_000_000)
+
+
+class _Computer:
+    """A clock that stands still except while it is waited on and while the line is set.
+
+    Args:
+        late_ns: how late a wait ends.
+        slow_ns: how long setting the line takes.
+        end: no wait goes beyond.
+    """
+
+    def __init__(self, late_ns: Callable[[], int], slow_ns: Callable[[], int], end: HostNs) -> None:
+        self._late_ns, self._slow_ns, self._end = late_ns, slow_ns, end
+        self.time = ORIGIN
+        self.edges: list[tuple[HostNs, bool]] = []
+
+    def now(self) -> HostNs:
+        return self.time
+
+    def wait(self, until: HostNs, *, precisely: bool) -> bool:
+        del precisely
+        if self.time < self._end:
+            self.time = HostNs(max(until, self.time) + self._late_ns())
+        return self.time < self._end
+
+    def set_line(self, active: bool) -> None:
+        slow = self._slow_ns()
+        self.time = HostNs(self.time + slow // 2)
+        self.edges.append((self.time, active))
+        self.time = HostNs(self.time + slow - slow // 2)
+
+    @property
+    def rises(self) -> list[HostNs]:
+        return [time for time, active in self.edges if active]
+
+
+def _run(computer: _Computer, rate_hz: float, width_us: int = 1000) -> Pulser:
+    pulser = Pulser(computer.set_line, computer, ORIGIN, rate_hz, width_us * US)
+    pulser.run()
+    return pulser
+
+
+@pytest.mark.parametrize("rate_hz", [0.1, 29.97, 30.0, 200.0])
+def test_pulses_of_an_idle_computer_are_at_even_times_for_ever(rate_hz: float) -> None:
+    computer = _Computer(lambda: 0, lambda: 0, HostNs(ORIGIN + round(1000e9 / rate_hz) + 2_000_000))
+    pulser = _run(computer, rate_hz)
+    assert computer.rises == [ORIGIN + round(pulse * 1e9 / rate_hz) for pulse in range(1, 1001)]
+    assert {fall - rise for (rise, _), (fall, _) in zip(computer.edges[::2], computer.edges[1::2], strict=True)} == {
+        1000 * US
+    }
+    made = pulser.figures(realtime=True)
+    assert (made.made, made.skipped, made.late_max_us) == (1000, 0, 0.0)
+
+
+def test_after_a_stall_the_train_goes_on_at_its_even_times_without_a_burst() -> None:
+    waits = iter([0] * 20 + [1_000_000_000] + [0] * 10_000)
+    computer = _Computer(lambda: next(waits), lambda: 0, HostNs(ORIGIN + 3_000_000_000))
+    made = _run(computer, 30.0).figures(realtime=False)
+    pulses = [round((time - ORIGIN) * 30 / 1e9) for time in computer.rises]
+    # The eleventh wait for a pulse was late by a second, until the 41st is due.
+    assert pulses == [*range(1, 11), *range(41, 90)]
+    assert made.skipped == 30
+    assert all(time == ORIGIN + round(n * 1e9 / 30) for time, n in zip(computer.rises, pulses, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_however_the_computer_stalls_pulses_keep_their_distance_and_are_counted(seed: int) -> None:
+    chance, period_ns, width_ns = random.Random(seed), 1e9 / 60, 1000 * US
+
+    def late() -> int:
+        return round(chance.expovariate(1 / (30 * US)) + (chance.random() < 0.05) * chance.expovariate(1 / period_ns))
+
+    computer = _Computer(late, lambda: late() // 4, HostNs(ORIGIN + 60_000_000_000))
+    pulser = _run(computer, 60.0)
+    rises, made = computer.rises, pulser.figures(realtime=True)
+    distances = [after - before for before, after in pairwise(rises)]
+    assert min(distances) >= (1 - LATEST) * period_ns - 1
+    falls = [time for time, active in computer.edges if not active]
+    assert min(rise - fall for fall, rise in zip(falls, rises[1:], strict=False)) >= width_ns
+    assert not computer.edges[-1][1]
+    assert made.made == len(rises)
+    assert abs(made.made + made.skipped - 3600) <= 1
+    assert 0.02 < made.skipped / 3600 < 0.2
+    fired = list(pulser.fired)
+    assert [each.number for each in fired] == list(range(made.made - len(fired) + 1, made.made + 1))
+    assert all(abs(e.time - t) <= e.uncertainty_ns for e, t in zip(fired, rises[-len(fired) :], strict=True))
+
+
+def test_a_line_that_was_active_when_the_train_was_ended_is_inactive() -> None:
+    computer = _Computer(lambda: 0, lambda: 0, HostNs(ORIGIN + 100_500_000))
+    _run(computer, 10.0)
+    assert computer.edges == [(ORIGIN + 100_000_000, True), (ORIGIN + 101_000_000, False)]
+
+
+def test_an_error_in_a_pulse_leaves_the_line_inactive() -> None:
+    computer = _Computer(lambda: 0, lambda: 0, HostNs(ORIGIN + 100_500_000))
+
+    def fail() -> int:
+        if computer.edges:
+            raise RuntimeError("unforeseen")
+        return 0
+
+    computer._late_ns = fail
+    with pytest.raises(RuntimeError, match="unforeseen"):
+        _run(computer, 10.0)
+    assert [active for _, active in computer.edges] == [True, False]
+
+
+def test_the_lateness_is_told_by_median_99_percent_and_the_latest() -> None:
+    late = iter([n * US for n in range(1, 201) for _ in (0, 1)])
+    computer = _Computer(lambda: next(late, 0), lambda: 0, HostNs(ORIGIN + 6_680_000_000))
+    made = _run(computer, 30.0).figures(realtime=True)
+    assert (made.late_median_us, made.late_p99_us, made.late_max_us) == (101.0, 199.0, 200.0)

@@ -1,0 +1,1 @@
+"""Pulses from a line of the computer, through libgpiod."""

@@ -66,6 +66,22 @@ def open_chip(path: Path) -> gpiod.Chip:
         raise TriggerError(phrase("gpio_no_chip", text, chip=str(path), why=_why(error))) from None
 
 
+def consumer_of(chip: str, line: GpioLine) -> str:
+    """Who has a line; empty: nobody. The line is left as it is.
+
+    Args:
+        chip: its chip, as the rig file names it.
+        line: number or name.
+
+    Raises:
+        TriggerError: there is no such chip or line, or the chip may not be opened.
+    """
+    path = chip_path(chip)
+    with open_chip(path) as opened:
+        info = opened.get_line_info(_offset(opened, path, line))
+    return (info.consumer or "?") if info.used else ""
+
+
 class RequestedLine:
     """A line that this process has; a context manager that gives it back.
 

@@ -37,6 +37,10 @@ export const findings = {
   check_fallback_not_writable: ["det kan ikke skrives i {folder} (recorder.fallback_directory): {why}", "rett tilgangen; under systemd tillates det med: sudo systemctl edit svev, [Service] ReadWritePaths="],
   check_fallback_same_disk: ["{folder} (recorder.fallback_directory) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
 
+  check_gpio: ["linje {line} på {chip} er klar for triggerpulsene"],
+  check_gpio_chip: ["triggerlinje: {why}", "til det er rettet, lages ingen pulser"],
+  check_gpio_taken: ["linje {line} på {chip} er opptatt av {consumer}", "avslutt det, eller sett en annen linje som trigger.line i riggfilen"],
+
   check_webhook: ["{host} kan nås for varsler; svev doctor --send-test sender et"],
   check_webhook_file: ["varsler: {why}", "rett filen; varsler sendes ikke før det er gjort"],
   check_webhook_away: ["{host} kan ikke nås for varsler ({why})", "se om denne datamaskinen har en vei dit; varslene venter til den kan nås"],

@@ -1,0 +1,29 @@
+"""Examines the line of the computer that makes the pulses, where the rig file names one."""
+
+from collections.abc import Iterator
+
+from rig.errors import TriggerError
+from rig.settings.model import RigSettings
+from rig.settings.trigger import GpioTrigger
+from svev.doctor.finding import Finding, Topic, failure, passed
+from triggering.sources.gpio.lines import CONSUMER, consumer_of
+
+
+def look_at_gpio(rig: RigSettings) -> Iterator[Finding]:
+    """Is the chip there, may it be opened, and is the line free? The line is left as it is."""
+    trigger = rig.trigger
+    if not isinstance(trigger, GpioTrigger):
+        return
+    place = {"line": trigger.line, "chip": trigger.chip}
+    try:
+        consumer = consumer_of(trigger.chip, trigger.line)
+    except TriggerError as error:
+        remedy = "no pulses are made until then"
+        yield failure(Topic.CAMERAS, "check_gpio_chip", "trigger line: {why}", remedy, why=error.said)
+        return
+    if consumer in {"", CONSUMER}:
+        yield passed(Topic.CAMERAS, "check_gpio", "line {line} of {chip} is there for the trigger pulses", **place)
+    else:
+        what = "line {line} of {chip} is taken by {consumer}"
+        remedy = "end that, or name another line as trigger.line in the rig file"
+        yield failure(Topic.CAMERAS, "check_gpio_taken", what, remedy, consumer=consumer, **place)

@@ -1,0 +1,57 @@
+"""The doctor and the line that makes the pulses: an emulated chip, seen through the real libgpiod."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from rig.settings.file import CONFIG
+from simrig.gpio.build import environment
+from simrig.gpio.chip import GpioChip
+
+_PROGRAM = """
+import sys
+from pathlib import Path
+from rig.settings.file import load_rig
+from rig.settings.trigger import ExternalTrigger, GpioTrigger
+from svev.doctor.gpio import look_at_gpio
+from triggering.sources.gpio.lines import OutputLine
+rig, chip = load_rig(Path(sys.argv[1])), sys.argv[2]
+def look(trigger):
+    for found in look_at_gpio(rig.model_copy(update={"trigger": trigger})):
+        print(found.level, found.code, found.what.replace(chip, "CHIP"), found.remedy, sep="|")
+def gpio(chip, line):
+    return GpioTrigger(source="gpio", chip=chip, line=line)
+look(ExternalTrigger())
+look(gpio(chip, 0))
+with OutputLine(chip, 0, active_low=False):
+    look(gpio(chip, 0))
+look(gpio(chip, "FAN"))
+look(gpio(chip, 9))
+"""
+
+
+def test_the_doctor_says_whether_the_line_can_make_pulses() -> None:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        GpioChip(Path(folder) / "gpiochip0", lines=("", "FAN"), taken={1: "fan"}) as chip,
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", _PROGRAM, str(CONFIG / "rigs" / "sim.toml"), str(chip.path)],
+            env={**os.environ, **environment()}, capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, "")
+        assert chip.edges == []
+    assert done.stdout.splitlines() == [
+        "PASS|check_gpio|line 0 of CHIP is there for the trigger pulses|",
+        "PASS|check_gpio|line 0 of CHIP is there for the trigger pulses|",
+        (
+            "FAIL|check_gpio_taken|line FAN of CHIP is taken by fan|end that, or name another line as trigger.line in "
+            "the rig file"
+        ),
+        (
+            "FAIL|check_gpio_chip|trigger line: GPIO chip CHIP has no line 9, but lines 0 to 1: name one that gpioinfo "
+            "lists in the rig file|no pulses are made until then"
+        ),
+    ]

@@ -32,6 +32,7 @@ from rig.picture import shown
 from rig.pulse import RigPulse
 from rig.transport.preview import PreviewImage, PreviewSlot
 from service.aids import aids_of, close_up_of, shown_as
+from service.automatic.barrier import BarrierWatch
 from service.automatic.watch import MotionWatch
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
@@ -91,6 +92,10 @@ class Service(Archive):
         self._watch = None
         if motion is not None:
             self._watch = MotionWatch(supervisor.rig, motion, slot, lambda: supervisor.status.state, self._moved)
+        self._barrier, barrier = None, supervisor.rig.automatic.barrier
+        if barrier is not None:
+            told = partial(self.tell, "warning", "mark")
+            self._barrier = BarrierWatch(barrier, lambda: supervisor.status.state, self._crossed, told)
         self._closing = threading.Event()
 
     def status(self) -> Status:
@@ -195,18 +200,26 @@ class Service(Archive):
         return self.status()
 
     def watch(self) -> None:
-        """Begin to watch for motion, if the rig file says so; `close` ends it."""
-        if self._watch is not None:
-            self._watch.start()
+        """Begin to watch for motion and at the light barrier, if the rig file says so; `close` ends it."""
+        for watch in (self._watch, self._barrier):
+            if watch is not None:
+                watch.start()
 
     def _moved(self, time_: HostNs) -> None:
         """Begin a recording, because something moves in an image; the thread that watches goes on whatever happens."""
-        mark = Mark(source="motion", time=datetime.fromtimestamp(UtcAnchor.take().utc(time_) / NS_PER_S, UTC))
         try:
-            self.mark(mark)
+            self.mark(_mark("motion", time_))
         except SvevError as error:
             text = "something moved, but no recording could begin: {why}"
             self.tell("warning", "motion", phrase("event_motion_unrecorded", text, why=str(error)))
+
+    def _crossed(self, time_: HostNs) -> None:
+        """Begin a recording, because the light barrier is interrupted; its thread goes on whatever happens."""
+        try:
+            self.mark(_mark("light barrier", time_))
+        except SvevError as error:
+            text = "the light barrier was interrupted, but no recording could begin: {why}"
+            self.tell("warning", "mark", phrase("event_barrier_unrecorded", text, why=str(error)))
 
     def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:
         """Stop, and return when the log is closed."""
@@ -312,8 +325,13 @@ class Service(Archive):
     def close(self) -> None:
         """End the waiting of all threads that wait for a preview, and the watching."""
         self._closing.set()
-        if self._watch is not None:
-            self._watch.close()
+        for watch in (self._watch, self._barrier):
+            if watch is not None:
+                watch.close()
+
+
+def _mark(source: str, time_: HostNs) -> Mark:
+    return Mark(source=source, time=datetime.fromtimestamp(UtcAnchor.take().utc(time_) / NS_PER_S, UTC))
 
 
 def _age_s(mark: Mark) -> float:

@@ -11,7 +11,14 @@ from pydantic import Field, model_validator
 
 from rig.pixels import FORMATS, PixelFormat, PixelFormatName, Pixels
 from rig.settings.strict_toml import StrictModel
-from rig.settings.trigger import ActionTrigger, ExternalTrigger, SoftwareTrigger, Trigger, check_takes_actions
+from rig.settings.trigger import (
+    ActionTrigger,
+    BarrierSettings,
+    ExternalTrigger,
+    SoftwareTrigger,
+    Trigger,
+    check_takes_actions,
+)
 from rig.settings.webhook import WebhookSettings
 from rig.topics import DEFAULT_PUBLISH
 
@@ -201,6 +208,7 @@ class AutomaticSettings(StrictModel):
     before_s: float = Field(4.0, ge=0, le=600, description="seconds before the mark, as far as they are held in memory")
     after_s: float = Field(8.0, gt=0, le=3600, description="seconds after it")
     motion: MotionSettings | None = Field(None, description="watch a camera's images for the jumper")
+    barrier: BarrierSettings | None = Field(None, description="a light barrier on a GPIO line of this computer")
 
 
 class AnalysisSettings(StrictModel):

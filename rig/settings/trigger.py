@@ -122,6 +122,19 @@ class GpioTrigger(TriggerSettings):
         return self
 
 
+class BarrierSettings(StrictModel):
+    """A light barrier on an input line of this computer; each edge to active is a mark."""
+
+    chip: str = Field(
+        "gpiochip0", min_length=1, max_length=200, description="GPIO chip: device file, number, or label (gpiodetect)"
+    )
+    line: GpioLine = Field(description="line of the light barrier: its number on the chip, or its name (gpioinfo)")
+    active_low: bool = Field(False, description="the line is low while the barrier is interrupted")
+    debounce_ms: float = Field(
+        5.0, ge=0, le=1000, description="the line must keep its level for so long, or it has only bounced"
+    )
+
+
 def check_takes_actions(name: str, backend: str, address: str) -> None:
     """Check that action commands reach a camera, and that its answers can be known for its own.
 

@@ -179,7 +179,7 @@ class EdgeLine(RequestedLine):
         return self.request.fd
 
     def edges(self) -> list[HostNs]:
-        """When the edges came that have not been told yet; waits for one if there are none.
+        """When the edges came that have not been told yet, and lasted; waits for one if there are none.
 
         Raises:
             TriggerError: the chip is gone.

@@ -111,6 +111,7 @@ class PairingHealth(msgspec.Struct, frozen=True):
     spread_max_us: Annotated[float, Meta(description="likewise, the largest of late")]
     alarm: Annotated[bool, Meta(description="whether the spread is larger than the pairing allows for")]
     cameras: tuple[CameraPairing, ...]
+    spread_usual_us: Annotated[float, Meta(description="spread that nine in ten of the recent pulses keep")] = 0.0
     rate_hz: Annotated[float | None, Meta(description="measured; null where the pulses have no rhythm")] = None
     split_us: Annotated[
         float | None,

@@ -32,7 +32,7 @@ from rig.errors import (
     StorageError,
     UnknownRecordingError,
 )
-from rig.events import PAIRING, Event
+from rig.events import PAIRING, Event, Level
 from rig.settings.model import RigSettings
 from rig.transport import wire
 from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
@@ -72,7 +72,7 @@ class HeadlessRig:
         self, rig: RigSettings, rig_toml: str, on_event: Callable[[str], None], hill: StartHill | None = None
     ) -> None:
         def tell(event: Event) -> None:
-            if event.name == PAIRING:
+            if event.name == PAIRING and event.level is not Level.INFO:
                 self._alarms[event.code or event.message] = event.message
             if event.name != "service":
                 on_event(f"{event.name} {event.message}")

@@ -20,8 +20,8 @@ from recorder.publishing.publisher import Publisher
 from rig.action import ActionCounts
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
-from rig.events import PAIRING, TRIGGER, Event, Level
-from rig.health import PairingHealth, PulsesMade
+from rig.events import TRIGGER, Event, Level
+from rig.health import PulsesMade
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
@@ -47,7 +47,6 @@ from rig.transport.messages import (
 )
 from rig.transport.preview import PreviewSlot
 from rig.transport.ring import CameraRing
-from triggering.pairing.alarms import alarms
 from triggering.sources.choice import trigger_source
 from triggering.sources.telling import SpreadTeller
 from triggering.timeline.steady_rate import steady_rate
@@ -90,7 +89,6 @@ class RecorderLoop:
         self._quit = False
         self._warm = self._unreported = 0
         self._times: deque[HostNs] = deque(maxlen=_RATE_PULSES)
-        self._alarmed: set[tuple[str, object]] = set()
         self._source = trigger_source(rig.trigger)
         self._spread = SpreadTeller(self._source)
         self._actions: tuple[ActionCounts, ...] | None = None
@@ -205,23 +203,10 @@ class RecorderLoop:
             recording=self._recordings.statistics(),
         )
         self._tell(RecorderHealth(health=health))
-        self._tell_alarms(health.pairing)
         if (said := self._spread.tell(health.pairing)) is not None:
             self._warn(TRIGGER, said)
         self._own_up()
         self._recordings.health(wire.encode(health))
-
-    def _tell_alarms(self, health: PairingHealth) -> None:
-        """Tell of what has become wrong with clocks, trigger or rate; again when it comes back."""
-        names = [camera.name for camera in self._rig.cameras]
-        present = {}
-        one_edge = not self._source.set_up_only
-        for said in alarms(health, names, self._rig.trigger.rate_hz, one_edge=one_edge):
-            present[said.code, said.values.get("camera")] = said
-        for key, said in present.items():
-            if key not in self._alarmed:
-                self._warn(PAIRING, said)
-        self._alarmed = set(present)
 
     def _own_up(self) -> None:
         """Tell of reports that were dropped because the service does not read, and of refused subscribers."""

@@ -170,12 +170,22 @@ class RehearsalProgress(Model):
     pulses: int = Field(0, description="pulses to record; 0: not known yet")
 
 
+class Alarm(Model):
+    """Something that has gone wrong with pulses, clocks or a camera while the rig is armed."""
+
+    number: int = Field(description="counts up with every alarm of this run of the service, also if it gets worse")
+    topic: str = Field(description="what may be wrong; of each topic there is one alarm at a time")
+    since: datetime = Field(description="when it began, UTC")
+    statement: Statement = Field(description="what is wrong and what to do; `level` is warning or error")
+
+
 class Status(Model):
     """Everything about the running service at one moment."""
 
     state: State
     since: datetime = Field(description="when this state began, UTC")
     statement: Statement = Field(description="the state in plain words, and what to do next")
+    alarms: tuple[Alarm, ...] = Field((), description="what is wrong with pulses, clocks and cameras, the worst first")
     notice: Statement | None = Field(None, description="what befell the last recording, until the next one")
     guard: TapGuard
     rig: str

@@ -31,6 +31,9 @@ class TriggerSettings(StrictModel):
     min_cameras: int | None = Field(
         None, ge=1, le=8, description="with fewer cameras than this the rig is not armed; left out: all of them"
     )
+    gated: bool = Field(
+        False, description="pulses come at times only, e.g. when a jumper starts: that they stop is no alarm"
+    )
 
     @property
     def period_ns(self) -> int:

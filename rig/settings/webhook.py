@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from rig.settings.strict_toml import StrictModel
 
 #: What people who are elsewhere can be told.
-Occasion = Literal["fault", "recording", "disk", "cameras"]
+Occasion = Literal["fault", "recording", "disk", "cameras", "alarms"]
 
 
 def checked_url(url: str) -> str:
@@ -43,10 +43,11 @@ class WebhookSettings(StrictModel):
         None, description="file with a token that is sent as Authorization: Bearer, relative to the rig file"
     )
     events: tuple[Occasion, ...] = Field(
-        ("fault", "recording", "disk", "cameras"),
+        ("fault", "recording", "disk", "cameras", "alarms"),
         min_length=1,
         description="fault: the rig has one, and it is over; recording: one has ended, with its verdict; disk: nearly "
-        "full; cameras: one is gone, and is back",
+        "full; cameras: one is gone, and is back; alarms: pulses stop, their rate or spread changes, or a camera "
+        "misses pulses, and it is over",
     )
 
     @model_validator(mode="after")

@@ -22,7 +22,7 @@ class Notification(Model):
 
     Attributes:
         event: what it is about; "test" comes from `svev doctor --send-test`.
-        over: the fault is over, or the camera is back.
+        over: the fault or the alarm is over, or the camera is back.
         time: when it happened, UTC.
         rig: name of the rig.
         state: state of the service then.
@@ -57,6 +57,7 @@ class Occasions:
     def __init__(self, wanted: tuple[Occasion, ...]) -> None:
         self._wanted = wanted
         self._told: dict[str, tuple[bool, float]] = {}
+        self._alarms_told: dict[str, tuple[str, str]] = {}  # topic and text of what is not over yet
         self._ended: str | None = None
 
     def look(self, status: Status, now: float) -> list[tuple[Notification, str]]:
@@ -69,7 +70,10 @@ class Occasions:
         Returns:
             What to tell, each with the id of the recording whose verdict belongs to it; empty: none.
         """
-        found = [*self._fault(status, now), *self._cameras(status, now), *self._disk(status, now)]
+        found = [
+            *self._fault(status, now), *self._cameras(status, now), *self._disk(status, now),
+            *self._alarms(status, now),
+        ]  # fmt: skip
         told = [(notification, "") for notification in found if notification.event in self._wanted]
         if status.last_recording not in {None, self._ended}:
             self._ended = status.last_recording
@@ -98,6 +102,24 @@ class Occasions:
                 yield _notification(status, "cameras", said.text, said.advice)
             elif camera.state in {CameraState.READY, CameraState.SILENT} and self._changed(topic, False, now):
                 yield _notification(status, "cameras", f"{camera.name} is back", over=True)
+
+    def _alarms(self, status: Status, now: float) -> Iterator[Notification]:
+        """What is wrong with pulses, clocks and cameras, or its end; nobody needs to be told that it was disarmed."""
+        if status.state in {State.IDLE, State.DISARMING}:
+            for key in self._alarms_told:
+                self._told.pop(key, None)
+            self._alarms_told.clear()
+        for alarm in status.alarms:
+            said = alarm.statement
+            key = f"alarm {alarm.topic} {said.level}"
+            if self._changed(key, True, now):
+                self._alarms_told[key] = alarm.topic, said.text
+                yield _notification(status, "alarms", said.text, said.advice)
+        topics = {alarm.topic for alarm in status.alarms}
+        for key, (topic, text) in list(self._alarms_told.items()):
+            if topic not in topics and self._changed(key, False, now):
+                del self._alarms_told[key]
+                yield _notification(status, "alarms", f"over: {text}", over=True)
 
     def _disk(self, status: Status, now: float) -> Iterator[Notification]:
         left = status.disk.jumps_left

@@ -13,6 +13,7 @@ from rig.api.recordings import NextJumper, Recording
 from rig.api.statement import Level, Statement
 from rig.api.status import (
     ActionAnswers,
+    Alarm,
     CameraStatus,
     DiskStatus,
     MadePulses,
@@ -30,7 +31,6 @@ from service.status.statements import about_camera, about_state, camera_state, p
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import tap_guard
 from service.supervision.watching import PulseRate
-from triggering.pairing.alarms import alarms
 from triggering.sources.choice import trigger_source
 from triggering.sources.telling import set_up_only
 
@@ -53,6 +53,7 @@ class Facts:
         health: the recorder's last health record, None if there is none.
         warm: whether whole triplets have come.
         pulses: rate of the pulses.
+        alarms: what is wrong with pulses, clocks and cameras.
         overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
         room: on the disk.
         preroll_s: what is to be held in memory.
@@ -68,6 +69,7 @@ class Facts:
     health: Health | None
     warm: bool
     pulses: PulseRate
+    alarms: tuple[Alarm, ...]
     overloaded: Sequence[int]
     room: Room
     preroll_s: float
@@ -91,8 +93,8 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         statement = about_state(state, rig.cameras, states, arriving, rate, facts.overloaded)
         if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
             statement = facts.notice
-        if statement.level is Level.GOOD and (alarm := _pairing_alarm(rig, facts)) is not None:
-            statement = alarm
+        if statement.level is Level.GOOD and (wrong := _wrong(rig, facts)) is not None:
+            statement = wrong
     elif facts.fault is not None:
         statement = facts.fault
     else:
@@ -104,6 +106,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         since=facts.phase.since,
         statement=statement,
         notice=facts.notice,
+        alarms=facts.alarms,
         guard=tap_guard(facts.phase),
         rig=rig.name,
         version=_VERSION,
@@ -131,16 +134,13 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
     )
 
 
-def _pairing_alarm(rig: RigSettings, facts: Facts) -> Statement | None:
-    """What is wrong with clocks, trigger or rate, or that the trigger is for set-up only; None: nothing."""
+def _wrong(rig: RigSettings, facts: Facts) -> Statement | None:
+    """The worst alarm, or that the trigger is for set-up only; None: nothing."""
+    if facts.alarms:
+        return facts.alarms[0].statement
     if facts.health is None:
         return None
-    names = [camera.name for camera in rig.cameras]
-    source = trigger_source(rig.trigger)
-    said = next(
-        alarms(facts.health.pairing, names, rig.trigger.rate_hz, one_edge=not source.set_up_only),
-        set_up_only(source, facts.health.pairing),
-    )
+    said = set_up_only(trigger_source(rig.trigger), facts.health.pairing)
     return None if said is None else pairing_alarm(said)
 
 

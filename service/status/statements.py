@@ -313,16 +313,17 @@ def recording_resumed(before: str, recording: str, gap: Pause | None) -> Stateme
     )
 
 
-def pairing_alarm(said: Phrase) -> Statement:
+def pairing_alarm(said: Phrase, level: Level = Level.WARNING) -> Statement:
     """Something is wrong with clocks, trigger or rate.
 
     Args:
-        said: what is wrong, as `triggering.pairing.alarms` and `triggering.sources.telling` say it; what to do stands
-            behind its colon.
+        said: what is wrong, as `triggering.alarms` and `triggering.sources.telling` say it; what to do stands behind
+            its colon.
+        level: how bad it is.
     """
     text, _, advice = said.text.partition(": ")
     values = {name: value for name, value in said.values.items() if not isinstance(value, Phrase)}
-    return Statement(level=Level.WARNING, code=said.code, text=text, advice=advice, values=values)
+    return Statement(level=level, code=said.code, text=text, advice=advice, values=values)
 
 
 def process_restarted(name: str, restarts: int) -> Statement:

@@ -112,10 +112,9 @@ class Supervisor:
         self.recordings = RecordingControl(
             self._machine, self._session, self._jumpers, rig_toml, calibration, self.truths
         )
-        self._fault = Fault()
-        self._wanted = False
+        self._fault, self._wanted = Fault(), False
         self._least = rig.least_cameras
-        self._settling, self._watch = Settling(rig), RecorderWatch()
+        self._settling, self._watch = Settling(rig), RecorderWatch(rig, self._session.tell)
         self._overload = Overload(rig.trigger.period_ns)
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
@@ -289,6 +288,7 @@ class Supervisor:
                 self._hear(report)
             if isinstance(report, RecorderHealth):
                 self._look_for_overload(report.health, processes.pids)
+                self._watch.alarms.look(report.health, self._overload.cameras)
         if not processes.recorder_died and self._watch.stuck(processes):
             said = phrase("event_recorder_stuck", "no sign of life for {seconds:g} s: it is ended", seconds=STUCK_S)
             self._session.tell(Event.now(Level.FATAL, RECORDER, said))
@@ -309,8 +309,7 @@ class Supervisor:
         if self._overload.cameras and not before:
             late = ", ".join(self.rig.cameras[index].name for index in self._overload.cameras)
             text = "too slow: frames of {late} come too late or get lost; close other programs"
-            said = phrase("event_too_slow", text, late=late)
-            self._session.tell(Event.now(Level.WARNING, "computer", said))
+            self._session.tell(Event.now(Level.WARNING, "computer", phrase("event_too_slow", text, late=late)))
 
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
@@ -386,6 +385,7 @@ class Supervisor:
             health=self.health,
             warm=processes is not None and processes.warm,
             pulses=self._watch.pulses,
+            alarms=self._watch.alarms.present,
             overloaded=self._overload.cameras,
             room=room_for(self.rig, free or 0),
             preroll_s=self._recorder.preroll_s,

@@ -1,12 +1,15 @@
-"""Watches a running rig for the supervisor: pulse rate, signs of life of the recorder, cameras after arming."""
+"""Watches a running rig for the supervisor: pulses, alarms, signs of life of the recorder, cameras after arming."""
 
 import time
+from collections.abc import Callable
 from typing import Final
 
 from rig.api.statement import Statement
+from rig.events import Event
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
 from rig.transport.messages import RecorderHealth, RecorderReport
+from service.alarms.keeper import AlarmKeeper
 from service.processes.rig_processes import RigProcesses
 from service.status.statements import no_camera, too_few_cameras, wrong_rate
 from triggering.timeline.steady_rate import SteadyRate
@@ -56,16 +59,21 @@ _LATE_S: Final = 10.0
 
 
 class RecorderWatch:
-    """Watches the recorder's reports: is it alive, at what rate do pulses come.
+    """Watches the recorder's reports: is it alive, at what rate do pulses come, what is wrong with them.
 
     The supervisor's thread enters reports; any thread may ask `late`.
 
+    Args:
+        rig: the rig.
+        tell: takes an event for the live log and for the log of a recording.
+
     Attributes:
         pulses: the pulse rate.
+        alarms: what is wrong.
     """
 
-    def __init__(self) -> None:
-        self.pulses = PulseRate()
+    def __init__(self, rig: RigSettings, tell: Callable[[Event], None]) -> None:
+        self.pulses, self.alarms = PulseRate(), AlarmKeeper(rig, tell)
         self._reported = time.monotonic()
 
     def hear(self, report: RecorderReport) -> None:
@@ -78,6 +86,7 @@ class RecorderWatch:
         """Note that there is no recorder now, so that no report is late."""
         self._reported = time.monotonic()
         self.pulses.forget()
+        self.alarms.forget()
 
     def stuck(self, processes: RigProcesses) -> bool:
         """Whether the recorder has sent no report for so long that it has to be ended."""

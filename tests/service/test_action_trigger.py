@@ -54,8 +54,8 @@ def _are_told(rig: RigSettings, health: Health) -> None:
         rig,
         Facts(
             phase=Phase.now(State.ARMED, 1), fault=None, notice=None, heard=None, health=health, warm=True,
-            pulses=PulseRate(), overloaded=(), room=Room(10**9, 1.0, 1), preroll_s=0.0, holding_s=0.0, recording=None,
-            last_recording=None, last_jump=None, next_jumper=NextJumper(), pids={}, restarts={},
+            pulses=PulseRate(), alarms=(), overloaded=(), room=Room(10**9, 1.0, 1), preroll_s=0.0, holding_s=0.0,
+            recording=None, last_recording=None, last_jump=None, next_jumper=NextJumper(), pids={}, restarts={},
         ),
     )  # fmt: skip
     wanted = {camera.name: camera.actions.acknowledged for camera in health.cameras if camera.actions}

@@ -15,7 +15,7 @@ import pytest
 from rig.api.fields import Model
 from rig.api.recordings import Recording
 from rig.api.statement import Statement
-from rig.api.status import CameraState, CameraStatus, DiskStatus, State, Status
+from rig.api.status import Alarm, CameraState, CameraStatus, DiskStatus, State, Status
 from rig.errors import BadInputError, UnknownRecordingError
 from rig.events import Event
 from rig.settings.file import load_rig
@@ -285,3 +285,20 @@ def test_a_fault_is_told_with_its_end_but_not_if_somebody_disarms() -> None:
     ]
     assert told == [[], [False], [], [], [True], [False], [], []]
     assert not Occasions(("disk",)).look(_status(State.FAULT, {}), 0.0)
+
+
+def test_an_alarm_is_told_when_it_begins_when_it_gets_worse_and_when_it_is_over_but_not_if_somebody_disarms() -> None:
+    occasions, told = Occasions(("alarms",)), []
+    steps: list[tuple[State, list[str]]] = [
+        (State.ARMED, []), (State.ARMED, ["warning"]), (State.RECORDING, ["warning"]), (State.ARMED, ["error"]),
+        (State.ARMED, []), (State.ARMED, ["error"]), (State.IDLE, []), (State.ARMED, []),
+    ]  # fmt: skip
+    for at, (state, levels) in enumerate(steps):
+        said = [Statement(level=level, code="alarm_spread", text=f"in words: {level}") for level in levels]
+        alarms = tuple(_part(Alarm, number=at, topic="spread", statement=each) for each in said)
+        status = _status(state, {}).model_copy(update={"alarms": alarms})
+        told.append([each.text for each, _ in occasions.look(status, 100.0 * at)])
+    assert told == [
+        [], ["in words: warning"], [], ["in words: error"], ["over: in words: warning", "over: in words: error"],
+        ["in words: error"], [], [],
+    ]  # fmt: skip

@@ -241,6 +241,7 @@ class Pairer:
             period_us=round(train.period_ns / 1000, 3),
             spread_median_us=train.spread_median_ns / 1000,
             spread_max_us=train.spread_max_ns / 1000,
+            spread_usual_us=train.spread_usual_ns / 1000,
             alarm=train.alarm,
             cameras=tuple(camera_health(track, train.last) for track in self._tracks),
             rate_hz=NS_PER_S / train.period_ns if train.steady else None,

@@ -146,13 +146,17 @@ class PulseTrain:
         self.tolerance_ns = min(self.tolerance_ns, self.widest_ns)
 
     def _learn_tolerance(self) -> None:
-        usual = sorted(self._spreads)[int(_USUAL * (len(self._spreads) - 1))]
-        self.tolerance_ns = min(max(self._least_ns, _SPREADS * usual), self.widest_ns)
+        self.tolerance_ns = min(max(self._least_ns, _SPREADS * self.spread_usual_ns), self.widest_ns)
 
     @property
     def spread_median_ns(self) -> int:
         """Median spread inside the recent sets."""
         return sorted(self._spreads)[len(self._spreads) // 2] if self._spreads else 0
+
+    @property
+    def spread_usual_ns(self) -> int:
+        """The spread that nine in ten of the recent sets keep."""
+        return sorted(self._spreads)[int(_USUAL * (len(self._spreads) - 1))] if self._spreads else 0
 
     @property
     def spread_max_ns(self) -> int:

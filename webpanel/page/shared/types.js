@@ -189,10 +189,13 @@
  * @property {number} done
  * @property {number} pulses
  *
+ * @typedef {{ number: number, topic: string, since: string, statement: Statement }} Alarm
+ *
  * @typedef {object} Status
  * @property {State} state
  * @property {string} since
  * @property {Statement} statement
+ * @property {Alarm[]} alarms
  * @property {Statement|null} notice
  * @property {TapGuard} guard
  * @property {string} rig

@@ -1,0 +1,68 @@
+"""Keeps the alarms of the running rig for the status, and tells of each when it begins and when it ends."""
+
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from typing import Final
+
+from rig.api import status
+from rig.api.statement import Level
+from rig.events import Event
+from rig.events import Level as EventLevel
+from rig.health import Health
+from rig.settings.model import RigSettings
+from service.status.statements import pairing_alarm
+from triggering.alarms.alarm import Alarm
+from triggering.alarms.watch import AlarmWatch
+
+_LEVELS: Final = {EventLevel.WARNING: Level.WARNING, EventLevel.ERROR: Level.ERROR}
+
+
+class AlarmKeeper:
+    """Only one thread may use it.
+
+    Args:
+        rig: the rig.
+        tell: takes an event for the live log and for the log of a recording.
+
+    Attributes:
+        present: the alarms at present, the worst first.
+    """
+
+    def __init__(self, rig: RigSettings, tell: Callable[[Event], None]) -> None:
+        self._rig, self._tell = rig, tell
+        self._watch: AlarmWatch | None = None
+        self._numbers = 0
+        self._known: dict[str, status.Alarm] = {}
+
+    @property
+    def present(self) -> tuple[status.Alarm, ...]:
+        """The alarms at present, the worst first, and of these the latest."""
+        known = self._known.values()
+        return tuple(sorted(known, key=lambda alarm: (alarm.statement.level is not Level.ERROR, -alarm.number)))
+
+    def look(self, health: Health, overloaded: Sequence[int]) -> None:
+        """Enter a health record.
+
+        Args:
+            health: the record.
+            overloaded: indices of the cameras that suffer from a computer that is too slow.
+        """
+        self._watch = self._watch or AlarmWatch(self._rig)
+        begun, over = self._watch.look(health, overloaded, time.monotonic())
+        for alarm in begun:
+            self._numbers += 1
+            self._known[alarm.topic] = self._stated(alarm)
+            self._tell(Event.now(alarm.level, alarm.name, alarm.said))
+        for alarm in over:
+            del self._known[alarm.topic]
+            self._tell(Event.now(EventLevel.INFO, alarm.name, alarm.over))
+
+    def forget(self) -> None:
+        """Start anew: there is no recorder any more. That nobody watches any more does not end what was wrong."""
+        self._watch = None
+        self._known.clear()
+
+    def _stated(self, alarm: Alarm) -> status.Alarm:
+        statement = pairing_alarm(alarm.said, _LEVELS[alarm.level])
+        return status.Alarm(number=self._numbers, topic=alarm.topic, since=datetime.now(UTC), statement=statement)

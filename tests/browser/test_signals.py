@@ -1,8 +1,11 @@
 """Sounds, vibration and wake lock: what the browser was asked to do, at which moment."""
 
+from datetime import UTC, datetime
+
 from playwright.sync_api import expect
 
-from rig.api.status import State
+from rig.api.statement import Level, Statement
+from rig.api.status import Alarm, State
 from tests.browser.conftest import Open
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
@@ -54,3 +57,32 @@ def test_started_stopped_and_fault_are_signalled_once_they_are_switched_on(
     expect(page.locator("#state-word")).to_have_text("Idle")
     page.locator("#open-settings").click()
     expect(page.locator("#signal-sound")).to_be_checked()
+    page.locator("#settings-close").click()
+
+    def alarmed(level: Level) -> list[str]:
+        said = Statement(level=level, code="", text="K2 misses pulses, 15 of 59", advice="check its trigger cable")
+        service.alarms = (Alarm(number=1, topic="camera K2", since=datetime.now(UTC), statement=said),)
+        service._wake()
+        expect(page.locator(f"#alarms li[data-level={level}]")).to_contain_text(said.text)
+        return tones()
+
+    def tones() -> list[str]:
+        asked: list[str] = page.evaluate("asked.splice(0)")
+        return [each for each in asked if each.startswith("tone")]
+
+    assert alarmed(Level.WARNING) == ["tone 784", "tone 784"]
+    page.reload()
+    assert alarmed(Level.ERROR) == [], "a browser makes no sound before the first touch"
+    page.locator("#state").click()
+    page.wait_for_function("asked.length > 0")
+    assert tones() == ["tone 1175", "tone 1175", "tone 1175", "tone 880"]
+    page.reload()
+    expect(page.locator("#alarms")).to_contain_text("Check its trigger cable", ignore_case=True)
+    page.locator("#alarms-sound").click()
+    expect(page.locator("#alarms-sound")).to_have_text("Alarm sound on")
+    assert tones() == alarmed(Level.WARNING) == []
+    page.reload()
+    expect(page.locator("#alarms-sound")).to_have_text("Alarm sound on")
+    service.alarms = ()
+    service._wake()
+    expect(page.locator("#alarms")).to_be_hidden()

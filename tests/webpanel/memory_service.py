@@ -23,6 +23,7 @@ from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals
 from rig.api.statement import Level, Statement
 from rig.api.status import (
+    Alarm,
     ArmOrder,
     AutomaticStatus,
     CameraState,
@@ -70,6 +71,7 @@ class MemoryService(Archive):
         well: what `healthy` says.
         broken: raised by `status`, if set.
         last_jump: what the analysis measured last, set by tests.
+        alarms: what is wrong with pulses, clocks and cameras, set by tests.
         notice: what befell the last recording, set by tests.
         fault: what it says in a fault, set by tests.
         automatic: whether recordings begin by themselves, set by tests.
@@ -85,6 +87,7 @@ class MemoryService(Archive):
         self.well = True
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None
+        self.alarms: tuple[Alarm, ...] = ()
         self.notice: Statement | None = None
         self.fault: Statement | None = None
         self.automatic: AutomaticStatus | None = None
@@ -131,6 +134,7 @@ class MemoryService(Archive):
                 recording=self._recording,
                 last_recording=self._last,
                 last_jump=self.last_jump,
+                alarms=self.alarms,
                 notice=self.notice,
                 automatic=self.automatic,
                 rehearsal=self.rehearsal,

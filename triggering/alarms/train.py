@@ -77,11 +77,11 @@ class Stopped:
 
     def _stopped(self, rate_hz: float) -> Phrase:
         if self._commanded:
-            text = "no camera answers the commands to expose any more, {rate_hz} came a second: arm anew"
+            text = "no camera answers the commands to expose any more ({rate_hz} a second): disarm, and arm again"
             return phrase("alarm_stopped_commands", text, rate_hz=round(rate_hz, 1))
         text = (
-            "the pulses have stopped, {rate_hz} came a second: see whether what makes them runs, then check the cable "
-            "from it to the cameras"
+            "the pulses have stopped (there were {rate_hz} a second): see whether what makes them runs, then check "
+            "the cable from it to the cameras"
         )
         return phrase("alarm_stopped", text, rate_hz=round(rate_hz, 1))
 

@@ -1,5 +1,6 @@
 /** Puts the page together. Each part draws itself from what store.js holds; connection.js keeps that up to date. */
 
+import { startAlarms } from "./frame/alarms.js";
 import { drawKeys, startKeys } from "./frame/keys.js";
 import { startLogin } from "./frame/login.js";
 import { startRole } from "./frame/role.js";
@@ -64,6 +65,7 @@ for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startAim, sta
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();
+startAlarms();
 startLogin(() => location.reload());
 startRouter(entered, recordings.leaveRecordings);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));

@@ -1,8 +1,9 @@
 /**
  * Sounds and vibration for what an operator must notice while he watches the hill: a recording began, ended, a fault,
- * the last place on the disk. And the wake lock, which keeps the display on while the rig is armed.
+ * the last place on the disk, an alarm. And the wake lock, which keeps the display on while the rig is armed.
  *
- * Browsers allow sound only after a tap, so all of it is off until it is switched on in the settings, on each device.
+ * Browsers allow sound only after the page was touched. All of it is off until it is switched on in the settings, on each
+ * device, but for the sound of alarms, which is on until it is switched off: an alarm before the first touch sounds then.
  */
 
 import { $ } from "../shared/dom.js";
@@ -15,6 +16,8 @@ const SIGNALS = {
   started: { tones: [[660, 0.12], [990, 0.18]], pattern: [200] },
   stopped: { tones: [[990, 0.12], [660, 0.18]], pattern: [100, 80, 100] },
   last_place: { tones: [[520, 0.15], [0, 0.1], [520, 0.15]], pattern: [300, 150, 300] },
+  alarm: { tones: [[1175, 0.15], [0, 0.05], [1175, 0.15], [0, 0.05], [1175, 0.15], [880, 0.4]], pattern: [400, 100, 400, 100, 400] },
+  warning: { tones: [[784, 0.2], [0, 0.1], [784, 0.2]], pattern: [300, 100, 300] },
   fault: { tones: [[880, 0.2], [440, 0.2], [880, 0.2], [440, 0.4]], pattern: [500, 150, 500, 150, 500] },
 };
 const LOUDNESS = 0.4;
@@ -28,6 +31,8 @@ let before = null;
 /** @type {WakeLockSentinel|null} */
 let lock = null;
 let locking = false;
+/** Whether the page was touched: before that a browser makes no sound, and complains if it is asked. */
+let touched = false;
 
 export function startSignals() {
   for (const name of ["sound", "vibration", "awake"]) {
@@ -39,11 +44,49 @@ export function startSignals() {
       void keepAwake();
     });
   }
+  $("signal-alarms").checked = load("alarms", true);
+  $("signal-alarms").addEventListener("change", () => setAlarmSound($("signal-alarms").checked));
   $("signal-vibration").closest("label").hidden = !("vibrate" in navigator);
   $("signal-awake").closest("label").hidden = !("wakeLock" in navigator); // needs HTTPS, or the computer itself
-  addEventListener("pointerdown", () => { if (wants("sound")) void sounding().resume(); });
+  for (const touch of ["pointerdown", "keydown"]) addEventListener(touch, () => void wake());
   watch(notice);
+  watch(callForSomebody);
   watch(() => void keepAwake());
+}
+
+/** Whether alarms sound on this device. */
+export function soundsAlarms() {
+  return $("signal-alarms").checked;
+}
+
+/**
+ * Let alarms sound on this device, or not; it is remembered.
+ *
+ * @param {boolean} on
+ */
+export function setAlarmSound(on) {
+  $("signal-alarms").checked = on;
+  save("alarms", on);
+  if (on) give("warning", true); // to hear that it works
+}
+
+/** At a touch: be ready for sounds, and give that of an alarm which came before. */
+async function wake() {
+  touched = true;
+  if (!wants("sound") && !soundsAlarms()) return;
+  await sounding().resume();
+  callForSomebody();
+}
+
+/** Give the sound of alarms that this browser has not heard yet, once for all of them. */
+function callForSomebody() {
+  const { status, connected } = known;
+  if (!status || !connected) return;
+  const heard = load("alarms_heard", 0);
+  const fresh = status.alarms.filter(({ since }) => Date.parse(since) > heard);
+  if (!fresh.length || soundsAlarms() && !touched) return;
+  save("alarms_heard", Math.max(...fresh.map(({ since }) => Date.parse(since))));
+  give(fresh.some(({ statement }) => statement.level === "error") ? "alarm" : "warning", soundsAlarms());
 }
 
 /** @param {"sound"|"vibration"|"awake"} name */
@@ -69,11 +112,14 @@ function notice() {
   before = now;
 }
 
-/** @param {string} name */
-function give(name) {
+/**
+ * @param {string} name
+ * @param {boolean} [audible]
+ */
+function give(name, audible = wants("sound")) {
   const { tones, pattern } = SIGNALS[name];
   if (wants("vibration")) navigator.vibrate(pattern);
-  if (!wants("sound")) return;
+  if (!audible) return;
   const context = sounding();
   let at = context.currentTime + RAMP_S;
   for (const [pitch, length] of tones) {

@@ -26,6 +26,7 @@ export const en = {
   "state.recording": "Recording",
   "state.disarming": "Closing",
   "state.fault": "Fault",
+  "state.alarmed": "ready, but not well: see the top of the page",
   "state.pulses": "{pulses} pulses, all complete",
   "state.pulses_partial": "{pulses} pulses, {partial} lack a frame",
 
@@ -35,6 +36,11 @@ export const en = {
   "lost.retry_in": "Try now ({seconds})",
   "lost.trying": "Trying …",
   "lost.as_of": "as of {time}",
+
+  "alarms.label": "Alarms",
+  "alarms.since": "since {time}",
+  "alarms.mute": "Alarm sound off",
+  "alarms.unmute": "Alarm sound on",
 
   "actions.label": "What comes next",
   "actions.arm": "Arm",
@@ -343,6 +349,7 @@ export const en = {
 
   "signals.title": "Signals on this device",
   "signals.sound": "Sounds: started, stopped, fault, one jump left",
+  "signals.alarms": "Sound of alarms",
   "signals.vibration": "Vibration",
   "signals.awake": "Keep the display on while armed",
 

@@ -26,6 +26,7 @@ export const nb = {
   "state.recording": "Opptak",
   "state.disarming": "Stenger",
   "state.fault": "Feil",
+  "state.alarmed": "klar, men noe er galt: se øverst på siden",
   "state.pulses": "{pulses} pulser, alle komplette",
   "state.pulses_partial": "{pulses} pulser, {partial} mangler et bilde",
 
@@ -35,6 +36,11 @@ export const nb = {
   "lost.retry_in": "Prøv nå ({seconds})",
   "lost.trying": "Prøver …",
   "lost.as_of": "fra kl. {time}",
+
+  "alarms.label": "Alarmer",
+  "alarms.since": "siden kl. {time}",
+  "alarms.mute": "Slå av alarmlyden",
+  "alarms.unmute": "Slå på alarmlyden",
 
   "actions.label": "Neste steg",
   "actions.arm": "Gjør klar",
@@ -343,6 +349,7 @@ export const nb = {
 
   "signals.title": "Signaler på denne enheten",
   "signals.sound": "Lyd: startet, stoppet, feil, plass til ett hopp",
+  "signals.alarms": "Lyd ved alarmer",
   "signals.vibration": "Vibrasjon",
   "signals.awake": "Hold skjermen på mens riggen er klar",
 

@@ -41,6 +41,8 @@ function inWords() {
   const { status } = known;
   if (!status) return "";
   const { text, advice } = say(status.statement);
+  const alarmed = status.alarms.some(({ statement }) => statement.code === status.statement.code);
+  if (alarmed) return status.recording ? recordingInWords(status.recording) : asSentence(t("state.alarmed"));
   if (status.recording && status.statement.level === "good") return recordingInWords(status.recording);
   const todo = status.statement.level === "warning" ? "" : advice; // what to do about a missing camera stands on its card
   return [text, todo].filter(Boolean).map(asSentence).join(" ");

@@ -119,7 +119,7 @@ class HeadlessRig:
         Raises:
             CameraNotFoundError: too few cameras answer in time.
             CameraError: all cameras are connected, but no complete triplet came.
-        BadInputError: pulses come at another rate than the rig file names.
+            BadInputError: pulses come at another rate than the rig file names.
             SvevError: the rig cannot be set up.
         """
         began = complete_since = time.monotonic()

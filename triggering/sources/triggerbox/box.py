@@ -61,8 +61,8 @@ class TriggerBox:
             raise TriggerError(phrase("trigger_silent", text, port=self._port))
         if version != protocol.VERSION:
             text = "the trigger box at {port} speaks protocol {found}, not {wanted}: load the firmware of that protocol"
-            values: dict[str, str | int] = {"port": self._port, "found": version, "wanted": protocol.VERSION}
-            raise TriggerError(phrase("trigger_protocol", text, **values))
+            wanted = protocol.VERSION
+            raise TriggerError(phrase("trigger_protocol", text, port=self._port, found=version, wanted=wanted))
 
     def start(self, rate: Rate) -> None:
         """Stop the pulses, count from 0, and start them at a rate.

@@ -145,5 +145,5 @@ class TrainKeeper:
         hz = self._rate.hz
         off = hz / self._wanted_hz - 1
         text = "makes {hz} pulses per second, {ppm} ppm off trigger.rate_hz"
-        values = {"hz": round(hz, 4), "ppm": round(off * 1e6)}
-        self._tell(Level.WARNING if abs(off) > _OFF else Level.INFO, phrase("trigger_running", text, **values))
+        said = phrase("trigger_running", text, hz=round(hz, 4), ppm=round(off * 1e6))
+        self._tell(Level.WARNING if abs(off) > _OFF else Level.INFO, said)

@@ -82,9 +82,7 @@ def test_true_times_lie_within_the_uncertainty_of_the_line(
         now += way + 100 * MS
         if clock.line is not None:
             number = round(now / true_period)
-            assert abs(clock.line.at(number) - number * true_period) <= clock.line.uncertainty_ns + 0.1 * MS + (
-                2 * clock.line.uncertainty_ns if clock.line.readings < 10 else 0
-            )
+            assert abs(clock.line.at(number) - number * true_period) <= 1.5 * clock.line.uncertainty_ns
     assert not clock.broken
     for _ in range(3):
         clock.add(Reading(HostNs(round(now)), HostNs(round(now + MS)), 3.0))

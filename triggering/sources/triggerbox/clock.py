@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.clocks import HostNs
 
@@ -56,7 +57,8 @@ class ClockLine:
         time: host time of that pulse, ns.
         gain_ns: time between two pulses, ns.
         residual_ns: largest distance of a question that was used from the line, ns.
-        uncertainty_ns: largest error of the times, ns: half of the longest round trip that was used.
+        uncertainty_ns: largest error of the times at the last question, ns: half of the longest round trip that was
+            used, and what the error of the gain has added since.
         readings: questions that were used.
     """
 
@@ -139,4 +141,16 @@ class BoxClock:
         limits = self._period_ns / (1 + _CRYSTAL), self._period_ns / (1 - _CRYSTAL)
         gain = min(max(gain, limits[0]), limits[1])
         residual = float(np.abs(y - gain * x).max())
-        return ClockLine(number, first + time, gain, residual, float(half.max()), len(best))
+        return ClockLine(number, first + time, gain, residual, self._bound(half, middle, first + time), len(best))
+
+    def _bound(self, half: NDArray[np.float64], middle: NDArray[np.float64], centre: float) -> float:
+        """Largest error of the line at the last question, ns: where it was put, and what its slope adds since then.
+
+        Args:
+            half: largest errors of the readings, shape (n,), ns.
+            middle: their times, shape (n,), ns.
+            centre: host time of their centre, ns.
+        """
+        longest, span = float(half.max()), float(np.ptp(middle))
+        slope = min(2 * longest / max(span, 1.0), 2 * _CRYSTAL)
+        return longest + slope * abs(self._readings[-1].middle - centre)

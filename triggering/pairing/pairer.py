@@ -234,10 +234,7 @@ class Pairer:
         """Rhythm, spread and each camera's clock and totals."""
         train, split = self._train, self._train.split
         return PairingHealth(
-            pulses=self._closed,
-            proven_by_ids=self._proven_by_ids,
-            unwatched=self._unwatched,
-            open=len(self._open),
+            pulses=self._closed, proven_by_ids=self._proven_by_ids, unwatched=self._unwatched, open=len(self._open),
             period_us=round(train.period_ns / 1000, 3),
             spread_median_us=train.spread_median_ns / 1000,
             spread_max_us=train.spread_max_ns / 1000,
@@ -247,7 +244,7 @@ class Pairer:
             rate_hz=NS_PER_S / train.period_ns if train.steady else None,
             split_us=None if split is None or not is_recent(split[0], train.last) else split[1] / 1000,
             source=source_health(self._fired, train.last),
-        )
+        )  # fmt: skip
 
     # -- details -------------------------------------------------------------------------------------------------
 

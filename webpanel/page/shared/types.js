@@ -32,7 +32,6 @@
  * @property {number|null} clock_offset_us
  * @property {[number, number]|null} columns
  * @property {ActionAnswers|null} actions
- *
  * @typedef {object} ActionAnswers
  * @property {number} acknowledged
  * @property {number} late
@@ -45,7 +44,6 @@
  * @property {number|null} spread_us
  * @property {number} number
  * @property {MadePulses|null} made
- *
  * @typedef {object} MadePulses
  * @property {number} made
  * @property {number} skipped
@@ -72,7 +70,6 @@
  * @property {number} missed
  * @property {number} damaged
  * @property {number} absent
- *
  * @typedef {object} Counts
  * @property {number} pulses
  * @property {number} complete
@@ -112,12 +109,10 @@
  * @typedef {object} Trash
  * @property {number} recordings
  * @property {number} bytes
- *
  * @typedef {object} PulseSummary
  * @property {number} pulse
  * @property {number} time_s
  * @property {string[]} statuses
- *
  * @typedef {object} Pulses
  * @property {string} id
  * @property {string[]} cameras
@@ -173,7 +168,6 @@
  * @property {number} id
  * @property {"waiting"|"jumped"|"skipped"} mark
  * @property {string[]} jumps
- *
  * @typedef {object} StartList
  * @property {number} version
  * @property {number} round
@@ -219,7 +213,6 @@
  * @property {string} what
  * @property {string} remedy
  * @property {Values} values
- *
  * @typedef {object} DoctorReport
  * @property {"PASS"|"WARN"|"FAIL"} worst
  * @property {Finding[]} findings

@@ -35,7 +35,8 @@ from rig.errors import (
 from rig.events import PAIRING, Event, Level
 from rig.settings.model import RigSettings
 from rig.transport import wire
-from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording
+from rig.transport.recorder_commands import RecorderOptions, StartRecording
+from rig.transport.recorder_reports import RecordingFinished
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.in_progress import Outcome

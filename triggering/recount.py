@@ -20,7 +20,7 @@ from rig.events import Event
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
-from rig.transport.messages import CameraNews
+from rig.transport.recorder_reports import CameraNews
 
 #: News after which numbers and clock of a camera prove nothing about the frames before it.
 _BREAKS: Final = frozenset(

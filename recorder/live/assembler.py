@@ -19,7 +19,7 @@ from rig.phrase import Phrase, phrase, plain
 from rig.pixels import Stored
 from rig.settings.model import RigSettings
 from rig.tag import CameraTag
-from rig.transport.messages import CameraChanged, CameraNews
+from rig.transport.recorder_reports import CameraChanged, CameraNews
 from rig.transport.ring import CameraRing
 from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
 from triggering.sources.choice import trigger_source

@@ -1,6 +1,6 @@
 """The main loop of the recorder process: reads the rings, obeys commands, writes and publishes, reports.
 
-The commands are `rig.transport.messages.RecorderCommand`, the reports `RecorderReport`.
+The commands are `rig.transport.recorder_commands.RecorderCommand`, the reports `RecorderReport`.
 """
 
 import os
@@ -25,19 +25,13 @@ from rig.health import PulsesMade
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
-from rig.transport.messages import (
-    CameraChanged,
+from rig.transport.message import Quit
+from rig.transport.preview import PreviewSlot
+from rig.transport.recorder_commands import (
     GrabberDied,
     PulsesFired,
-    Quit,
     RecorderCommand,
     RecorderConfig,
-    RecorderEvent,
-    RecorderFailed,
-    RecorderHealth,
-    RecorderReady,
-    RecorderReport,
-    RecorderWarm,
     StartRecording,
     StopRecording,
     TellActions,
@@ -45,7 +39,15 @@ from rig.transport.messages import (
     TellPulses,
     TellResult,
 )
-from rig.transport.preview import PreviewSlot
+from rig.transport.recorder_reports import (
+    CameraChanged,
+    RecorderEvent,
+    RecorderFailed,
+    RecorderHealth,
+    RecorderReady,
+    RecorderReport,
+    RecorderWarm,
+)
 from rig.transport.ring import CameraRing
 from triggering.sources.choice import trigger_source
 from triggering.sources.telling import SpreadTeller

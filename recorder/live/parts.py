@@ -7,7 +7,7 @@ from recorder.live.recording import Recording
 from rig.api.recordings import Counts
 from rig.clocks import host_now
 from rig.errors import FileVanishedError, StorageError, SvevError
-from rig.transport.messages import RecorderFailed, RecordingFinished, RecordingProgress
+from rig.transport.recorder_reports import RecorderFailed, RecordingFinished, RecordingProgress
 
 #: A recording has so many logs at most, however often one of them fails.
 _PARTS_MAX: Final = 20

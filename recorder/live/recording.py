@@ -26,7 +26,8 @@ from rig.phrase import phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
-from rig.transport.messages import GoesOn, LogPart, StartRecording, TellResult
+from rig.transport.recorder_commands import GoesOn, StartRecording, TellResult
+from rig.transport.recorder_reports import LogPart
 from rig.utc_clock import utc_fields
 from triggering.ledger import Ledger
 from triggering.pairing.pairer import ClosedPulse

@@ -33,14 +33,13 @@ from rig.frame import FrameStatus
 from rig.health import WritingHealth
 from rig.phrase import Phrase, phrase
 from rig.topics import JUMPER
-from rig.transport.messages import (
+from rig.transport.recorder_commands import StartRecording, TellResult
+from rig.transport.recorder_reports import (
     RecorderEvent,
     RecorderFailed,
     RecorderReport,
     RecordingContinued,
     RecordingStarted,
-    StartRecording,
-    TellResult,
 )
 
 _SLICE_NS: Final = NS_PER_S // 200

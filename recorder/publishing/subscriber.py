@@ -17,7 +17,7 @@ from rig.errors import ProcessDiedError
 from rig.tag import TripletTag
 from rig.topics import HEALTH, TRIPLET
 from rig.transport.child import begin
-from rig.transport.messages import Message, Quit
+from rig.transport.message import Message, Quit
 from rig.transport.process_table import ProcessSpec, ProcessTable
 
 T = TypeVar("T")

@@ -13,7 +13,7 @@ from collections import deque
 from typing import Any, Final, Generic, TypeVar
 
 from rig.transport import wire
-from rig.transport.messages import Message
+from rig.transport.message import Message
 
 Incoming = TypeVar("Incoming")
 

@@ -13,7 +13,7 @@ from typing import Any, Final, Generic, TypeVar
 import msgspec
 
 from rig.transport.channel import ControlChannel
-from rig.transport.messages import Quit
+from rig.transport.message import Quit
 
 Config = TypeVar("Config")
 

@@ -19,7 +19,7 @@ from typing import IO, Any, Final
 from rig.errors import ProcessDiedError
 from rig.phrase import phrase
 from rig.transport.channel import ControlChannel
-from rig.transport.messages import Quit
+from rig.transport.message import Quit
 
 _STOP_S: Final = 8.0
 _ROOT: Final = str(Path(__file__).resolve().parents[2])

@@ -9,7 +9,8 @@ from rig.clocks import HostNs
 from rig.events import Event
 from rig.health import Health
 from rig.settings.model import RigSettings
-from rig.transport.messages import Message, PulsesFired, Quit, TellActions, TellPulses
+from rig.transport.message import Message, Quit
+from rig.transport.recorder_commands import PulsesFired, TellActions, TellPulses
 
 
 class TriggerBoxConfig(Message):

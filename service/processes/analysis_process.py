@@ -22,9 +22,11 @@ from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 from rig.settings.model import AnalysisSettings, NetworkSettings, RigSettings
 from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
+from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
 from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
-from rig.transport.messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Quit, TellResult
+from rig.transport.message import Quit
+from rig.transport.recorder_commands import TellResult
 from service.processes import live_jumps
 
 #: It holds nothing that could be lost.

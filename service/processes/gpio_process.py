@@ -12,7 +12,8 @@ from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.trigger import GpioTrigger
 from rig.transport.child import ChildContext, begin
-from rig.transport.messages import Quit, TellPulses
+from rig.transport.message import Quit
+from rig.transport.recorder_commands import TellPulses
 from rig.transport.trigger_messages import TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
 from triggering.sources.gpio.lines import OutputLine

@@ -5,7 +5,8 @@ from typing import Final
 
 from capture.grabber import Grabber
 from rig.transport.child import begin
-from rig.transport.messages import GrabberConfig, Quit
+from rig.transport.grabber_messages import GrabberConfig
+from rig.transport.message import Quit
 from rig.transport.ring import CameraRing
 from service.processes.backends import camera_opener
 from service.processes.priority import allowed_priority, prefer_this_process

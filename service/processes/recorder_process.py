@@ -5,7 +5,8 @@ from typing import Final
 from recorder.live.main_loop import RecorderLoop
 from rig.errors import SvevError
 from rig.transport.child import begin
-from rig.transport.messages import RecorderCommand, RecorderConfig, RecorderFailed
+from rig.transport.recorder_commands import RecorderCommand, RecorderConfig
+from rig.transport.recorder_reports import RecorderFailed
 
 #: Time to write the triplets that wait for the disk, and the log's index.
 _GRACE_S: Final = 20.0

@@ -22,29 +22,28 @@ from rig.health import Health
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, GpioTrigger, TriggerBoxTrigger
-from rig.transport.messages import (
-    AnalysisConfig,
-    AnalysisReport,
-    AnalysisTold,
-    CameraChanged,
-    CameraNews,
-    GrabberConfig,
+from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
+from rig.transport.grabber_messages import GrabberConfig
+from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
+from rig.transport.recorder_commands import (
     GrabberDied,
-    JumpMeasured,
     PulsesFired,
     RecorderCommand,
     RecorderConfig,
-    RecorderEvent,
-    RecorderHealth,
     RecorderOptions,
-    RecorderReady,
-    RecorderReport,
-    RecorderWarm,
     TellActions,
     TellPulses,
     TellResult,
 )
-from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
+from rig.transport.recorder_reports import (
+    CameraChanged,
+    CameraNews,
+    RecorderEvent,
+    RecorderHealth,
+    RecorderReady,
+    RecorderReport,
+    RecorderWarm,
+)
 from rig.transport.ring import CameraRing
 from rig.transport.trigger_messages import CamerasSeen, TriggerBoxConfig, TriggerConfig, TriggerReport, TriggerTold
 from service.processes.backends import check_backends

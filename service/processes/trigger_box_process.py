@@ -8,7 +8,8 @@ from rig.errors import BadInputError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase
 from rig.transport.child import ChildContext, begin
-from rig.transport.messages import PulsesFired, Quit
+from rig.transport.message import Quit
+from rig.transport.recorder_commands import PulsesFired
 from rig.transport.trigger_messages import TriggerBoxConfig, TriggerTold
 from triggering.sources.choice import trigger_source
 from triggering.sources.triggerbox.keeper import Fired, TrainKeeper

@@ -9,7 +9,8 @@ from rig.phrase import Phrase
 from rig.settings.trigger import ActionTrigger
 from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
-from rig.transport.messages import Quit, TellActions
+from rig.transport.message import Quit
+from rig.transport.recorder_commands import TellActions
 from rig.transport.trigger_messages import CamerasSeen, TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import allowed_priority, prefer_this_process
 from triggering.sources.action_sender import ActionSender

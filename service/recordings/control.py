@@ -24,8 +24,8 @@ from rig.errors import (
 from rig.events import Event, Level
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.transport.messages import (
-    Calibration,
+from rig.transport.recorder_commands import Calibration, StartRecording, StopRecording
+from rig.transport.recorder_reports import (
     RecorderFailed,
     RecorderHealth,
     RecorderReport,
@@ -33,8 +33,6 @@ from rig.transport.messages import (
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
-    StartRecording,
-    StopRecording,
 )
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RigProcesses

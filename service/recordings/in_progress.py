@@ -9,7 +9,8 @@ from rig.api.recordings import Counts, Recording, RecordingState, SessionChange,
 from rig.api.statement import Level, Statement
 from rig.clocks import NS_PER_S, host_now
 from rig.errors import SvevError
-from rig.transport.messages import RecordingFinished, RecordingProgress, RecordingStarted, StartRecording
+from rig.transport.recorder_commands import StartRecording
+from rig.transport.recorder_reports import RecordingFinished, RecordingProgress, RecordingStarted
 from service.recordings.interruption import Interruption
 from service.recordings.listing import more_of
 

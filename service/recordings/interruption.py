@@ -12,7 +12,7 @@ from recorder.reading.info import LogInfo, info
 from rig.api.recordings import SessionFields
 from rig.clocks import NS_PER_S, HostNs
 from rig.errors import SvevError
-from rig.transport.messages import GoesOn, StartRecording
+from rig.transport.recorder_commands import GoesOn, StartRecording
 
 #: A disk from which the log is not read within this time hangs.
 _READ_S: Final = 10.0

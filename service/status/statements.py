@@ -13,7 +13,7 @@ from rig.errors import SvevError
 from rig.phrase import Phrase, Value, phrase
 from rig.pulse import Pause
 from rig.settings.model import CameraSettings
-from rig.transport.messages import CameraNews
+from rig.transport.recorder_reports import CameraNews
 from service.processes.rig_processes import CameraPresence
 
 _CAMERA_ADVICE = "check its power and cable; it is connected again by itself"

@@ -13,7 +13,7 @@ from rig.errors import ProcessDiedError, SvevError
 from rig.events import Event
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
-from rig.transport.messages import RecorderOptions, TellEvent
+from rig.transport.recorder_commands import RecorderOptions, TellEvent
 from service.processes.rig_processes import RigProcesses
 from service.processes.simulation import WriteTruth, hill_environment, simulated_truth
 

@@ -20,7 +20,9 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
-from rig.transport.messages import JumpMeasured, RecorderFailed, RecorderHealth, RecorderOptions, RecorderReport
+from rig.transport.analysis_messages import JumpMeasured
+from rig.transport.recorder_commands import RecorderOptions
+from rig.transport.recorder_reports import RecorderFailed, RecorderHealth, RecorderReport
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import ANALYSIS, RECORDER, TRIGGER, CameraPresence
 from service.recordings import live_results

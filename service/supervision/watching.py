@@ -8,7 +8,7 @@ from rig.api.statement import Statement
 from rig.events import Event
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
-from rig.transport.messages import RecorderHealth, RecorderReport
+from rig.transport.recorder_reports import RecorderHealth, RecorderReport
 from service.alarms.keeper import AlarmKeeper
 from service.processes.rig_processes import RigProcesses
 from service.status.statements import no_camera, too_few_cameras, wrong_rate

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Final, TypeVar
 
 from rig.errors import BadInputError
-from rig.transport.messages import Message, Quit
+from rig.transport.message import Message, Quit
 from rig.transport.process_table import Child, ProcessSpec
 from simrig.programs.messages import (
     Answer,

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from rig.settings.strict_toml import StrictModel
-from rig.transport.messages import Message, Quit
+from rig.transport.message import Message, Quit
 from simrig.firewire.camera.advanced import Signature
 from simrig.firewire.firewire_bus import BusState
 from simrig.gige.camera import CameraConfig

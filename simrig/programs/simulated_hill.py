@@ -12,7 +12,7 @@ from typing import Final, Self, TypedDict, Unpack
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor, host_now
 from rig.errors import BadInputError
 from rig.settings.strict_toml import validate
-from rig.transport.messages import Message
+from rig.transport.message import Message
 from rig.transport.process_table import Child, ProcessSpec
 from simrig.firewire.camera.advanced import Signature
 from simrig.firewire.firewire_bus import BusState

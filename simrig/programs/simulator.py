@@ -12,7 +12,7 @@ import msgspec
 from rig.errors import BadInputError
 from rig.transport.channel import ControlChannel
 from rig.transport.child import begin
-from rig.transport.messages import Quit
+from rig.transport.message import Quit
 from simrig.programs.messages import Answer, Done, Refused
 
 Config = TypeVar("Config")

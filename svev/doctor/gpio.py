@@ -14,16 +14,17 @@ def look_at_gpio(rig: RigSettings) -> Iterator[Finding]:
     trigger = rig.trigger
     if not isinstance(trigger, GpioTrigger):
         return
-    place = {"line": trigger.line, "chip": trigger.chip}
+    line, chip = trigger.line, trigger.chip
     try:
-        consumer = consumer_of(trigger.chip, trigger.line)
+        consumer = consumer_of(chip, line)
     except TriggerError as error:
         remedy = "no pulses are made until then"
         yield failure(Topic.CAMERAS, "check_gpio_chip", "trigger line: {why}", remedy, why=error.said)
         return
     if consumer in {"", CONSUMER}:
-        yield passed(Topic.CAMERAS, "check_gpio", "line {line} of {chip} is there for the trigger pulses", **place)
+        what = "line {line} of {chip} is there for the trigger pulses"
+        yield passed(Topic.CAMERAS, "check_gpio", what, line=line, chip=chip)
     else:
         what = "line {line} of {chip} is taken by {consumer}"
         remedy = "end that, or name another line as trigger.line in the rig file"
-        yield failure(Topic.CAMERAS, "check_gpio_taken", what, remedy, consumer=consumer, **place)
+        yield failure(Topic.CAMERAS, "check_gpio_taken", what, remedy, consumer=consumer, line=line, chip=chip)

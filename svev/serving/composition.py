@@ -19,8 +19,8 @@ from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.settings.webhook import WebhookSettings
-from rig.transport.messages import RecorderOptions
 from rig.transport.preview import PreviewSlot
+from rig.transport.recorder_commands import RecorderOptions
 from service.alarms.messenger import Messenger
 from service.alarms.occasions import Occasions
 from service.exports.jobs import Exports

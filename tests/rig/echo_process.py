@@ -5,7 +5,7 @@ import select
 import threading
 
 from rig.transport.child import begin
-from rig.transport.messages import Message, Quit
+from rig.transport.message import Message, Quit
 
 
 class EchoConfig(Message):

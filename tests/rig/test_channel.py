@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import pytest
 
 from rig.transport.channel import ControlChannel
-from rig.transport.messages import Message
+from rig.transport.message import Message
 
 Channel = ControlChannel[dict[str, Any]]
 

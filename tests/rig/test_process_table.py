@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from rig.errors import ProcessDiedError
-from rig.transport.messages import Quit
+from rig.transport.message import Quit
 from rig.transport.process_table import Child, ProcessSpec, ProcessTable
 from tests.rig.echo_process import EchoConfig
 from tests.support.waiting import wait_until

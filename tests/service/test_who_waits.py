@@ -14,14 +14,8 @@ from recorder.reading.log_reader import LogReader
 from rig.clocks import host_now
 from rig.events import Event, Level
 from rig.phrase import plain
-from rig.transport.messages import (
-    RecorderOptions,
-    RecordingFinished,
-    RecordingStarted,
-    StartRecording,
-    StopRecording,
-    TellEvent,
-)
+from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording, TellEvent
+from rig.transport.recorder_reports import RecordingFinished, RecordingStarted
 from service.processes.rig_processes import RECORDER, RigProcesses
 from tests.capture.rigs import make_rig, write_rig
 from tests.support.loopback import Loopback

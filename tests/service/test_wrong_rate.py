@@ -11,7 +11,7 @@ from rig.clocks import host_now
 from rig.phrase import plain
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
-from rig.transport.messages import CameraNews
+from rig.transport.recorder_reports import CameraNews
 from service.processes.rig_processes import CameraPresence, RigProcesses
 from service.supervision.watching import why_not_armed
 from simrig.programs.simulated_hill import SimulatedHill

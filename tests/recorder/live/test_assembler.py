@@ -9,7 +9,7 @@ from recorder.live.assembler import Assembler, Triplet
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus
-from rig.transport.messages import CameraNews
+from rig.transport.recorder_reports import CameraNews
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, ring_rig
 
 Parts = tuple[Assembler, RingCameras, TripletBuffers]

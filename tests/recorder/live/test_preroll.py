@@ -30,7 +30,8 @@ from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.phrase import plain
-from rig.transport.messages import RecorderReport, RecordingFinished, RecordingStarted, StartRecording
+from rig.transport.recorder_commands import StartRecording
+from rig.transport.recorder_reports import RecorderReport, RecordingFinished, RecordingStarted
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
 from tests.support.waiting import wait_until
 

@@ -24,21 +24,19 @@ from rig.jumper import JumperState
 from rig.pulse import PulseNumber
 from rig.settings.model import RigSettings
 from rig.topics import JUMPER
-from rig.transport.messages import (
+from rig.transport.analysis_messages import JumpMeasured
+from rig.transport.preview import PreviewSlot
+from rig.transport.recorder_commands import RecorderOptions, StartRecording, TellResult
+from rig.transport.recorder_reports import (
     CameraChanged,
     CameraNews,
-    JumpMeasured,
     RecorderFailed,
     RecorderHealth,
-    RecorderOptions,
     RecorderReport,
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
-    StartRecording,
-    TellResult,
 )
-from rig.transport.preview import PreviewSlot
 from service.processes.rig_processes import RECORDER, RigProcesses
 from service.processes.simulation import simulated_hill
 from tests.capture.rigs import make_rig

@@ -17,7 +17,8 @@ from recorder.reading.log_reader import LogReader
 from rig.clocks import host_now
 from rig.events import Event, Level
 from rig.phrase import plain
-from rig.transport.messages import RecorderOptions, RecordingFinished, StartRecording, StopRecording
+from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording
+from rig.transport.recorder_reports import RecordingFinished
 from service.processes.rig_processes import RECORDER, RigProcesses
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback

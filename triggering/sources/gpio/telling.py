@@ -44,6 +44,7 @@ class LatenessTeller:
             text = (
                 "{line}: pulses begin {median_us} us late (median), {p99_us} us (99 of 100), {max_us} us (the latest)"
             )
-            figures = {"max_us": worst, "median_us": made.late_median_us or 0.0, "p99_us": made.late_p99_us or 0.0}
-            said.append((Level.INFO, phrase("gpio_late", text, line=self._line, **figures)))
+            median_us, p99_us = made.late_median_us or 0.0, made.late_p99_us or 0.0
+            late = phrase("gpio_late", text, line=self._line, median_us=median_us, p99_us=p99_us, max_us=worst)
+            said.append((Level.INFO, late))
         return said

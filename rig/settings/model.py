@@ -53,6 +53,10 @@ class IidcSettings(StrictModel):
     )
 
 
+#: Processes and events that are not of one camera go by these names, beside those that go by a camera's.
+_TAKEN: Final = frozenset({"recorder", "analysis", "trigger", "pairing", "service"})
+
+
 class CameraSettings(StrictModel):
     """One camera. The order of the cameras in the file is their order in the triplet, from left to right."""
 
@@ -255,6 +259,8 @@ class RigSettings(StrictModel):
     @model_validator(mode="after")
     def _cameras_fit_together(self) -> "RigSettings":
         names = [camera.name for camera in self.cameras]
+        if taken := {name for name in names if name.lower() in _TAKEN}:
+            raise ValueError(f"{', '.join(sorted(taken))} is the name of a part of Svev: give the camera another name")
         if twice := {name for name in names if names.count(name) > 1}:
             raise ValueError(f"camera name {', '.join(sorted(twice))} is used twice: give each camera its own name")
         own = [camera for camera in self.cameras if camera.address and camera.backend != "replay"]

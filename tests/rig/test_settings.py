@@ -105,6 +105,11 @@ def test_the_schema_is_a_schema() -> None:
             "trigger.min_cameras = 2, but the rig has 1 cameras: make it 1 or less, or leave it out",
             id="more cameras wanted than there are",
         ),
+        pytest.param(
+            HEAD + CAMERA.replace("K1", "Recorder"),
+            "Recorder is the name of a part of Svev: give the camera another name",
+            id="name of a process",
+        ),
         pytest.param(HEAD + CAMERA + CAMERA, "camera name K1 is used twice: give each camera its own", id="same name"),
         pytest.param(
             HEAD + CAMERA + CAMERA.replace("K1", "K2"),

@@ -48,7 +48,7 @@ def test_cameras_that_do_not_keep_up_are_no_fault_of_a_generator(tmp_path: Path,
     path.write_text(path.read_text().replace("[trigger]\n", "[trigger]\nsettle_s = 0.5\n"))
     code, _, said = _record(path, tmp_path / "logs", 1)
     assert code == 5
-    assert "lower trigger.rate_hz in the rig file" in said
+    assert "lower trigger.rate_hz or exposure_us in the rig file" in said
     assert "generator" not in said
 
 

@@ -25,6 +25,8 @@ const best = new Map();
 /** @type {CameraAids|null} */
 let aids = null;
 let running = false;
+/** Address of the picture that is shown; the browser keeps a picture for as long as it has one. */
+let picture = "";
 
 export function startAim() {
   $("aim-again").addEventListener("click", () => { best.delete(camera); draw(); });
@@ -76,13 +78,17 @@ async function show(path, name) {
   }
   if (!answer.ok) throw await asProblem(answer);
   if (answer.status === 204) return;
-  const picture = URL.createObjectURL(await answer.blob());
-  const image = $("aim-image");
-  if (name === camera) {
-    image.src = picture;
-    await image.decode().catch(() => {}); // the view was left meanwhile
+  const next = URL.createObjectURL(await answer.blob());
+  // Decoded apart: a browser that is given another source while it decodes may never answer.
+  const ahead = make("img", { src: next });
+  await ahead.decode().catch(() => {}); // no picture is better than none ever again
+  if (name !== camera) {
+    URL.revokeObjectURL(next);
+    return;
   }
+  $("aim-image").src = next;
   URL.revokeObjectURL(picture);
+  picture = next;
 }
 
 function draw() {

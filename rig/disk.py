@@ -1,4 +1,4 @@
-"""What the disk below a file or directory offers: free room, direct I/O (past the page cache)."""
+"""What the disk below a file or directory offers: free room, direct I/O (past the page cache), files renewed whole."""
 
 import errno
 import fcntl
@@ -27,6 +27,24 @@ def free_bytes(place: Path | int) -> int | None:
         return ask_free_bytes(place)
     except OSError:
         return None
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file, or renew it: whoever reads it, also after a power cut, finds the old content or the new one.
+
+    Args:
+        path: of the file.
+        content: of the file.
+
+    Raises:
+        OSError: it cannot be written; then it is as it was.
+    """
+    new = path.with_suffix(".new")
+    with new.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)
 
 
 def set_direct(descriptor: int, *, wanted: bool) -> bool:

@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from rig.api.rehearsal import Rehearsal, Rehearsals, RehearsalVerdict
 from rig.api.statement import Level, Statement
 from rig.api.status import Finding, RehearsalProgress, RehearsalStage
+from rig.disk import replace_file
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.phrase import Phrase, phrase
@@ -173,7 +174,7 @@ class Rehearser:
         good = found.verdict in {RehearsalVerdict.READY, RehearsalVerdict.WARNED}
         self._tell(Event.now(EventLevel.INFO if good else EventLevel.WARNING, "rehearsal", said))
         try:
-            _keep(self._folder / NAME, found)
+            replace_file(self._folder / NAME, found.model_dump_json(indent=1).encode())
         except OSError as error:
             text = "{path}: the verdict cannot be kept ({why}); a restart of the service loses it"
             why = error.strerror or str(error)
@@ -249,12 +250,3 @@ def _load(path: Path) -> Rehearsal | None:
         return Rehearsal.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
         return None
-
-
-def _keep(path: Path, found: Rehearsal) -> None:
-    new = path.with_suffix(".new")
-    with new.open("wb") as file:
-        file.write(found.model_dump_json(indent=1).encode())
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)

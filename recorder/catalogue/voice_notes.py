@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from rig.disk import replace_file
 from rig.errors import BadInputError
 
 _NAME: Final = re.compile(r"([1-9][0-9]{0,5})_pulse-([1-9][0-9]{0,15})\.webm")
@@ -84,9 +85,4 @@ def add_voice_note(log: Path, pulse: int, data: bytes) -> None:
     folder.mkdir(exist_ok=True)
     number = max((note.number for note in voice_notes(log)), default=0) + 1
     path = folder / f"{number}_pulse-{pulse}.webm"
-    new = path.with_suffix(".new")
-    with new.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
+    replace_file(path, data)

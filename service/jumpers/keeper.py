@@ -4,7 +4,6 @@ The lists to which the last changes can be undone stand in a file of their own: 
 roll-back, reads the list all the same.
 """
 
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from pydantic import ValidationError
 from rig.api.fields import Model
 from rig.api.start_list import StartList
 from rig.api.statement import Statement
+from rig.disk import replace_file
 from rig.events import Event, Level
 from rig.phrase import phrase, plain
 
@@ -101,22 +101,14 @@ class Keeper:
                     return
             try:
                 start_list, changes = found
-                self._write(self._path, start_list.model_dump_json(indent=1).encode())
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                replace_file(self._path, start_list.model_dump_json(indent=1).encode())
                 kept = _Changes(version=start_list.version, changes=changes)
-                self._write(self._undo_path, kept.model_dump_json().encode())
+                replace_file(self._undo_path, kept.model_dump_json().encode())
             except OSError as error:
                 self._lament(error)
             else:
                 self._failed = False
-
-    def _write(self, path: Path, content: bytes) -> None:
-        new = path.with_suffix(".new")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with new.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
 
     def _lament(self, error: OSError) -> None:
         """Say once that the list is not kept, until it is again."""

@@ -8,6 +8,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 from typing import Any, Final, Generic, TypeVar
 
 import msgspec
@@ -20,6 +21,7 @@ Config = TypeVar("Config")
 _CONFIG_S: Final = 10.0
 #: At the end of a process its last reports wait so long for a parent that does not read.
 _LAST_REPORTS_S: Final = 5.0
+_TURN_S: Final = 0.25
 _BAD_CONFIG: Final = 2
 _THREAD_FAILED: Final = 70  # EX_SOFTWARE of <sysexits.h>
 _PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
@@ -50,6 +52,16 @@ class ChildContext(Generic[Config]):
             if self._stop:
                 end_in(self._grace_s)
         return self._stop
+
+    def stops_within(self, seconds: float) -> bool:
+        """Wait, but not beyond the moment from which the process is `stopping`; whether it is."""
+        end = time.monotonic() + seconds
+        while not self.stopping():
+            left = end - time.monotonic()
+            if left <= 0:
+                return False
+            select.select([self.control], [], [], min(left, _TURN_S))  # SIGTERM does not end it
+        return True
 
     def terminated(self) -> bool:
         """Whether the process got SIGTERM. For a main loop that reads the control channel itself."""

@@ -1,18 +1,16 @@
 """The program of the process that makes the pulses of a line of the computer."""
 
 import gc
-import select
 import sys
 import threading
 from typing import Final
 
-from rig.clocks import NS_PER_S, HostNs, host_now
+from rig.clocks import HostNs
 from rig.errors import TriggerError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.trigger import GpioTrigger
 from rig.transport.child import ChildContext, begin
-from rig.transport.message import Quit
 from rig.transport.recorder_commands import TellPulses
 from rig.transport.trigger_messages import TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
@@ -23,9 +21,8 @@ from triggering.sources.gpio.timer import Timer
 
 #: A pulse and the line that is made inactive.
 _GRACE_S: Final = 2.0
-_TURN_MS: Final = 250
-_REPORT_EVERY_NS: Final = NS_PER_S // 2
-_RETRY_NS: Final = 2 * NS_PER_S
+_REPORT_EVERY_S: Final = 0.5
+_RETRY_S: Final = 2.0
 #: Python hands over to a thread that waits for it after so long: a pulse does not wait longer for a report.
 _SWITCH_S: Final = 1e-4
 
@@ -56,7 +53,7 @@ def main() -> None:
             if str(error) != said:
                 said = str(error)
                 _tell(child, Level.ERROR, error.said)
-        if _stops_before(child, HostNs(host_now() + _RETRY_NS)):
+        if child.stops_within(_RETRY_S):
             return
 
 
@@ -79,7 +76,7 @@ class _Maker:
         teller, stopping = LatenessTeller(self._line.name), False
         try:
             while not stopping and thread.is_alive():
-                stopping = _stops_before(child, HostNs(host_now() + _REPORT_EVERY_NS))
+                stopping = child.stops_within(_REPORT_EVERY_S)
                 made = self._pulser.figures(realtime=realtime)
                 child.control.send(TellPulses(made=made))
                 for level, said in teller.tell(made):
@@ -95,20 +92,6 @@ class _Maker:
             self._pulser.run()
         except TriggerError as error:
             self._failure = error
-
-
-def _stops_before(child: ChildContext[TriggerConfig], time: HostNs) -> bool:
-    """Wait until a time, or until told to quit; whether it is that."""
-    poll = select.poll()
-    poll.register(child.control, select.POLLIN)
-    while not (child.control.ended or child.terminated()):
-        left_ms = (time - host_now()) // 1_000_000
-        if left_ms <= 0:
-            return False
-        poll.poll(min(left_ms, _TURN_MS))
-        if any(isinstance(command, Quit) for command in child.control.receive(0)):
-            return True
-    return True
 
 
 def _tell(child: ChildContext[TriggerConfig], level: Level, said: Phrase) -> None:

@@ -1,13 +1,11 @@
 """The program of the process that drives a trigger box: keeps its pulses going, and tells which have fired."""
 
-import select
-import time
 from typing import Final
 
 from rig.errors import BadInputError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase
-from rig.transport.child import ChildContext, begin
+from rig.transport.child import begin
 from rig.transport.message import Quit
 from rig.transport.recorder_commands import PulsesFired
 from rig.transport.trigger_messages import TriggerBoxConfig, TriggerTold
@@ -17,17 +15,6 @@ from triggering.sources.triggerbox.source import TriggerBoxPulses
 
 #: Time to stop the pulses.
 _GRACE_S: Final = 3.0
-
-
-def _wait(child: ChildContext[TriggerBoxConfig], seconds: float) -> bool:
-    """Wait, but not beyond a `Quit`; whether to stop."""
-    end = time.monotonic() + seconds
-    while not child.stopping():
-        left = end - time.monotonic()
-        if left <= 0:
-            return False
-        select.select([child.control], [], [], left)
-    return True
 
 
 def main() -> None:
@@ -52,9 +39,7 @@ def main() -> None:
             )
         )
 
-    TrainKeeper(
-        child.config.port, source.rate, trigger.rate_hz, tell=tell, fired=fired, wait=lambda s: _wait(child, s)
-    ).run()
+    TrainKeeper(child.config.port, source.rate, trigger.rate_hz, tell=tell, fired=fired, wait=child.stops_within).run()
 
 
 if __name__ == "__main__":

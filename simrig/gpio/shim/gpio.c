@@ -27,6 +27,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "open.h"
 #include "real.h"
 
 #define MAX_DESCRIPTORS 4096
@@ -162,28 +163,11 @@ static int open_chip(const char *path) {
     return connection;
 }
 
-static int open_path(const char *path, int flags, va_list arguments) {
-    mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(arguments, mode_t) : 0;
+int svev_open(const char *path, int flags, mode_t mode) {
     struct stat status;
     if (chip_number(path) >= 0 && REAL(stat)(path, &status) == 0 && S_ISSOCK(status.st_mode))
         return open_chip(path);
     return REAL(open)(path, flags, mode);
-}
-
-SHIM int open(const char *path, int flags, ...) {
-    va_list arguments;
-    va_start(arguments, flags);
-    int result = open_path(path, flags, arguments);
-    va_end(arguments);
-    return result;
-}
-
-SHIM int open64(const char *path, int flags, ...) {
-    va_list arguments;
-    va_start(arguments, flags);
-    int result = open_path(path, flags | O_LARGEFILE, arguments);
-    va_end(arguments);
-    return result;
 }
 
 SHIM int close(int descriptor) {

@@ -21,6 +21,7 @@
 
 #include "bus.h"
 #include "nodes.h"
+#include "open.h"
 #include "real.h"
 
 #define MAX_DESCRIPTORS 4096
@@ -101,26 +102,9 @@ static int open_node(const char *node, int flags) {
     return ends[0];
 }
 
-static int open_path(const char *path, int flags, va_list arguments) {
-    mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(arguments, mode_t) : 0;
+int svev_open(const char *path, int flags, mode_t mode) {
     const char *node = node_of_path(path);
     return node != NULL ? open_node(node, flags) : REAL(open)(path, flags, mode);
-}
-
-SHIM int open(const char *path, int flags, ...) {
-    va_list arguments;
-    va_start(arguments, flags);
-    int result = open_path(path, flags, arguments);
-    va_end(arguments);
-    return result;
-}
-
-SHIM int open64(const char *path, int flags, ...) {
-    va_list arguments;
-    va_start(arguments, flags);
-    int result = open_path(path, flags | O_LARGEFILE, arguments);
-    va_end(arguments);
-    return result;
 }
 
 SHIM int close(int descriptor) {

@@ -32,19 +32,29 @@ def free_bytes(place: Path | int) -> int | None:
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file, or renew it: whoever reads it, also after a power cut, finds the old content or the new one.
 
+    A file that was there keeps its permissions.
+
     Args:
-        path: of the file.
+        path: of the file; what a link points to is renewed.
         content: of the file.
 
     Raises:
         OSError: it cannot be written; then it is as it was.
     """
-    new = path.with_suffix(".new")
-    with new.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
+    path = path.resolve()
+    new = path.with_name(f".{path.name}.new")
+    try:
+        new.unlink(missing_ok=True)
+        with new.open("xb") as file:
+            if path.exists():
+                os.fchmod(file.fileno(), path.stat().st_mode & 0o777)
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    except OSError:
+        new.unlink(missing_ok=True)
+        raise
 
 
 def set_direct(descriptor: int, *, wanted: bool) -> bool:

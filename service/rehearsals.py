@@ -38,8 +38,7 @@ class Rehearser:
 
     Args:
         program: command line of the program that rehearses.
-        rig: the rig.
-        rig_toml: the rig file's text.
+        in_use: gives the rig and its text, as they are in use.
         folder: of the recordings.
         tell: takes an event about what a rehearsal showed.
         changed: called when progress or verdict have changed.
@@ -48,13 +47,12 @@ class Rehearser:
     def __init__(
         self,
         program: Sequence[str],
-        rig: RigSettings,
-        rig_toml: str,
+        in_use: Callable[[], tuple[RigSettings, str]],
         folder: Path,
         tell: Callable[[Event], None],
         changed: Callable[[], None],
     ) -> None:
-        self._program, self._rig, self._rig_toml, self._folder = tuple(program), rig, rig_toml, folder
+        self._program, self._in_use, self._folder = tuple(program), in_use, folder
         self._tell, self._changed = tell, changed
         self._lock = threading.Lock()
         self._progress: RehearsalProgress | None = None
@@ -103,9 +101,10 @@ class Rehearser:
         self.end()
 
     def _rehearse(self, seconds: float) -> None:
+        rig, rig_toml = self._in_use()
         asked = {
-            "rig": self._rig.model_dump(mode="json", exclude_unset=True),
-            "toml": self._rig_toml,
+            "rig": rig.model_dump(mode="json", exclude_unset=True),
+            "toml": rig_toml,
             "directory": str(self._folder),
             "seconds": seconds,
         }

@@ -12,6 +12,7 @@ from prometheus_client.metrics_core import Metric
 from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.export import ExportJob, ExportOrder
+from rig.api.light import CameraLight, LightChange
 from rig.api.looking import Moment, Note, VoiceNote
 from rig.api.recordings import Pulses, Recording, RecordingOrder, RecordingQuery, SessionChange, StopOrder, Trash
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
@@ -334,6 +335,18 @@ class RigService(Protocol):
 
     def close_up(self, camera: str, newer_than: RigPulse, timeout_s: float, *, peaking: bool) -> CloseUp | None:
         """The whole picture of a camera; waits as `preview`. UnknownCameraError: no such one."""
+        ...
+
+    def camera_light(self, camera: str) -> CameraLight:
+        """Exposure and gain of a camera. UnknownCameraError: no such one."""
+        ...
+
+    def change_light(self, camera: str, change: LightChange) -> CameraLight:
+        """Change exposure or gain of a camera, and keep them in the rig file if that is wished.
+
+        UnknownCameraError: no such camera. BadInputError: out of range. StateForbidsError: a recording runs.
+        StorageError: the rig file cannot be written.
+        """
         ...
 
     def events(self, after: int) -> list[Event]:

@@ -15,6 +15,7 @@ from recorder.catalogue.folder import Catalogue
 from rig import events
 from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
@@ -36,6 +37,7 @@ from service.automatic.barrier import BarrierWatch
 from service.automatic.watch import MotionWatch
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
+from service.lights import Lights
 from service.recordings.archive import Archive, as_recording
 from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
@@ -69,6 +71,7 @@ class Service(Archive):
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
         rehearser: makes rehearsals of the rig.
+        lights: exposure and gain of the cameras.
         examine: the doctor; examines what disturbs nothing in the given state.
     """
 
@@ -81,11 +84,12 @@ class Service(Archive):
         keeper: TrashKeeper,
         slot: PreviewSlot,
         rehearser: Rehearser,
+        lights: Lights,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
         super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
-        self._slot, self._rehearser, self._examine = slot, rehearser, examine
+        self._slot, self._rehearser, self._lights, self._examine = slot, rehearser, lights, examine
         #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
         self._idle, self._examining = threading.Lock(), threading.Lock()
         self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
@@ -273,6 +277,16 @@ class Service(Archive):
         index = self._index(camera)
         image = self._awaited(newer_than, timeout_s)
         return None if image is None else close_up_of(image, self._supervisor.rig, index, peaking=peaking)
+
+    def camera_light(self, camera: str) -> CameraLight:
+        """Exposure and gain of a camera."""
+        return self._lights.view(camera)
+
+    def change_light(self, camera: str, change: LightChange) -> CameraLight:
+        """Change exposure or gain of a camera; it is away for a moment if the rig is armed."""
+        if self._rehearser.progress is not None:
+            raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change exposure or gain")
+        return self._lights.change(camera, change)
 
     def _index(self, camera: str) -> int:
         names = [each.name for each in self._supervisor.rig.cameras]

@@ -58,6 +58,11 @@ class AlarmKeeper:
             del self._known[alarm.topic]
             self._tell(Event.now(EventLevel.INFO, alarm.name, alarm.over))
 
+    def use(self, rig: RigSettings) -> None:
+        """Judge by another exposure of a camera from now on."""
+        self._rig = rig
+        self.forget()
+
     def forget(self) -> None:
         """Start anew: there is no recorder any more. That nobody watches any more does not end what was wrong."""
         self._watch = None

@@ -24,6 +24,7 @@ from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, GpioTrigger, TriggerBoxTrigger
 from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
 from rig.transport.grabber_messages import GrabberConfig
+from rig.transport.message import Quit
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
 from rig.transport.recorder_commands import (
     GrabberDied,
@@ -130,6 +131,7 @@ class RigProcesses:
         self._helpers = [*self._names, *making, *([] if rig.analysis is None else [ANALYSIS])]
         self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
+        self._renewed: set[str] = set()
         self.cameras = [CameraPresence()] * len(rig.cameras)
         self.warm = self.ready = self.recorder_died = False
         self.health: Health | None = None
@@ -182,6 +184,18 @@ class RigProcesses:
     def kill_recorder(self) -> None:
         """Kill a recorder that does not answer; the next `turn` raises ProcessDiedError."""
         self._processes[RECORDER].kill()
+
+    def change_camera(self, rig: RigSettings, name: str) -> None:
+        """Let a camera's grabber begin anew with its settings in `rig`, and the analysis, which reads them too.
+
+        Args:
+            rig: the rig; only this camera's exposure and gain are others than before.
+            name: of the camera.
+        """
+        self._rig = rig
+        for helper in (name, *([] if rig.analysis is None else [ANALYSIS])):
+            self._renewed.add(helper)
+            self._processes[helper].control.send(Quit())
 
     def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
@@ -259,7 +273,14 @@ class RigProcesses:
 
     def _tend_helper(self, child: Child) -> None:
         name, now = child.spec.name, time.monotonic()
-        if child not in self._again:
+        if name in self._renewed:
+            self._renewed.discard(name)
+            self._again.pop(child, None)
+            if name in self._names:
+                reason = phrase("why_other_settings", "it gets other settings, and is back at once")
+                self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
+            self._start(name)
+        elif child not in self._again:
             how = child.ending() or ""
             if name not in self._names:
                 reason = phrase("why_process_ended", "process ended ({how})", how=how)

@@ -95,6 +95,10 @@ class RecordingControl:
         self.armed_at = self.emptied_at = time.monotonic()
         self._answers: list[Callable[[], None]] = []
 
+    def use_rig_file(self, rig_toml: str) -> None:
+        """Attach another text of the rig file to the logs from now on."""
+        self._rig_toml = rig_toml
+
     @property
     def opening(self) -> bool:
         """Whether a log is being opened: the recording is ordered, and the state is not yet that of recording."""

@@ -74,6 +74,12 @@ class RigSession:
         if self.processes is not None:
             self.processes.tell(TellEvent(event=event))
 
+    def change_camera(self, rig: RigSettings, name: str) -> None:
+        """Use the rig with a camera's other exposure or gain from now on; not while a job runs in the background."""
+        self.rig = rig
+        if self.processes is not None:
+            self.processes.change_camera(rig, name)
+
     def begin_set_up(self) -> None:
         """Begin to start the simulated hill, if there is none yet, and the processes."""
         self._begin(self._set_up)

@@ -8,7 +8,6 @@ import select
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from rig.api.jump import LastJump
@@ -24,7 +23,7 @@ from rig.transport.analysis_messages import JumpMeasured
 from rig.transport.recorder_commands import RecorderOptions
 from rig.transport.recorder_reports import RecorderFailed, RecorderHealth, RecorderReport
 from service.jumpers.book import JumperBook
-from service.processes.rig_processes import ANALYSIS, RECORDER, TRIGGER, CameraPresence
+from service.processes.rig_processes import ANALYSIS, RECORDER, TRIGGER
 from service.recordings import live_results
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
@@ -37,6 +36,7 @@ from service.supervision.fault import Fault
 from service.supervision.overload import Overload
 from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.state_machine import StateMachine
+from service.supervision.warm_up import WarmUp
 from service.supervision.watching import STUCK_S, RecorderWatch, Settling, why_not_armed
 
 _TURN_S: Final = 0.2
@@ -44,23 +44,6 @@ _PICTURE_S: Final = 1.0
 _FINISH_S: Final = 4.0
 #: If a turn takes longer than this, the loop hangs.
 _TURNS_S: Final = 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class WarmUp:
-    """How far a rig has come since it was armed.
-
-    Attributes:
-        state: the state of the service.
-        cameras: presence of each camera; None while there are no processes.
-        warm: whether complete triplets have come.
-        fault: why the rig is not armed; None in any other state.
-    """
-
-    state: State
-    cameras: tuple[CameraPresence, ...] | None
-    warm: bool
-    fault: Statement | None
 
 
 class Supervisor:
@@ -181,6 +164,15 @@ class Supervisor:
                 self._session.begin_take_down(keep_hill=True)
             self._reconcile()
         return self._refresh()
+
+    def change_camera(self, rig: RigSettings, rig_toml: str, name: str) -> None:
+        """Command: use a rig with another exposure or gain of a camera, which is away for a moment while armed."""
+        if self.recordings.current is not None or self._session.busy:
+            raise StateForbidsError(FORBIDDEN["expose", self._machine.state])
+        self.rig, self.rig_toml = rig, rig_toml
+        self._session.change_camera(rig, name)
+        self.recordings.use_rig_file(rig_toml)
+        self._watch.alarms.use(rig)
 
     def note(self, event: Event) -> None:
         """Command: tell an event, also to the log of a recording that runs or begins soon."""

@@ -26,6 +26,7 @@ from service.alarms.occasions import Occasions
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.jumpers.keeper import Keeper
+from service.lights import Lights
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.storage import usable_bytes
@@ -96,9 +97,13 @@ def serve(settings: ServiceSettings) -> None:
         supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)
         keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
         exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
-        rehearser = stack.enter_context(closing(Rehearser(REHEARSE, rig, rig_toml, data, hub.tell, hub.wake)))
-        examine = PanelDoctor(rig, data).report
-        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, examine)
+
+        def in_use() -> tuple[RigSettings, str]:
+            return supervisor.rig, supervisor.rig_toml
+
+        rehearser = stack.enter_context(closing(Rehearser(REHEARSE, in_use, data, hub.tell, hub.wake)))
+        lights, examine = Lights(supervisor, settings.rig), PanelDoctor(lambda: supervisor.rig, data).report
+        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, examine)
         server = make_server(create_app(service, settings.access), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report

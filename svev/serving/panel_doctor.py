@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -22,11 +22,11 @@ class PanelDoctor:
     """Examines what a recording stands on. May be asked from any thread.
 
     Args:
-        rig: the rig.
+        rig: gives the rig as it is in use.
         data: folder of the recordings.
     """
 
-    def __init__(self, rig: RigSettings, data: Path) -> None:
+    def __init__(self, rig: Callable[[], RigSettings], data: Path) -> None:
         self._rig, self._data = rig, data
         self._lock = threading.Lock()
         self._report: models.DoctorReport | None = None
@@ -50,7 +50,7 @@ class PanelDoctor:
             return self._report
 
     def _look(self, status: Status, *, idle: bool) -> Iterator[Finding]:
-        for probe in probes(self._rig, self._data):
+        for probe in probes(self._rig(), self._data):
             if idle or probe.name not in _ONLY_IDLE:
                 yield from run_probe(probe)
             elif probe.name == "cameras" and status.rehearsal is None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
+from rig.api.recordings import RecordingOrder
 from rig.frame import FrameStatus
 from tests.browser.conftest import Open
 from tests.browser.test_layout import BROKEN
@@ -109,3 +110,31 @@ def _picture(answer: httpx.Response) -> NDArray[np.int64]:
     assert answer.status_code == 200, answer.text
     image = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
     return np.asarray(image, np.int64)
+
+
+def test_a_camera_is_made_brighter_and_kept_so(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    service.arm()
+    page = open_page(f"{panel.url}/#/aim", width=360, height=780, color_scheme="light")
+    exposure, gain, said = (page.locator(name) for name in ("#light-exposure", "#light-gain", "#light-said"))
+    expect(exposure).to_have_text("2.00 ms")
+    expect(page.locator("#light-less")).to_be_disabled()
+    expect(page.locator("#light-save")).to_be_disabled()
+    page.locator("#light-longer").click()
+    expect(exposure).to_have_text("2.52 ms")
+    page.locator("#light-more").click()
+    expect(gain).to_have_text("1.0 dB")
+    expect(said).to_contain_text("keep it")
+    page.locator("#aim-cameras button").nth(1).click()
+    expect(exposure).to_have_text("2.00 ms")
+    page.locator("#aim-cameras button").nth(0).click()
+    expect(exposure).to_have_text("2.52 ms")
+    page.locator("#light-save").click()
+    expect(said).to_have_text("The rig file says the same.")
+    assert service.lights["K1"].saved
+    assert service.lights["K2"].exposure_us == 2000
+    service.start_recording(RecordingOrder())
+    expect(page.locator("#light-shorter")).to_be_disabled()
+    expect(said).to_have_text("Not while a recording runs.")
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    assert page.evaluate(BROKEN) == []
+    assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []

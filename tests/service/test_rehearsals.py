@@ -19,7 +19,7 @@ def _progress(service: Serving) -> str:
 
 
 def _rehearser(rig: Path, folder: Path, events: list[Event]) -> Rehearser:
-    return Rehearser(REHEARSE, load_rig(rig), rig.read_text(), folder, events.append, lambda: None)
+    return Rehearser(REHEARSE, lambda: (load_rig(rig), rig.read_text()), folder, events.append, lambda: None)
 
 
 def test_a_rehearsal_gives_way_to_arming_and_its_verdict_outlives_the_service(

@@ -19,6 +19,7 @@ from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.api.aids import BINS, CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.jump import LastJump
+from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals
 from rig.api.statement import Level, Statement
@@ -77,6 +78,7 @@ class MemoryService(Archive):
         automatic: whether recordings begin by themselves, set by tests.
         rehearsal: how far a rehearsal is, and `rehearsed`, what the last one showed; set by tests.
         through_the_lens: what the lens makes of the picture of a camera, set by tests.
+        lights: exposure and gain of each camera.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -94,6 +96,7 @@ class MemoryService(Archive):
         self.rehearsal: RehearsalProgress | None = None
         self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
+        self.lights = {name: CameraLight(camera=name, exposure_us=2000, gain_db=0, saved=True) for name in CAMERAS}
         self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
         self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
@@ -265,6 +268,19 @@ class MemoryService(Archive):
         left, right = COLUMNS[CAMERAS.index(camera)]
         pixels = np.ascontiguousarray(self.through_the_lens(found.pixels[:, left:right]))
         return CloseUp(found.pulse, FrameStatus.OK, pixels, sharp(pixels, mosaic=False) if peaking else None)
+
+    def camera_light(self, camera: str) -> CameraLight:
+        if camera not in CAMERAS:
+            raise UnknownCameraError(f"no camera {camera}: the rig has {', '.join(CAMERAS)}")
+        return self.lights[camera]
+
+    def change_light(self, camera: str, change: LightChange) -> CameraLight:
+        before = self.camera_light(camera)
+        if self._recording is not None:
+            raise StateForbidsError("a recording is running: stop it, then change exposure or gain")
+        changed = before.model_copy(update={"saved": before.saved and not change.values(), **change.values()})
+        self.lights[camera] = changed.model_copy(update={"saved": changed.saved or change.save})
+        return self.lights[camera]
 
     def events(self, after: int) -> list[Event]:
         with self._lock:

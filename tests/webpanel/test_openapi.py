@@ -16,6 +16,7 @@ from webpanel.door.access import Access
 #: The calls of the contract, and those that the page needs beyond it.
 CALLS = {
     "POST /api/mark", "PUT /api/automatic",
+    "GET /api/cameras/{camera}", "PATCH /api/cameras/{camera}",
     "GET /api/cameras/{camera}/aids", "GET /api/cameras/{camera}/picture.jpg",
     "GET /api/rehearsal", "POST /api/rehearsal", "DELETE /api/rehearsal",
     "GET /api/status", "POST /api/arm", "POST /api/disarm", "GET /api/rig", "GET /api/doctor", "GET /api/events",

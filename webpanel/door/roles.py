@@ -36,6 +36,10 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     (r"DELETE /api/rehearsal", lambda: phrase("act_rehearsal_ended", "ended the rehearsal")),
     (r"POST /api/recordings", lambda: phrase("act_started", "started a recording")),
     (r"POST /api/mark", lambda: phrase("act_marked", "marked a jump")),
+    (
+        r"PATCH /api/cameras/([^/]+)",
+        lambda camera: phrase("act_light", "changed exposure or gain of {camera}", camera=camera),
+    ),
     (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),
     (
         r"POST /api/recordings/([^/]+)/stop",

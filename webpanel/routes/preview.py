@@ -18,12 +18,13 @@ from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
 
 from rig.api.aids import CameraAids
+from rig.api.light import CameraLight, LightChange
 from rig.errors import SvevError
 from rig.pulse import RigPulse
 from service.seam import CloseUp, RigService
 from webpanel.door.streams import OpenStreams, Streams
 from webpanel.problems import ProblemError
-from webpanel.routes.common import Responses, jpeg_answer, refusals, strict_router
+from webpanel.routes.common import CHANGING, Responses, jpeg_answer, refusals, strict_router
 
 _APART_S = 0.1  # least time between two pictures: the eye needs no more than ten a second
 #: With more viewers than these the pictures come less often, so that serving them costs no more.
@@ -198,6 +199,20 @@ def preview_router(service: RigService, streams: OpenStreams) -> APIRouter:
         """
         found = await run_sync(wait_for_aids, camera, after, limiter=at_once)
         return Response(status_code=HTTPStatus.NO_CONTENT) if found is None else found
+
+    @router.get("/cameras/{camera}", responses=refusals(404))
+    def get_camera(camera: _Camera) -> CameraLight:
+        """Exposure and gain of a camera."""
+        return service.camera_light(camera)
+
+    @router.patch("/cameras/{camera}", responses=CHANGING | refusals(404))
+    def change_camera(camera: _Camera, change: LightChange) -> CameraLight:
+        """Change exposure or gain of a camera; while armed it is connected anew with them, which takes a second or two.
+
+        Not while a recording runs: all its frames are to be alike. The logs from then on hold the rig file with what
+        was changed. `save` writes it into the rig file too; else it holds until the service ends.
+        """
+        return service.change_light(camera, change)
 
     @router.get(
         "/cameras/{camera}/picture.jpg",

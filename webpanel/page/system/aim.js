@@ -7,6 +7,7 @@ import { number, quantity } from "../shared/format.js";
 import { tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
 import { earlierOf } from "./earlier.js";
+import { lightOf, startLight } from "./light.js";
 
 /** After a failed call. */
 const PAUSE_MS = 2000;
@@ -29,6 +30,7 @@ let running = false;
 let picture = "";
 
 export function startAim() {
+  startLight();
   $("aim-again").addEventListener("click", () => { best.delete(camera); draw(); });
   watch(() => {
     draw();
@@ -100,6 +102,7 @@ function draw() {
     buttons.replaceChildren(...names.map((name) => make("button", { type: "button", onclick: () => choose(name) }, name)));
   }
   earlierOf(camera);
+  if (known.view === "aim" && known.connected) lightOf(camera);
   for (const button of buttons.children) button.setAttribute("aria-pressed", String(button.textContent === camera));
   const on = ["armed", "recording"].includes(status?.state ?? "");
   const shown = on && aids?.camera === camera ? aids : null;

@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 
 from recorder.reading.log_reader import LogReader
-from rig.topics import RIG_ATTACHMENT
+from rig.topics import RIG_ATTACHMENT, TAG
 from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
@@ -22,12 +22,13 @@ def test_a_camera_takes_another_exposure_and_the_rig_file_keeps_it(tmp_path: Pat
         assert service.get(K1) == {"camera": "K1", "exposure_us": 2000, "gain_db": 0, "saved": True}
         status, answer = service.call("PATCH", K1, {"exposure_us": 40_000})
         assert (status, "pulses come every 33.3 ms" in answer["detail"]) == (422, True)
-        # This camera exposes for 10 us at least, and says so: the change has come to it.
-        assert service.call("PATCH", K1, {"exposure_us": 5, "gain_db": 1})[1]["saved"] is False
-        told = "it exposes 10 us, not 5"
+        # This camera has 24 dB at most, and says so: the change has come to it.
+        assert service.call("PATCH", K1, {"exposure_us": 1000, "gain_db": 30})[1]["saved"] is False
+        told = "its gain is 24 dB, not 30 dB"
         wait_until(lambda: told in service.log.read_text(), "the camera says what it can", PATIENCE_S, 0.05)
-        assert service.call("PATCH", K1, {"exposure_us": 1500})[1]["exposure_us"] == 1500
-        wait_until(lambda: service.get("/api/status")["pulses"]["warm"], "all cameras are back", PATIENCE_S, 0.05)
+        assert service.call("PATCH", K1, {"exposure_us": 1500, "gain_db": 1})[1]["exposure_us"] == 1500
+        back = "K1: connected"
+        wait_until(lambda: service.log.read_text().count(back) == 3, "the camera is back", PATIENCE_S, 0.05)
         assert path.read_text() == first
         recording = service.post("/api/recordings")["id"]
         status, answer = service.call("PATCH", K1, {"exposure_us": 1000})
@@ -38,6 +39,7 @@ def test_a_camera_takes_another_exposure_and_the_rig_file_keeps_it(tmp_path: Pat
         assert "killed" not in service.log.read_text()
         assert service.get("/api/status")["state"] == "armed"
     with LogReader(service.data / f"{recording}.mcap") as reader:
+        assert any(True for _ in reader.messages(TAG.name))
         attached = tomllib.loads(reader.attachments[RIG_ATTACHMENT].decode())
     assert (attached["cameras"][0]["exposure_us"], attached["cameras"][0]["gain_db"]) == (1500, 1)
     assert path.read_text().startswith("# do not lose this line\n")

@@ -1,1 +1,1 @@
-"""The child processes of a rig: their programs, and the object that starts and watches them."""
+"""The child processes of a rig: the object that starts and watches them; `programs` is what they do."""

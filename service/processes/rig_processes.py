@@ -309,18 +309,18 @@ class RigProcesses:
     def _start_analysis(self) -> None:
         config = AnalysisConfig(rig=self._rig, directory=self._options.directory)
         self._processes.start(
-            ProcessSpec(ANALYSIS, "service.processes.analysis_process", config, reports=AnalysisReport)
+            ProcessSpec(ANALYSIS, "service.processes.programs.analysis", config, reports=AnalysisReport)
         )
 
     def _start_trigger(self) -> None:
         trigger = self._rig.trigger
         if isinstance(trigger, TriggerBoxTrigger):
             config = TriggerBoxConfig(rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port))
-            box = ProcessSpec(TRIGGER, "service.processes.trigger_box_process", config, reports=TriggerReport)
+            box = ProcessSpec(TRIGGER, "service.processes.programs.triggerbox", config, reports=TriggerReport)
             self._processes.start(box)
         else:
             by_line = isinstance(trigger, GpioTrigger)
-            program = "service.processes.gpio_process" if by_line else "service.processes.trigger_process"
+            program = "service.processes.programs.gpio" if by_line else "service.processes.programs.actions"
             even = TriggerConfig(rig=self._rig, epoch=self._epoch)
             self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport))
 
@@ -331,7 +331,7 @@ class RigProcesses:
         self._processes.start(
             ProcessSpec(
                 RECORDER,
-                "service.processes.recorder_process",
+                "service.processes.programs.recorder",
                 config,
                 inherit=(*fds, self._doorbell, *preview),
                 reports=RecorderReport,
@@ -346,7 +346,7 @@ class RigProcesses:
         self._processes.start(
             ProcessSpec(
                 self._names[index],
-                "service.processes.grabber_process",
+                "service.processes.programs.grabber",
                 config,
                 inherit=(ring, self._doorbell),
                 environment=more,

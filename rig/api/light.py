@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from rig.api.fields import Model
 
@@ -16,7 +16,7 @@ class LightChange(Model):
     gain_db: Annotated[float, Field(ge=0, le=60, strict=True)] | None = Field(
         None, description="gain, decibels", examples=[3]
     )
-    save: bool = Field(False, description="write exposure and gain of this camera into the rig file as well")
+    save: StrictBool = Field(False, description="write exposure and gain of this camera into the rig file as well")
 
     def values(self) -> dict[str, float]:
         """What is to be changed, by the keys of the rig file."""

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.service.firewire_matrix import committed, rows
+from tests.service.cameras.firewire_matrix import committed, rows
 
 
 def test_each_fault_comes_to_what_the_documentation_says(tmp_path: Path) -> None:

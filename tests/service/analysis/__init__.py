@@ -1,0 +1,1 @@
+"""Jumps that are measured while they are recorded."""

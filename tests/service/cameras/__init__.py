@@ -1,0 +1,1 @@
+"""Cameras that are away, silent, slow, of other kinds."""

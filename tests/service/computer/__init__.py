@@ -1,0 +1,1 @@
+"""Processor, memory and processes that are short or stopped."""

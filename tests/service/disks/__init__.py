@@ -1,0 +1,1 @@
+"""Disks that are full, slow, broken or cut off."""

@@ -1,0 +1,1 @@
+"""Recordings, from arming to what the log holds."""

@@ -1,0 +1,1 @@
+"""Where the pulses come from, at the running service."""

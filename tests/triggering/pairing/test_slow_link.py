@@ -6,8 +6,8 @@ from rig.clocks import HostNs
 from rig.frame import FrameStatus
 from tests.triggering.feed import PERIOD
 from tests.triggering.oracle import ABSENT, LOST, OK
+from tests.triggering.pairing.test_records import running_train
 from tests.triggering.simulation import MS
-from tests.triggering.test_records import running_train
 
 
 class SlowLink:

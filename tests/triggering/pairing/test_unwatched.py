@@ -8,8 +8,8 @@ from rig.clocks import NS_PER_S, HostNs
 from rig.frame import FrameStatus, Record, RecordKind
 from tests.triggering.feed import HOLD, PERIOD, Feed
 from tests.triggering.oracle import ABSENT, DAMAGED, LOST, OK, check, check_no_pulse_is_mixed
+from tests.triggering.pairing.test_records import running_train
 from tests.triggering.simulation import MS, Hill, Outage, Run, Scenario
-from tests.triggering.test_records import running_train
 
 
 def fates(feed: Feed) -> list[set[FrameStatus]]:

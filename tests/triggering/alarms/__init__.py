@@ -1,0 +1,1 @@
+"""What is wrong while a rig is armed."""

@@ -1,0 +1,1 @@
+"""Frames and pulses are set side by side: never mixed, every possible triplet."""

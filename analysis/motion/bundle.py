@@ -13,10 +13,11 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.motion.blocks import Normals, Solution, solve
+from analysis.motion.camera_arrays import CameraArrays
 from analysis.motion.channels import CHANNELS, MotionFrame
-from analysis.motion.observations import Equations, Observations, linearised
+from analysis.motion.equations import Equations, linearised
+from analysis.motion.observations import Observations
 from analysis.motion.prior import STATE, Prior, transitions
-from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Flags, Floats
 
 _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
@@ -32,8 +33,9 @@ class Model:
 
     Attributes:
         observed: the measurements.
-        system: the cameras as they were oriented.
-        root: (p, r) L, a root of the covariance of their parameters.
+        cameras: as they were oriented.
+        root: (p, r) L, a root of the covariance of all cameras' parameters.
+        own_root: (m, 16, r) its rows that belong to each camera, see `own_root`.
         frame: of the motion.
         prior: of the motion.
         late: (m,) expected lateness of the cameras, in pulse intervals.
@@ -42,8 +44,9 @@ class Model:
     """
 
     observed: Observations
-    system: CameraSystem
+    cameras: CameraArrays
     root: Floats
+    own_root: Floats
     frame: MotionFrame
     prior: Prior
     late: Floats
@@ -72,11 +75,6 @@ class Adjusted:
     equations: Equations
     solution: Solution
     step: float = np.inf
-
-    @property
-    def cameras(self) -> CameraSystem:
-        """The cameras with adjusted parameters."""
-        return _cameras(self.model, self.shared)
 
     @property
     def late(self) -> Floats:
@@ -109,7 +107,7 @@ def near(model: Model, states: Floats, shared: Floats) -> Flags:
     takes back (`without_gross_errors`).
     """
     channels = np.einsum("id,ndc->nic", _instants(model, shared), states.reshape(len(states), 3, CHANNELS))
-    v = linearised(model.observed, _cameras(model, shared), model.frame, channels).v
+    v = _linearised(model, shared, channels).v
     seen, square = model.observed.seen, (v**2).sum(axis=-1)
     usual = np.array([np.median(square[:, :, g][seen[:, :, g]]) if seen[:, :, g].any() else 0.0 for g in range(6)])
     return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, MEDIAN)))
@@ -134,8 +132,9 @@ def rows_by_shared(adjusted: Adjusted) -> Floats:
     return _rows_by_shared(adjusted.model, adjusted.equations, adjusted.states, adjusted.instants)
 
 
-def _cameras(model: Model, shared: Floats) -> CameraSystem:
-    return model.system.moved(model.root @ shared[: model.root.shape[1]])
+def _linearised(model: Model, shared: Floats, channels: Floats) -> Equations:
+    cameras = model.cameras.moved(model.own_root @ shared[: model.root.shape[1]])
+    return linearised(model.observed, cameras, model.own_root, model.frame, channels)
 
 
 def _instants(model: Model, shared: Floats) -> Floats:
@@ -148,7 +147,7 @@ def _rows_by_shared(model: Model, equations: Equations, states: Floats, instants
     x = states.reshape(n, 3, CHANNELS)
     rank = model.root.shape[1]
     out = np.zeros((n, m, 6, 2, rank + m))
-    out[..., :rank] = equations.by_camera @ model.root
+    out[..., :rank] = equations.by_u
     for i in range(m):
         speed = x[:, 1] + 2 * instants[i, 1] * x[:, 2]
         out[:, i, :, :, rank + i] = np.einsum("ngac,nc->nga", equations.by_channels[:, i], speed)
@@ -160,7 +159,7 @@ def _stepped(model: Model, used: Flags, states: Floats, shared: Floats) -> Adjus
     n, _ = model.observed.shape
     instants = _instants(model, shared)
     channels = np.einsum("id,ndc->nic", instants, states.reshape(n, 3, CHANNELS))
-    equations = linearised(model.observed, _cameras(model, shared), model.frame, channels)
+    equations = _linearised(model, shared, channels)
     normals = _normals(model, used, states, shared, equations, instants)
     solution = solve(normals)
     sigma = np.sqrt(np.diagonal(solution.covariance[:, :3, :3], axis1=1, axis2=2))

@@ -14,17 +14,18 @@ from scipy.special import chdtri
 
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
 from analysis.motion.bundle import Model, begun, near, root_of, settled
+from analysis.motion.camera_arrays import CameraArrays, own_root
 from analysis.motion.channels import CHANNELS, SLOPE, MotionFrame
+from analysis.motion.equations import linearised
 from analysis.motion.gross_errors import without_gross_errors
-from analysis.motion.observations import GROUPS, Observations, linearised, observations, used_cameras
-from analysis.motion.prior import STATE, prior, start_densities, transitions
+from analysis.motion.observations import GROUPS, Observations, by_hand, observations, used_cameras
+from analysis.motion.prior import SHARE, STATE, prior, start_densities, transitions, white_jerk
 from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import start_values
 from analysis.result.model import SmoothedState
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Flags, Floats
 from rig.clocks import NS_PER_S, UtcNs
-from rig.pulse import PulseNumber
 
 _TRIGGER_S: Final = 20e-6  # of cameras that obey one trigger
 _STAY_S: Final = 0.15  #: mean time that a motion stays calm, or lively
@@ -33,15 +34,32 @@ _STEPS, _REMOVALS = 8, 4
 #: How far a jumper's skis turn at all: standard deviations of slope, its difference, heading and opening (rows), of
 #: value, speed and acceleration (columns), rad, rad/s, rad/s^2. Nothing may be less certain: so much is known unseen.
 _SKI_LIMITS: Final = np.array(((0.45, 2.0, 30.0), (0.3, 1.0, 15.0), (0.25, 1.0, 15.0), (0.5, 2.0, 30.0)))
-_MODELS: Final = ("calm", "lively")
+_BOUNDED: Final = (np.arange(3)[:, None] * CHANNELS + np.arange(SLOPE, CHANNELS)).ravel()  # places of their transpose
+_REGIMES: Final = (2, 1)  #: of `prior`: the models are calm as in flight, lively as at the edge
+_CALM, _LIVELY = range(len(_REGIMES))
+_OF_CHANNEL: Final = np.arange(CHANNELS)[:, None] + CHANNELS * np.arange(3)  # (16, 3) its places in a state
+_UNSEEN: Final[Mapping[str, tuple[str, ...]]] = dict.fromkeys(GROUPS, ())
+_BY_NOBODY: Final = dict.fromkeys(GROUPS, False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Belief:
-    """State and u of one model: (48 + r,) and their covariance."""
+class _Beliefs:
+    """State and u of k models.
+
+    Attributes:
+        mean: (k, 48 + r).
+        covariance: (k, 48 + r, 48 + r).
+    """
 
     mean: Floats
     covariance: Floats
+
+    def mixed(self, weights: Floats) -> "_Beliefs":
+        """Normal distributions with mean and covariance of j mixtures, by the weights (j, k) of the models."""
+        mean = weights @ self.mean
+        off = self.mean - mean[:, None]
+        apart = (off * weights[:, :, None]).swapaxes(1, 2) @ off
+        return _Beliefs(mean, np.tensordot(weights, self.covariance, 1) + apart)
 
 
 class CausalFilter:
@@ -57,14 +75,15 @@ class CausalFilter:
         self._system = system
         self._header = Measurements("", rate_hz, cameras, ())
         self._unit = 1.0 / rate_hz
+        self._cameras = CameraArrays.of(system, tuple(cameras))
         self._root = root_of(system.covariance)
+        self._own_root = own_root(system, self._cameras.names, self._root)
         self._back = np.linalg.pinv(self._root)
-        start = start_densities()
-        self._densities = [np.repeat(start[regime : regime + 1], 3, axis=0) for regime in (2, 1)]
+        self._densities = start_densities()[_REGIMES, :]
         self._waiting: list[PulseMeasurements] = []
         self._frame: MotionFrame | None = None
-        self._beliefs: list[_Belief] = []
-        self._chances = np.full(len(_MODELS), 1 / len(_MODELS))
+        self._beliefs = _Beliefs(np.empty(0), np.empty(0))
+        self._chances = np.full(len(_REGIMES), 1 / len(_REGIMES))
         self._time = UtcNs(0)
         self._known: Flags = np.zeros(len(GROUPS), bool)
 
@@ -78,7 +97,7 @@ class CausalFilter:
         self._advance(pulse.time)
         used = self._measure(self._frame, observed)
         self._known |= known_groups(used)
-        return self._result(observed, used, self._known)
+        return self._result(self._frame, used_cameras(observed, used), by_hand(observed, used), self._known)
 
     def predicted(self, time: UtcNs) -> SmoothedState | None:
         """Where to look for the jumper at a pulse that is measured next; None before enough pulses are measured.
@@ -92,11 +111,10 @@ class CausalFilter:
         if self._frame is None:
             return None
         self._advance(time)
-        nothing = self._observed((PulseMeasurements(PulseNumber(0), time, {}),))
-        return self._result(nothing, nothing.seen, np.ones(len(GROUPS), bool))
+        return self._result(self._frame, [_UNSEEN], [_BY_NOBODY], np.ones(len(GROUPS), bool))
 
     def _observed(self, pulses: tuple[PulseMeasurements, ...]) -> Observations:
-        return observations(JumpMeasurements(0, pulses), self._header, self._system)
+        return observations(JumpMeasurements(0, pulses), self._header, self._cameras)
 
     def begin(self, pulses: Sequence[PulseMeasurements]) -> list[SmoothedState]:
         """Begin with a small bundle of the first pulses.
@@ -115,12 +133,14 @@ class CausalFilter:
         if len(observed.times) < 2 or (start := start_values(observed, self._system)) is None:
             return []
         m = len(observed.names)
+        lively = np.repeat(self._densities[_LIVELY : _LIVELY + 1], 3, axis=0)
         model = Model(
             observed,
-            self._system,
+            self._cameras,
             self._root,
+            self._own_root,
             start.frame,
-            prior(observed.times, self._unit, None, self._densities[1]),
+            prior(observed.times, self._unit, None, lively),
             np.zeros(m),
             np.full(m, _TRIGGER_S / self._unit),
         )
@@ -134,12 +154,21 @@ class CausalFilter:
         of_u = solution.shared_covariance[:rank, :rank]
         covariance = np.block([[solution.covariance[-1], cross[-1]], [cross[-1].T, of_u]])
         mean = np.concatenate((adjusted.states[-1], adjusted.shared[:rank]))
-        self._beliefs = [self._bounded(mean, covariance)] * len(_MODELS)
+        both = self._bounded(mean, covariance)
+        self._beliefs = _Beliefs(*(np.stack([part] * len(_REGIMES)) for part in both))
         self._frame, self._time = start.frame, pulses[-1].time
         self._waiting.clear()
         self._known = known_groups(adjusted.used)
-        return self._states(
-            observed, adjusted.used, self._known, adjusted.states, solution.covariance, cross @ self._back
+        return smoothed_states(
+            self._frame,
+            self._unit,
+            adjusted.states,
+            solution.covariance,
+            cross @ self._back,
+            used_cameras(observed, adjusted.used),
+            by_hand(observed, adjusted.used),
+            self._known,
+            vague=np.inf,  # as in `_result`
         )
 
     def _advance(self, time: UtcNs) -> None:
@@ -153,114 +182,107 @@ class CausalFilter:
     def _mix(self, seconds: float) -> None:
         """Each model starts from both, by the chance that the motion was the other's and changed."""
         stay = np.exp(-seconds / _STAY_S)
-        change = stay * np.eye(2) + (1 - stay) / 2
+        change = stay * np.eye(len(_REGIMES)) + (1 - stay) / 2
         joint = change * self._chances[:, None]
         self._chances = joint.sum(axis=0)
-        self._beliefs = [_mixed(self._beliefs, joint[:, k] / self._chances[k]) for k in range(len(_MODELS))]
+        self._beliefs = self._beliefs.mixed((joint / self._chances).T)
 
     def _predict(self, seconds: float) -> None:
-        times = np.array((0.0, seconds))
-        move = np.eye(len(self._beliefs[0].mean))
-        move[:STATE, :STATE] = np.kron(transitions(np.array(seconds / self._unit)), np.eye(CHANNELS))
-        beliefs = []
-        for belief, density in zip(self._beliefs, self._densities, strict=True):
-            covariance = move @ belief.covariance @ move.T
-            noise = prior(times, self._unit, None, density).noise()[0]
-            for channel in range(CHANNELS):
-                at = channel + CHANNELS * np.arange(3)
-                covariance[np.ix_(at, at)] += noise[channel]
-            beliefs.append(self._bounded(move @ belief.mean, covariance))
-        self._beliefs = beliefs
+        move = transitions(np.array(seconds / self._unit))
+        mean, covariance = self._beliefs.mean.copy(), self._beliefs.covariance
+        mean[:, :STATE] = _moved(move, mean[:, :STATE, None])[..., 0]
+        for _ in range(2):  # the rows, then the columns
+            rows = covariance.swapaxes(1, 2).copy()
+            rows[:, :STATE] = _moved(move, rows[:, :STATE])
+            covariance = rows
+        jerk = white_jerk(np.array([seconds]), self._unit)[0]
+        noise = self._densities[:, SHARE, None, None] * jerk
+        covariance[:, _OF_CHANNEL[:, :, None], _OF_CHANNEL[:, None]] += noise
+        bounded = [self._bounded(*of_model) for of_model in zip(mean, covariance, strict=True)]
+        self._beliefs = _Beliefs(*(np.stack(part) for part in zip(*bounded, strict=True)))
 
-    def _bounded(self, mean: Floats, covariance: Floats) -> _Belief:
-        """A belief in which the skis do what skis do, where it was less certain than that.
+    def _bounded(self, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance of a model in which the skis do what skis do, where it was less certain than that.
 
         A pseudo-observation of zero brings the variance v of such a part of the state down to its limit l: its own
         variance is r = v l / (v - l), so that 1 / v + 1 / r = 1 / l.
         """
         scale = np.array((1.0, self._unit, self._unit**2 / 2))
-        for degree, limits in enumerate((_SKI_LIMITS * scale).T):
-            for channel, limit in enumerate(limits**2, start=SLOPE):
-                at = degree * CHANNELS + channel
-                excess = covariance[at, at] - limit
-                if excess > 0:
-                    gain = covariance[:, at] * excess / covariance[at, at] ** 2
-                    mean = mean - gain * mean[at]
-                    covariance = covariance - np.outer(gain, covariance[at])
-        return _Belief(mean, covariance)
+        limits = ((_SKI_LIMITS * scale).T ** 2).ravel()
+        for k in np.flatnonzero(np.diagonal(covariance)[_BOUNDED] > limits):
+            at = _BOUNDED[k]
+            excess = covariance[at, at] - limits[k]
+            if excess > 0:  # still: each of them makes the others more certain
+                gain = covariance[:, at] * excess / covariance[at, at] ** 2
+                mean = mean - gain * mean[at]
+                covariance = covariance - np.outer(gain, covariance[at])
+        return mean, covariance
 
     def _measure(self, frame: MotionFrame, observed: Observations) -> Flags:
         """Use the measurements of a pulse; returns which (1, m, 6)."""
-        point = _mixed(self._beliefs, self._chances).mean
-        x = point[:STATE].reshape(3, CHANNELS)
+        mean, covariance = self._beliefs.mean, self._beliefs.covariance
+        point = self._chances @ mean
         instants = transitions(observed.delay / self._unit)[:, 0]
-        equations = linearised(observed, self._system, frame, (instants @ x)[None])
-        by_state = np.einsum("id,igac->igadc", instants, equations.by_channels[0]).reshape(-1, STATE)
-        by_u = (equations.by_camera[0] @ self._root).reshape(len(by_state), -1)
+        channels = instants @ point[:STATE].reshape(3, CHANNELS)
+        equations = linearised(observed, self._cameras, self._own_root, frame, channels[None])
+        by_state = (instants[:, None, None, :, None] * equations.by_channels[0, ..., None, :]).reshape(-1, STATE)
+        by_u = equations.by_u.reshape(len(by_state), -1)
         rows = np.concatenate((by_state, by_u), axis=1)
         v = equations.v.reshape(-1) + by_u @ point[STATE:]
-        used = observed.seen & self._plausible(rows, v, point).reshape(observed.seen.shape)
+        off = v + (mean - point) @ rows.T
+        cross = rows @ covariance
+        plausible = _plausible(off[_LIVELY], rows, cross[_LIVELY])
+        used = observed.seen & plausible.reshape(observed.seen.shape)
         take = np.repeat(used.ravel(), 2)
-        rows, v = rows[take], v[take]
-        likelihood = np.zeros(len(_MODELS))
-        beliefs = []
-        for k, belief in enumerate(self._beliefs):
-            innovation = -(v + rows @ (belief.mean - point))
-            spread = rows @ belief.covariance @ rows.T + np.eye(len(v))
-            gain = np.linalg.solve(spread, rows @ belief.covariance).T
-            likelihood[k] = -(innovation @ np.linalg.solve(spread, innovation) + np.linalg.slogdet(spread)[1]) / 2
-            covariance = belief.covariance - gain @ rows @ belief.covariance
-            beliefs.append(_Belief(belief.mean + gain @ innovation, (covariance + covariance.T) / 2))
-        self._beliefs = beliefs
+        off, cross, rows = off[:, take], cross[:, take], rows[take]
+        spread = cross @ rows.T + np.eye(len(rows))
+        solved = np.linalg.solve(spread, np.concatenate((cross, off[..., None]), axis=2))
+        gain, pull = solved[..., :-1].swapaxes(1, 2), solved[..., -1]
+        likelihood = -((off * pull).sum(axis=1) + np.linalg.slogdet(spread)[1]) / 2
+        after = covariance - gain @ cross
+        moved = (gain @ off[..., None])[..., 0]
+        self._beliefs = _Beliefs(mean - moved, (after + after.swapaxes(1, 2)) / 2)
         weight = self._chances * np.exp(likelihood - likelihood.max())
         self._chances = weight / weight.sum()
         return used
 
-    def _plausible(self, rows: Floats, v: Floats, point: Floats) -> Flags:
-        """Which groups of two observations agree with the livelier prediction."""
-        lively = self._beliefs[1]
-        off = (v + rows @ (lively.mean - point)).reshape(-1, 2)
-        pairs = rows.reshape(-1, 2, rows.shape[1])
-        spread = pairs @ lively.covariance @ pairs.transpose(0, 2, 1) + np.eye(2)
-        distance = np.einsum("ga,gab,gb->g", off, np.linalg.inv(spread), off)
-        return np.asarray(distance < chdtri(2, _GATE_P))
-
-    def _result(self, observed: Observations, used: Flags, known: Flags) -> SmoothedState:
-        """What both models believe at the pulse of `observed`."""
-        belief = _mixed(self._beliefs, self._chances)
-        of_state, by_u = belief.covariance[None, :STATE, :STATE], belief.covariance[None, :STATE, STATE:]
-        return self._states(observed, used, known, belief.mean[None, :STATE], of_state, by_u @ self._back)[0]
-
-    def _states(
+    def _result(
         self,
-        observed: Observations,
-        used: Flags,
+        frame: MotionFrame,
+        cameras: Sequence[Mapping[str, tuple[str, ...]]],
+        hands: Sequence[Mapping[str, bool]],
         known: Flags,
-        states: Floats,
-        covariance: Floats,
-        by_calibration: Floats,
-    ) -> list[SmoothedState]:
-        if self._frame is None:
-            raise AssertionError("the filter has not begun")
-        by_hand: Flags = np.asarray((observed.by_hand & used).any(axis=1))
+    ) -> SmoothedState:
+        """What both models believe at the pulse of which `cameras` and `hands` tell who measured."""
+        belief = self._beliefs.mixed(self._chances[None])
         return smoothed_states(
-            self._frame,
+            frame,
             self._unit,
-            states,
-            covariance,
-            by_calibration,
-            used_cameras(observed, used),
-            [dict(zip(GROUPS, of_pulse.tolist(), strict=True)) for of_pulse in by_hand],
+            belief.mean[:, :STATE],
+            belief.covariance[:, :STATE, :STATE],
+            belief.covariance[:, :STATE, STATE:] @ self._back,
+            cameras,
+            hands,
             known,
             vague=np.inf,  # the filter itself bounds what it does not know, and whoever follows needs all parts
-        )
+        )[0]
 
 
-def _mixed(beliefs: list[_Belief], weights: Floats) -> _Belief:
-    """One normal distribution with mean and covariance of a mixture."""
-    mean = np.einsum("k,ks->s", weights, [belief.mean for belief in beliefs])
-    covariance = np.zeros((len(mean), len(mean)))
-    for weight, belief in zip(weights, beliefs, strict=True):
-        off = belief.mean - mean
-        covariance += weight * (belief.covariance + np.outer(off, off))
-    return _Belief(mean, covariance)
+def _moved(move: Floats, rows: Floats) -> Floats:
+    """Rows (k, 48, f) of states, one after a motion (3, 3) of each channel."""
+    return np.asarray((move @ rows.reshape(len(rows), 3, -1)).reshape(rows.shape))
+
+
+def _plausible(off: Floats, rows: Floats, cross: Floats) -> Flags:
+    """Which groups of two observations agree with a prediction.
+
+    Args:
+        off: (2 g,) computed - observed.
+        rows: (2 g, s) derivatives by the state.
+        cross: (2 g, s) these times the covariance of the state.
+    """
+    pairs = rows.reshape(-1, 2, rows.shape[1])
+    spread = cross.reshape(pairs.shape) @ pairs.swapaxes(1, 2) + np.eye(2)
+    apart = off.reshape(-1, 2, 1)
+    distance = (apart * np.linalg.solve(spread, apart)).sum(axis=(1, 2))
+    return np.asarray(distance < chdtri(2, _GATE_P))

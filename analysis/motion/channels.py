@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from photogrammetry.jumper.stick_model import direction_of
-from rig.arrays import Floats
+from rig.arrays import Floats, Integers
 
 #: Number of channels: 3 of O, 3 of each of three vectors, 4 of the skis.
 CHANNELS: Final = 16
@@ -21,8 +21,8 @@ SLOPE, SLOPE_DIFFERENCE, HEADING, OPENING = range(12, 16)
 
 #: P1..P4 (rows) from O, hip - O, helmet - hip, left - right binding (columns).
 POINT_WEIGHTS: Final = np.array(((1, 1, 1, 0), (1, 1, 0, 0), (1, 0, 0, -0.5), (1, 0, 0, 0.5)))
-#: Slope and heading of the right and the left ski from the last four channels; opening is left minus right.
-_SKI_WEIGHTS: Final = np.array((((1, 0.5, 0, 0), (0, 0, 1, -0.5)), ((1, -0.5, 0, 0), (0, 0, 1, 0.5))))
+#: (2, 2, 4) slope and heading of the right and the left ski from the last four channels; opening is left minus right.
+SKI_WEIGHTS: Final = np.array((((1, 0.5, 0, 0), (0, 0, 1, -0.5)), ((1, -0.5, 0, 0), (0, 0, 1, 0.5))))
 
 #: Where a body part may be at all, m, m/s, rad: mean and standard deviation of value, speed and acceleration of each
 #: channel in the first pulse. They are wide and matter only where nothing was measured.
@@ -53,27 +53,30 @@ class MotionFrame:
         vectors = channels[..., :VECTORS].reshape(*channels.shape[:-1], 4, 3)
         return np.asarray(self.origin + np.einsum("lv,...vc->...lc", POINT_WEIGHTS, vectors) @ self.rotation.T)
 
-    def point_jacobian(self) -> Floats:
-        """Derivatives of P1..P4 (4, 3, 16) by the channels."""
-        by = np.zeros((4, 3, CHANNELS))
-        for vector in range(4):
-            by[:, :, 3 * vector : 3 * vector + 3] = POINT_WEIGHTS[:, vector, None, None] * self.rotation
-        return by
+    def by_vectors(self, by_points: Floats, labels: Integers) -> Floats:
+        """Derivatives (..., g, q, 12) by the first channels, from those (..., g, q, 3) by one point each.
+
+        Args:
+            by_points: derivatives by points in the object system.
+            labels: (g,) which of P1..P4 they are.
+        """
+        local = by_points @ self.rotation
+        by = POINT_WEIGHTS[labels][:, None, :, None] * local[..., None, :]
+        return np.asarray(by.reshape(*local.shape[:-1], VECTORS))
 
     def skis(self, channels: Floats) -> Floats:
         """Unit directions of the right and the left ski in the object system (..., 2, 3)."""
         return direction_of(slopes_and_headings(channels)) @ self.rotation.T
 
-    def ski_jacobian(self, channels: Floats) -> Floats:
-        """Derivatives of the directions (..., 2, 3, 16) by the channels."""
+    def by_skis(self, channels: Floats) -> Floats:
+        """Derivatives of the directions of the skis (..., 2, 3, 4) by the last four channels."""
         slope, heading = np.moveaxis(slopes_and_headings(channels), -1, 0)
-        zero = np.zeros_like(slope)
-        by_slope = np.stack((-np.sin(slope) * np.cos(heading), -np.sin(slope) * np.sin(heading), np.cos(slope)), -1)
-        by_heading = np.stack((-np.cos(slope) * np.sin(heading), np.cos(slope) * np.cos(heading), zero), -1)
-        local = np.stack((by_slope, by_heading), axis=-1)
-        by = np.zeros((*local.shape[:-1], CHANNELS))
-        by[..., VECTORS:] = np.einsum("ij,...sja,sak->...sik", self.rotation, local, _SKI_WEIGHTS)
-        return by
+        level, up = np.cos(slope), np.sin(slope)
+        ahead, aside = np.cos(heading), np.sin(heading)
+        local = np.zeros((*slope.shape, 3, 2))
+        local[..., 0, 0], local[..., 1, 0], local[..., 2, 0] = -up * ahead, -up * aside, level
+        local[..., 0, 1], local[..., 1, 1] = -level * aside, level * ahead
+        return np.asarray(self.rotation @ local @ SKI_WEIGHTS)
 
     @property
     def heading(self) -> float:
@@ -83,7 +86,7 @@ class MotionFrame:
 
 def slopes_and_headings(channels: Floats) -> Floats:
     """Slope and heading (in the frame of the motion) of the right and the left ski (..., 2, 2), rad."""
-    return np.asarray(np.einsum("sak,...k->...sa", _SKI_WEIGHTS, channels[..., VECTORS:]))
+    return np.asarray(np.einsum("sak,...k->...sa", SKI_WEIGHTS, channels[..., VECTORS:]))
 
 
 def ski_channels(right: Floats, left: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""The measurements of a jump as arrays, and their linearised error equations.
+"""The measurements of a jump as arrays.
 
 Every ray and every image line of a ski is one group of two observations: x and y of a point, or the distances of two
 points of the ski's image from the axis. A weighted straight line is equivalent to two points with independent errors,
@@ -12,20 +12,25 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, SkiMeasurement, Source
-from analysis.motion.channels import CHANNELS, MotionFrame
-from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from analysis.measurements.model import (
+    POINTS,
+    SIDES,
+    JumpMeasurements,
+    Measurements,
+    PointMeasurement,
+    SkiMeasurement,
+    Source,
+)
+from analysis.motion.camera_arrays import CameraArrays
 from rig.arrays import Flags, Floats
 from rig.clocks import NS_PER_S
 
 #: What is measured in an image, in the order of the groups.
 GROUPS: Final = (*POINTS, *SIDES)
 _POINTS = len(POINTS)
-_BINDINGS = slice(2, 4)  # P3 and P4 lie on the right and on the left ski
 _MEAN_AND_DIFFERENCE: Final = np.sqrt(0.5) * np.array(((1.0, 1.0), (1.0, -1.0)))
 _SCATTER_P = 1e-3  # points of a ski that scatter more about their line than with this probability: sigma grows
-_FOOT_STEPS = 3  # iterations for the point of a ski that is nearest to a measured one
-_FARTHEST_M = 5.0  # along a ski; its points are within half its length of the binding
+_Place = tuple[int, int, int]  # pulse, camera, group
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,14 +96,13 @@ class Observations:
         )
 
 
-def observations(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> Observations:
-    """Bring the measurements of a jump into arrays; cameras that are not oriented are left out."""
-    names = tuple(name for name in system.names if name in measurements.cameras)
-    n, m = len(jump.pulses), len(names)
+def observations(jump: JumpMeasurements, measurements: Measurements, cameras: CameraArrays) -> Observations:
+    """Bring the measurements of a jump into arrays; those of other cameras than the given ones are left out."""
+    n, m = len(jump.pulses), len(cameras.names)
     out = Observations(
-        names,
+        cameras.names,
         np.array([pulse.time - jump.pulses[0].time for pulse in jump.pulses], float) / NS_PER_S + measurements.middle_s,
-        np.array([measurements.late_s(name) for name in names]),
+        np.array([measurements.late_s(name) for name in cameras.names]),
         np.zeros((n, m, 6, 2, 2)),
         np.zeros((n, m, 6, 2, 2)),
         np.zeros((n, m, 6), bool),
@@ -106,142 +110,69 @@ def observations(jump: JumpMeasurements, measurements: Measurements, system: Cam
         np.zeros((n, m, 6)),
         np.ones((6, 2)),
     )
-    for i, name in enumerate(names):
-        skis: list[tuple[tuple[int, int, int], SkiMeasurement]] = []
-        for k, pulse in enumerate(jump.pulses):
+    points: list[tuple[_Place, PointMeasurement]] = []
+    skis: list[tuple[_Place, SkiMeasurement]] = []
+    for k, pulse in enumerate(jump.pulses):
+        for i, name in enumerate(cameras.names):
             if (image := pulse.images.get(name)) is None:
                 continue
             for group, label in enumerate(POINTS):
                 if (point := image.points.get(label)) is not None:
-                    _put(out, (k, i, group), np.stack((point.xy, point.xy)), point.covariance, point.source)
+                    points.append(((k, i, group), point))
             for group, side in enumerate(SIDES, start=_POINTS):
                 if (ski := image.skis.get(side)) is not None and len(ski.xy) >= 2:
                     skis.append(((k, i, group), ski))
-        for (at, ski), ends, covariance in zip(skis, *_two_points([ski for _, ski in skis], system[name]), strict=True):
-            _put(out, at, ends, covariance, ski.source)
-            out.lasting[at] = ski.lasting
+    if points:
+        xy = np.array([point.xy for _, point in points])[:, None].repeat(2, axis=1)
+        _put(out, points, xy, np.array([point.covariance for _, point in points]))
+    if skis:
+        _put(out, skis, *_two_points(skis, cameras))
+        out.lasting[tuple(np.transpose([at for at, _ in skis]))] = [ski.lasting for _, ski in skis]
     return out
 
 
-def _put(out: Observations, at: tuple[int, int, int], xy: Floats, covariance: Floats, source: Source) -> None:
-    if not (np.isfinite(xy).all() and np.isfinite(covariance).all()):
-        return
-    out.xy[at] = xy
-    out.whitener[at] = np.linalg.inv(np.linalg.cholesky(covariance))
+def _put(
+    out: Observations,
+    measured: Sequence[tuple[_Place, PointMeasurement | SkiMeasurement]],
+    xy: Floats,
+    covariance: Floats,
+) -> None:
+    """Put g measured groups, of two points xy (g, 2, 2) each, in their places, unless they are not finite."""
+    good = np.isfinite(xy).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2))
+    at = tuple(np.transpose([place for place, _ in measured])[:, good])
+    out.xy[at] = xy[good]
+    out.whitener[at] = np.linalg.inv(np.linalg.cholesky(covariance[good]))
     out.seen[at] = True
-    out.by_hand[at] = source is Source.BY_HAND
+    out.by_hand[at] = np.array([thing.source is Source.BY_HAND for _, thing in measured])[good]
 
 
-def _two_points(skis: Sequence[SkiMeasurement], placed: PlacedCamera) -> tuple[Floats, Floats]:
-    """Two points (n, 2, 2) of each ski's image that stand for all of it, px, and covariances of their distances."""
-    if not skis:
-        return np.empty((0, 2, 2)), np.empty((0, 2, 2))
-    flat = placed.reduced(np.concatenate([ski.xy for ski in skis]))  # without distortion, where the skis are straight
-    parts = np.split(flat, np.cumsum([len(ski.xy) for ski in skis])[:-1])
-    fitted = [_straight(part, ski) for part, ski in zip(parts, skis, strict=True)]
-    ends = np.stack([of_ski for of_ski, _ in fitted])
-    depth = np.broadcast_to(placed.camera.interior[0], (len(skis), 2, 1))
-    rays = np.concatenate((ends, -depth), axis=-1) @ placed.rotation.T
-    return placed.project(placed.position + rays), np.stack([covariance for _, covariance in fitted])
+def _two_points(skis: Sequence[tuple[_Place, SkiMeasurement]], cameras: CameraArrays) -> tuple[Floats, Floats]:
+    """Two points (s, 2, 2) of each ski's image that stand for all of it, px, and covariances of their distances."""
+    count = np.array([len(ski.xy) for _, ski in skis])
+    camera = np.array([i for (_, i, _), _ in skis])
+    ski, first = np.repeat(np.arange(len(skis)), count), np.cumsum(count) - count
+    # Without distortion, where the skis are straight.
+    flat = cameras.each(camera[ski]).reduced(np.concatenate([thing.xy for _, thing in skis]))
+    weight = np.concatenate([thing.sigma for _, thing in skis]) ** -2.0
 
+    def mean(values: Floats) -> Floats:
+        """Weighted mean of each ski's points."""
+        return np.asarray(np.add.reduceat(weight * values, first) / total)
 
-def _straight(flat: Floats, ski: SkiMeasurement) -> tuple[Floats, Floats]:
-    """The two points (2, 2) of one ski, reduced, and the covariance (2, 2) of their distances from the axis."""
-    weight = ski.sigma**-2.0
-    centre = weight @ flat / weight.sum()
-    off = flat - centre
-    axis = np.linalg.eigh((off * weight[:, None]).T @ off)[1][:, 1]
-    along, across = off @ axis, off @ np.array((-axis[1], axis[0]))
-    degrees = len(flat) - 2
-    scatter = float(weight @ across**2)
-    factor = scatter / degrees if degrees and scatter > chdtri(degrees, _SCATTER_P) else 1.0
-    spread = np.sqrt(weight @ along**2 / weight.sum())
-    ends = centre + np.array((-spread, spread))[:, None] * axis
-    return ends, 2.0 * factor / weight.sum() * np.eye(2) + ski.common**2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Equations:
-    """Error equations, divided by the standard deviations: each observation has the weight 1.
-
-    Attributes:
-        v: (n, m, 6, 2) computed - observed; 0 where nothing was measured.
-        by_channels: (n, m, 6, 2, 16) derivatives by the channels at the camera's own time.
-        by_camera: (n, m, 6, 2, p) derivatives by the uncertain parameters of all cameras.
-    """
-
-    v: Floats
-    by_channels: Floats
-    by_camera: Floats
-
-
-def linearised(observed: Observations, system: CameraSystem, frame: MotionFrame, channels: Floats) -> Equations:
-    """The error equations at channels (n, m, 16): at each pulse as each camera sees it."""
-    n, m = observed.shape
-    v = np.zeros((n, m, 6, 2))
-    by_channels = np.zeros((n, m, 6, 2, CHANNELS))
-    by_camera = np.zeros((n, m, 6, 2, len(system.covariance)))
-    points, of_points = frame.points(channels), frame.point_jacobian()
-    skis, of_skis = frame.skis(channels), frame.ski_jacobian(channels)
-    for i, name in enumerate(observed.names):
-        placed = system[name]
-        xy = observed.xy[:, i]
-        residuals, by_point, by_own = _at(placed, points[:, i], xy[:, :_POINTS, 0])
-        v[:, i, :_POINTS] = residuals
-        by_channels[:, i, :_POINTS] = np.einsum("nlri,lik->nlrk", by_point, of_points)
-        by_camera[:, i, :_POINTS, :, placed.columns] = np.moveaxis(by_own, -1, 0)
-        line = _axis_distances(placed, points[:, i, _BINDINGS], skis[:, i], xy[:, _POINTS:])
-        v[:, i, _POINTS:] = line.v
-        by_channels[:, i, _POINTS:] = np.einsum("nsri,sik->nsrk", line.by_point, of_points[_BINDINGS]) + np.einsum(
-            "nsri,nsik->nsrk", line.by_point * line.along[..., None], of_skis[:, i]
-        )
-        by_camera[:, i, _POINTS:, :, placed.columns] = np.moveaxis(line.by_own, -1, 0)
-    good = observed.seen & np.isfinite(v).all(axis=-1)
-    white = np.where(good[..., None, None], observed.whitener, 0.0)
-    return Equations(*(_whitened(white, array) for array in (v[..., None], by_channels, by_camera)))
-
-
-def _whitened(white: Floats, rows: Floats) -> Floats:
-    out = white @ np.where(np.isfinite(rows), rows, 0.0)
-    return out[..., 0] if out.shape[-1] == 1 else out
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Lines:
-    """Distances of measured points from the images of the skis (n, 2, 2) and their derivatives."""
-
-    v: Floats
-    by_point: Floats
-    by_own: Floats
-    along: Floats
-
-
-def _axis_distances(placed: PlacedCamera, binding: Floats, direction: Floats, xy: Floats) -> _Lines:
-    along = np.zeros(xy.shape[:-1])
-    for step in range(_FOOT_STEPS + 1):
-        spots = binding[:, :, None] + along[..., None] * direction[:, :, None]
-        v, by_point, by_own = _at(placed, spots, xy)
-        tangent = np.einsum("nspri,nsi->nspr", by_point, direction)
-        if step < _FOOT_STEPS:
-            with np.errstate(all="ignore"):
-                along = along - (tangent * v).sum(axis=-1) / (tangent**2).sum(axis=-1)
-            along = np.clip(np.nan_to_num(along), -_FARTHEST_M, _FARTHEST_M)
-    with np.errstate(all="ignore"):
-        normal = np.stack((-tangent[..., 1], tangent[..., 0]), axis=-1) / np.linalg.norm(tangent, axis=-1)[..., None]
-    return _Lines(
-        np.einsum("nspr,nspr->nsp", normal, v),
-        np.einsum("nspr,nspri->nspi", normal, by_point),
-        np.einsum("nspr,nsprk->nspk", normal, by_own),
-        along,
-    )
-
-
-def _at(placed: PlacedCamera, xyz: Floats, xy: Floats) -> tuple[Floats, Floats, Floats]:
-    """`PlacedCamera.linearised` for points (..., 3); NaN where they are not before the camera."""
-    with np.errstate(all="ignore"):
-        v, by_point, by_own = placed.linearised(xyz.reshape(-1, 3), xy.reshape(-1, 2))
-    v = np.where(placed.in_front(xyz.reshape(-1, 3))[:, None], v, np.nan)
-    return tuple(a.reshape(*xyz.shape[:-1], *a.shape[1:]) for a in (v, by_point, by_own))  # type: ignore[return-value]
+    total = np.add.reduceat(weight, first)
+    centre = np.stack((mean(flat[:, 0]), mean(flat[:, 1])), axis=-1)
+    x, y = (flat - centre[ski]).T
+    turn = np.arctan2(2 * mean(x * y), mean(x * x) - mean(y * y)) / 2
+    axis = np.stack((np.cos(turn), np.sin(turn)), axis=-1)
+    along, across = x * axis[ski, 0] + y * axis[ski, 1], y * axis[ski, 0] - x * axis[ski, 1]
+    scatter, degrees = mean(across**2) * total, count - 2
+    loose = (degrees > 0) & (scatter > chdtri(np.maximum(degrees, 1), _SCATTER_P))
+    variance = 2.0 / total * np.where(loose, scatter / np.maximum(degrees, 1), 1.0)
+    half = np.sqrt(mean(along**2))[:, None] * axis
+    ends = np.stack((centre - half, centre + half), axis=1)
+    common = np.array([thing.common for _, thing in skis])
+    covariance = variance[:, None, None] * np.eye(2) + common[:, None, None] ** 2
+    return cameras.each(np.repeat(camera, 2)).shown(ends.reshape(-1, 2)).reshape(ends.shape), covariance
 
 
 def used_cameras(observed: Observations, used: Flags) -> list[Mapping[str, tuple[str, ...]]]:
@@ -250,3 +181,9 @@ def used_cameras(observed: Observations, used: Flags) -> list[Mapping[str, tuple
         {group: tuple(name for i, name in enumerate(observed.names) if row[i, g]) for g, group in enumerate(GROUPS)}
         for row in used & observed.seen
     ]
+
+
+def by_hand(observed: Observations, used: Flags) -> list[Mapping[str, bool]]:
+    """Per pulse, by group whether a person measured any of what was used; `used` has shape (n, m, 6)."""
+    rows = np.asarray((observed.by_hand & used).any(axis=1)).tolist()
+    return [dict(zip(GROUPS, row, strict=True)) for row in rows]

@@ -95,7 +95,7 @@ def prior(times: Floats, unit: float, takeoff: float | None, density: Floats, ai
         bounds = np.clip(np.array((-np.inf, takeoff, takeoff + EDGE_S, np.inf))[:, None], start, end)
     after = end - bounds[1:]  # time left at the end of each regime's part
     by_density = np.stack(
-        [_carried(_white_jerk(bounds[r + 1] - bounds[r], unit), after[r] / unit) for r in range(len(REGIMES))],
+        [_carried(white_jerk(bounds[r + 1] - bounds[r], unit), after[r] / unit) for r in range(len(REGIMES))],
         axis=1,
     )
     by_break = np.zeros((len(start), 3, 3))
@@ -115,7 +115,7 @@ def transitions(steps: Floats) -> Floats:
     return out
 
 
-def _white_jerk(seconds: Floats, unit: float) -> Floats:
+def white_jerk(seconds: Floats, unit: float) -> Floats:
     """(n, 3, 3) covariance that white noise of density 1 on the jerk adds in so many seconds."""
     powers = np.array(((20.0, 8.0, 6.0), (8.0, 3.0, 2.0), (6.0, 2.0, 1.0)))
     exponents = np.array(((5, 4, 3), (4, 3, 2), (3, 2, 1)))

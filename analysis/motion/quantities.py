@@ -6,17 +6,17 @@ from typing import Final
 import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES
-from analysis.motion.channels import CHANNELS, MotionFrame, slopes_and_headings
+from analysis.motion.channels import CHANNELS, ORIGIN, SKI_WEIGHTS, VECTORS, MotionFrame, slopes_and_headings
 from analysis.motion.observations import GROUPS
 from analysis.result.model import QUANTITIES, PointState, Quantity, SkiState, SmoothedState, Status, Vector
-from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope
+from photogrammetry.jumper.stick_model import ANGLES, body_angle_derivatives, body_angles, slope, slope_gradient
 from rig.arrays import Flags, Floats
 
 _INPUTS = CHANNELS + 3  # the channels and the velocity of O
-_STEP = 1e-6  # m, rad, m/s: for derivatives by central differences
 _CONTROLLED = 3  # rays
 _POINT_ROWS, _SKI_ROWS, _ORIGIN_ROWS = slice(0, 12), slice(12, 16), slice(16, 19)
-_QUANTITY_ROWS = slice(19, 30)
+_QUANTITY_ROWS, _ANGLE_ROWS, _VELOCITY_ROWS = slice(19, 30), slice(19, 24), slice(27, 30)
+_ATTACK_ROW, _HEIGHT_ROW, _SPEED_ROW = 24, 25, 26
 _DEGREES = np.ones(30)
 _DEGREES[[12, 13, 14, 15, *range(19, 25)]] = np.degrees(1.0)
 #: rad. Angles follow from a state by derivatives, which hold no longer where twice the sigma is a radian: there
@@ -102,10 +102,26 @@ def _evaluated(frame: MotionFrame, inputs: Floats) -> Floats:
 
 
 def _derivatives(frame: MotionFrame, inputs: Floats) -> Floats:
-    """(n, 30, 19)."""
-    steps = _STEP * np.eye(_INPUTS)
-    difference = _evaluated(frame, inputs[:, None] + steps) - _evaluated(frame, inputs[:, None] - steps)
-    return difference.transpose(0, 2, 1) / (2 * _STEP)
+    """(n, 30, 19) of what `_evaluated` gives by its inputs."""
+    channels, velocity = inputs[:, :CHANNELS], inputs[:, CHANNELS:] @ frame.rotation.T
+    points, skis = frame.points(channels), frame.skis(channels)
+    by = np.zeros((len(inputs), len(_DEGREES), _INPUTS))
+    by_points = frame.by_vectors(np.tile(np.eye(3), (len(POINTS), 1, 1)), np.arange(len(POINTS)))
+    by[:, _POINT_ROWS, :VECTORS] = by_points.reshape(-1, VECTORS)
+    by[:, _SKI_ROWS, VECTORS:CHANNELS] = SKI_WEIGHTS.reshape(-1, CHANNELS - VECTORS)
+    by[:, _ORIGIN_ROWS, ORIGIN] = frame.rotation
+    body = (*points[:, :2].swapaxes(0, 1), points[:, 2:].mean(axis=1))
+    of_angles = body_angle_derivatives(*body, *skis.swapaxes(0, 1))
+    by_body = np.concatenate((by_points[0], by_points[1], by_points[2:].mean(axis=0)))
+    by[:, _ANGLE_ROWS, :VECTORS] = of_angles[:, :, :3].reshape(len(by), len(ANGLES), -1) @ by_body
+    by_skis = frame.by_skis(channels).reshape(len(by), -1, CHANNELS - VECTORS)
+    by[:, _ANGLE_ROWS, VECTORS:CHANNELS] = of_angles[:, :, 3:].reshape(len(by), len(ANGLES), -1) @ by_skis
+    by[:, _ATTACK_ROW] = by[:, _ANGLE_ROWS][:, ANGLES.index("phi")]
+    by[:, _ATTACK_ROW, CHANNELS:] = -slope_gradient(velocity) @ frame.rotation
+    by[:, _HEIGHT_ROW, ORIGIN] = frame.rotation[2]
+    by[:, _SPEED_ROW, CHANNELS:] = velocity @ frame.rotation / np.linalg.norm(velocity, axis=1, keepdims=True)
+    by[:, _VELOCITY_ROWS, CHANNELS:] = frame.rotation
+    return by
 
 
 def _state(
@@ -152,7 +168,6 @@ def _state(
     ]
     gradient = np.where(np.array(missing)[:, None], np.nan, gradient)
     found = {name: None if missing[i] else quantity(first + i) for i, name in enumerate(QUANTITIES)}
-    velocity = slice(first + QUANTITIES.index("velocity_x"), _QUANTITY_ROWS.stop)
     return SmoothedState(
         points=points,
         skis=skis,
@@ -160,7 +175,7 @@ def _state(
         height=found["height"],
         speed=found["speed"],
         origin=Vector(values[_ORIGIN_ROWS], covariance[_ORIGIN_ROWS, _ORIGIN_ROWS]),
-        velocity=Vector(values[velocity], covariance[velocity, velocity]),
+        velocity=Vector(values[_VELOCITY_ROWS], covariance[_VELOCITY_ROWS, _VELOCITY_ROWS]),
         angle_of_attack=found["angle_of_attack"],
         by_calibration=gradient,
     )

@@ -17,9 +17,10 @@ from analysis.motion.bundle import (
     settled,
     with_prior,
 )
+from analysis.motion.camera_arrays import CameraArrays, own_root
 from analysis.motion.gross_errors import fitting_sigmas, statistics, with_factors, without_gross_errors
 from analysis.motion.lasting import lasting_covariance
-from analysis.motion.observations import GROUPS, Observations, observations, used_cameras
+from analysis.motion.observations import GROUPS, Observations, by_hand, observations, used_cameras
 from analysis.motion.prior import Prior, prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import FEWEST, Start, start_values
@@ -93,7 +94,7 @@ def smooth(
     Returns:
         The motion; without states, and with the reason, where nothing can be computed.
     """
-    everything = observations(jump, measurements, system)
+    everything = observations(jump, measurements, CameraArrays.of(system, tuple(measurements.cameras)))
     measured = np.flatnonzero(everything.seen.any(axis=(1, 2)))
     sight = slice(int(measured[0]), int(measured[-1]) + 1) if len(measured) else slice(0, 0)
     start = start_values(everything.part(sight), system) if len(measured) >= FEWEST else None
@@ -150,10 +151,12 @@ def _with_free_cameras(
     """
     m, late = len(observed.names), start.late / unit
     loose = np.repeat(start_densities()[1:2], 3, axis=0)
+    root = root_of(system.covariance)
     model = Model(
         observed,
-        system,
-        root_of(system.covariance),
+        CameraArrays.of(system, observed.names),
+        root,
+        own_root(system, observed.names, root),
         start.frame,
         prior(observed.times, unit, None, loose),
         np.full(m, late.mean()),
@@ -236,7 +239,6 @@ def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
     states, covariance, cross = _over_takeoff(adjusted, edge)
     fit = statistics(adjusted)
     covariance = covariance + lasting_covariance(adjusted, fit.square, fit.redundancy)
-    by_hand = [dict(zip(GROUPS, row, strict=True)) for row in np.asarray((model.observed.by_hand & used).any(axis=1))]
     return smoothed_states(
         model.frame,
         model.prior.unit,
@@ -244,7 +246,7 @@ def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
         covariance,
         cross[:, :, :rank] @ np.linalg.pinv(model.root),
         used_cameras(model.observed, used),
-        by_hand,
+        by_hand(model.observed, used),
         known_groups(used),
     )
 

@@ -147,7 +147,7 @@ def linearise(lens: Lens, rotation: Numbers, position: Numbers, xyz: Numbers, xy
     terms = _terms(lens, q)
     v = ideal + np.einsum("nrk,nk->nr", terms, interior[..., 3:]) - reduced
 
-    slope = _slope(lens, q)
+    slope = distortion_slope(lens, q)
     unit = np.eye(2)
     by_ideal = np.where(measured[..., None], 0.0, slope) + unit
     by_k = np.zeros((*k.shape[:-1], 2, 3), dtype=v.dtype)
@@ -184,7 +184,7 @@ def _terms(lens: Lens, q: Numbers) -> Numbers:
     return terms
 
 
-def _slope(lens: Lens, q: Numbers) -> Numbers:
+def distortion_slope(lens: Lens, q: Numbers) -> Numbers:
     """Derivative of d(q) by q: (..., 2, 2)."""
     x, y = q[..., 0], q[..., 1]
     a1, a2, a3, b1, b2, c1, c2 = (lens.interior[..., i] for i in range(3, len(INTERIOR)))
@@ -223,5 +223,5 @@ def _solve(lens: Lens, target: Numbers, sign: float) -> Numbers:
 
 def _jacobian(lens: Lens, q: Numbers, sign: float) -> tuple[Numbers, Numbers]:
     """Derivative of q + sign d(q), and its determinant."""
-    matrix = np.eye(2) + sign * _slope(lens, q)
+    matrix = np.eye(2) + sign * distortion_slope(lens, q)
     return matrix, matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]

@@ -43,9 +43,36 @@ def body_angles(helmet: Floats, hip: Floats, origin: Floats, right: Floats, left
     )
 
 
+def body_angle_derivatives(helmet: Floats, hip: Floats, origin: Floats, right: Floats, left: Floats) -> Floats:
+    """Derivatives (..., 5, 5, 3) of the angles by the five arguments of `body_angles`; zero where there is none."""
+    ahead = _unit(right) + _unit(left)
+    by = np.zeros((*np.shape(helmet)[:-1], len(ANGLES), 5, 3))
+    by_ahead, by_legs = _between_gradients(ahead, hip - origin)
+    by[..., 0, 1, :], by[..., 0, 2, :] = by_legs, -by_legs
+    by_thigh, by_back = _between_gradients(origin - hip, helmet - hip)
+    by[..., 1, 0, :], by[..., 1, 1, :], by[..., 1, 2, :] = by_back, -by_thigh - by_back, by_thigh
+    by[..., 2, 3, :], by[..., 2, 4, :] = _between_gradients(right, left)
+    by[..., 3, 3, :], by[..., 3, 4, :] = slope_gradient(right), -slope_gradient(left)
+    of_mean = np.stack((by_ahead, slope_gradient(ahead)), axis=-2)
+    for ski, direction in ((3, right), (4, left)):
+        along = _unit(direction)
+        across = of_mean - (of_mean @ along[..., None]) * along[..., None, :]
+        by[..., (0, 4), ski, :] = across / np.linalg.norm(direction, axis=-1)[..., None, None]
+    return by
+
+
 def slope(direction: Floats) -> Floats:
     """Angle of directions (..., 3) above the horizontal, rad."""
     return np.asarray(np.arctan2(direction[..., 2], np.hypot(direction[..., 0], direction[..., 1])))
+
+
+def slope_gradient(direction: Floats) -> Floats:
+    """Derivatives (..., 3) of `slope` by the direction; zero where there is none."""
+    x, y, z = np.moveaxis(direction, -1, 0)
+    level = np.hypot(x, y)
+    square = level**2 + z**2
+    steep = _divided(z, level * square)
+    return np.stack((-x * steep, -y * steep, _divided(level, square)), axis=-1)
 
 
 def slope_and_heading(direction: Floats) -> Floats:
@@ -65,5 +92,30 @@ def _unit(direction: Floats) -> Floats:
 
 def _between(one: Floats, other: Floats) -> Floats:
     """Angle between vectors (..., 3), rad; precise also for small angles."""
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    across = np.linalg.norm(_cross(one, other), axis=-1)
     return np.asarray(np.arctan2(across, np.sum(one * other, axis=-1)))
+
+
+def _between_gradients(one: Floats, other: Floats) -> tuple[Floats, Floats]:
+    """Derivatives (..., 3) of `_between` by both vectors; zero where they are parallel.
+
+    With n the unit vector across both, the angle grows as the one turns backwards about n, and the other forwards.
+    """
+    normal = _cross(one, other)
+    normal = _divided(normal, np.linalg.norm(normal, axis=-1, keepdims=True))
+    by_one, by_other = (
+        _divided(_cross(normal, vector), np.sum(vector * vector, axis=-1, keepdims=True)) for vector in (one, other)
+    )
+    return -by_one, by_other
+
+
+def _cross(one: Floats, other: Floats) -> Floats:
+    """As `np.cross`, which takes several times as long for a few vectors."""
+    a, b, c = one[..., 0], one[..., 1], one[..., 2]
+    x, y, z = other[..., 0], other[..., 1], other[..., 2]
+    return np.stack((b * z - c * y, c * x - a * z, a * y - b * x), axis=-1)
+
+
+def _divided(numerator: Floats, by: Floats) -> Floats:
+    """The quotient; 0 where the divisor is 0."""
+    return np.asarray(np.where(by > 0, numerator, 0.0) / np.where(by > 0, by, 1.0))

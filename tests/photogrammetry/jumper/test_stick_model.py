@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from photogrammetry.jumper.stick_model import ANGLES, body_angles, direction_of
+from photogrammetry.jumper.stick_model import ANGLES, body_angle_derivatives, body_angles, direction_of
 from rig.settings.file import CONFIG
 from simrig.world.jumper import JumpSeries
 from simrig.world.scenario import load_scenario
@@ -34,3 +34,17 @@ def test_a_pose_that_can_be_worked_out_by_hand() -> None:
     assert found[1] == pytest.approx(90.0)
     assert found[3] == pytest.approx(6.0)
     assert found[0] + found[4] == pytest.approx(90.0, abs=0.1)  # legs upright, in the plane of X' but for its heading
+
+
+def test_derivatives_are_those_of_the_angles() -> None:
+    rng, step = np.random.default_rng(6), 1e-6
+    places = rng.standard_normal((5, 20, 3))  # helmet, hip, origin, right, left
+    found = body_angle_derivatives(*places)
+    for thing in range(5):
+        for axis in range(3):
+            off = np.zeros_like(places)
+            off[thing, :, axis] = step
+            by = (body_angles(*(places + off)) - body_angles(*(places - off))) / (2 * step)
+            assert np.allclose(found[:, :, thing, axis], by, rtol=1e-5, atol=1e-5)
+    straight = np.array(((0.0, 0.0, 2.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)))
+    assert np.isfinite(body_angle_derivatives(*straight)).all()

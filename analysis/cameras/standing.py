@@ -7,11 +7,13 @@ one pose of the jump, and everything after them need not know of the shake.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from analysis.candidates.known_discs import DiscShape
-from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots
+from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
+from analysis.candidates.wanted_traces import WantedTraces
 from analysis.measurements.model import (
     ImageMeasurements,
     JumpMeasurements,
@@ -107,14 +109,12 @@ class Standing:
         shake = self.shake.get(name, {}).get(pulse)
         if shake is None or name not in self.system.cameras:
             return image
-        places = [image.spots.xy, *(trace.xy for trace in image.traces), *(trace.ends for trace in image.traces)]
-        (of_spots, added), *of_traces = _all_steadied(self.system[name], shake, places)
-        spots: Spots = replace(image.spots, xy=of_spots, covariance=image.spots.covariance + added)
-        count = len(image.traces)
-        traces = tuple(
-            replace(trace, xy=xy, ends=ends, common=_common(trace.common, of_axis))
-            for trace, (xy, of_axis), (ends, _) in zip(image.traces, of_traces[:count], of_traces[count:], strict=True)
-        )
+        placed = self.system[name]
+        xy, added = steadied(placed, shake, image.spots.xy)
+        spots: Spots = replace(image.spots, xy=xy, covariance=image.spots.covariance + added)
+        steady = partial(_steadied_traces, placed, shake)
+        wanted = image.traces
+        traces = wanted.changed(steady) if isinstance(wanted, WantedTraces) else steady(tuple(wanted))
         return ImageCandidates(spots, traces)
 
 
@@ -186,6 +186,18 @@ def _all_steadied(placed: PlacedCamera, shake: FrameShake, places: Sequence[Floa
     xy, added = steadied(placed, shake, np.concatenate(places))
     ends = np.cumsum([len(part) for part in places])[:-1]
     return list(zip(np.split(xy, ends), np.split(added, ends), strict=True))
+
+
+def _steadied_traces(placed: PlacedCamera, shake: FrameShake, traces: tuple[Trace, ...]) -> tuple[Trace, ...]:
+    """Traces where the camera of the jump shows them."""
+    if not traces:
+        return ()
+    places = [*(trace.xy for trace in traces), *(trace.ends for trace in traces)]
+    found = _all_steadied(placed, shake, places)
+    return tuple(
+        replace(trace, xy=xy, ends=ends, common=_common(trace.common, of_axis))
+        for trace, (xy, of_axis), (ends, _) in zip(traces, found[: len(traces)], found[len(traces) :], strict=True)
+    )
 
 
 def _image_measurements(placed: PlacedCamera, shake: FrameShake, image: ImageMeasurements) -> ImageMeasurements:

@@ -30,7 +30,6 @@ _MAD_TO_SIGMA = 1.4826
 _STRIP = 32 << 10  # pixels that are compared at a time
 _FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
 _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
-_SHORTEST_BORDER = 2 * _SMALLEST - 2  # px around something of that size that is a pixel thick
 _THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
 _JOIN = 9  # px: what is nearer to each other belongs together
 _MARGIN = 10  # px around what moves
@@ -219,29 +218,18 @@ def _usual(grey: GreyImage, noise: GreyImage) -> GreyImage:
 
 def _boxes(front: NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
     """Boxes around what moves: columns and rows of the first and behind the last pixel, the largest first."""
-    contours, hierarchy = cv2.findContours(front, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    outside = () if hierarchy is None else (hierarchy[0, :, 3] < 0).tolist()
-    boxes = []
-    for contour, outer in zip(contours, outside, strict=True):
-        if len(contour) < _SHORTEST_BORDER or not outer:  # most are specks
-            continue
-        x, y, w, h = cv2.boundingRect(contour)
-        if max(w, h) >= _SMALLEST and min(w, h) >= _THINNEST:
-            area = _area(front[y : y + h, x : x + w], contour[0, 0] - (x, y))
-            boxes.append((x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area))
+    # this algorithm takes a third of the time of the usual one where snow makes a thousand specks
+    stats = cv2.connectedComponentsWithStatsWithAlgorithm(front, 8, cv2.CV_32S, cv2.CCL_BBDT)[2][1:]
+    sides = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
+    large = (sides.max(axis=1) >= _SMALLEST) & (sides.min(axis=1) >= _THINNEST)
+    boxes = [(x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area) for x, y, w, h, area in stats[large].tolist()]
     rows, columns = front.shape
-    grown = sorted(_joined(boxes[::-1]), key=lambda box: -box[4])[:_MOST]
+    grown = sorted(_joined(boxes), key=lambda box: -box[4])[:_MOST]
     spare = _MARGIN - _JOIN
     return [
         (max(0, x - spare), max(0, y - spare), min(columns, right + spare), min(rows, bottom + spare))
         for x, y, right, bottom, _ in grown
     ]
-
-
-def _area(front: NDArray[np.uint8], place: NDArray[np.int32]) -> int:
-    """Pixels of what holds a place, column and row."""
-    _, labels = cv2.connectedComponents(front, connectivity=8)
-    return int(np.count_nonzero(labels == labels[place[1], place[0]]))
 
 
 def _joined(boxes: list[tuple[int, int, int, int, int]]) -> list[tuple[int, int, int, int, int]]:

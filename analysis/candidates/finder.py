@@ -1,7 +1,8 @@
 """Finds the candidates of all images of a recording, and looks again where an identification expects something.
 
-What is in front of the static scene is cut out of each image and kept in memory for the second look, which is given a
-predicted place with its covariance, and takes weaker evidence there. Pixels that are a signature of the camera
+What is in front of the static scene is cut out of each image and kept in memory: for the traces of skis, which are
+sought where a jumper is known to be, and for the second look, which is given a predicted place with its covariance and
+takes weaker evidence there. Pixels that are a signature of the camera
 (`stamped` in the tag) are no picture and are never looked at.
 """
 
@@ -9,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from weakref import ref
 
 import numpy as np
 from msgspec import UNSET
@@ -18,6 +20,7 @@ from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs,
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
 from analysis.candidates.traces import find_expected_traces, find_traces
+from analysis.candidates.wanted_traces import WantedTraces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets, triplets
@@ -31,7 +34,7 @@ from rig.tag import CameraTag, TripletTag
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
 
 _THINNEST = 4  # px; a smaller part of an image holds no spot
-_FITS_OF_OTHERS = 6  # places that are fitted in regions without skis, but for the largest one
+_FITS_OF_OTHERS = 6  # places that are fitted in a region, but for the largest one of an image
 
 
 class Finder:
@@ -45,6 +48,7 @@ class Finder:
     def __init__(self, static: Mapping[str, StaticImage], memory: int = _MEMORY) -> None:
         self._backgrounds = {name: Background(image) for name, image in static.items()}
         self._regions: OrderedDict[tuple[PulseNumber, str], list[Region]] = OrderedDict()
+        self._wanted: dict[tuple[PulseNumber, str], ref[WantedTraces]] = {}
         self._kept, self._memory = 0, memory
 
     def find(self, tag: TripletTag, image: Grey) -> PulseCandidates:
@@ -60,8 +64,9 @@ class Finder:
         found: dict[str, ImageCandidates] = {}
         for camera, background, block in self._blocks(tag, image):
             regions = background.regions(block, _stamped(camera))
-            self._keep(tag.pulse, camera.name, regions)
-            found[camera.name] = _candidates(regions)
+            traces = WantedTraces.of(regions)
+            self._keep(tag.pulse, camera.name, regions, traces)
+            found[camera.name] = ImageCandidates(_spots(regions), traces)
         return PulseCandidates(tag.pulse, tag.time, found)
 
     def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:
@@ -161,13 +166,21 @@ class Finder:
         spots.strength[there] = np.abs(discs.contrast) / discs.sigma_contrast
         return spots
 
-    def _keep(self, pulse: PulseNumber, camera: str, regions: list[Region]) -> None:
-        self._kept -= sum(region.nbytes for region in self._regions.pop((pulse, camera), ()))
+    def _keep(self, pulse: PulseNumber, camera: str, regions: list[Region], traces: WantedTraces | None = None) -> None:
+        self._forget((pulse, camera))
         self._regions[pulse, camera] = regions
+        if traces is not None:
+            self._wanted[pulse, camera] = ref(traces)
         self._kept += sum(region.nbytes for region in regions)
         while self._kept > self._memory and len(self._regions) > 1:
-            _, oldest = self._regions.popitem(last=False)
-            self._kept -= sum(region.nbytes for region in oldest)
+            self._forget(next(iter(self._regions)))
+
+    def _forget(self, image: tuple[PulseNumber, str]) -> None:
+        """Give the memory of an image back; its traces are found before, if its candidates are still there."""
+        self._kept -= sum(region.nbytes for region in self._regions.pop(image, ()))
+        traces = wanted() if (wanted := self._wanted.pop(image, None)) is not None else None
+        if traces is not None:
+            traces.find()
 
 
 def find_candidates(
@@ -195,10 +208,9 @@ def find_candidates(
     return found
 
 
-def _candidates(regions: list[Region]) -> ImageCandidates:
-    traces = [find_traces(region) for region in regions]
-    most = [MOST if found or i == 0 else _FITS_OF_OTHERS for i, found in enumerate(traces)]
-    return ImageCandidates(find_spots(regions, most), tuple(trace for found in traces for trace in found))
+def _spots(regions: list[Region]) -> Spots:
+    most = [MOST if i == 0 else _FITS_OF_OTHERS for i in range(len(regions))]
+    return find_spots(regions, most)
 
 
 def _inside(box: Floats, shape: tuple[int, int]) -> tuple[int, int, int, int] | None:

@@ -101,7 +101,7 @@ class ImageCandidates:
     """
 
     spots: Spots
-    traces: tuple[Trace, ...]
+    traces: Sequence[Trace]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from analysis.identification.flights import Flight, find_flights, find_tracks
 from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.refinement import refined
 from analysis.identification.ski_traces import StraightTrace, straightened
-from analysis.identification.skis import follow_skis
+from analysis.identification.skis import LONGEST_M, Places, follow_skis
 from analysis.identification.space_points import Appearance
 from analysis.identification.synchrony import lateness
 from analysis.identification.views import Views
@@ -33,6 +33,7 @@ _SEARCH_HZ = 30.0  #: tracks are sought in so many pulses per second: displaceme
 _BEYOND_S = 0.6  #: that markers are followed before the first and after the last point of a track
 _LEAST_NAMES = 2  #: a jumper has more than one point
 _LEAST_PULSES = 3  #: and shows them in more than a glimpse
+_SIGMAS = 3.0  #: of a binding's place, within which skis are sought
 
 
 def identify(
@@ -129,6 +130,7 @@ class Sighting:
         if look is not None:
             markers = follow_further(views, window, flight, markers, look)
             markers = refined(views, window, flight, markers, self.appearance, look)
+        _look_for_traces(views, window, markers.places(BINDINGS))
         _tell_skis_apart(views, window, flight)
         traces = straight_traces(views, window)
         skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
@@ -157,6 +159,17 @@ def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Fli
 
 def _named(pulse: PulseMeasurements) -> set[str]:
     return {label for image in pulse.images.values() for label in image.points}
+
+
+def _look_for_traces(views: Views, window: Window, bindings: Places) -> None:
+    """Find the traces of what may be skis: nothing else is as near to the bindings."""
+    spread = np.sqrt(np.linalg.eigvalsh(bindings.covariance)[..., -1])
+    reach_m = np.minimum(LONGEST_M + _SIGMAS * spread, REACH_M)
+    for k in range(len(views)):
+        sight = views.see(k, bindings.xyz.reshape(-1, 3))
+        scale = np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2))
+        places = sight.xy.reshape(-1, 2, 2) - window.shift[:, k, None]
+        window.look_for_traces(k, places, reach_m * scale.reshape(-1, 2))
 
 
 def _tell_skis_apart(views: Views, window: Window, flight: Flight) -> None:

@@ -8,6 +8,7 @@ about those in which they are not.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -44,7 +45,8 @@ _MOST_TURNS = 6
 _BEAM = 12
 _KNOWN_RAD = 0.1  #: standard deviation of a direction that tells a ski from a leg
 _BEYOND_M = 0.35  #: more than a boot
-_LONGEST_M, _LONGEST_SIGMA_M = 1.4, 0.1  #: from a binding to tail or tip: skis of 2.8 m
+LONGEST_M: Final = 1.4  #: from a binding to tail or tip: skis of 2.8 m
+_LONGEST_SIGMA_M = 0.1  #: of that
 _END_SIGMA_M = 0.06  #: of a visible end of a ski
 _LEAST_TRACES = 8  #: of each ski that tell where its ends are
 _LENGTH_PX = 40.0  #: of a trace, for the density of traces that are there by chance
@@ -154,7 +156,7 @@ class _Search:
         self._known = sigma < MOST_VAGUE_M
         height = np.array([placed.size.min() for placed in views.placed])
         self._space = height * np.pi / 2 * _LENGTH_PX  # px^2 over which the ends of a trace may lie by chance
-        self._ends = np.tile((-_LONGEST_M, _LONGEST_M), (2, 1))  # of each ski, m from its binding: tail and tip
+        self._ends = np.tile((-LONGEST_M, LONGEST_M), (2, 1))  # of each ski, m from its binding: tail and tip
         self._ends_sigma = _LONGEST_SIGMA_M
 
     def belief(self, angles: Prediction, offsets: tuple[Floats, Floats]) -> tuple[Floats, Floats]:

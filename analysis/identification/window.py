@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
+from analysis.candidates.wanted_traces import WantedTraces
 from analysis.identification.body import REACH_M
 from analysis.identification.flights import Flight
 from analysis.identification.space_points import Appearance, Rays, find_space_points, rays_of
@@ -107,12 +108,24 @@ class Window:
         images = {**self.candidates[t].images, name: ImageCandidates(spots, image.traces)}
         self.candidates[t] = replace(self.candidates[t], images=images)
 
-    def traces(self, t: int, k: int) -> tuple[Trace, ...]:
+    def look_for_traces(self, k: int, places: Floats, reach: Floats) -> None:
+        """Find the traces in the images of a camera near some places, where they have not been sought before.
+
+        Args:
+            k: number of the camera.
+            places: (t, n, 2) px, in each image; NaN: nowhere.
+            reach: (t, n) px around each; what lies further away is left out.
+        """
+        for t in range(len(self)):
+            if isinstance(wanted := self.traces(t, k), WantedTraces):
+                self.put_traces(t, k, wanted.near(places[t], reach[t]))
+
+    def traces(self, t: int, k: int) -> Sequence[Trace]:
         """The traces of an image; none where it is missing."""
         image = self.candidates[t].images.get(self._views.names[k])
         return () if image is None else image.traces
 
-    def put_traces(self, t: int, k: int, traces: tuple[Trace, ...]) -> None:
+    def put_traces(self, t: int, k: int, traces: Sequence[Trace]) -> None:
         """Replace the traces of an image."""
         name = self._views.names[k]
         images = {**self.candidates[t].images, name: replace(self.candidates[t].images[name], traces=traces)}

@@ -121,7 +121,7 @@ class Follower:
         assigned = assign(views, window, places, flight.axes)
         for k in range(len(views)):
             if traces := window.traces(0, k):
-                window.put_traces(0, k, self._skis.told_apart(k, traces))
+                window.put_traces(0, k, self._skis.told_apart(k, tuple(traces)))
         lines = straight_traces(views, window)
         bindings = Markers(assigned, places).places(BINDINGS)
         skis = assign_skis(views, lines, window.delivered, flight, bindings, _angles(state, flight))

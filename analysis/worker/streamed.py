@@ -24,6 +24,8 @@ _SPREAD_S: Final = 4.0
 _WAITING_BYTES: Final = 400 << 20
 #: Candidates of so long a time are kept: longer than anybody is in sight.
 _KEPT_S: Final = 8.0
+#: While nobody is, the last moments are enough: a jumper is found soon after he has come into sight.
+_KEPT_UNSEEN_S: Final = 2.0
 #: After a failure to orient the cameras it is tried again with new frames after so long a time.
 _AGAIN_S: Final = 10.0
 
@@ -138,7 +140,8 @@ class Streamed:
     def keep(self, candidates: PulseCandidates) -> None:
         """Keep candidates; the oldest make room."""
         self.candidates.append(candidates)
-        while self.candidates[-1].pulse - self.candidates[0].pulse > _KEPT_S * self.rate_hz:
+        kept_s = _KEPT_UNSEEN_S if self.seen is None else _KEPT_S
+        while self.candidates[-1].pulse - self.candidates[0].pulse > kept_s * self.rate_hz:
             self.candidates.popleft()
 
     def between(self, first: float, last: float) -> list[PulseCandidates]:

@@ -88,7 +88,8 @@ class Hill:
         frames = [self.triplet(pulse) for pulse in pulses]
         names = [camera.name for camera in shown.cameras]
         blocks = {name: [f[:, i * size[0] : (i + 1) * size[0]] for f in frames] for i, name in enumerate(names)}
-        self.finder = Finder({name: static_image(name, block) for name, block in blocks.items()})
+        self.static = {name: static_image(name, block) for name, block in blocks.items()}
+        self.finder = Finder(self.static)
 
     def triplet(self, pulse: int) -> NDArray[np.uint8]:
         """The images of a pulse side by side."""
@@ -181,7 +182,7 @@ def _judge_spots(
     verdict.false += len(image.spots) - len(taken)
 
 
-def _judge_traces(verdict: Verdict, traces: tuple[Trace, ...], lines: dict[str, Floats], size: tuple[int, int]) -> None:
+def _judge_traces(verdict: Verdict, traces: Sequence[Trace], lines: dict[str, Floats], size: tuple[int, int]) -> None:
     best: dict[int, tuple[float, Floats, Floats]] = {}
     for line in lines.values():
         inside = bool(((line > 4) & (line < np.array(size) - 5)).all())

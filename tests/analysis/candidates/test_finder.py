@@ -41,13 +41,13 @@ def test_numbers_written_into_the_images_are_no_candidates() -> None:
     stamped = Hill(scenario().model_copy(update={"stamp": True}))
     for image in stamped.find(85).images.values():
         assert len(image.spots) == 0
-        assert image.traces == ()
+        assert len(image.traces) == 0
 
 
 def test_nothing_moves_nothing_found(hill: Hill) -> None:
     for image in hill.find(85).images.values():  # between two jumps, with flakes of snow in the air
         assert len(image.spots) == 0
-        assert image.traces == ()
+        assert len(image.traces) == 0
 
 
 def test_a_predicted_place_finds_the_marker_again(hill: Hill) -> None:

@@ -5,6 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bench.analysis.faults import run_faults
 from bench.analysis.honesty import run_honesty
 from bench.analysis.jumps import run_jumps
@@ -112,11 +114,12 @@ def _honesty(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
-def _repeats(seconds: float, directory: Path) -> dict[str, Any]:
-    cases = run_repeats(seconds)
+def _repeats(draws: int, directory: Path) -> dict[str, Any]:
+    cases = run_repeats(draws)
     path = write_results("jump-repeats", cases, directory)
     table = [
-        f"{case['name']}: different in {case['found']:.1%} of {case['pairs']} pairs, expected {case['expected']:.1%}"
+        f"{case['name']}: found different in {case['found']:.1%} of {case['pairs']} comparisons, expected "
+        f"{case['expected']:.1%}"
         for case in cases
     ]
     return {"cases": cases, "file": str(path), "table": table}
@@ -142,7 +145,8 @@ def _smoothing(draws: int, directory: Path) -> dict[str, Any]:
     for case in cases:
         table.append(f"{case['name']}, {case['draws']} draws: mean square, within 2 sigma, sigma over scatter")
         table += [
-            f"  {quantity:24}{of['mean_square']:8.2f}{of['within_2_sigma']:8.1%}{of['sigma_over_scatter']:8.2f}"
+            f"  {quantity:24}{of['mean_square']:8.2f} ± {of['known_to'] or np.nan:4.2f}"
+            f"{of['within_2_sigma']:8.1%}{of['sigma_over_scatter']:8.2f}"
             for quantity, of in case["honesty"].items()
         ]
     return {"cases": cases, "file": str(path), "table": table}
@@ -172,9 +176,8 @@ SUITES: dict[str, Suite] = {
     "jump-faults": _faults,
     "live": lambda seconds, directory: _timed("live", lambda _: run_live(), seconds, directory),
     "jump-honesty": _honesty,
-    "jump-repeats": _repeats,
 }
 #: Suites that draw jumps or networks and the errors of their measurements.
-DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "gross-errors": _gross_errors}
+DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "jump-repeats": _repeats, "gross-errors": _gross_errors}
 #: Suites that fire a number of simulated pulses.
 FIRED: dict[str, DrawnSuite] = {"pairing": _pairing}

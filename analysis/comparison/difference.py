@@ -26,7 +26,7 @@ DRAWS: Final = 4_000
 _SEED: Final = 2012
 #: Changes, lasting over the flight, whose chance of being found is stated: degrees, m, m/s.
 CHANGES: Final = dict(zip(QUANTITIES, (2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.02, 0.2, 0.2, 0.2, 0.2), strict=True))
-_FOUND: Final = 0.8
+FOUND: Final = 0.8  #: probability with which `Power.change_80` is found
 _BISECTIONS: Final = 30
 
 
@@ -189,7 +189,7 @@ def _power(draws: Floats, deviation: Floats, known: Flags, times: Floats, limit:
         low, high = 0.0, float(4 * limit / unit.max())
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
-            low, high = (low, middle) if _chance(z, unit, middle, limit) > _FOUND else (middle, high)
+            low, high = (low, middle) if _chance(z, unit, middle, limit) > FOUND else (middle, high)
         found[name] = Power(CHANGES[name], _chance(z, unit, CHANGES[name], limit), high)
     return found
 

@@ -10,8 +10,9 @@ sampled at equal times this is a filter with the frequency response
 which gives k from the variances. Errors of measurement then have the spectrum S^2, those of rates w^2 S^2, the stated
 variance belongs to S and w^2 S. Of the stated variance of values errors of measurement are 5/6, of that of rates 1/2,
 if the smoother reaches far. Near the ends of a jump the smoother is one-sided: there nearly all of the variance of
-rates is from errors of measurement, so all of it is taken. The angle of attack is phi, a value, minus the slope of the
-path, which is a rate.
+rates is from errors of measurement, so all of it is taken. The same holds on both sides of the edge: what comes between
+table and flight is so rough that it says little of their smooth motion. The angle of attack is phi, a value, minus the
+slope of the path, which is a rate.
 """
 
 from typing import Final
@@ -19,6 +20,7 @@ from typing import Final
 import numpy as np
 
 from analysis.comparison.aligned import ATTACK, HEIGHT, PHI, RATES, Series
+from analysis.result.model import EDGE_S
 from rig.arrays import Flags, Floats
 
 _FREQUENCIES: Final = 128
@@ -39,7 +41,7 @@ def noise_covariance(series: Series) -> Floats:
     share = np.vstack((series.share, series.share[HEIGHT]))
     frequencies = (np.arange(_FREQUENCIES) + 0.5) * np.pi / _FREQUENCIES
     amplitude = _amplitude(share, frequencies)
-    one_sided = _RATES_AND_PATH[:, None] & _near_ends(series, share)
+    one_sided = _RATES_AND_PATH[:, None] & _one_sided(series, share)
     amplitude[one_sided] /= np.linalg.norm(amplitude[one_sided], axis=-1, keepdims=True)
     amplitude *= np.sqrt(variance)[..., None]
     phase = series.times[:, None] * series.rate_hz * frequencies
@@ -59,10 +61,12 @@ def _amplitude(share: Floats, frequencies: Floats) -> Floats:
     return np.asarray(np.sqrt(weight) * response / np.sqrt((weight * response).sum(axis=-1, keepdims=True)))
 
 
-def _near_ends(series: Series, share: Floats) -> Flags:
-    """Which values (12, T) the smoother's window, 1 / share pulses wide, would take from beyond the ends."""
-    within = np.minimum(series.times - series.ends_s[0], series.ends_s[1] - series.times) * series.rate_hz
-    return np.asarray(within < 0.5 / share)
+def _one_sided(series: Series, share: Floats) -> Flags:
+    """Which values (12, T) the smoother's window, 1 / share pulses wide, would take from beyond an end or the edge."""
+    times = series.times
+    off = np.minimum(times - series.ends_s[0], series.ends_s[1] - times)
+    off = np.minimum(off, np.where(times < EDGE_S / 2, np.maximum(-times, 0.0), np.maximum(times - EDGE_S, 0.0)))
+    return np.asarray(off * series.rate_hz < 0.5 / share)
 
 
 def _stiffness(share: Floats) -> Floats:

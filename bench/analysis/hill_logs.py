@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, DeviceNs, UtcNs
 from rig.frame import FrameStatus
+from rig.pixels import Stored
 from rig.pulse import HillPulse, PulseNumber
 from rig.tag import CameraTag, TripletTag
 from simrig.images.view import CameraView
@@ -38,12 +39,20 @@ class HillLog:
     truth: dict[int, dict[str, Any]]
 
 
+class View(Protocol):
+    """What one camera sees."""
+
+    def render_into(self, out: Stored, pulse: HillPulse) -> None:
+        """Render the image of hill pulse `pulse` into `out`, shape (height, width)."""
+
+
 def write_hill_log(
     path: Path,
     scenario: Scenario,
     pulses: Sequence[int],
     size: tuple[int, int] = (640, 480),
     rate_hz: float = 30.0,
+    views: Sequence[View] | None = None,
 ) -> HillLog:
     """Render hill pulses into a log, numbered from 1.
 
@@ -53,9 +62,10 @@ def write_hill_log(
         pulses: hill pulses.
         size: width and height of the images, px.
         rate_hz: pulses per second.
+        views: what the cameras of the scenario see, if it is not to be rendered from it.
     """
     width, height = size
-    views = [CameraView(scenario, index, width, height, rate_hz) for index in range(len(scenario.cameras))]
+    views = views or [CameraView(scenario, index, width, height, rate_hz) for index in range(len(scenario.cameras))]
     shape = (height, width * len(views))
     log = path.with_suffix(".mcap")
     buffers = TripletBuffers(shape, 8)
@@ -74,7 +84,7 @@ def write_hill_log(
     return HillLog(log, surveyed, dict(enumerate(states, 1)))
 
 
-def _triplet(views: Sequence[CameraView], size: tuple[int, int], pulse: int) -> NDArray[np.uint8]:
+def _triplet(views: Sequence[View], size: tuple[int, int], pulse: int) -> NDArray[np.uint8]:
     """The images of all cameras at a hill pulse, side by side."""
     images = []
     for view in views:

@@ -1,72 +1,127 @@
-"""Whether comparing jumps finds what it says: one jump rendered again and again, and with another leg angle."""
+"""Whether comparing jumps finds what it says: one jump filmed again and again, and with another leg angle.
+
+The images of either jump are rendered once; each recording has noise of its own. The cameras are oriented once, as for
+a day of training, so that the errors of the calibration are the same in all recordings.
+"""
 
 import tempfile
-import time
-from collections.abc import Iterable
-from itertools import combinations, product
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
+from analysis.cameras.poses_file import Calibration, read_poses
 from analysis.cameras.source import read_source
-from analysis.comparison.aligned import MeasuredJump, comparable, measured_jump
+from analysis.comparison.aligned import MeasuredJump, measured_jump
 from analysis.comparison.alignment import align
-from analysis.comparison.difference import CHANGES, LEVEL, Difference, difference
+from analysis.comparison.difference import CHANGES, FOUND, LEVEL, Difference, Power, difference
 from analysis.procedure.analyze import analyze
-from bench.analysis.hill_logs import write_hill_log
+from analysis.result.model import QUANTITIES
+from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.analysis.jumps import PULSES, scenario_of
+from bench.analysis.same_images import SameImages
+from photogrammetry.reports.procedures import orientation_to_json
+from photogrammetry.reports.result_file import write_result
 from simrig.world.scenario import Jumper, Scenario, Variation
 
 RATE_HZ: Final = 30.0
+SIZE: Final = (640, 480)
 _SEED: Final = 7000
 _LEG: Final = "alpha"
-_CHANGED_EVERY: Final = 3  #: jumps, of which the last one has another leg angle
+_PER_CHANGED: Final = 8  #: comparisons of each changed jump
+_NEXT: Final = (1, 2)  #: with which jumps of the ring each is compared
+_FEWEST: Final = 5  #: jumps in a ring, so that no pair comes twice
 
 
-def run_repeats(seconds: float) -> list[dict[str, Any]]:
-    """Render, measure and compare jumps that are alike, and jumps with the leg angle changed by `CHANGES`.
+def run_repeats(comparisons: int) -> list[dict[str, Any]]:
+    """Film, measure and compare jumps that are alike, and such with another leg angle.
 
-    Every jump is of its own recording; all are oriented with the same survey. The jumps of all pairs are the same few,
-    so that the pairs are not independent.
+    The leg angle is changed by as much as the comparison tells the chance of, and by as little as it says to find in
+    80 % of the comparisons. Jumps that are alike stand in a ring: each is compared with the next two, so that it is in
+    four comparisons. Each changed jump is compared with eight of them.
 
     Args:
-        seconds: about how long to go on; two jumps of each kind at least.
+        comparisons: of jumps that are alike; there are half as many such jumps, and a sixteenth with each change.
 
     Returns:
-        Cases with name, pairs, the share in which a difference was found, and what share was to be expected.
+        Cases with name, pairs, the share in which a difference was found, what share was to be expected, in how many
+        pairs each quantity was found different, and the mean square of differences over their stated sigmas.
     """
-    alike: list[MeasuredJump] = []
-    changed: list[MeasuredJump] = []
-    end = time.monotonic() + seconds
-    made = 0
-    with tempfile.TemporaryDirectory(prefix="svev-bench-") as folder:
-        while min(len(alike), len(changed)) < 2 or time.monotonic() < end:
-            other = made % _CHANGED_EVERY == _CHANGED_EVERY - 1
-            scenario = _scenario(CHANGES[_LEG] if other else 0.0)
-            (changed if other else alike).extend(_measured(Path(folder), scenario, made))
-            made += 1
-    same = [difference(align(list(pair))) for pair in combinations(alike, 2)]
-    different = [difference(align(list(pair))) for pair in product(alike, changed)]
-    predicted = [power.probability for each in different if (power := each.power[_LEG]) is not None]
-    return [
-        _case("jumps that are alike", same, (bool(each.found()) for each in same), LEVEL),
-        _case(
-            f"leg angle changed by {CHANGES[_LEG]:g} degrees",
-            different,
-            (_LEG in each.found() for each in different),
-            sum(predicted) / max(1, len(predicted)),
-        ),
-    ]
+    count = max(comparisons // len(_NEXT), _FEWEST)
+    with tempfile.TemporaryDirectory(prefix="svev-bench-") as name:
+        folder = Path(name)
+        hill = _Hill(folder, 0.0)
+        poses = hill.oriented()
+        ring = [hill.measured(number, poses) for number in range(count)]
+        same = [_compared(one, ring[(k + step) % count]) for step in _NEXT for k, one in enumerate(ring)]
+        cases = [_case("jumps that are alike", same, lambda each: bool(each.found()), LEVEL)]
+        power = _mean_power(same)
+        for change_deg, expected in ((power.change, power.probability), (power.change_80, FOUND)):
+            hill = _Hill(folder, change_deg)
+            others = [hill.measured(count + k, poses) for k in range(-(-count // _PER_CHANGED))]
+            different = [_compared(one, others[k // _PER_CHANGED]) for k, one in enumerate(ring)]
+            title = f"leg angle changed by {change_deg:.3g} degrees"
+            cases.append(_case(title, different, lambda each: _LEG in each.found(), expected))
+    return cases
 
 
-def _case(name: str, compared: list[Difference], found: Iterable[bool], expected: float) -> dict[str, Any]:
-    count = sum(found)
+def _compared(one: MeasuredJump, other: MeasuredJump) -> Difference:
+    return difference(align([one, other]))
+
+
+def _mean_power(compared: list[Difference]) -> Power:
+    """What would have been found in the leg angle."""
+    known = [power for each in compared if (power := each.power[_LEG]) is not None]
+    probability = float(np.mean([power.probability for power in known]))
+    return Power(CHANGES[_LEG], probability, float(np.mean([power.change_80 for power in known])))
+
+
+class _Hill:
+    """A hill whose jumps are all alike.
+
+    Args:
+        folder: for its logs.
+        leg_deg: by how much the leg angle in flight is larger.
+    """
+
+    def __init__(self, folder: Path, leg_deg: float) -> None:
+        self._folder, self._scenario = folder, _scenario(leg_deg)
+        self._images = SameImages(self._scenario, PULSES, SIZE, RATE_HZ)
+
+    def oriented(self) -> Calibration:
+        """The cameras, oriented by a recording of their own."""
+        log = self._filmed(0)
+        orientation = analyze(log.path, read_source(log.survey, None)).orientation
+        if orientation is None:
+            raise RuntimeError("the simulated hill was not oriented")
+        write_result(orientation_to_json(orientation), poses := self._folder / "poses.json")
+        return read_poses(poses)
+
+    def measured(self, number: int, poses: Calibration) -> MeasuredJump:
+        """A jump of a recording with noise of its own."""
+        log = self._filmed(number + 1)
+        result = analyze(log.path, poses).result
+        log.path.unlink()
+        return measured_jump(result, 1, f"jump {number}")
+
+    def _filmed(self, seed: int) -> HillLog:
+        path = self._folder / f"jump-{seed}"
+        return write_hill_log(path, self._scenario, PULSES, SIZE, RATE_HZ, self._images.noisy(seed))
+
+
+def _case(
+    name: str, compared: list[Difference], found: Callable[[Difference], bool], expected: float
+) -> dict[str, Any]:
     quantities = [quantity for each in compared for quantity in each.found()]
+    squares = np.nanmean([np.nanmean((each.value / each.repeat) ** 2, axis=1) for each in compared], axis=0)
     return {
         "name": name,
         "pairs": len(compared),
-        "found": round(count / max(1, len(compared)), 3),
+        "found": round(sum(map(found, compared)) / len(compared), 3),
         "expected": round(expected, 3),
         "by_quantity": {quantity: quantities.count(quantity) for quantity in sorted(set(quantities))},
+        "mean_square": dict(zip(QUANTITIES, squares.round(2).tolist(), strict=True)),
     }
 
 
@@ -77,12 +132,3 @@ def _scenario(leg_deg: float) -> Scenario:
     jumper = Jumper.model_validate(scenario.jumper.model_dump() | {"leg_angle_deg": legs})
     none = Variation(**dict.fromkeys(Variation.model_fields, 0.0))
     return scenario.model_copy(update={"jumper": jumper, "variation": none})
-
-
-def _measured(folder: Path, scenario: Scenario, jump: int) -> list[MeasuredJump]:
-    """The jump number `jump` of a hill, if it was found."""
-    begin = round(jump * scenario.jump_every_s * RATE_HZ)
-    log = write_hill_log(folder / f"jump-{jump}", scenario, [begin + pulse for pulse in PULSES], rate_hz=RATE_HZ)
-    result = analyze(log.path, read_source(log.survey, None)).result
-    log.path.unlink()
-    return [measured_jump(result, each.number, f"jump {jump}") for each in result.jumps if comparable(each)]

@@ -17,6 +17,7 @@ from analysis.motion.smoother import Motion, smooth
 from analysis.result.model import Phase, SmoothedState, Status, phase_at
 from bench.analysis.simulated import RATE_HZ, TrueJump, drawn, simulated_measurements, training, true_cameras, true_jump
 from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope
+from rig.arrays import Floats
 
 #: What is blanked, one after the other from draw to draw.
 BLANKED: Final = tuple((group, phase) for phase in Phase for group in GROUPS)
@@ -26,16 +27,31 @@ _GOLDEN: Final = 0.6180339887  # of a pulse, from draw to draw: the take-off lie
 
 @dataclass(slots=True)
 class Honesty:
-    """Errors with their sigmas, by phase and quantity."""
+    """Errors with their sigmas.
+
+    Attributes:
+        pairs: by phase and quantity, error and sigma.
+        jumps: for each of them, of which jump it is.
+    """
 
     pairs: dict[tuple[str, str], list[tuple[float, float]]] = field(default_factory=lambda: defaultdict(list))
+    jumps: dict[tuple[str, str], list[int]] = field(default_factory=lambda: defaultdict(list))
+    _jump: int = 0
+
+    def begin(self) -> None:
+        """What is added from now on is of another jump."""
+        self._jump += 1
 
     def add(self, phase: str, quantity: str, error: float, sigma: float) -> None:
         """Add one error."""
         self.pairs[phase, quantity].append((error, sigma))
+        self.jumps[phase, quantity].append(self._jump)
 
-    def figures(self) -> dict[str, dict[str, float]]:
-        """By phase and quantity: number of errors, mean square of error over sigma, share within two sigmas, sizes."""
+    def figures(self) -> dict[str, dict[str, Any]]:
+        """By phase and quantity: number of errors, mean square of error over sigma, share within two sigmas, sizes.
+
+        `known_to` is the standard deviation of the mean square, as the jumps show it: the errors of one are correlated.
+        """
         out = {}
         for key, pairs in sorted(self.pairs.items()):
             error, sigma = np.array(pairs).T
@@ -43,6 +59,7 @@ class Honesty:
             out[" ".join(key)] = {
                 "n": len(z),
                 "mean_square": round(float(np.mean(z**2)), 3),
+                "known_to": _known_to(z**2, self.jumps[key]),
                 "within_2_sigma": round(float(np.mean(np.abs(z) < _WITHIN)), 3),
                 "mean_sigma": float(np.mean(sigma)),
                 "sigma_over_scatter": round(float(np.mean(sigma)) / scatter, 3),
@@ -99,8 +116,16 @@ def blanked_out(jump: JumpMeasurements, truth: TrueJump, group: str, phase: Phas
     return replace(jump, pulses=pulses)
 
 
+def _known_to(squares: Floats, jumps: list[int]) -> float | None:
+    """Standard deviation of a mean of squares that are independent from jump to jump only; None of a single jump."""
+    of_jumps = np.bincount(jumps, squares - squares.mean())
+    count = len(set(jumps))
+    return round(float(np.sqrt(np.sum(of_jumps**2) * count / (count - 1)) / len(squares)), 3) if count > 1 else None
+
+
 def judge(truth: TrueJump, jump: JumpMeasurements, motion: Motion, honesty: Honesty) -> None:
     """Add the errors of a smoothed jump."""
+    honesty.begin()
     for pulse, state in zip(jump.pulses, motion.states, strict=True):
         if state is not None:
             phase = phase_at(truth.since_takeoff(pulse.pulse)).value

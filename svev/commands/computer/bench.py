@@ -18,7 +18,9 @@ def bench(
     draws: Annotated[
         int,
         typer.Option(
-            min=1, max=10_000, help="number of jumps that smoothing draws, of networks of each kind for gross-errors"
+            min=1,
+            max=10_000,
+            help="number of jumps that smoothing and jump-repeats draw, of networks of each kind for gross-errors",
         ),
     ] = 18,
     pulses: Annotated[int, typer.Option(min=100, max=10_000_000, help="pulses of each case of pairing")] = 5000,
@@ -34,14 +36,15 @@ def bench(
     the simulated cameras. firewire: the same on an emulated FireWire bus. parts: pairing, composing, checksum and
     drawing, each alone. api: answer times of the service while it records at 30 Hz; the baseline is the idle service.
     catalogue, listing: lists of many recordings; the baseline is a service that has just been started.
-    intersection, planning: intersections of rays and planned networks. adjustment: free networks with full
-    covariance; the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and
-    with faults. jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump
-    measured again and again, and with another leg angle: how often a comparison finds a difference. live: how soon a
-    worker tells the state of each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all
-    measurements and with a marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with
+    intersection, planning: intersections of rays and planned networks. adjustment: free networks with full covariance;
+    the baseline is scipy's least_squares. jumps, jump-faults: rendered jumps are measured, without and with faults.
+    jump-honesty: the same with many drawn surveys, errors beside their sigmas. jump-repeats: one jump filmed again and
+    again, and with another leg angle: how often comparisons find a difference; some seven seconds a draw. live: how
+    soon a worker tells the state of each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with
+    all measurements and with a marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with
     exchanged names, wrong survey, wrong image points or wrong units: what the search for gross errors makes of them.
-    pairing: triplets mixed, not found and invented under clocks that are set and rates that the rig file does not name.
+    pairing: triplets mixed, not found and invented under clocks that are set and rates that the rig file does not
+    name.
 
     Example: svev bench saturated --seconds 10
     """

@@ -176,11 +176,20 @@ def test_a_quantity_that_was_not_measured_is_left_out() -> None:
 
 
 def test_errors_of_measurement_are_five_sixths_of_the_variance_of_values_and_half_of_that_of_rates() -> None:
-    times = np.arange(-30, 31) / 30
+    assert _noise_variance(at_s=3.0) == pytest.approx(1.1 * np.where(RATES, 1 / 2, 5 / 6), abs=0.02)
+
+
+@pytest.mark.parametrize("at_s", [0.0, -0.1, 0.2])
+def test_next_to_the_edge_all_of_the_variance_of_rates_is_of_measurement(at_s: float) -> None:
+    assert _noise_variance(at_s) == pytest.approx(1.1 * np.where(RATES, 1, 5 / 6), abs=0.02)
+
+
+def _noise_variance(at_s: float) -> Floats:
+    """(11,) at a time since the take-off, of stated variances of 1 and a smoother that reaches far."""
     count = len(QUANTITIES)
-    shape = (count, len(times))
-    wide = Series(
-        times,
+    shape = (count, 1)
+    series = Series(
+        np.array([at_s]),
         np.zeros(shape),
         np.zeros(shape),
         np.ones(shape),
@@ -191,8 +200,7 @@ def test_errors_of_measurement_are_five_sixths_of_the_variance_of_values_and_hal
         30.0,
         (-9.0, 9.0),
     )
-    variance = noise_covariance(wide).diagonal().reshape(shape)[:, 30]
-    assert variance == pytest.approx(1.1 * np.where(RATES, 1 / 2, 5 / 6), abs=0.02)
+    return noise_covariance(series).diagonal()
 
 
 def test_own_scatter_is_that_within_the_athletes() -> None:

@@ -1,18 +1,15 @@
 """Exposure and gain of the cameras, changed while the rig runs and kept in the rig file when somebody wishes that."""
 
-import threading
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 from rig.api.light import CameraLight, LightChange
-from rig.disk import replace_file
-from rig.errors import StorageError
 from rig.events import Event, Level
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.light import camera_of, with_light, written
 from rig.settings.model import CameraSettings
-from rig.settings.strict_toml import read_text
+from service.rig_file import keep
 from service.supervision.commands import at_once
 from service.supervision.supervisor import Supervisor
 
@@ -29,7 +26,6 @@ class Lights:
 
     def __init__(self, supervisor: Supervisor, rig_file: Path) -> None:
         self._supervisor, self._file = supervisor, rig_file
-        self._lock = threading.Lock()
         self._kept = {camera.name: _light(camera) for camera in supervisor.rig.cameras}
 
     def view(self, name: str) -> CameraLight:
@@ -52,7 +48,7 @@ class Lights:
             StateForbidsError: a recording runs.
             StorageError: the rig file cannot be written; the camera has its other exposure or gain all the same.
         """
-        with self._lock:
+        with self._supervisor.changing:
             supervisor, before = self._supervisor, self.view(name)
             rig = with_light(supervisor.rig, name, change.values())
             exposure_us, gain_db = _light(camera_of(rig, name))
@@ -69,22 +65,19 @@ class Lights:
             return self.view(name)
 
     def _keep(self, name: str, exposure_us: float, gain_db: float) -> None:
-        """Write exposure and gain of a camera into the rig file as it is now; what else was edited in it stays."""
-        now = read_text(self._file, "TOML", "the rig file in use")
-        text = written(now, name, {"exposure_us": exposure_us, "gain_db": gain_db})
-        try:
-            replace_file(self._file, text.encode())
-        except OSError as error:
-            what = (
+        """Write exposure and gain of a camera into the rig file."""
+
+        def not_kept(why: str) -> Phrase:
+            text = (
                 "{path}: cannot be written ({why}); write exposure_us = {exposure_us:g} and gain_db = {gain_db:g} of "
                 "{camera} into it, or a restart of the service loses them"
             )
-            raise StorageError(
-                phrase(
-                    "why_light_not_kept", what, path=str(self._file), why=error.strerror or str(error),
-                    exposure_us=exposure_us, gain_db=gain_db, camera=name,
-                )
-            ) from error  # fmt: skip
+            return phrase(
+                "why_light_not_kept", text,
+                path=str(self._file), why=why, exposure_us=exposure_us, gain_db=gain_db, camera=name,
+            )  # fmt: skip
+
+        keep(self._file, lambda text: written(text, name, {"exposure_us": exposure_us, "gain_db": gain_db}), not_kept)
         self._kept[name] = exposure_us, gain_db
 
 

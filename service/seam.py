@@ -18,6 +18,7 @@ from rig.api.recordings import Pulses, Recording, RecordingOrder, RecordingQuery
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
+from rig.api.trigger import TriggerChange, TriggerView
 from rig.frame import FrameStatus
 from rig.phrase import Phrase
 from rig.pulse import RigPulse
@@ -346,6 +347,18 @@ class RigService(Protocol):
 
         UnknownCameraError: no such camera. BadInputError: out of range. StateForbidsError: a recording runs.
         StorageError: the rig file cannot be written.
+        """
+        ...
+
+    def trigger(self) -> TriggerView:
+        """Who makes the pulses, and at what rate."""
+        ...
+
+    def change_trigger(self, change: TriggerChange) -> TriggerView:
+        """Change the rate of the pulses, and keep it in the rig file if that is wished.
+
+        BadInputError: source, cameras or memory do not take the rate. StateForbidsError: a recording runs, or others
+        make the pulses. StorageError: the rig file cannot be written.
         """
         ...
 

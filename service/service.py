@@ -19,6 +19,7 @@ from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
+from rig.api.trigger import TriggerChange, TriggerView
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
 from rig.errors import (
     BadInputError,
@@ -47,6 +48,7 @@ from service.status.measurements import measurements
 from service.status.statements import FORBIDDEN, rehearsing
 from service.supervision.commands import at_once
 from service.supervision.supervisor import Supervisor
+from service.trains import Trains
 
 _SOON_S: Final = 10.0
 _OPEN_S: Final = 15.0
@@ -72,6 +74,7 @@ class Service(Archive):
         slot: shared memory with the newest triplet.
         rehearser: makes rehearsals of the rig.
         lights: exposure and gain of the cameras.
+        trains: the pulses, where svev makes them.
         examine: the doctor; examines what disturbs nothing in the given state.
     """
 
@@ -85,11 +88,13 @@ class Service(Archive):
         slot: PreviewSlot,
         rehearser: Rehearser,
         lights: Lights,
+        trains: Trains,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
         super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
-        self._slot, self._rehearser, self._lights, self._examine = slot, rehearser, lights, examine
+        self._slot, self._rehearser, self._lights, self._trains = slot, rehearser, lights, trains
+        self._examine = examine
         #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
         self._idle, self._examining = threading.Lock(), threading.Lock()
         self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
@@ -287,6 +292,16 @@ class Service(Archive):
         if self._rehearser.progress is not None:
             raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change exposure or gain")
         return self._lights.change(camera, change)
+
+    def trigger(self) -> TriggerView:
+        """Who makes the pulses, and at what rate."""
+        return self._trains.view()
+
+    def change_trigger(self, change: TriggerChange) -> TriggerView:
+        """Change the rate of the pulses; if the rig is armed, it is armed anew."""
+        if self._rehearser.progress is not None:
+            raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change the rate")
+        return self._trains.change(change)
 
     def _index(self, camera: str) -> int:
         names = [each.name for each in self._supervisor.rig.cameras]

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 import tomlkit
-from tomlkit.exceptions import TOMLKitError
 
 from rig.errors import BadInputError, UnknownCameraError
+from rig.settings.editing import as_toml, editable
 from rig.settings.model import CameraSettings, RigSettings
 from rig.settings.strict_toml import validate
 
@@ -57,14 +57,11 @@ def written(text: str, name: str, light: Mapping[str, float]) -> str:
     Raises:
         BadInputError: the text is not TOML, or has no such camera.
     """
-    try:
-        document = tomlkit.parse(text)
-    except TOMLKitError as error:
-        raise BadInputError(f"the rig file is not valid TOML any more: {error}; correct it there") from None
+    document = editable(text)
     cameras = document.get("cameras", [])
     camera = next((each for each in cameras if each.get("name") == name), None) if isinstance(cameras, list) else None
     if camera is None:
         raise BadInputError(f"the rig file has no camera {name} any more: start the service again")
     for key, value in light.items():
-        camera[key] = int(value) if float(value).is_integer() else value
+        camera[key] = as_toml(value)
     return tomlkit.dumps(document)

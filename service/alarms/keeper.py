@@ -59,7 +59,7 @@ class AlarmKeeper:
             self._tell(Event.now(EventLevel.INFO, alarm.name, alarm.over))
 
     def use(self, rig: RigSettings) -> None:
-        """Judge by another exposure of a camera from now on."""
+        """Judge by other exposures or another rate from now on."""
         self._rig = rig
         self.forget()
 

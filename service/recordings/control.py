@@ -95,9 +95,9 @@ class RecordingControl:
         self.armed_at = self.emptied_at = time.monotonic()
         self._answers: list[Callable[[], None]] = []
 
-    def use_rig_file(self, rig_toml: str) -> None:
-        """Attach another text of the rig file to the logs from now on."""
-        self._rig_toml = rig_toml
+    def use(self, rig: RigSettings, rig_toml: str) -> None:
+        """Take other settings and attach another text of the rig file to the logs from now on."""
+        self._rig, self._rig_toml = rig, rig_toml
 
     @property
     def opening(self) -> bool:

@@ -34,13 +34,13 @@ class TrashKeeper:
     """Looks after the trash of a folder in a thread of its own, because the disk may hang; a context manager.
 
     Args:
-        rig: says how much room a recording takes.
+        in_use: gives the rig in use, which says how much room a recording takes.
         catalogue: of the folder.
         tell: takes an event whenever something was removed, or could not be; any thread may call it.
     """
 
-    def __init__(self, rig: RigSettings, catalogue: Catalogue, tell: Callable[[Event], None]) -> None:
-        self._rig, self._catalogue, self._tell = rig, catalogue, tell
+    def __init__(self, in_use: Callable[[], RigSettings], catalogue: Catalogue, tell: Callable[[Event], None]) -> None:
+        self._in_use, self._catalogue, self._tell = in_use, catalogue, tell
         self._contents = TrashContents(0, 0)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="trash keeper", daemon=True)
@@ -59,7 +59,7 @@ class TrashKeeper:
         trash, disk = self._contents.bytes, status.disk
         if not trash:
             return status
-        room = room_for(self._rig, round(disk.free_gb * _GB), trash)
+        room = room_for(self._in_use(), round(disk.free_gb * _GB), trash)
         counted = DiskStatus(
             free_gb=disk.free_gb,
             trash_gb=round(trash / _GB, 2),
@@ -83,7 +83,8 @@ class TrashKeeper:
         free = free_bytes(self._catalogue.directory)
         if free is None:  # the disk is not there
             return
-        missing = seconds * bytes_per_s(self._rig) - usable_bytes(self._rig, free)
+        rig = self._in_use()
+        missing = seconds * bytes_per_s(rig) - usable_bytes(rig, free)
         if missing > 0:
             gone = self._catalogue.make_room(missing, older_than_s=_FRESH_S if spare_fresh else 0.0)
             self._say(gone, phrase("why_room_needed", "room was needed"))
@@ -96,7 +97,7 @@ class TrashKeeper:
         """
         old = phrase("why_too_old", "it was older than {days} days", days=KEPT_DAYS)
         self._say(self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S), old)
-        self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._rig.recorder.jump_s), spare_fresh=True)
+        self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._in_use().recorder.jump_s), spare_fresh=True)
         self.make_room(_LAST_S)
         self._contents = self._catalogue.trash()
 

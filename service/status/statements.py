@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from rig.api.jump import LastJump
 from rig.api.statement import Level, Statement
 from rig.api.status import CameraState, State
 from rig.errors import SvevError
@@ -184,6 +185,18 @@ def moved(before: State, to: State, fault: Statement | None) -> Phrase:
     return phrase("event_failed", "{before} -> {to}: {why}", before=left, to=entered, why=fault.said)
 
 
+def measured(jump: LastJump) -> Phrase:
+    """A jump was measured live."""
+    text = "jump {jump} of {recording}: {verdict}"
+    return phrase("event_jump", text, jump=jump.jump, recording=jump.recording, verdict=jump.verdict)
+
+
+def too_slow(late: Sequence[str]) -> Phrase:
+    """The computer has become too slow for the cameras of these names."""
+    text = "too slow: frames of {late} come too late or get lost; close other programs"
+    return phrase("event_too_slow", text, late=", ".join(late))
+
+
 def no_camera() -> Statement:
     """The fault that none of the cameras answers."""
     return Statement(
@@ -350,6 +363,11 @@ FORBIDDEN: dict[tuple[str, State], str] = {
     ("expose", State.RECORDING): "a recording is running: stop it, then change exposure or gain",
     ("expose", State.DISARMING): "the rig is being disarmed: wait until that is done, then change exposure or gain",
     ("expose", State.FAULT): "the rig is being tried again: wait a moment, then change exposure or gain",
+    ("rate", State.ARMING): "the rig is being armed: wait until it is armed, then change the rate",
+    ("rate", State.ARMED): "a recording is about to start: stop it, then change the rate",
+    ("rate", State.RECORDING): "a recording is running: stop it, then change the rate",
+    ("rate", State.DISARMING): "the rig is being disarmed: wait until that is done, then change the rate",
+    ("rate", State.FAULT): "the rig is being tried again: wait a moment, then change the rate",
     ("disarm", State.RECORDING): "a recording is running: stop it, then disarm",
     ("start", State.IDLE): "the rig is not armed: arm it, then start recording",
     ("start", State.ARMING): "the rig is being armed: wait until it is armed, then start recording",

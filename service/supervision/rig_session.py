@@ -32,7 +32,8 @@ class RigSession:
         hill: starts the simulated cameras; None: as the rig file says.
 
     Attributes:
-        rig, recorder: as given.
+        rig: in use; the owner may set another one of the same cameras, which counts when processes are started.
+        recorder: as given.
         processes: the running processes; None while there are none, or while they are started or stopped.
         truth: writes what the simulated cameras saw; None: the cameras are real, or those that the caller started.
     """
@@ -48,8 +49,7 @@ class RigSession:
     ) -> None:
         self.rig, self.recorder = rig, recorder
         self._on_event, self._on_done = on_event, on_done
-        self._own_hill = hill is None
-        self._start_hill = partial(hill_environment, rig) if hill is None else hill
+        self._given_hill = hill
         self.truth: WriteTruth | None = None
         self._hill: ExitStack | None = None
         self._epoch: HostNs | None = None
@@ -74,11 +74,10 @@ class RigSession:
         if self.processes is not None:
             self.processes.tell(TellEvent(event=event))
 
-    def change_camera(self, rig: RigSettings, name: str) -> None:
-        """Use the rig with a camera's other exposure or gain from now on; not while a job runs in the background."""
-        self.rig = rig
+    def change_camera(self, name: str) -> None:
+        """Give a camera its exposure and gain of `rig`, which are others now; not while a background job runs."""
         if self.processes is not None:
-            self.processes.change_camera(rig, name)
+            self.processes.change_camera(self.rig, name)
 
     def begin_set_up(self) -> None:
         """Begin to start the simulated hill, if there is none yet, and the processes."""
@@ -133,9 +132,10 @@ class RigSession:
         with ExitStack() as stack:
             if self._hill is None:
                 epoch = host_now()
-                self._environment = stack.enter_context(self._start_hill(epoch))
+                start = self._given_hill or partial(hill_environment, self.rig)
+                self._environment = stack.enter_context(start(epoch))
                 self._epoch = epoch
-                self.truth = simulated_truth(self.rig, epoch) if self._own_hill else None
+                self.truth = simulated_truth(self.rig, epoch) if self._given_hill is None else None
             processes = RigProcesses(
                 self.rig, self._on_event, epoch=self._epoch, recorder=self.recorder,
                 environment=self._environment,

@@ -9,7 +9,8 @@
    └── disarming ◄── from all but recording     fault ◄──── from anywhere ┘
 ```
 
-From arming a recording goes on at once whose recorder died.
+From arming a recording goes on at once whose recorder died. From armed the rig is armed anew if its pulses get another
+rate.
 
 Only the supervisor's thread moves the machine; any thread reads its phase.
 """
@@ -28,7 +29,7 @@ FOLLOWS: Final[Mapping[State, frozenset[State]]] = MappingProxyType(
     {
         State.IDLE: frozenset({State.ARMING}),
         State.ARMING: frozenset({State.ARMED, State.RECORDING, State.FAULT, State.DISARMING}),
-        State.ARMED: frozenset({State.RECORDING, State.FAULT, State.DISARMING}),
+        State.ARMED: frozenset({State.ARMING, State.RECORDING, State.FAULT, State.DISARMING}),
         State.RECORDING: frozenset({State.ARMED, State.FAULT}),
         State.DISARMING: frozenset({State.IDLE}),
         State.FAULT: frozenset({State.ARMING, State.ARMED, State.DISARMING}),

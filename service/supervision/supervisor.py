@@ -23,17 +23,16 @@ from rig.transport.analysis_messages import JumpMeasured
 from rig.transport.recorder_commands import RecorderOptions
 from rig.transport.recorder_reports import RecorderFailed, RecorderHealth, RecorderReport
 from service.jumpers.book import JumperBook
-from service.processes.rig_processes import ANALYSIS, RECORDER, TRIGGER
+from service.processes.rig_processes import RECORDER
 from service.recordings import live_results
 from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.picture import Facts, picture
-from service.status.statements import FORBIDDEN, moved
+from service.status.statements import FORBIDDEN, measured, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
-from service.supervision.overload import Overload
 from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.state_machine import StateMachine
 from service.supervision.warm_up import WarmUp
@@ -68,6 +67,7 @@ class Supervisor:
         health: the recorder's last health record, None if there is none.
         failure: the error that ended the thread, None if there was none.
         commands: through which other threads give commands.
+        changing: held by the thread that changes settings of the rig in use.
         recordings: starts and ends recordings; only for commands in the supervisor's thread.
         truths: writes the truth beside the logs of simulated cameras; any thread may wait for it.
     """
@@ -89,7 +89,7 @@ class Supervisor:
         self.on_turn: Callable[[], None] = lambda: None
         self.on_end: Callable[[], None] = lambda: None
         self.failure: Exception | None = None
-        self.commands = Commands()
+        self.commands, self.changing = Commands(), threading.Lock()
         self._machine = StateMachine(self._moved)
         self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder, hill=hill)
         self.truths = TruthWriter(hub.tell)
@@ -100,7 +100,6 @@ class Supervisor:
         self._fault, self._wanted = Fault(), False
         self._least = rig.least_cameras
         self._settling, self._watch = Settling(rig), RecorderWatch(rig, self._session.tell)
-        self._overload = Overload(rig.trigger.period_ns)
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
@@ -169,10 +168,27 @@ class Supervisor:
         """Command: use a rig with another exposure or gain of a camera, which is away for a moment while armed."""
         if self.recordings.current is not None or self._session.busy:
             raise StateForbidsError(FORBIDDEN["expose", self._machine.state])
+        self._use(rig, rig_toml)
+        self._session.change_camera(name)
+
+    def change_rate(self, rig: RigSettings, rig_toml: str) -> None:
+        """Command: use a rig with another rate of its pulses; if it is armed, or has a fault, it is armed anew."""
+        state = self._machine.state
+        if self.recordings.current is not None or self._session.busy or state is State.ARMING:
+            raise StateForbidsError(FORBIDDEN["rate", state])
+        self._use(rig, rig_toml)
+        self._settling = Settling(rig)
+        if self._session.processes is not None:
+            self._fault.hurry()
+            self._machine.move(State.ARMING)
+            self._session.begin_take_down(keep_hill=False)
+        self._refresh()
+
+    def _use(self, rig: RigSettings, rig_toml: str) -> None:
         self.rig, self.rig_toml = rig, rig_toml
-        self._session.change_camera(rig, name)
-        self.recordings.use_rig_file(rig_toml)
-        self._watch.alarms.use(rig)
+        self._session.rig = rig
+        self.recordings.use(rig, rig_toml)
+        self._watch.use(rig)
 
     def note(self, event: Event) -> None:
         """Command: tell an event, also to the log of a recording that runs or begins soon."""
@@ -271,7 +287,6 @@ class Supervisor:
         processes = self._session.processes
         if processes is None or processes.recorder_died:
             self._watch.expect_nothing()
-            self._overload.forget()
         if processes is None:
             select.select([self.commands.bell], [], [], _TURN_S)
             return
@@ -281,8 +296,7 @@ class Supervisor:
             else:
                 self._hear(report)
             if isinstance(report, RecorderHealth):
-                self._look_for_overload(report.health, processes.pids)
-                self._watch.alarms.look(report.health, self._overload.cameras)
+                self._watch.look(report.health, processes.pids)
         if not processes.recorder_died and self._watch.stuck(processes):
             said = phrase("event_recorder_stuck", "no sign of life for {seconds:g} s: it is ended", seconds=STUCK_S)
             self._session.tell(Event.now(Level.FATAL, RECORDER, said))
@@ -295,22 +309,10 @@ class Supervisor:
             self._fault.complain(report.error())
         self.recordings.hear(report)
 
-    def _look_for_overload(self, health: Health, pids: dict[str, int]) -> None:
-        """Look whether the computer is too slow, and say so when that begins."""
-        before = self._overload.cameras
-        fetching = {name: pid for name, pid in pids.items() if name not in {ANALYSIS, TRIGGER}}
-        self._overload.look(health, fetching, time.monotonic())
-        if self._overload.cameras and not before:
-            late = ", ".join(self.rig.cameras[index].name for index in self._overload.cameras)
-            text = "too slow: frames of {late} come too late or get lost; close other programs"
-            self._session.tell(Event.now(Level.WARNING, "computer", phrase("event_too_slow", text, late=late)))
-
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
         level = Level.INFO if jump.ok else Level.WARNING
-        text = "jump {jump} of {recording}: {verdict}"
-        said = phrase("event_jump", text, jump=jump.jump, recording=jump.recording, verdict=jump.verdict)
-        self._session.tell(Event.now(level, "analysis", said))
+        self._session.tell(Event.now(level, "analysis", measured(jump)))
 
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""
@@ -380,7 +382,7 @@ class Supervisor:
             warm=processes is not None and processes.warm,
             pulses=self._watch.pulses,
             alarms=self._watch.alarms.present,
-            overloaded=self._overload.cameras,
+            overloaded=self._watch.overload.cameras,
             room=room_for(self.rig, free or 0),
             preroll_s=self._recorder.preroll_s,
             holding_s=time.monotonic() - self.recordings.emptied_at,

@@ -1,17 +1,19 @@
 """Watches a running rig for the supervisor: pulses, alarms, signs of life of the recorder, cameras after arming."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from rig.api.statement import Statement
-from rig.events import Event
+from rig.events import Event, Level
+from rig.health import Health
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
 from rig.transport.recorder_reports import RecorderHealth, RecorderReport
 from service.alarms.keeper import AlarmKeeper
-from service.processes.rig_processes import RigProcesses
-from service.status.statements import no_camera, too_few_cameras, wrong_rate
+from service.processes.rig_processes import ANALYSIS, TRIGGER, RigProcesses
+from service.status.statements import no_camera, too_few_cameras, too_slow, wrong_rate
+from service.supervision.overload import Overload
 from triggering.timeline.steady_rate import SteadyRate
 
 #: Between reports farther apart than this the rate is not known.
@@ -70,11 +72,18 @@ class RecorderWatch:
     Attributes:
         pulses: the pulse rate.
         alarms: what is wrong.
+        overload: whether the computer is too slow.
     """
 
     def __init__(self, rig: RigSettings, tell: Callable[[Event], None]) -> None:
-        self.pulses, self.alarms = PulseRate(), AlarmKeeper(rig, tell)
+        self._rig, self._tell = rig, tell
+        self.pulses, self.alarms, self.overload = PulseRate(), AlarmKeeper(rig, tell), Overload(rig.trigger.period_ns)
         self._reported = time.monotonic()
+
+    def use(self, rig: RigSettings) -> None:
+        """Judge by other exposures or another rate from now on."""
+        self._rig, self.overload = rig, Overload(rig.trigger.period_ns)
+        self.alarms.use(rig)
 
     def hear(self, report: RecorderReport) -> None:
         """Enter a report."""
@@ -82,11 +91,27 @@ class RecorderWatch:
         if isinstance(report, RecorderHealth):
             self.pulses.count(report.health.pairing.seen, self._reported)
 
+    def look(self, health: Health, pids: Mapping[str, int]) -> None:
+        """Look what is wrong, and whether the computer is too slow; say so when that begins.
+
+        Args:
+            health: the recorder's record.
+            pids: process ids by row of the process table.
+        """
+        before = self.overload.cameras
+        fetching = {name: pid for name, pid in pids.items() if name not in {ANALYSIS, TRIGGER}}
+        self.overload.look(health, fetching, time.monotonic())
+        if self.overload.cameras and not before:
+            late = [self._rig.cameras[index].name for index in self.overload.cameras]
+            self._tell(Event.now(Level.WARNING, "computer", too_slow(late)))
+        self.alarms.look(health, self.overload.cameras)
+
     def expect_nothing(self) -> None:
         """Note that there is no recorder now, so that no report is late."""
         self._reported = time.monotonic()
         self.pulses.forget()
         self.alarms.forget()
+        self.overload.forget()
 
     def stuck(self, processes: RigProcesses) -> bool:
         """Whether the recorder has sent no report for so long that it has to be ended."""

@@ -35,6 +35,7 @@ from service.rehearsals import Rehearser
 from service.service import Service
 from service.status.event_hub import EventHub
 from service.supervision.supervisor import Supervisor
+from service.trains import Trains
 from svev import console
 from svev.serving.claims import data_lock, listen, url
 from svev.serving.panel_doctor import PanelDoctor
@@ -95,7 +96,7 @@ def serve(settings: ServiceSettings) -> None:
         options = RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
         jumpers = JumperBook(Keeper(data, hub.tell), hub.wake)
         supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)
-        keeper = stack.enter_context(TrashKeeper(rig, catalogue, hub.tell))
+        keeper = stack.enter_context(TrashKeeper(lambda: supervisor.rig, catalogue, hub.tell))
         exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
 
         def in_use() -> tuple[RigSettings, str]:
@@ -103,7 +104,8 @@ def serve(settings: ServiceSettings) -> None:
 
         rehearser = stack.enter_context(closing(Rehearser(REHEARSE, in_use, data, hub.tell, hub.wake)))
         lights, examine = Lights(supervisor, settings.rig), PanelDoctor(lambda: supervisor.rig, data).report
-        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, examine)
+        trains = Trains(supervisor, settings.rig, preroll_s)
+        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, trains, examine)
         server = make_server(create_app(service, settings.access), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report

@@ -42,6 +42,7 @@ from rig.api.status import (
     State,
     Status,
 )
+from rig.api.trigger import TriggerChange, TriggerControl, TriggerView
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StateForbidsError, UnknownCameraError, UnknownRecordingError
 from rig.frame import FrameStatus
@@ -79,6 +80,7 @@ class MemoryService(Archive):
         rehearsal: how far a rehearsal is, and `rehearsed`, what the last one showed; set by tests.
         through_the_lens: what the lens makes of the picture of a camera, set by tests.
         lights: exposure and gain of each camera.
+        pulses_made: who makes the pulses.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -96,6 +98,7 @@ class MemoryService(Archive):
         self.rehearsal: RehearsalProgress | None = None
         self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
+        self.pulses_made = TriggerView(source="gpio", rate_hz=30, controls=(TriggerControl.RATE,), saved=True)
         self.lights = {name: CameraLight(camera=name, exposure_us=2000, gain_db=0, saved=True) for name in CAMERAS}
         self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
         self._phase = Phase.now(State.IDLE, 1)
@@ -281,6 +284,18 @@ class MemoryService(Archive):
         changed = before.model_copy(update={"saved": before.saved and not change.values(), **change.values()})
         self.lights[camera] = changed.model_copy(update={"saved": changed.saved or change.save})
         return self.lights[camera]
+
+    def trigger(self) -> TriggerView:
+        return self.pulses_made
+
+    def change_trigger(self, change: TriggerChange) -> TriggerView:
+        before = self.pulses_made
+        if self._recording is not None:
+            raise StateForbidsError("a recording is running: stop it, then change the rate")
+        rate_hz = before.rate_hz if change.rate_hz is None else change.rate_hz
+        saved = change.save or (before.saved and rate_hz == before.rate_hz)
+        self.pulses_made = before.model_copy(update={"rate_hz": rate_hz, "saved": saved})
+        return self.pulses_made
 
     def events(self, after: int) -> list[Event]:
         with self._lock:

@@ -4,6 +4,7 @@ A process of its own sends them (`action_sender`): one command by broadcast expo
 program that controls a camera is waited for. Scheduled commands are for whole multiples of the period in PTP time.
 """
 
+from rig.api.trigger import TriggerControl
 from rig.clocks import HostNs
 from rig.settings.trigger import ActionTrigger
 from triggering.sources.even_train import EvenTrain
@@ -16,6 +17,7 @@ class ActionPulses:
         settings: of the rig file.
     """
 
+    controls = frozenset({TriggerControl.RATE})
     advice = (
         "see in the live log what the cameras answer to the action commands, and lower trigger.rate_hz in the rig file "
         "if they come too late"

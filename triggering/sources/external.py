@@ -1,5 +1,6 @@
 """Pulses from a generator that svev knows nothing of: cameras see them at their inputs."""
 
+from rig.api.trigger import TriggerControl
 from rig.clocks import HostNs
 
 
@@ -8,6 +9,7 @@ class ExternalPulses:
 
     spread_ns = 0
     set_up_only = False
+    controls = frozenset[TriggerControl]()
     advice = "check the pulse generator, the trigger cables and trigger.rate_hz in the rig file"
 
     def commands(self, origin: HostNs) -> None:

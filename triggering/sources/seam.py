@@ -5,6 +5,7 @@ One conformance suite (`tests/triggering/sources/test_conformance.py`) runs over
 
 from typing import Protocol
 
+from rig.api.trigger import TriggerControl
 from rig.clocks import HostNs
 
 
@@ -52,6 +53,11 @@ class TriggerSource(Protocol):
     @property
     def set_up_only(self) -> bool:
         """Whether its frames are good for setting up cameras, but not for measuring."""
+        ...
+
+    @property
+    def controls(self) -> frozenset[TriggerControl]:
+        """What svev can change of the pulses while the rig is armed; nothing: somebody else makes them."""
         ...
 
     @property

@@ -4,6 +4,7 @@ The grabber of each camera gives its commands by itself, so no program waits for
 cameras are the same because all count from the same origin.
 """
 
+from rig.api.trigger import TriggerControl
 from rig.clocks import HostNs
 from rig.settings.trigger import SoftwareTrigger
 from triggering.sources.even_train import EvenTrain
@@ -17,6 +18,7 @@ class SoftwarePulses:
     """
 
     set_up_only = True
+    controls = frozenset({TriggerControl.RATE})
     advice = (
         "commands or frames come too late, or the cameras stamp their frames at the end of a long exposure; lower "
         "trigger.rate_hz or exposure_us in the rig file, and close other programs"

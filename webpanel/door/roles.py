@@ -40,6 +40,7 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         r"PATCH /api/cameras/([^/]+)",
         lambda camera: phrase("act_light", "changed exposure or gain of {camera}", camera=camera),
     ),
+    (r"PATCH /api/trigger", lambda: phrase("act_trigger", "changed the pulses")),
     (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),
     (
         r"POST /api/recordings/([^/]+)/stop",

@@ -8,6 +8,7 @@ from fastapi import APIRouter
 
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, RigView, Status
+from rig.api.trigger import TriggerChange, TriggerView
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 
@@ -37,6 +38,22 @@ def rig_router(service: RigService) -> APIRouter:
     def disarm(_: NoFields = None) -> Status:
         """Begin to disconnect the cameras. Not while recording. While idle it changes nothing."""
         return service.disarm()
+
+    @router.get("/trigger")
+    def get_trigger() -> TriggerView:
+        """Who makes the pulses, at what rate, and what of that can be changed here."""
+        return service.trigger()
+
+    @router.patch("/trigger", responses=CHANGING)
+    def change_trigger(change: TriggerChange) -> TriggerView:
+        """Change the rate of the pulses, where svev makes them. If the rig is armed it is armed anew, at the new rate.
+
+        That takes some seconds, and what was held of the past is gone. Not while a recording runs: 409, as where
+        others make the pulses. A rate that source, cameras or this computer's memory do not take is refused (422). The
+        logs from then on hold the rig file with the new rate. `save` writes it into the rig file too; else it holds
+        until the service ends.
+        """
+        return service.change_trigger(change)
 
     @router.get("/rig")
     def get_rig() -> RigView:

@@ -38,14 +38,14 @@ def test_room_is_made_only_when_it_runs_short(tmp_path: Path) -> None:
     events: list[Event] = []
     catalogue = _deleted(tmp_path, "a", "b")
     plenty = SIM.model_copy(update={"recorder": SIM.recorder.model_copy(update={"reserve_gb": 0.0, "jump_s": 0.01})})
-    keeper = TrashKeeper(plenty, catalogue, events.append)
+    keeper = TrashKeeper(lambda: plenty, catalogue, events.append)
     keeper.make_room(0.01)
     assert catalogue.trash().recordings == 2
     with _without_room(tmp_path, spare_s=100) as rig:
-        TrashKeeper(rig, catalogue, events.append).look()
+        TrashKeeper(lambda: rig, catalogue, events.append).look()
         assert catalogue.trash().recordings == 2, "they were deleted just now, and there is room for a while"
     with _without_room(tmp_path) as rig:
-        TrashKeeper(rig, catalogue, events.append).look()
+        TrashKeeper(lambda: rig, catalogue, events.append).look()
     assert catalogue.trash().recordings == 0
     assert [event.message.partition(";")[2] for event in events] == [" room was needed"]
     assert "2 recordings" in events[0].message

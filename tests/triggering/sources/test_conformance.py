@@ -7,6 +7,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from capture.clock_reading import ClockReading
+from rig.api.trigger import TriggerControl
 from rig.clocks import ClockLatch, DeviceNs, HostNs
 from rig.frame import Record, RecordKind
 from rig.settings.trigger import Trigger
@@ -27,6 +28,8 @@ TABLES: dict[str, dict[str, Any]] = {
 SOURCES = list(TABLES)
 #: Those whose pulses are commands at times that the host chooses; of them, those that grabbers give.
 COMMANDING, BY_GRABBERS = ["software", "action", "action by broadcast"], ["software"]
+#: Those whose pulses others make.
+ELSEWHERE = ["external"]
 MS = 1_000_000
 ORIGIN = HostNs(7_000 * MS)
 
@@ -52,6 +55,12 @@ def _train(source: str) -> CommandTrain:
     train = made.commands(ORIGIN) or made.sent(ORIGIN)
     assert train is not None
     return train
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_rate_of_pulses_is_changed_where_svev_makes_them(source: str) -> None:
+    made = trigger_source(_settings(source))
+    assert (TriggerControl.RATE in made.controls) == (source not in ELSEWHERE)
 
 
 @pytest.mark.parametrize("source", COMMANDING)

@@ -1,5 +1,6 @@
 """Pulses from a line of the computer, whose cable leads to all cameras. A process of its own makes them (`pulser`)."""
 
+from rig.api.trigger import TriggerControl
 from rig.clocks import HostNs
 
 
@@ -8,6 +9,7 @@ class GpioPulses:
 
     spread_ns = 0
     set_up_only = False
+    controls = frozenset({TriggerControl.RATE})
     advice = (
         "see in the live log whether the pulses are made, and check trigger.line in the rig file and the trigger cables"
     )

@@ -1,5 +1,6 @@
 """A trigger box as a source of pulses: its cable leads to all cameras, and a process of its own drives it."""
 
+from rig.api.trigger import TriggerControl
 from rig.clocks import HostNs
 from rig.settings.trigger import TriggerBoxTrigger
 from triggering.sources.triggerbox.protocol import Rate, nearest_rate
@@ -20,6 +21,7 @@ class TriggerBoxPulses:
 
     spread_ns = 0
     set_up_only = False
+    controls = frozenset({TriggerControl.RATE})
     advice = "see what is said of the trigger box, and check the cable from it to the cameras"
 
     def __init__(self, settings: TriggerBoxTrigger) -> None:

@@ -1,0 +1,28 @@
+"""Writes what was changed while the rig runs into the rig file, as it is by then: what else was edited in it stays."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from rig.disk import replace_file
+from rig.errors import StorageError
+from rig.phrase import Phrase
+from rig.settings.strict_toml import read_text
+
+
+def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phrase]) -> None:
+    """Edit the rig file.
+
+    Args:
+        path: of the rig file.
+        edit: makes the new text of the present one.
+        not_kept: what to say, given the reason, if the file cannot be written.
+
+    Raises:
+        BadInputError: the file has become unreadable.
+        StorageError: it cannot be written.
+    """
+    text = edit(read_text(path, "TOML", "the rig file in use"))
+    try:
+        replace_file(path, text.encode())
+    except OSError as error:
+        raise StorageError(not_kept(error.strerror or str(error))) from error

@@ -1,0 +1,112 @@
+"""The train of pulses, where svev makes it: its rate is changed while the rig runs, and kept in the rig file."""
+
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from capture.iidc.configuration import READOUT_NS
+from rig.api.trigger import TriggerChange, TriggerControl, TriggerView
+from rig.clocks import NS_PER_US
+from rig.errors import BadInputError, StateForbidsError
+from rig.events import TRIGGER, Event, Level
+from rig.phrase import Phrase, phrase
+from rig.settings.model import RigSettings
+from rig.settings.rate import with_rate, written_rate
+from service.processes.backends import check_backends
+from service.processes.memory import check_memory
+from service.rig_file import keep
+from service.supervision.commands import at_once
+from service.supervision.supervisor import Supervisor
+from triggering.sources.choice import trigger_source
+
+_SOON_S: Final = 10.0
+
+
+class Trains:
+    """Any thread may call any method.
+
+    Args:
+        supervisor: owns the rig.
+        rig_file: where the rate is kept.
+        preroll_s: length of the pre-roll, whose memory grows with the rate.
+    """
+
+    def __init__(self, supervisor: Supervisor, rig_file: Path, preroll_s: float) -> None:
+        self._supervisor, self._file, self._preroll_s = supervisor, rig_file, preroll_s
+        self._kept_hz = supervisor.rig.trigger.rate_hz
+
+    def view(self) -> TriggerView:
+        """Who makes the pulses, and at what rate."""
+        trigger = self._supervisor.rig.trigger
+        return TriggerView(
+            source=trigger.source,
+            rate_hz=trigger.rate_hz,
+            controls=tuple(sorted(trigger_source(trigger).controls)),
+            saved=trigger.rate_hz == self._kept_hz,
+        )
+
+    def change(self, change: TriggerChange) -> TriggerView:
+        """Change the rate, and write it into the rig file if that is wished.
+
+        Raises:
+            BadInputError: source, cameras or memory of this computer do not take the rate.
+            StateForbidsError: a recording runs, the rig is being armed or disarmed, or others make the pulses.
+            StorageError: the rig file cannot be written; the rate is changed all the same.
+        """
+        with self._supervisor.changing:
+            self._check_made_here()
+            if change.rate_hz is not None and change.rate_hz != self._supervisor.rig.trigger.rate_hz:
+                self._change_rate(change.rate_hz)
+            if change.save:
+                self._keep(self._supervisor.rig.trigger.rate_hz)
+            return self.view()
+
+    def _check_made_here(self) -> None:
+        rig = self._supervisor.rig
+        if TriggerControl.RATE in trigger_source(rig.trigger).controls:
+            return
+        if any(camera.backend == "replay" for camera in rig.cameras):
+            raise StateForbidsError("the pulses are those of the replayed log: replay a log of another rate")
+        raise StateForbidsError(
+            f'a generator that svev does not drive makes the pulses (trigger.source = "{rig.trigger.source}"): change '
+            "its rate there and trigger.rate_hz in the rig file, then start the service again"
+        )
+
+    def _change_rate(self, rate_hz: float) -> None:
+        supervisor = self._supervisor
+        rig = with_rate(supervisor.rig, rate_hz)
+        trigger_source(rig.trigger)
+        check_backends(rig)
+        _check_dead_time(rig)
+        check_memory(rig, self._preroll_s)
+        text = written_rate(supervisor.rig_toml, rate_hz)
+        supervisor.commands.ask(at_once(partial(supervisor.change_rate, rig, text)), _SOON_S)
+        said = phrase("event_rate", "is to make {rate_hz:g} pulses per second from now on", rate_hz=rate_hz)
+        supervisor.hub.tell(Event.now(Level.INFO, TRIGGER, said))
+
+    def _keep(self, rate_hz: float) -> None:
+        def not_kept(why: str) -> Phrase:
+            text = (
+                "{path}: cannot be written ({why}); write rate_hz = {rate_hz:g} under [trigger] into it, or a restart "
+                "of the service loses it"
+            )
+            return phrase("why_rate_not_kept", text, path=str(self._file), why=why, rate_hz=rate_hz)
+
+        keep(self._file, lambda text: written_rate(text, rate_hz), not_kept)
+        self._kept_hz = rate_hz
+
+
+def _check_dead_time(rig: RigSettings) -> None:
+    """Check that FireWire cameras have exposed and begun to send before the next pulse; of others it is not known.
+
+    Raises:
+        BadInputError: one has not.
+    """
+    for camera in rig.cameras:
+        busy_ns = round(camera.exposure_us * NS_PER_US) + READOUT_NS
+        if camera.backend == "iidc" and busy_ns >= rig.trigger.period_ns:
+            raise BadInputError(
+                f"at {rig.trigger.rate_hz:g} Hz pulses would come every {rig.trigger.period_ns / 1e6:.1f} ms, and "
+                f"exposure and readout of camera {camera.name} take {busy_ns / 1e6:.1f} ms: choose a lower rate, or "
+                "shorten its exposure first"
+            )

@@ -1,0 +1,101 @@
+"""The rate of the pulses changed while the rig is armed: everything follows it, and no triplet is mixed."""
+
+import tomllib
+from contextlib import closing
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from recorder.reading.log_reader import LogReader
+from rig.api.trigger import TriggerChange
+from rig.errors import BadInputError, StateForbidsError, SvevError
+from rig.settings.file import load_rig
+from rig.tag import TripletTag
+from rig.topics import RIG_ATTACHMENT, TAG
+from rig.transport.recorder_commands import RecorderOptions
+from service.status.event_hub import EventHub
+from service.supervision.supervisor import Supervisor
+from service.trains import Trains
+from tests.capture.rigs import write_rig
+from tests.service.serving import PATIENCE_S, serving
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
+
+TRIGGER = "/api/trigger"
+
+
+def test_the_rate_is_changed_while_armed(tmp_path: Path, loopback: Loopback) -> None:
+    path = write_rig(tmp_path, "sim", loopback, source="triggerbox", rate_hz=20, names=["K1", "K2"])
+    first = path.read_text()
+    with serving(tmp_path, path, loopback) as service:
+        service.arm()
+        now = {"source": "triggerbox", "rate_hz": 20, "controls": ["rate"], "saved": True}
+        assert service.get(TRIGGER) == now
+        status, answer = service.call("PATCH", TRIGGER, {"rate_hz": 600})
+        assert (status, "camera K1 exposes for 2 ms" in answer["detail"]) == (422, True)
+        recording = service.post("/api/recordings")["id"]
+        status, answer = service.call("PATCH", TRIGGER, {"rate_hz": 40})
+        assert (status, "stop it, then change the rate" in answer["detail"]) == (409, True)
+        service.await_pulses(10)
+        service.post(f"/api/recordings/{recording}/stop", {"confirm": True})
+        assert service.call("PATCH", TRIGGER, {"rate_hz": 40})[1] == now | {"rate_hz": 40, "saved": False}
+        assert service.state() == "arming"
+        service.await_state("armed")
+        other = service.post("/api/recordings")["id"]
+        service.await_pulses(40)
+        service.post(f"/api/recordings/{other}/stop", {"confirm": True})
+        assert path.read_text() == first
+        assert service.call("PATCH", TRIGGER, {"save": True})[1] == now | {"rate_hz": 40}
+        assert service.state() == "armed"
+        assert service.get("/api/status")["alarms"] == []
+        disk = service.get("/api/status")["disk"]["seconds_left"]
+        service.post("/api/disarm")
+        service.await_state("idle")
+        assert service.call("PATCH", TRIGGER, {"rate_hz": 20})[0] == 200
+        wait_until(
+            lambda: service.get("/api/status")["disk"]["seconds_left"] > 1.5 * disk, "room by the new rate", PATIENCE_S
+        )
+    _evenly(service.data / f"{recording}.mcap", 20)
+    _evenly(service.data / f"{other}.mcap", 40)
+    assert tomllib.loads(path.read_text()) == tomllib.loads(first) | {
+        "trigger": {"source": "triggerbox", "rate_hz": 40}
+    }
+
+
+def _evenly(log: Path, rate_hz: float) -> None:
+    """Every pulse of a log is complete, a period after the one before, and its rig file says the rate."""
+    with LogReader(log) as reader:
+        tags = [TripletTag.decode(message.data or b"") for message in reader.messages(TAG.name)]
+        attached = tomllib.loads(reader.attachments[RIG_ATTACHMENT].decode())
+    assert attached["trigger"]["rate_hz"] == rate_hz
+    periods = [(after.time - before.time) * rate_hz / 1e9 for before, after in pairwise(tags)]
+    assert all(tag.complete for tag in tags)
+    assert periods == pytest.approx([1.0] * len(periods), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("backend", "source", "rate_hz", "error", "said"),
+    [
+        (
+            "sim",
+            "external",
+            40,
+            StateForbidsError,
+            r'svev does not drive makes the pulses \(trigger.source = "external"',
+        ),
+        ("iidc", "software", 60, BadInputError, "exposure and readout of camera K1 take 16.8 ms: choose a lower rate"),
+        ("sim", "triggerbox", 3.5, BadInputError, 'key "rate_hz" = 3.5'),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_ends(
+    tmp_path: Path, loopback: Loopback, backend: str, source: str, rate_hz: float, error: type[SvevError], said: str
+) -> None:
+    path = write_rig(tmp_path, backend, loopback, source=source, rate_hz=20, names=["K1"])
+    path.write_text(path.read_text() + "exposure_us = 16300\n")
+    hub = EventHub(lambda _: None)
+    supervisor = Supervisor(load_rig(path), path.read_text(), hub, RecorderOptions(directory=tmp_path))
+    with closing(supervisor.commands), pytest.raises(error, match=said):
+        Trains(supervisor, path, 5.0).change(TriggerChange(rate_hz=rate_hz, save=True))
+    assert supervisor.rig.trigger.rate_hz == tomllib.loads(path.read_text())["trigger"]["rate_hz"] == 20
+    assert hub.after(0) == []

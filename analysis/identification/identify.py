@@ -114,9 +114,9 @@ class Sighting:
     def pulses(self) -> range:
         """From the first to the last pulse with a named marker; empty if he shows too few of them to be a jumper."""
         named: Flags = np.asarray(np.any(self.markers.assigned.rays >= 0, axis=2))
-        there = np.flatnonzero(named.any(axis=1))
-        if np.count_nonzero(named.sum(axis=1) >= _LEAST_NAMES) < _LEAST_PULSES:
+        if not _is_jumper(named):
             return range(0)
+        there = np.flatnonzero(named.any(axis=1))
         first, last = (self.window.candidates[int(t)].pulse for t in there[[0, -1]])
         return range(first, last + 1)
 
@@ -130,6 +130,8 @@ class Sighting:
         if look is not None:
             markers = follow_further(views, window, flight, markers, look)
             markers = refined(views, window, flight, markers, self.appearance, look)
+        if not _is_jumper(np.asarray(np.any(markers.assigned.rays >= 0, axis=2))):
+            return ()
         _look_for_traces(views, window, markers.places(BINDINGS))
         _tell_skis_apart(views, window, flight)
         traces = straight_traces(views, window)
@@ -138,8 +140,6 @@ class Sighting:
             named_pulse(views, c, markers.assigned.rays[t], skis.traces[t], traces[t])
             for t, c in enumerate(window.candidates)
         ]
-        if sum(len(_named(pulse)) >= _LEAST_NAMES for pulse in pulses) < _LEAST_PULSES:
-            return ()
         found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
         return tuple(pulses[found[0] : found[-1] + 1])
 
@@ -157,8 +157,9 @@ def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Fli
     return Appearance.of(contrasts, radii)
 
 
-def _named(pulse: PulseMeasurements) -> set[str]:
-    return {label for image in pulse.images.values() for label in image.points}
+def _is_jumper(named: Flags) -> bool:
+    """Whether enough markers (t, 4) are named in enough pulses."""
+    return bool(np.count_nonzero(named.sum(axis=1) >= _LEAST_NAMES) >= _LEAST_PULSES)
 
 
 def _look_for_traces(views: Views, window: Window, bindings: Places) -> None:

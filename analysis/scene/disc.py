@@ -14,6 +14,7 @@ noise is there, whatever made it (sensor, texture, compression).
 """
 
 from dataclasses import dataclass
+from math import exp, isfinite, log
 from typing import Final
 
 import numpy as np
@@ -27,9 +28,11 @@ _WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one 
 _NODES = 0.3  # blurs between the nodes of a profile
 _SHARP = 8.0  # R / s: from there on the border is that of a half plane, with the curvature's first term
 _BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and blur of a small disc go together
+_LOG_BLUR = log(_BLUR)
 _STRETCH_SPREAD = 0.2  # weak prior of the stretch
 STEPS: Final = 25  #: iterations
-_ENOUGH = 1e-4  # px
+_ENOUGH, _ENOUGH_OF_SHAPE = 1e-4, 1e-3  # of a step: px; log R, log s and stretch
+_LOG_RADII, _LOG_BLURS = (log(0.2), log(40)), (log(0.15), log(8))  # that a fit may go through
 _SETTLED = 2e-5  # relative decrease of the square sum: a twentieth of a sigma or less
 _TRIAL_STEPS, _POOR = 4, 0.25  # steps after which the residuals over the contrast must be smaller than that
 POOR_START: Final = 0.4  #: residuals over contrast, before the first step
@@ -129,16 +132,17 @@ def _share(r: Floats, radius: float, blur: float) -> Floats:
     count = int(last / (_NODES * blur)) + 2
     if 2 * count > len(r):
         return np.asarray(chndtr(b * b, 2.0, (r / blur) ** 2))
-    nodes, width = np.linspace(0.0, last, count, retstep=True)
-    a = nodes / blur
+    width = last / (count - 1)
+    a = np.arange(count) * (width / blur)
     value = chndtr(b * b, 2.0, a * a)
     by_r = -(b / blur) * np.exp(-0.5 * (a - b) ** 2) * i1e(a * b) * width
-    left = np.minimum((r / width).astype(int), count - 2)
-    t = r / width - left
-    first, second = value[left], value[left + 1]
-    return np.asarray(
-        first + t * t * (3 - 2 * t) * (second - first) + t * (1 - t) * ((1 - t) * by_r[left] - t * by_r[left + 1])
-    )
+    place = r / width
+    left = np.minimum(place.astype(np.intp), count - 2)
+    t = place - left
+    # the cubic of each step as a polynomial: value, slope, and what makes it end as the next one begins
+    rise, slope, next_slope = np.diff(value), by_r[:-1], by_r[1:]
+    square, cube = (3 * rise - 2 * slope - next_slope)[left], (slope + next_slope - 2 * rise)[left]
+    return np.asarray(value[left] + t * (slope[left] + t * (square + t * cube)))
 
 
 _Window = tuple[Floats, Floats, Floats]
@@ -154,14 +158,17 @@ def _window(
     top, bottom = int(np.ceil(xy[1] - reach)), int(np.floor(xy[1] + reach))
     if not (radius < xy[0] < columns - 1 - radius and radius < xy[1] < rows - 1 - radius):
         return None
-    y, x = np.mgrid[max(0, top) : min(rows, bottom + 1), max(0, left) : min(columns, right + 1)]
-    inside = (x - xy[0]) ** 2 + (y - xy[1]) ** 2 <= reach**2
+    part = slice(max(0, top), min(rows, bottom + 1)), slice(max(0, left), min(columns, right + 1))
+    x, y = np.arange(part[1].start, part[1].stop), np.arange(part[0].start, part[0].stop)
+    inside = (x - xy[0]) ** 2 + ((y - xy[1]) ** 2)[:, None] <= reach**2
     if mask is not None:
-        inside &= mask[y, x] > 0
-    y, x = y[inside], x[inside]
-    if len(x) < 2 * _UNKNOWNS:
+        inside &= mask[part] > 0
+    row, column = np.nonzero(inside)
+    if len(row) < 2 * _UNKNOWNS:
         return None
-    return np.column_stack((x, y)).astype(float), grey[y, x].astype(float), sigma[y, x].astype(float)
+    places = np.empty((len(row), 2))
+    places[:, 0], places[:, 1] = x[column], y[row]
+    return places, grey[part][inside].astype(float), sigma[part][inside].astype(float)
 
 
 def _started(theta: Floats, window: _Window, factors: tuple[float, ...], poor: float) -> Floats | None:
@@ -170,18 +177,20 @@ def _started(theta: Floats, window: _Window, factors: tuple[float, ...], poor: f
     dx, dy = places[:, 0] - theta[0], places[:, 1] - theta[1]
     r = np.hypot(dx, dy)
     radii = np.array(factors) * float(np.exp(theta[2]))
-    design = np.empty((len(radii), len(r), 4))
+    n = len(radii)
+    columns = np.empty((n + 4, len(r)))  # of the design, one cover for each radius, and the grey values
     # the border as that of a half plane is near enough for a start
-    design[:, :, 0] = 0.5 * erfc((r - radii[:, None]) / (np.sqrt(2) * np.exp(theta[3])))
-    design[:, :, 1], design[:, :, 2], design[:, :, 3] = 1.0, dx, dy
-    design /= sigma[:, None]
-    v = grey / sigma
-    turned = design.transpose(0, 2, 1)
-    normal = turned @ design + 1e-12 * np.eye(4)
-    linear = np.linalg.solve(normal, (turned @ v)[..., None])[..., 0]
-    squares = ((v - (design @ linear[..., None])[..., 0]) ** 2).mean(axis=1)
+    columns[:n] = 0.5 * erfc((r - radii[:, None]) / (np.sqrt(2) * np.exp(theta[3])))
+    columns[n], columns[n + 1], columns[n + 2], columns[n + 3] = 1.0, dx, dy, grey
+    columns /= sigma
+    products = columns @ columns.T
+    own = np.column_stack((np.arange(n), np.tile(np.arange(n, n + 3), (n, 1))))
+    normal = products[own[:, :, None], own[:, None]] + 1e-12 * np.eye(4)
+    right = products[own, -1]
+    linear = np.linalg.solve(normal, right[..., None])[..., 0]
+    squares = (products[-1, -1] - (linear * right).sum(axis=1)) / len(r)
     best = int(squares.argmin())
-    if not np.sqrt(squares[best]) * _middle(sigma) < poor * abs(float(linear[best, 0])):
+    if not np.sqrt(max(0.0, squares[best])) * _middle(sigma) < poor * abs(float(linear[best, 0])):
         return None
     return np.concatenate((theta[:2], [np.log(radii[best])], theta[3:6], linear[best]))
 
@@ -210,15 +219,19 @@ def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats, steps: i
             damping *= 10
             if damping > 1e8:
                 break
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), gradient)
-        step[2:6] = np.clip(step[2:6], -_LARGEST_STEP, _LARGEST_STEP)
-        if not np.isfinite(step).all():
+        damped = normal.copy()
+        diagonal = damped.reshape(-1)[:: _UNKNOWNS + 1]
+        diagonal += damping * (diagonal + 1e-12)
+        step = np.linalg.solve(damped, gradient)
+        np.minimum(np.maximum(step[2:6], -_LARGEST_STEP, out=step[2:6]), _LARGEST_STEP, out=step[2:6])
+        if not isfinite(step.sum()):
             return None
         theta = best + step
-        if np.abs(step[:2]).max() < _ENOUGH and np.abs(step[2:6]).max() < 1e-3:
+        off = np.abs(step[:6]).tolist()
+        if max(off[:2]) < _ENOUGH and max(off[2:]) < _ENOUGH_OF_SHAPE:
             best = theta
             break
-        if not (np.log(0.2) < theta[2] < np.log(40) and np.log(0.15) < theta[3] < np.log(8)):
+        if not (_LOG_RADII[0] < theta[2] < _LOG_RADII[1] and _LOG_BLURS[0] < theta[3] < _LOG_BLURS[1]):
             return None
     else:
         return None
@@ -228,10 +241,11 @@ def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats, steps: i
 def _normal_equations(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> tuple[float, Floats, Floats]:
     """Cost, normal matrix and right-hand side, priors included."""
     value, design = _model(theta, places)
-    v, j = (grey - value) / sigma, design / sigma[:, None]
-    normal, gradient, cost = j.T @ j, j.T @ v, float(v @ v)
-    for i, mean, spread in ((3, np.log(_BLUR), _BLUR_SPREAD), (4, 0.0, _STRETCH_SPREAD), (5, 0.0, _STRETCH_SPREAD)):
-        off = mean - theta[i]
+    v = (grey - value) / sigma
+    design /= sigma
+    normal, gradient, cost = design @ design.T, design @ v, float(v @ v)
+    for i, mean, spread in ((3, _LOG_BLUR, _BLUR_SPREAD), (4, 0.0, _STRETCH_SPREAD), (5, 0.0, _STRETCH_SPREAD)):
+        off = mean - float(theta[i])
         normal[i, i] += spread**-2
         gradient[i] += off / spread**2
         cost += (off / spread) ** 2
@@ -239,29 +253,29 @@ def _normal_equations(theta: Floats, places: Floats, grey: Floats, sigma: Floats
 
 
 def _model(theta: Floats, places: Floats) -> tuple[Floats, Floats]:
-    """Grey values (n,) and their derivatives (n, 10)."""
-    x, y, log_r, log_s, p, q, contrast, *plane = theta
-    radius, blur = float(np.exp(log_r)), float(np.exp(log_s))
+    """Grey values (n,) and their derivatives (10, n)."""
+    x, y, log_r, log_s, p, q, contrast, *plane = theta.tolist()
+    radius, blur = exp(log_r), exp(log_s)
     dx, dy = places[:, 0] - x, places[:, 1] - y
     # stretched coordinates (I + [[p, q], [q, -p]]) d
     u, w = (1 + p) * dx + q * dy, q * dx + (1 - p) * dy
     r = np.sqrt(u * u + w * w) + 1e-9
     value, by_r, by_radius = cover(r, radius, blur)
     nu, nw = u / r, w / r
-    design = np.empty((len(r), _UNKNOWNS))
-    design[:, 0] = -by_r * (nu * (1 + p) + nw * q)
-    design[:, 1] = -by_r * (nu * q + nw * (1 - p))
-    design[:, 2] = by_radius * radius
-    design[:, 3] = -(r * by_r + radius * by_radius)  # the cover depends on the ratios of r, R and s alone
-    design[:, 4] = by_r * (nu * dx - nw * dy)
-    design[:, 5] = by_r * (nu * dy + nw * dx)
-    design[:, :6] *= contrast
-    design[:, 6] = value
-    design[:, 7] = 1.0
-    design[:, 8], design[:, 9] = dx, dy
+    design = np.empty((_UNKNOWNS, len(r)))
+    design[0] = -by_r * (nu * (1 + p) + nw * q)
+    design[1] = -by_r * (nu * q + nw * (1 - p))
+    design[2] = by_radius * radius
+    design[3] = -(r * by_r + radius * by_radius)  # the cover depends on the ratios of r, R and s alone
+    design[4] = by_r * (nu * dx - nw * dy)
+    design[5] = by_r * (nu * dy + nw * dx)
+    design[:6] *= contrast
+    design[6] = value
+    design[7] = 1.0
+    design[8], design[9] = dx, dy
     # the plane hangs on the centre, whose derivative it therefore has too
-    design[:, 0] -= plane[1]
-    design[:, 1] -= plane[2]
+    design[0] -= plane[1]
+    design[1] -= plane[2]
     return contrast * value + plane[0] + plane[1] * dx + plane[2] * dy, design
 
 

@@ -7,16 +7,16 @@ import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
 from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
-from analysis.identification.body import REACH_M
-from analysis.identification.flights import Flight, find_flights, find_tracks
-from analysis.identification.markers import BINDINGS, Markers, follow_further, follow_markers
-from analysis.identification.refinement import refined
-from analysis.identification.ski_traces import StraightTrace, straightened
-from analysis.identification.skis import LONGEST_M, Places, follow_skis
-from analysis.identification.space_points import Appearance
-from analysis.identification.synchrony import lateness
-from analysis.identification.views import Views
-from analysis.identification.window import Window
+from analysis.identification.markers.markers import BINDINGS, Markers, follow_further, follow_markers
+from analysis.identification.markers.refinement import refined
+from analysis.identification.markers.synchrony import lateness
+from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
+from analysis.identification.over_time.window import Window
+from analysis.identification.skis.ski_traces import StraightTrace, straightened
+from analysis.identification.skis.skis import LONGEST_M, Places, follow_skis
+from analysis.identification.space.body import REACH_M
+from analysis.identification.space.space_points import Appearance
+from analysis.identification.space.views import Views
 from analysis.measurements.model import (
     POINTS,
     SIDES,

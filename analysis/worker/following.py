@@ -12,16 +12,16 @@ from typing import Final, TypeVar
 import numpy as np
 
 from analysis.candidates.model import Expected, PulseCandidates
-from analysis.identification.assignment import assign
-from analysis.identification.body import REACH_M
-from analysis.identification.flights import Flight
 from analysis.identification.identify import named_pulse, straight_traces
-from analysis.identification.markers import BINDINGS, Markers
-from analysis.identification.prediction import Prediction
-from analysis.identification.skis import assign_skis
-from analysis.identification.space_points import Appearance
-from analysis.identification.views import Views
-from analysis.identification.window import Window
+from analysis.identification.markers.markers import BINDINGS, Markers
+from analysis.identification.over_time.assignment import assign
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.prediction import Prediction
+from analysis.identification.over_time.window import Window
+from analysis.identification.skis.skis import assign_skis
+from analysis.identification.space.body import REACH_M
+from analysis.identification.space.space_points import Appearance
+from analysis.identification.space.views import Views
 from analysis.measurements.model import SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
 from analysis.motion.causal import CausalFilter
 from analysis.result.model import SmoothedState, Status

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.candidates.model import Trace
-from analysis.identification.views import Sight
+from analysis.identification.space.views import Sight
 from analysis.result.model import PointState, Quantity, SkiState, SmoothedState, Status, Vector
 from analysis.worker.ski_images import SkiImages
 from rig.arrays import Floats

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from analysis.identification.left_right import name_bindings
-from analysis.identification.prediction import Part, PathFilter
+from analysis.identification.markers.left_right import name_bindings
+from analysis.identification.over_time.prediction import Part, PathFilter
 from rig.arrays import Floats
 
 _PULSES = 40

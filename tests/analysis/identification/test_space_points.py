@@ -3,8 +3,8 @@
 import numpy as np
 
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
-from analysis.identification.space_points import find_space_points, rays_of
-from analysis.identification.views import Views
+from analysis.identification.space.space_points import find_space_points, rays_of
+from analysis.identification.space.views import Views
 from rig.arrays import Floats
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber

@@ -8,11 +8,11 @@ is measured by the bundle over time.
 import numpy as np
 from scipy.special import bdtrc
 
-from analysis.identification.assignment import well_known
-from analysis.identification.flights import Flight
-from analysis.identification.markers import Markers
-from analysis.identification.views import Views
-from analysis.identification.window import Window
+from analysis.identification.markers.markers import Markers
+from analysis.identification.over_time.assignment import well_known
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.window import Window
+from analysis.identification.space.views import Views
 from rig.arrays import Flags, Floats, Integers
 
 _LEAST_CAMERAS = 3  #: two cameras cannot tell which of them is late

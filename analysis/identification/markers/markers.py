@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.candidates.model import SecondLook, Spots
-from analysis.identification.assignment import Assigned, assign, well_known
-from analysis.identification.body import USUAL, implausibility
-from analysis.identification.flights import Flight
-from analysis.identification.left_right import name_bindings
-from analysis.identification.naming import name_points
-from analysis.identification.prediction import Part, PathFilter, Prediction, predict
-from analysis.identification.skis import Places
-from analysis.identification.space_points import SpacePoints
-from analysis.identification.views import Views
-from analysis.identification.window import Window
+from analysis.identification.markers.left_right import name_bindings
+from analysis.identification.markers.naming import name_points
+from analysis.identification.over_time.assignment import Assigned, assign, well_known
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.prediction import Part, PathFilter, Prediction, predict
+from analysis.identification.over_time.window import Window
+from analysis.identification.skis.skis import Places
+from analysis.identification.space.body import USUAL, implausibility
+from analysis.identification.space.space_points import SpacePoints
+from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.identification.assignment import (
+from analysis.identification.over_time.assignment import (
     DECISIVE,
     DETECTED,
     MOST_OPTIONS,
@@ -21,11 +21,11 @@ from analysis.identification.assignment import (
     jointly_best,
     nothing,
 )
-from analysis.identification.flights import Flight
-from analysis.identification.prediction import Part, Prediction, predict
-from analysis.identification.ski_traces import Equations, Lines, SeenSkis, StraightTrace
-from analysis.identification.views import Views, gate
-from analysis.identification.window import Window
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.prediction import Part, Prediction, predict
+from analysis.identification.over_time.window import Window
+from analysis.identification.skis.ski_traces import Equations, Lines, SeenSkis, StraightTrace
+from analysis.identification.space.views import Views, gate
 from analysis.measurements.model import SIDES
 from photogrammetry.jumper.stick_model import slope_and_heading
 from rig.arrays import Flags, Floats, Integers

@@ -10,12 +10,12 @@ from itertools import permutations
 
 import numpy as np
 
-from analysis.identification.assignment import DECISIVE, DETECTED
-from analysis.identification.body import REACH_M, implausibility
-from analysis.identification.flights import Flight
-from analysis.identification.space_points import Rays, SpacePoints
-from analysis.identification.views import Views
-from analysis.identification.window import Window
+from analysis.identification.over_time.assignment import DECISIVE, DETECTED
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.window import Window
+from analysis.identification.space.body import REACH_M, implausibility
+from analysis.identification.space.space_points import Rays, SpacePoints
+from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
 

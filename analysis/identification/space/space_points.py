@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.candidates.model import PulseCandidates, Spots
-from analysis.identification.views import Views, gate
+from analysis.identification.space.views import Views, gate
 from photogrammetry.intersection.point_intersection import intersect_points
 from rig.arrays import Flags, Floats, Integers
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.identification.assignment import DECISIVE
-from analysis.identification.prediction import PathFilter
+from analysis.identification.over_time.assignment import DECISIVE
+from analysis.identification.over_time.prediction import PathFilter
 from rig.arrays import Flags, Floats, Integers
 
 #: What the two bindings may be at a pulse: index of the point that was taken as the P3 and P4; -1: none.

@@ -7,10 +7,10 @@ import numpy as np
 
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.candidates.wanted_traces import WantedTraces
-from analysis.identification.body import REACH_M
-from analysis.identification.flights import Flight
-from analysis.identification.space_points import Appearance, Rays, find_space_points, rays_of
-from analysis.identification.views import Views
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.space.body import REACH_M
+from analysis.identification.space.space_points import Appearance, Rays, find_space_points, rays_of
+from analysis.identification.space.views import Views
 from rig.arrays import Flags, Floats, Integers
 
 _MOST_SPOTS = 60  #: of an image, in the search for a jumper; the strongest of a snowfall

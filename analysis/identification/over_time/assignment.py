@@ -12,11 +12,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from analysis.identification.body import USUAL, implausibility
-from analysis.identification.prediction import Prediction
-from analysis.identification.space_points import Rays, SpacePoints
-from analysis.identification.views import Views, gate
-from analysis.identification.window import Window
+from analysis.identification.over_time.prediction import Prediction
+from analysis.identification.over_time.window import Window
+from analysis.identification.space.body import USUAL, implausibility
+from analysis.identification.space.space_points import Rays, SpacePoints
+from analysis.identification.space.views import Views, gate
 from rig.arrays import Flags, Floats, Integers
 
 #: How much likelier than each rival, and than chance, an assignment must be: minus twice the logarithm of 1/1000.

@@ -11,12 +11,12 @@ import numpy as np
 
 from analysis.candidates.known_discs import BLUR_PX, DiscShape
 from analysis.candidates.model import SecondLook, Spots
-from analysis.identification.assignment import well_known
-from analysis.identification.flights import Flight
-from analysis.identification.markers import Markers, settled_again
-from analysis.identification.space_points import Appearance
-from analysis.identification.views import Sight, Views
-from analysis.identification.window import Window
+from analysis.identification.markers.markers import Markers, settled_again
+from analysis.identification.over_time.assignment import well_known
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.window import Window
+from analysis.identification.space.space_points import Appearance
+from analysis.identification.space.views import Sight, Views
 from analysis.measurements.model import POINTS
 from rig.arrays import Floats, Integers
 

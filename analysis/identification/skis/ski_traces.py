@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.candidates.model import Trace
-from analysis.identification.views import Views, gate
+from analysis.identification.space.views import Views, gate
 from rig.arrays import Flags, Floats, Integers
 
 _PERSPECTIVE = 0.05  #: share of a distance across the ski that neglects the perspective of 3 m

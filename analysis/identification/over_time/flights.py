@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.identification.body import REACH_M
-from analysis.identification.space_points import SpacePoints
+from analysis.identification.space.body import REACH_M
+from analysis.identification.space.space_points import SpacePoints
 from rig.arrays import Floats, Integers
 
 #: Speeds of a jumper on the table and in the early flight, m/s, with what his limbs may add.

@@ -1,0 +1,1 @@
+"""What pulses say of each other: flights, the pulses around one, prediction, and what fits it."""

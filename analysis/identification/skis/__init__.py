@@ -1,0 +1,1 @@
+"""Which traces show which ski."""

@@ -10,22 +10,25 @@ sampled at equal times this is a filter with the frequency response
 which gives k from the variances. Errors of measurement then have the spectrum S^2, those of rates w^2 S^2, the stated
 variance belongs to S and w^2 S. Of the stated variance of values errors of measurement are 5/6, of that of rates 1/2,
 if the smoother reaches far. Near the ends of a jump the smoother is one-sided: there nearly all of the variance of
-rates is from errors of measurement, so all of it is taken. The same holds on both sides of the edge: what comes between
-table and flight is so rough that it says little of their smooth motion. The angle of attack is phi, a value, minus the
-slope of the path, which is a rate.
+rates is from errors of measurement, so all of it is taken. Before the take-off it is the same: what follows says little
+of the motion on the table. Behind it, it is so for vertical velocity and slope of the path: they change when the table
+ends, and when that is has been measured, too. The angle of attack is phi, a value, minus the slope of the path, which
+is a rate.
 """
 
 from typing import Final
 
 import numpy as np
 
-from analysis.comparison.aligned import ATTACK, HEIGHT, PHI, RATES, Series
+from analysis.comparison.aligned import ATTACK, HEIGHT, PHI, RATES, VELOCITY, Series
 from analysis.result.model import EDGE_S
 from rig.arrays import Flags, Floats
 
 _FREQUENCIES: Final = 128
 #: The slope of the path stands behind `QUANTITIES`; it is a function of the velocity.
 _RATES_AND_PATH: Final = np.append(RATES, True)
+#: Rates that change when the table ends: vertical velocity and slope of the path.
+_VERTICAL: Final = np.append(np.arange(len(RATES)) == VELOCITY.stop - 1, True)
 #: Mean square of what the model over time makes of repeated measurements / that by this approximation: the model
 #: estimates how smooth a jump is from the jump itself, so that no two jumps are smoothed quite alike.
 _APPROXIMATE: Final = 1.1
@@ -64,8 +67,10 @@ def _amplitude(share: Floats, frequencies: Floats) -> Floats:
 def _one_sided(series: Series, share: Floats) -> Flags:
     """Which values (12, T) the smoother's window, 1 / share pulses wide, would take from beyond an end or the edge."""
     times = series.times
-    off = np.minimum(times - series.ends_s[0], series.ends_s[1] - times)
-    off = np.minimum(off, np.where(times < EDGE_S / 2, np.maximum(-times, 0.0), np.maximum(times - EDGE_S, 0.0)))
+    ends = np.minimum(times - series.ends_s[0], series.ends_s[1] - times)
+    table = np.minimum(ends, np.where(times <= 0, -times, np.inf))
+    flight = np.minimum(ends, np.maximum(times - EDGE_S, 0.0))
+    off = np.where(_VERTICAL[:, None] & (times > 0), flight, table)
     return np.asarray(off * series.rate_hz < 0.5 / share)
 
 

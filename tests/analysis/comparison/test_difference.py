@@ -13,13 +13,14 @@ from analysis.comparison.repeatability import noise_covariance
 from analysis.comparison.scatter import scatter
 from analysis.comparison.shared_calibration import Common, shared_calibration
 from analysis.result.model import QUANTITIES, MeasuredRecording, PulseState
-from rig.arrays import Floats
+from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
 from tests.analysis.result.recordings import calibration_error, recording, without_takeoff
 
 COMPARISONS = 32
 FEW = 400  #: draws; the limit is known to 2 % from them
 HEIGHT = QUANTITIES.index("height")
+VERTICAL = np.array(QUANTITIES) == "velocity_z"
 
 
 def measured(seed: int = 0, leg_deg: float = 0.0, error: Floats | None = None, source: str = "one") -> MeasuredJump:
@@ -179,9 +180,11 @@ def test_errors_of_measurement_are_five_sixths_of_the_variance_of_values_and_hal
     assert _noise_variance(at_s=3.0) == pytest.approx(1.1 * np.where(RATES, 1 / 2, 5 / 6), abs=0.02)
 
 
-@pytest.mark.parametrize("at_s", [0.0, -0.1, 0.2])
-def test_next_to_the_edge_all_of_the_variance_of_rates_is_of_measurement(at_s: float) -> None:
-    assert _noise_variance(at_s) == pytest.approx(1.1 * np.where(RATES, 1, 5 / 6), abs=0.02)
+@pytest.mark.parametrize(("at_s", "whole"), [(-0.1, RATES), (0.0, RATES), (0.2, VERTICAL)])
+def test_next_to_the_edge_all_of_the_variance_of_rates_is_of_measurement(at_s: float, whole: Flags) -> None:
+    """Before the take-off that of all of them, behind it that of what changes when the table ends."""
+    expected = 1.1 * np.where(whole, 1, np.where(RATES, 1 / 2, 5 / 6))
+    assert _noise_variance(at_s) == pytest.approx(expected, abs=0.02)
 
 
 def _noise_variance(at_s: float) -> Floats:

@@ -24,12 +24,19 @@ _TRANSPORT_NS = 3_000_000
 class Scene(Protocol):
     """The simulated hill as one camera sees it."""
 
-    def next_pulse(self, after: HostNs) -> int:
-        """Index of the first pulse strictly later than `after`."""
+    def start(self, after: HostNs) -> None:
+        """Let the pulses later than `after` reach the camera."""
         ...
 
-    def pulse_time(self, pulse: int) -> HostNs:
-        """When the pulse fires."""
+    def next_pulse(self, until: HostNs) -> tuple[int, HostNs] | None:
+        """Number and time of the next pulse that reaches the camera; None: there is none up to a time.
+
+        A scene that does not know its pulses in advance waits for one until then.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Let no pulse reach the camera any more."""
         ...
 
     def device_time(self, host: HostNs, pulse: int | None = None) -> DeviceNs:
@@ -54,7 +61,6 @@ class SimCamera:
         self._delay = round(settings.exposure_us * NS_PER_US) + _TRANSPORT_NS
         self._frame_id = 0
         self._underruns = 0
-        self._pulse = 0
 
     @property
     def description(self) -> str:
@@ -63,21 +69,18 @@ class SimCamera:
 
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""
-        self._pulse = self._scene.next_pulse(host_now())
+        self._scene.start(host_now())
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """See `capture.seam.Camera.receive`."""
         deadline = HostNs(host_now() + round(timeout_s * NS_PER_S))
-        while True:
-            ready = self._scene.pulse_time(self._pulse) + self._delay
-            if ready > deadline:
-                sleep_until(deadline)
-                return None
-            # The scenario is known in advance, so the frame is drawn before its time and handed over on time.
-            arrival = self._expose(self._pulse, HostNs(ready))
-            self._pulse = self._scene.next_pulse(self._scene.pulse_time(self._pulse))
+        # Where the scenario is known in advance, the frame is drawn before its time and handed over on time.
+        while (fired := self._scene.next_pulse(HostNs(deadline - self._delay))) is not None:
+            arrival = self._expose(*fired)
             if arrival is not None:
                 return arrival
+        sleep_until(deadline)
+        return None
 
     def latch(self) -> ClockLatch:
         """See `capture.seam.Camera.latch`."""
@@ -98,10 +101,11 @@ class SimCamera:
 
     def close(self) -> None:
         """Give all slots back."""
+        self._scene.stop()
         self._ring.reclaim()
 
-    def _expose(self, pulse: int, ready: HostNs) -> Arrival | None:
-        exposure = self._scene.exposure(pulse)
+    def _expose(self, pulse: int, time: HostNs) -> Arrival | None:
+        exposure, ready = self._scene.exposure(pulse), HostNs(time + self._delay)
         if exposure is FrameStatus.ABSENT:
             sleep_until(ready)  # or the grabber would connect again before the pulse has gone by
             raise CameraError(f"camera {self._settings.name} is gone, as the scenario wants")
@@ -119,5 +123,5 @@ class SimCamera:
         sleep_until(ready)
         if slot is None:
             return Arrival(whole=False, host_time=host_now())
-        device = self._scene.device_time(self._scene.pulse_time(pulse), pulse)
+        device = self._scene.device_time(time, pulse)
         return Arrival(True, host_now(), slot, self._frame_id, 0, device, self._frame_id)

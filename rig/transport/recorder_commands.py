@@ -179,10 +179,10 @@ class TellResult(Message):
 
 
 class PulsesFired(Message):
-    """From the process that drives a trigger box, by way of the service, to the recorder: what the box has fired.
+    """From the process that makes the pulses, by way of the service, to the recorder: which have been fired.
 
     Attributes:
-        first: number of the first pulse, as the box counts since its start.
+        first: number of the first pulse, as the source counts since its start.
         times: when the pulses fired; none: there were no more.
         uncertainty_ns: largest error of the times.
         until: all pulses up to this time have been told.

@@ -18,6 +18,7 @@ from simrig.programs.scene import SimScene
 from simrig.programs.simulated_hill import SimulatedHill
 from simrig.triggerbox.box import EmulatedBox
 from simrig.triggerbox.timer import HillTimer
+from simrig.world.cable import cable_end
 from simrig.world.pulses import PulseTrain
 from simrig.world.scenario import load_scenario
 
@@ -62,6 +63,7 @@ def simulated_hill(
         height=height,
         prerendered=prerendered,
         link_mbit_s=link_mbit_s,
+        line=cable_end(rig.trigger),
         broadcast=next(iter(rig.trigger.broadcast), None) if isinstance(rig.trigger, ActionTrigger) else None,
     )
 

@@ -22,6 +22,7 @@ from simrig.gige.registers.makers import DIALECTS, Maker, registers_of
 from simrig.gige.registers.register_map import RegisterMap
 from simrig.gige.registers.register_table import MIN_WIDTH, XML_ADDRESS, Identity, all_registers
 from simrig.images.painter import Painter
+from simrig.world.cable import Cable, CableEnd, CableWatch
 from simrig.world.faults import OF_THE_CAMERA, Fault, FaultPlan
 from simrig.world.pulses import DeviceClock, PulseTrain
 from simrig.world.scenario import Scenario, load_scenario
@@ -54,6 +55,7 @@ class CameraConfig(StrictModel):
     resend: bool = Field(True, description="whether the camera can send lost packets again")
     maker: Maker = Field(Maker.STANDARD, description="whose features the camera has")
     broadcast: str | None = Field(None, description="broadcast address for discovery, e.g. 127.255.255.255")
+    line: CableEnd | None = Field(None, description="emulated line that triggers the camera, if its chip is there")
     ptp_offset_ns: int = Field(description="time of the PTP master minus host time, ns")
 
 
@@ -72,30 +74,39 @@ class Camera:
             scenario, index, size, config.rate_hz, test_pattern=config.test_pattern, prerendered=config.prerendered
         )
         train = PulseTrain(HostNs(config.epoch), config.rate_hz, scenario.pauses)
+        cable = None if config.line is None else Cable.plugged(config.line)
         registers, clock = _registers(config), _clock(config, scenario, index)
         self._faults = FaultPlan(f for f in scenario.faults_of(config.name) if f.kind not in OF_THE_CAMERA)
         self._counters = Counters()
         self._link = Link(config.address, config.link_mbit_s, self._counters)
         self._transmitter = Transmitter(self._link, self._counters)
         self._sensor = Sensor(
-            train, self._faults, painter, clock, registers, self._transmitter, self._counters, config.first_block_id
-        )
+            train, self._faults, painter, clock, registers, self._transmitter, self._counters, config.first_block_id,
+            cable=cable is not None,
+        )  # fmt: skip
+        self._cable = None if cable is None else CableWatch(cable, self._sensor.edge)
         self._device = Device(registers, clock, painter, self._transmitter, self._sensor)
         try:
             self._server = ControlServer(self._device, config.address, config.broadcast)
         except BadInputError:
             self._link.close()
+            if cable is not None:
+                cable.close()
             raise
 
     def start(self) -> None:
         """Start the threads; the camera answers from now on."""
         self._transmitter.start()
         self._sensor.start()
+        if self._cable is not None:
+            self._cable.start()
         self._server.start()
 
     def stop(self) -> None:
         """Stop the threads and close the sockets."""
         self._server.stop()
+        if self._cable is not None:
+            self._cable.stop()
         self._sensor.stop()
         self._transmitter.stop()
         self._link.close()

@@ -6,6 +6,7 @@ from enum import IntEnum, IntFlag
 from typing import Final
 
 from rig.clocks import HostNs
+from simrig.world.cable import CONNECT
 
 _TEXT: Final = 32
 _CHIP_INFO: Final = struct.Struct(f"={_TEXT}s{_TEXT}sI")
@@ -20,12 +21,13 @@ _FLAGS, _VALUES, _DEBOUNCE = 1, 2, 3
 
 
 class Ioctl(IntEnum):
-    """The numbers of the ioctls of a chip; 0 is the shim's word that it was opened."""
+    """The numbers of the ioctls of a chip; 0 is the shim's word that it was opened, 255 that a cable is plugged in."""
 
     OPENED = 0
     CHIP_INFO = 1
     LINE_INFO = 5
     REQUEST = 7
+    CABLE = CONNECT
 
 
 class LineFlag(IntFlag):

@@ -1,6 +1,7 @@
 """An emulated GPIO chip: answers programs, notes each edge of an output with its time, drives inputs.
 
-A program that was started with `build.environment()` sees it as a device file of the kernel. As with many chips of the
+A program that was started with `build.environment()` sees it as a device file of the kernel. Simulated cameras are
+triggered by its lines through cables (`simrig.world.cable`). As with many chips of the
 kernel, a line that is given back keeps its level: whoever wants it inactive has to make it so.
 """
 
@@ -10,6 +11,7 @@ import socket
 import struct
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -17,6 +19,7 @@ from typing import Final, Self
 
 from rig.clocks import NS_PER_S, NS_PER_US, HostNs, host_now
 from simrig.gpio.abi import Ioctl, LineFlag, LineRequest, asked_line, chip_info, edge_event, line_info, set_value
+from simrig.world.cable import encode_edge
 
 _HEAD: Final = struct.Struct("=II")
 _BYTES: Final = 1 << 12
@@ -51,6 +54,7 @@ class _Line:
         reported: level that was last reported by an edge event.
         due: when a change of level has lasted for the debounce period; None: there is none.
         number: of the edge event that was sent last.
+        cables: to simulated cameras.
     """
 
     name: str
@@ -61,6 +65,7 @@ class _Line:
     reported: bool = False
     due: HostNs | None = None
     number: int = 0
+    cables: list[socket.socket] = field(default_factory=list)
 
     @property
     def consumer(self) -> str:
@@ -186,7 +191,9 @@ class GpioChip:
         if not data:
             self._selector.unregister(sock)
             sock.close()
-            if line is not None:
+            if line is not None and sock in line.cables:
+                line.cables.remove(sock)
+            elif line is not None:
                 line.request = line.events = line.due = None
         elif line is not None:
             self._set(line, data)
@@ -203,6 +210,11 @@ class GpioChip:
         if high != line.high:
             line.high = high
             self.edges.append(Edge(request.offset, high, time))
+            for cable in line.cables:
+                with suppress(
+                    BlockingIOError, BrokenPipeError, ConnectionResetError
+                ):  # a camera that hangs, or is gone
+                    cable.send(encode_edge(time, high=high), socket.MSG_DONTWAIT)
 
     def _answer(self, sock: socket.socket, data: bytes) -> None:
         code, _ = _HEAD.unpack_from(data)
@@ -218,6 +230,8 @@ class GpioChip:
             case Ioctl.REQUEST:
                 error, theirs = self._request(LineRequest.parsed(argument))
                 given = b"" if error else argument
+            case Ioctl.CABLE:
+                error = self._connect(sock, argument.decode())
             case _:
                 error = errno.ENOTTY
         descriptors = [] if theirs is None else [theirs.fileno()]
@@ -228,6 +242,15 @@ class GpioChip:
         finally:
             if theirs is not None:
                 theirs.close()
+
+    def _connect(self, sock: socket.socket, name: str) -> int:
+        """Let a cable begin at a line; an error number, or 0."""
+        line = next((line for number, line in enumerate(self._lines) if name in {str(number), line.name or None}), None)
+        if line is None:
+            return errno.EINVAL
+        line.cables.append(sock)
+        self._selector.modify(sock, selectors.EVENT_READ, line)
+        return 0
 
     def _describe(self, offset: int | None) -> tuple[int, bytes]:
         if offset is None or offset >= len(self._lines):

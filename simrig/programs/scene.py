@@ -10,6 +10,7 @@ from rig.pulse import HillPulse
 from rig.settings.model import RigSettings
 from simrig.images.packing import Packing
 from simrig.images.view import CameraView
+from simrig.world.cable import Cable, cable_end
 from simrig.world.faults import Fault, FaultKind, FaultPlan
 from simrig.world.pulses import DeviceClock, PulseTrain
 from simrig.world.scenario import load_scenario
@@ -40,6 +41,9 @@ class SimScene:
         settings = rig.cameras[index]
         camera = scenario.camera_index(settings.name)
         self._train = PulseTrain(epoch, rig.trigger.rate_hz, scenario.pauses)
+        self._since = HostNs(-1)
+        self._end = cable_end(rig.trigger)
+        self._cable: Cable | None = None
         region, held = settings.region, settings.format.pixels
         self._shape = (region.height, region.width)
         self._view = CameraView(scenario, camera, region.width, region.height, rig.trigger.rate_hz, bits=held.bits)
@@ -53,13 +57,35 @@ class SimScene:
         """Add a fault while the camera runs."""
         self._plan.inject(fault)
 
-    def next_pulse(self, after: HostNs) -> int:
-        """Index of the first pulse strictly later than `after`."""
-        return self._train.next_index(after)
+    def start(self, after: HostNs) -> None:
+        """Let the pulses later than `after` reach the camera: those of the emulated chip's line, or the hill's."""
+        self.stop()
+        self._since = after
+        self._cable = None if self._end is None else Cable.plugged(self._end)
 
-    def pulse_time(self, pulse: int) -> HostNs:
-        """When the pulse fires."""
-        return self._train.time(HillPulse(pulse))
+    def next_pulse(self, until: HostNs) -> tuple[HillPulse, HostNs] | None:
+        """Number and time of the next pulse that reaches the camera; None: there is none up to a time."""
+        if self._cable is not None:
+            return self._next_edge(self._cable, until)
+        pulse = self._train.next_index(self._since)
+        time = self._train.time(pulse)
+        if time > until:
+            return None
+        self._since = time
+        return pulse, time
+
+    def stop(self) -> None:
+        """Let no pulse reach the camera any more."""
+        if self._cable is not None:
+            self._cable.close()
+            self._cable = None
+
+    def _next_edge(self, cable: Cable, until: HostNs) -> tuple[HillPulse, HostNs] | None:
+        while (edge := cable.next_edge(until)) is not None:
+            pulse = self._train.nearest(edge.time)
+            if edge.active and pulse is not None:  # while the hill pauses, the cable is out
+                return pulse, edge.time
+        return None
 
     def device_time(self, host: HostNs, pulse: int | None = None) -> DeviceNs:
         """The camera's own clock; for a pulse, with the jitter of its exposure."""

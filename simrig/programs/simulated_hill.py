@@ -22,6 +22,7 @@ from simrig.gige.camera import CameraConfig
 from simrig.gige.registers.makers import Maker
 from simrig.programs.cameras import START_S, CameraProcess, HillCamera
 from simrig.programs.messages import AskBusState, BusConfig, Done, FireWireBus, GigeCamera, ResetBus, State
+from simrig.world.cable import CableEnd
 from simrig.world.faults import OF_THE_CAMERA, Fault, FaultKind
 from simrig.world.pulses import PulseTrain
 from simrig.world.scenario import load_scenario
@@ -42,6 +43,7 @@ class GigeOptions(TypedDict, total=False):
     resend: bool
     maker: Maker
     broadcast: str | None
+    line: CableEnd | None
 
 
 class SimulatedHill:

@@ -51,11 +51,15 @@ class PulseTrain:
         """When pulse `n` is due."""
         return HostNs(self.epoch + round(n * NS_PER_S / self.rate_hz))
 
+    def nearest(self, host: HostNs) -> HillPulse | None:
+        """The pulse that is due nearest to a time; None if that one is not fired."""
+        n = HillPulse(max(0, round((host - self.epoch) * self.rate_hz / NS_PER_S)))
+        return None if any(first <= n < end for first, end in self.pauses) else n
+
     def fired_at(self, host: HostNs) -> HillPulse | None:
         """The pulse that was fired at a measured time; None if none was within a quarter of a period."""
-        n = HillPulse(max(0, round((host - self.epoch) * self.rate_hz / NS_PER_S)))
-        paused = any(first <= n < end for first, end in self.pauses)
-        return None if paused or 4 * abs(host - self.time(n)) > NS_PER_S / self.rate_hz else n
+        n = self.nearest(host)
+        return None if n is None or 4 * abs(host - self.time(n)) > NS_PER_S / self.rate_hz else n
 
     def next_index(self, after: HostNs) -> HillPulse:
         """Index of the first pulse that is fired strictly later than `after`."""

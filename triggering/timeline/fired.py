@@ -93,6 +93,7 @@ class FiredPulses:
         self._trusted = uncertainty_ns <= _SHARE * reach
         if not self._trusted:
             self._decided.clear()
+            self._number = None  # the cameras' pulse at this time is not one that the source left out
             return
         if self._until is None:
             self._until = time

@@ -1,6 +1,7 @@
 """The program of the process that makes the pulses of a line of the computer."""
 
 import gc
+import itertools
 import sys
 import threading
 from typing import Final
@@ -11,7 +12,7 @@ from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.trigger import GpioTrigger
 from rig.transport.child import ChildContext, begin
-from rig.transport.recorder_commands import TellPulses
+from rig.transport.recorder_commands import PulsesFired, TellPulses
 from rig.transport.trigger_messages import TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
 from triggering.sources.gpio.lines import OutputLine
@@ -21,7 +22,9 @@ from triggering.sources.gpio.timer import Timer
 
 #: A pulse and the line that is made inactive.
 _GRACE_S: Final = 2.0
-_REPORT_EVERY_S: Final = 0.5
+#: The recorder hears of pulses as often as of those of a trigger box, and of the figures every so many times.
+_TELL_EVERY_S: Final = 0.1
+_FIGURES_EVERY: Final = 5
 _RETRY_S: Final = 2.0
 #: Python hands over to a thread that waits for it after so long: a pulse does not wait longer for a report.
 _SWITCH_S: Final = 1e-4
@@ -73,10 +76,13 @@ class _Maker:
         """
         thread = threading.Thread(target=self._run, name="pulses")
         thread.start()
-        teller, stopping = LatenessTeller(self._line.name), False
+        teller, turns, stopping = LatenessTeller(self._line.name), itertools.count(1), False
         try:
             while not stopping and thread.is_alive():
-                stopping = child.stops_within(_REPORT_EVERY_S)
+                stopping = child.stops_within(_TELL_EVERY_S)
+                self._tell_fired(child)
+                if next(turns) % _FIGURES_EVERY:
+                    continue
                 made = self._pulser.figures(realtime=realtime)
                 child.control.send(TellPulses(made=made))
                 for level, said in teller.tell(made):
@@ -84,8 +90,20 @@ class _Maker:
         finally:
             self._timer.end()
             thread.join()
+            self._tell_fired(child)
         if self._failure is not None:
             raise self._failure
+
+    def _tell_fired(self, child: ChildContext[TriggerConfig]) -> None:
+        fired, until = self._pulser.fetch()
+        child.control.send(
+            PulsesFired(
+                first=fired[0].number if fired else 0,
+                times=tuple(pulse.time for pulse in fired),
+                uncertainty_ns=max((pulse.uncertainty_ns for pulse in fired), default=0),
+                until=until,
+            )
+        )
 
     def _run(self) -> None:
         try:

@@ -17,6 +17,7 @@ from simrig.gige.imaging.transmitter import Transmitter
 from simrig.gige.registers.register_map import RegisterMap
 from simrig.gige.registers.register_table import AcquisitionMode, ExposureMode, TriggerSource
 from simrig.images.painter import Painter
+from simrig.world.cable import CableEdge
 from simrig.world.faults import Fault, FaultKind, FaultPlan
 from simrig.world.pulses import PULSE_WIDTH_NS, PulseTrain
 from simrig.world.statistics import Counters
@@ -62,7 +63,7 @@ class Sensor:
     """A thread that exposes.
 
     Args:
-        train: the hill's trigger pulses, which arrive at Line0.
+        train: the hill's trigger pulses, which arrive at Line0 if there is no cable.
         faults: faults of this camera.
         painter: draws the images.
         clock: gives the timestamps.
@@ -70,6 +71,7 @@ class Sensor:
         transmitter: receives the frames.
         counters: the sensor counts triggers here.
         first_block_id: block id of the first frame after each start of acquisition.
+        cable: edges that are told by `edge` arrive at Line0.
 
     Attributes:
         trigger_count: triggers seen while acquiring, since a controller last reset this count.
@@ -85,17 +87,19 @@ class Sensor:
         transmitter: Transmitter,
         counters: Counters,
         first_block_id: int,
+        *,
+        cable: bool = False,
     ) -> None:
         self._train, self._faults, self._painter, self._clock = train, faults, painter, clock
         self._registers, self._transmitter, self._counters = registers, transmitter, counters
-        self._first_block_id = first_block_id
+        self._first_block_id, self._cable = first_block_id, cable
         self.trigger_count = 0
         self._condition = threading.Condition()
         self._stopping = False
         self._store: FrameStore | None = None  # None: not acquiring
         self._changes = 0
         self._since = HostNs(0)  # triggers up to here have been served or skipped
-        self._pending: list[HostNs] = []  # software triggers and scheduled actions, a heap
+        self._pending: list[HostNs] = []  # software triggers, scheduled actions, edges of the cable, a heap
         self._busy_until = HostNs(0)
         self._ahead: _Ahead | None = None
         self._next_id = first_block_id
@@ -147,6 +151,13 @@ class Sensor:
                 heapq.heappush(self._pending, time)
                 self._look_again()
 
+    def edge(self, edge: CableEdge) -> None:
+        """Take an edge of the trigger cable; while the hill pauses, the cable is out."""
+        with self._condition:
+            begins = not self._registers.number("TriggerActivation")
+            if edge.active == begins and self._train.nearest(edge.time) is not None:
+                self.trigger(TriggerSource.LINE0, edge.time)
+
     def _look_again(self) -> None:
         self._changes += 1
         self._condition.notify_all()
@@ -181,10 +192,12 @@ class Sensor:
         match self._source():
             case None:
                 time = HostNs(max(self._since + self._free_period_ns(), self._busy_until, self._since + 1))
-            case TriggerSource.LINE0:
+            case TriggerSource.LINE0 if not self._cable:
                 delay = PULSE_WIDTH_NS if self._registers.number("TriggerActivation") else 0
                 pulse = self._train.next_index(HostNs(self._since - delay))
                 return Trigger(HostNs(self._train.time(pulse) + delay), pulse)
+            case TriggerSource.LINE0 if self._pending and (shown := self._train.nearest(self._pending[0])) is not None:
+                return Trigger(self._pending[0], shown)
             case TriggerSource.SOFTWARE | TriggerSource.ACTION0 if self._pending:
                 time = self._pending[0]
             case _:

@@ -32,10 +32,11 @@ def write_hill_log(path: Path, rig: RigSettings, pulses: int) -> None:
     shape = (camera.region.height, camera.region.width)
     scene, buffers = SimScene(rig, 0, HostNs(0)), TripletBuffers(shape, 8)
     with open_writer(path, buffers) as log:
-        pulse = -1
+        scene.start(HostNs(-1))
         for number in range(1, pulses + 1):
-            pulse = scene.next_pulse(HostNs(-1) if pulse < 0 else scene.pulse_time(pulse))
-            host = scene.pulse_time(pulse)
+            fired = scene.next_pulse(HostNs(2**62))
+            assert fired is not None
+            pulse, host = fired
             time = UtcNs(START + host)
             ready = UtcNs(time + _READY_NS)
             tag = CameraTag(

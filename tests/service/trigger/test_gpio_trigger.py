@@ -6,20 +6,23 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
 
+from rig.clocks import UtcAnchor
 from simrig.gpio.build import environment
 from simrig.gpio.chip import GpioChip
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 from triggering.sources.gpio.pulser import LATEST
 
-RATE_HZ = 20.0
+RATE_HZ = 10.0
 
 
 @pytest.fixture
@@ -29,8 +32,10 @@ def chip() -> Iterator[GpioChip]:
         yield chip
 
 
-def _record(folder: Path, loopback: Loopback, chip: GpioChip, line: int, seconds: float) -> subprocess.Popen[str]:
-    path = write_rig(folder, "sim", loopback, source="gpio", rate_hz=RATE_HZ, names=["K1"])
+def _record(
+    folder: Path, loopback: Loopback, chip: GpioChip, line: int, seconds: float, backend: str = "sim", **rig: Any
+) -> subprocess.Popen[str]:
+    path = write_rig(folder, backend, loopback, source="gpio", rate_hz=RATE_HZ, **{"names": ["K1"], **rig})
     keys = f'source = "gpio"\nchip = "{chip.path}"\nline = {line}\npulse_ms = 2.0'
     path.write_text(path.read_text().replace('source = "gpio"', keys))
     command = [sys.executable, "-m", "svev", "record", "--rig", str(path), "--seconds", str(seconds)]
@@ -40,21 +45,37 @@ def _record(folder: Path, loopback: Loopback, chip: GpioChip, line: int, seconds
     )  # fmt: skip
 
 
-def test_the_line_has_the_pulses_and_the_log_says_how_even_they_were(
-    tmp_path: Path, loopback: Loopback, chip: GpioChip
+@pytest.mark.parametrize("backend", ["sim", "aravis"])
+def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_camera_saw(
+    tmp_path: Path, loopback: Loopback, chip: GpioChip, backend: str
 ) -> None:
-    with _record(tmp_path, loopback, chip, 1, 2.0) as program:
+    """Of ten pulses the trigger cable is out for two, and K2 misses one more."""
+    gaps = [[pulse, pulse + 2] for pulse in range(0, 3000, 10)]
+    misses = [{"camera": "K2", "kind": "missed_pulse", "at_pulse": pulse} for pulse in range(5, 1000, 10)]
+    options = {"names": ["K1", "K2"], "scenario": f"pauses = {gaps}", "faults": misses}
+    with _record(tmp_path, loopback, chip, 1, 3.0, backend, **options) as program:
         output, complaints = program.communicate(timeout=90)
-    assert program.returncode == 0, complaints
+    assert program.returncode == 5, complaints
     chip.wait_for_use(1, used=False)
     edges = chip.edges
     assert [edge.high for edge in edges] == [True, False] * (len(edges) // 2)
     rises = [edge.time for edge in edges if edge.high]
-    assert len(rises) > RATE_HZ
+    assert len(rises) > 2 * RATE_HZ
     assert min(after - before for before, after in pairwise(rises)) > (1 - 2 * LATEST) * 1e9 / RATE_HZ
     with Path(json.loads(output)["log"]).open("rb") as file:
-        messages = list(make_reader(file).iter_messages(topics=["/health"]))
-    made = json.loads(messages[-1][2].data)["made"]
+        reader = make_reader(file)
+        healths = [json.loads(message.data) for _, _, message in reader.iter_messages(topics=["/health"])]
+        tags = [json.loads(message.data) for _, _, message in reader.iter_messages(topics=["/triplet/tag"])]
+    to_utc = UtcAnchor.take().offset_ns
+    pulses = [min(range(len(rises)), key=lambda n: abs(rises[n] + to_utc - int(tag["time_ns"]))) for tag in tags]
+    assert pulses == list(range(pulses[0], pulses[0] + len(tags)))
+    assert max(abs(rises[n] + to_utc - int(tag["time_ns"])) for n, tag in zip(pulses, tags, strict=True)) < 5e6
+    fates = Counter(tuple(camera["status"] for camera in tag["cameras"]) for tag in tags)
+    assert set(fates) == {("ok", "ok"), ("missed", "missed"), ("ok", "missed")}, fates
+    assert 0.1 < fates["missed", "missed"] / len(tags) < 0.3
+    source, made = healths[-1]["pairing"]["source"], healths[-1]["made"]
+    assert source["unfired"] == source["untagged"] == 0
+    assert source["unseen"] > 0
     assert 0 < made["made"] <= len(rises)
     assert made["late_median_us"] <= made["late_p99_us"] <= made["late_max_us"]
     assert made["late_max_us"] >= 0

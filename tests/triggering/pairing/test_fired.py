@@ -189,6 +189,17 @@ def test_a_pulse_that_the_source_did_not_fire_is_kept_and_told() -> None:
     assert _codes(feed) == ["pairing_unfired"]
 
 
+def test_a_single_pulse_of_uncertain_time_is_not_one_that_the_source_did_not_fire() -> None:
+    feed = _trained()
+    for pulse in range(20, 25):
+        feed.pairer.fired(pulse, feed.time_of(pulse), PERIOD if pulse == 21 else 100_000)
+        feed.pairer.fired_until(feed.time_of(pulse))
+        feed.all_cameras(pulse, [pulse + 1] * 3)
+    source = feed.pairer.health().source
+    assert source is not None
+    assert (source.fired, source.unseen, source.untagged, source.unfired) == (25, 0, 0, 0)
+
+
 @pytest.mark.parametrize(("error_ns", "tagged"), [(PERIOD // 5, 1), (PERIOD // 3, 0)])
 def test_a_source_whose_times_are_too_uncertain_proves_nothing(error_ns: int, tagged: int) -> None:
     feed = _trained()

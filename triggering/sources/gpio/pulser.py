@@ -46,8 +46,7 @@ class Pulser:
         rate_hz: pulses per second.
         width_ns: length of a pulse, at most half of the period.
 
-    Attributes:
-        fired: pulses that have been made and not been fetched; the reader takes them from the left.
+    One thread makes the pulses, another may ask for `figures` and `fetch` them.
     """
 
     def __init__(
@@ -60,7 +59,8 @@ class Pulser:
         self._free_from: HostNs | None = None
         self._late_ns: deque[int] = deque(maxlen=_REMEMBERED)
         self._made = self._skipped = self._latest_made_ns = 0
-        self.fired: deque[Fired] = deque(maxlen=_REMEMBERED)
+        self._making: HostNs | None = None  # the time for which a pulse is due that is being made
+        self._fired: deque[Fired] = deque(maxlen=_REMEMBERED)
 
     def run(self) -> None:
         """Make pulses until the waiting is ended; the line is inactive then.
@@ -93,6 +93,17 @@ class Pulser:
             realtime=realtime,
         )
 
+    def fetch(self) -> tuple[list[Fired], HostNs]:
+        """Pulses that have been made and not been fetched, and a time: all pulses up to then have been fetched.
+
+        Their numbers follow each other; after a gap they are left to the next call.
+        """
+        until, making = self._waiting.now(), self._making  # in this order: a pulse that begins later is after `until`
+        fired: list[Fired] = []
+        while self._fired and (not fired or self._fired[0].number == fired[-1].number + 1):
+            fired.append(self._fired.popleft())
+        return fired, until if making is None else min(until, making)
+
     def _due(self, pulse: int) -> HostNs:
         return HostNs(self._origin + round(pulse * NS_PER_S / self._rate_hz))
 
@@ -101,20 +112,22 @@ class Pulser:
 
     def _pulse(self, due: HostNs) -> bool:
         """Make one; whether to go on."""
+        self._making = due
         before = self._waiting.now()
         self._set_line(True)
         try:
             after = self._waiting.now()
+            time = HostNs((before + after) // 2)
+            self._made += 1
+            self._fired.append(Fired(self._made, time, (after - before + 1) // 2))
+            self._making = None
             goes_on = self._waiting.wait(HostNs(before + self._width_ns), precisely=False)
         finally:
             self._set_line(False)
         # A camera needs the line inactive for as long as active, or it sees no edge.
         self._free_from = HostNs(max(after + self._nearest_ns, self._waiting.now() + self._width_ns))
-        time = HostNs((before + after) // 2)
-        self._made += 1
         self._late_ns.append(time - due)
         self._latest_made_ns = max(self._latest_made_ns, time - due)
-        self.fired.append(Fired(self._made, time, (after - before + 1) // 2))
         return goes_on
 
 

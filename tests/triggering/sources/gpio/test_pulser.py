@@ -94,9 +94,35 @@ def test_however_the_computer_stalls_pulses_keep_their_distance_and_are_counted(
     assert made.made == len(rises)
     assert abs(made.made + made.skipped - 3600) <= 1
     assert 0.02 < made.skipped / 3600 < 0.2
-    fired = list(pulser.fired)
+    fired, until = pulser.fetch()
+    assert until == computer.time
     assert [each.number for each in fired] == list(range(made.made - len(fired) + 1, made.made + 1))
     assert all(abs(e.time - t) <= e.uncertainty_ns for e, t in zip(fired, rises[-len(fired) :], strict=True))
+
+
+def test_no_time_is_said_to_be_told_before_its_pulse_is() -> None:
+    """Whenever another thread asks: between two pulses, while the line is being set, while it is active."""
+    told: list[tuple[list[int], HostNs]] = []
+
+    class Asked(_Computer):
+        def set_line(self, active: bool) -> None:
+            self.ask()
+            super().set_line(active)
+            self.ask()
+
+        def ask(self) -> None:
+            fired, until = pulser.fetch()
+            told.append(([pulse.time for pulse in fired], until))
+
+    computer = Asked(lambda: 300 * US, lambda: 200 * US, HostNs(ORIGIN + 1_000_000_000))
+    pulser = Pulser(computer.set_line, computer, ORIGIN, 30.0, 1000 * US)
+    pulser.run()
+    computer.ask()
+    untold = HostNs(0)
+    for times, until in told:
+        assert all(time > untold for time in times)
+        untold = until
+    assert [time for times, _ in told for time in times] == computer.rises
 
 
 def test_a_line_that_was_active_when_the_train_was_ended_is_inactive() -> None:

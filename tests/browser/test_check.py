@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import pytest
 from playwright.sync_api import Page, expect
 
+from rig.api.recordings import RecordingOrder
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals, RehearsalVerdict
 from rig.api.statement import Level, Statement
 from rig.api.status import Finding, RehearsalProgress, RehearsalStage
@@ -100,3 +101,27 @@ def test_what_is_wrong_comes_first_with_what_to_do(panel: Panel, service: Memory
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     assert page.evaluate(BROKEN) == []
     assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+
+
+def test_the_rate_of_the_pulses_is_changed_and_kept(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    page = open_page(f"{panel.url}/#/doctor", width=360, height=780, locale="nb-NO")
+    wanted, use, save, said = (page.locator(f"#pulses-{name}") for name in ("wanted", "use", "save", "said"))
+    expect(page.locator("#pulses-source")).to_have_text("En linje på denne datamaskinen lager 30 i sekundet.")
+    expect(use).to_be_disabled()
+    for rate in ("40 /s", "50 /s"):
+        page.locator("#pulses-faster").click()
+        expect(wanted).to_have_text(rate)
+    assert service.pulses_made.rate_hz == 30
+    use.click()
+    expect(page.locator("#pulses-source")).to_contain_text("50 i sekundet")
+    expect(said).to_contain_text("lagre det")
+    save.click()
+    expect(said).to_have_text("Riggfilen sier det samme.")
+    assert (service.pulses_made.rate_hz, service.pulses_made.saved) == (50, True)
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    assert page.evaluate(BROKEN) == []
+    assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []
+    service.arm()
+    service.start_recording(RecordingOrder())
+    expect(page.locator("#pulses-slower")).to_be_disabled()
+    expect(said).to_have_text("Ikke mens et opptak går.")

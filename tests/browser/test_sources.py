@@ -29,6 +29,7 @@ COMPOSED = (
     "field.",
     "doctor.",
     "rehearsal.",
+    "pulses.",
     "list.",
     "export.",
     "log.is_",

@@ -25,6 +25,7 @@ import { startAim } from "./system/aim.js";
 import * as doctor from "./system/doctor.js";
 import { drawEarlier, enterEarlier, startEarlier } from "./system/earlier.js";
 import { startLog } from "./system/log.js";
+import { drawPulses, enterPulses, startPulses } from "./system/pulses.js";
 import * as rehearsal from "./system/rehearsal.js";
 import * as rig from "./system/rig.js";
 import { drawChoices, startComparing } from "./viewing/comparing.js";
@@ -43,6 +44,7 @@ function redraw() {
   drawExports();
   drawEarlier();
   drawKeys();
+  drawPulses();
 }
 
 /** @param {import("./shared/router.js").Place} place */
@@ -53,6 +55,7 @@ function entered({ view, id }) {
   if (view === "doctor") {
     doctor.draw();
     rehearsal.enterRehearsal();
+    void enterPulses();
   }
   if (view === "aim") void enterEarlier();
   if (view === "rig") void rig.enterRig();
@@ -61,7 +64,7 @@ function entered({ view, id }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

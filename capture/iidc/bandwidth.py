@@ -24,13 +24,31 @@ FRAMERATES: Final = (1.875, 3.75, 7.5, 15.0, 30.0, 60.0, 120.0, 240.0)
 _FAST: Final = 1.01
 #: A Format7 frame is sent within this share of the period, so that the next one never waits for it.
 _SHARE: Final = 0.9
-#: Formats that the standard fixes, by width and height: libdc1394's mode, and cycles per frame at 30 frames per second.
+
+
+@dataclass(frozen=True, slots=True)
+class FixedFormat:
+    """Formats of one size that the standard fixes (IIDC 1.31, section 2.2).
+
+    Attributes:
+        mono8: libdc1394's mode of 8-bit pixels.
+        mono16: libdc1394's mode of 16-bit pixels.
+        cycles_at_30: packets of a frame at 30 frames per second. Those of 16-bit pixels are twice as large, not twice
+            as many.
+    """
+
+    mono8: VideoMode
+    mono16: VideoMode
+    cycles_at_30: int = 240
+
+
+#: By width and height.
 FIXED_FORMATS: Final = {
-    (640, 480): (VideoMode.MONO8_640X480, 240),
-    (800, 600): (VideoMode.MONO8_800X600, 240),
-    (1024, 768): (VideoMode.MONO8_1024X768, 256),
-    (1280, 960): (VideoMode.MONO8_1280X960, 240),
-    (1600, 1200): (VideoMode.MONO8_1600X1200, 240),
+    (640, 480): FixedFormat(VideoMode.MONO8_640X480, VideoMode.MONO16_640X480),
+    (800, 600): FixedFormat(VideoMode.MONO8_800X600, VideoMode.MONO16_800X600),
+    (1024, 768): FixedFormat(VideoMode.MONO8_1024X768, VideoMode.MONO16_1024X768, 256),
+    (1280, 960): FixedFormat(VideoMode.MONO8_1280X960, VideoMode.MONO16_1280X960),
+    (1600, 1200): FixedFormat(VideoMode.MONO8_1600X1200, VideoMode.MONO16_1600X1200),
 }
 
 
@@ -82,8 +100,8 @@ def need(camera: CameraSettings, rate_hz: float, *, fixed: bool | None = None, u
         unit_bytes: packets of Format7 are a multiple of this, which the camera tells.
     """
     if is_fixed_format(camera) if fixed is None else fixed:
-        _, cycles_at_30 = FIXED_FORMATS[camera.region.width, camera.region.height]
-        cycles = round(cycles_at_30 * 30 / FRAMERATES[framerate_index(rate_hz)])
+        at_30 = FIXED_FORMATS[camera.region.width, camera.region.height].cycles_at_30
+        cycles = round(at_30 * 30 / FRAMERATES[framerate_index(rate_hz)])
     else:
         cycles = int(_SHARE * 1e9 / rate_hz / CYCLE_NS)
     packet = math.ceil(camera.frame_bytes / max(1, cycles) / unit_bytes) * unit_bytes
@@ -109,7 +127,9 @@ def check_bandwidth(rig: RigSettings) -> None:
         needs = [need(camera, rig.trigger.rate_hz).units for camera in cameras]
         if sum(needs) > UNITS_PER_BUS:
             each = ", ".join(f"{camera.name} {units}" for camera, units in zip(cameras, needs, strict=True))
+            deep = any(camera.format.pixels.size > 1 for camera in cameras)
             raise BadInputError(
                 f"the cameras on FireWire bus {bus} need {sum(needs)} of its {UNITS_PER_BUS} bandwidth units ({each}): "
                 "take one away, give it a card of its own and say so with iidc.bus, or lower trigger.rate_hz or regions"
+                + (', or set pixel_format = "Mono8", which needs half' if deep else "")
             )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, Final
 
-from capture.iidc.avt import AvtRegisters
+from capture.iidc.avt import AVT_VENDOR_ID, AvtRegisters
 from capture.iidc.bus import Bus
 from capture.iidc.clock import BusClock, CycleTimer, PacketTimes, first_packet
 from capture.iidc.configuration import (
@@ -24,6 +24,7 @@ from capture.iidc.configuration import (
 from capture.iidc.device import Device
 from capture.iidc.dma import DmaRing
 from capture.iidc.library import Dc1394Error
+from capture.iidc.pixels import copier
 from capture.iidc.signature import SIGNATURE_BYTES, ByteOrder, SignatureReader
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now
@@ -51,7 +52,7 @@ class IidcCamera:
         self._notices: list[str] = []
         region = settings.region
         self._stamped_pixels = StampedPixels(region.height - 1, 0, SIGNATURE_BYTES)
-        self._stamp_at = self._stamped_pixels.row * region.width
+        self._stamp_at = self._stamped_pixels.row * region.width * settings.format.pixels.size
         self._exposure_ns = 0 if settings.iidc.trigger_mode else round(settings.exposure_us * NS_PER_US)
         self._cleanup = ExitStack()
         try:
@@ -76,6 +77,7 @@ class IidcCamera:
         self._format = set_video_format(device, settings, rate_hz)
         set_trigger(device, settings, software=self._software)
         set_gain(device, settings)
+        self._copy = copier(settings, at_top=device.vendor_id == AVT_VENDOR_ID)
         self._avt = AvtRegisters(device)
         self._clock: BusClock = PacketTimes()
         self._signatures: SignatureReader | None = None
@@ -84,7 +86,8 @@ class IidcCamera:
         elif self._avt.signs:
             self._avt.sign_last_line()
             self._clock = CycleTimer(device)
-            self._signatures = SignatureReader(longest_delay_ns(settings, round(NS_PER_S / rate_hz)))
+            delay_ns = longest_delay_ns(settings, round(NS_PER_S / rate_hz))
+            self._signatures = SignatureReader(delay_ns, pixel_bytes=settings.format.pixels.size)
         self._dma = DmaRing(device, settings.iidc.dma_frames, settings.name)
         self._at_close(self._dma.close)
         set_exposure(device, self._avt, settings)
@@ -191,7 +194,7 @@ class IidcCamera:
         stamped: StampedPixels | None = None
         device_time = self._clock.at(HostNs(first - self._exposure_ns - READOUT_NS))
         if self._signatures is not None:
-            data = ctypes.string_at(image + self._stamp_at, SIGNATURE_BYTES)
+            data = ctypes.string_at(image + self._stamp_at, self._signatures.line_bytes)
             signature = self._signatures.read(data, self._clock.at(first))
             if signature is None:
                 return Arrival(False, host_now(), device_time=device_time)
@@ -201,7 +204,7 @@ class IidcCamera:
         if slot is None:
             self._underruns += 1
             return None
-        ctypes.memmove(self._ring.slot_address(slot), image, self._ring.frame_bytes)
+        self._copy(image, self._ring.frame(slot))
         return Arrival(True, host_now(), slot, frames, 0, device_time, triggers, stamped)
 
     def _after_bus_reset(self) -> None:

@@ -8,13 +8,23 @@ from dataclasses import dataclass
 from capture.iidc.avt import AvtRegisters
 from capture.iidc.bandwidth import FIXED_FORMATS, Need, framerate_index, is_fixed_format, need
 from capture.iidc.device import Device
-from capture.iidc.structures import COLOR_CODING_MONO8, TRIGGER_SOURCE_0, TRIGGER_SOURCE_SOFTWARE, Feature, VideoMode
+from capture.iidc.structures import (
+    COLOR_CODING_MONO8,
+    COLOR_CODING_MONO16,
+    TRIGGER_SOURCE_0,
+    TRIGGER_SOURCE_SOFTWARE,
+    Feature,
+    VideoMode,
+)
 from rig.clocks import NS_PER_US
 from rig.errors import CameraError
+from rig.pixels import FORMATS
 from rig.settings.model import CameraSettings
 
 #: Time from the end of the exposure to the first packet (Marlin manual: 500 us +- 62.5 us).
 READOUT_NS = 500_000
+#: What `DATA_DEPTH` says of 16-bit pixels if all bits are significant, or if it is not known how many are.
+_ALL_BITS = 16
 #: Commands, as a number among the trigger sources.
 _SOFTWARE = TRIGGER_SOURCE_SOFTWARE - TRIGGER_SOURCE_0
 
@@ -42,19 +52,41 @@ def set_video_format(device: Device, camera: CameraSettings, rate_hz: float) -> 
         BadInputError: no format is that fast.
     """
     device.set_iso_speed(camera.iidc.iso_speed)
-    if is_fixed_format(camera) and (fixed := _fixed(device, camera, rate_hz)) is not None:
-        return fixed
-    return _format7(device, camera, rate_hz)
+    chosen = _fixed(device, camera, rate_hz) if is_fixed_format(camera) else None
+    chosen = chosen or _format7(device, camera, rate_hz)
+    if _is_deep(camera):
+        _check_depth(device.data_depth(), camera)
+    return chosen
+
+
+def _is_deep(camera: CameraSettings) -> bool:
+    return camera.format.pixels.size > 1
+
+
+def _check_depth(depth: int, camera: CameraSettings) -> None:
+    """Check that the camera has as many significant bits as logs will say."""
+    named = f"Mono{depth}" if f"Mono{depth}" in FORMATS else "Mono16"
+    if depth != _ALL_BITS and camera.pixel_format != named:
+        raise CameraError(
+            f"camera {camera.name} sends pixels of {depth} significant bits, not {camera.pixel_format}: "
+            f'set pixel_format = "{named}"'
+        )
 
 
 def _fixed(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat | None:
     """Set a fixed format; None if the camera does not have it at this rate."""
     region, rate = camera.region, framerate_index(rate_hz)
-    mode, _ = FIXED_FORMATS[region.width, region.height]
+    formats = FIXED_FORMATS[region.width, region.height]
+    mode = formats.mono16 if _is_deep(camera) else formats.mono8
     if mode not in device.modes() or rate not in device.framerates(mode):
         return None
     device.set_fixed_format(mode, rate)
-    return VideoFormat(mode, f"{region.width} x {region.height}", need(camera, rate_hz, fixed=True))
+    return VideoFormat(mode, _name(camera), need(camera, rate_hz, fixed=True))
+
+
+def _name(camera: CameraSettings) -> str:
+    """The format of a fixed size, for people; 8 bits go without saying."""
+    return f"{camera.region.width} x {camera.region.height}" + (f" {camera.pixel_format}" if _is_deep(camera) else "")
 
 
 def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat:
@@ -64,6 +96,11 @@ def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFor
         raise CameraError(
             f"camera {camera.name} has no format of {region.width} x {region.height} at {rate_hz:g} Hz: set its region "
             "to x = 0, y = 0 and 640 x 480, or lower trigger.rate_hz"
+        )
+    if _is_deep(camera) and COLOR_CODING_MONO16 not in device.color_codings(mode):
+        raise CameraError(
+            f"camera {camera.name} sends {region.width} x {region.height} at {rate_hz:g} Hz with 8 bits only: set "
+            'pixel_format = "Mono8"'
         )
     _check_region(device, camera)
     # Set twice: the camera tells its packet sizes for a region only after the region has been set.
@@ -77,14 +114,17 @@ def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFor
             f"{camera.iidc.iso_speed} Mbit/s: make its region smaller or lower trigger.rate_hz"
         )
     _set_region(device, camera, wanted.packet_bytes)
-    name = f"{region.width} x {region.height} from {region.x}, {region.y}"
-    return VideoFormat(mode, name, wanted)
+    return VideoFormat(mode, f"{_name(camera)} from {region.x}, {region.y}", wanted)
+
+
+def _coding(camera: CameraSettings) -> int:
+    return COLOR_CODING_MONO16 if _is_deep(camera) else COLOR_CODING_MONO8
 
 
 def _set_region(device: Device, camera: CameraSettings, packet_bytes: int) -> None:
     region = camera.region
     device.call(
-        "format7_set_roi", VideoMode.FORMAT7_0, COLOR_CODING_MONO8, packet_bytes,
+        "format7_set_roi", VideoMode.FORMAT7_0, _coding(camera), packet_bytes,
         region.x, region.y, region.width, region.height,
     )  # fmt: skip
 

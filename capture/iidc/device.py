@@ -11,6 +11,7 @@ from capture.iidc.structures import (
     FRAMERATE_1_875,
     TRIGGER_MODE_0,
     TRIGGER_SOURCE_0,
+    ColorCodings,
     Feature,
     Framerates,
     IsoSpeed,
@@ -121,6 +122,19 @@ class Device:
     def mode(self) -> int:
         """The video mode that is set."""
         return self._int("video_get_mode")
+
+    def color_codings(self, mode: int) -> list[int]:
+        """Kinds of pixels that a mode of Format7 has."""
+        codings = ColorCodings()
+        self.call("format7_get_color_codings", mode, byref(codings))
+        return [int(coding) for coding in codings.codings[: codings.num]]
+
+    def data_depth(self) -> int:
+        """Significant bits of a pixel in the format that is set (IIDC 1.31, DATA_DEPTH).
+
+        For 16-bit pixels of a camera that does not tell, as all of IIDC 1.30 and before, libdc1394 says 16.
+        """
+        return self._u32("video_get_data_depth")
 
     def set_fixed_format(self, mode: VideoMode, framerate: int) -> None:
         """Set a fixed format of the standard, and its rate by index in `bandwidth.FRAMERATES`."""

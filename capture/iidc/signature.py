@@ -1,8 +1,9 @@
 """Reads the secure image signature that AVT's cameras write into a frame: its trigger time, and whether it is torn.
 
 The first twelve bytes of the last line are three words: the cycle time of the bus when the exposure began, the count
-of frames read out, the count of triggers seen. Cameras differ in the order of the bytes in a word; the reader tries
-both and compares the time with the cycle timer of the bus.
+of frames read out, the count of triggers seen. Cameras differ in the order of the bytes in a word, and where pixels
+have 16 bits, the manual leaves open whether the twelve stand one behind the other or one in each pixel ("the very first
+4 bytes/pixels of a line"). The reader tries all and compares the time with the cycle timer of the bus.
 
 libdc1394 on Linux does not report a frame that has lost a packet: everything behind the gap has moved up, and the
 frame's end is the beginning of the next frame. Then the signature is not where it should be: so torn frames are found.
@@ -11,6 +12,7 @@ frame's end is the beginning of the next frame. Then the signature is not where 
 import struct
 from dataclasses import dataclass
 from enum import Enum
+from itertools import product
 from typing import Final
 
 from capture.iidc.clock import CYCLE_NS, CycleTime, unwrap
@@ -31,6 +33,19 @@ class ByteOrder(Enum):
 
     BIG = ">"
     LITTLE = "<"
+
+
+class Places(Enum):
+    """Where in a line the bytes of the signature are: first one, and step to the next."""
+
+    TOGETHER = 0, 1
+    HIGH = 0, 2  #: the higher byte of each 16-bit pixel, which is sent first
+    LOW = 1, 2  #: the lower byte of each 16-bit pixel
+
+    def of(self, line: bytes) -> bytes:
+        """The bytes of the signature."""
+        first, step = self.value
+        return line[first::step][:SIGNATURE_BYTES]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +69,17 @@ class SignatureReader:
     Args:
         longest_delay_ns: longest time from the beginning of the exposure to the first packet.
         order: order of the bytes, if it is known.
+        pixel_bytes: bytes of a pixel, 1 or 2.
 
     Attributes:
         order: order of the bytes; None until a frame has shown it.
+        line_bytes: so many bytes of the last line may hold the signature.
     """
 
-    def __init__(self, longest_delay_ns: int, order: ByteOrder | None = None) -> None:
+    def __init__(self, longest_delay_ns: int, order: ByteOrder | None = None, *, pixel_bytes: int = 1) -> None:
         self.order = order
+        self._places = Places.TOGETHER if pixel_bytes == 1 else None
+        self.line_bytes = SIGNATURE_BYTES * pixel_bytes
         self._longest_delay_ns = longest_delay_ns
         self._last: Signature | None = None
         self._refused = 0
@@ -69,7 +88,7 @@ class SignatureReader:
         """The signature of the next frame.
 
         Args:
-            data: the first `SIGNATURE_BYTES` of the last line.
+            data: the first `line_bytes` of the last line.
             first_packet_ns: when the frame's first packet came, unwrapped cycle time, in steps of 125 us; wrong by a
                 multiple of 8 s if the frame was fetched very late.
 
@@ -77,7 +96,12 @@ class SignatureReader:
             None if there is no signature: the frame is torn.
         """
         orders = [self.order] if self.order is not None else list(ByteOrder)
-        found = [(order, signature) for order in orders if (signature := self._try(data, first_packet_ns, order))]
+        places = [self._places] if self._places is not None else list(Places)
+        found = [
+            (order, place, signature)
+            for order, place in product(orders, places)
+            if (signature := self._try(place.of(data), first_packet_ns, order))
+        ]
         if not found:
             self._refused += 1
             if self._refused >= _MOST_REFUSALS:
@@ -85,10 +109,10 @@ class SignatureReader:
             return None
         self._refused = 0
         if len(found) == 1:
-            self.order = found[0][0]
-        # Very rarely both orders make sense. The counters began at 0, so the smaller count is taken; the next frame
+            self.order, self._places, _ = found[0]
+        # Very rarely several make sense. The counters began at 0, so the smaller count is taken; the next frame
         # confirms it or not.
-        signature = min((signature for _, signature in found), key=lambda signature: signature.frames)
+        signature = min((signature for *_, signature in found), key=lambda signature: signature.frames)
         self._last = signature
         return signature
 

@@ -82,7 +82,7 @@ class CameraList(Structure):
     _fields_: ClassVar = [("num", c_uint32), ("ids", POINTER(CameraId))]
 
 
-_MODES, _FRAMERATES, _SOURCES = 32, 8, 5
+_MODES, _FRAMERATES, _SOURCES, _CODINGS = 32, 8, 5, 11
 
 
 class VideoModes(Structure):
@@ -95,6 +95,12 @@ class Framerates(Structure):
     """`dc1394framerates_t`."""
 
     _fields_: ClassVar = [("num", c_uint32), ("framerates", c_uint32 * _FRAMERATES)]
+
+
+class ColorCodings(Structure):
+    """`dc1394color_codings_t`."""
+
+    _fields_: ClassVar = [("num", c_uint32), ("codings", c_uint32 * _CODINGS)]
 
 
 class TriggerSources(Structure):
@@ -128,13 +134,18 @@ class Log(IntEnum):
 
 
 class VideoMode(IntEnum):
-    """The values of `dc1394video_mode_t` for 8-bit monochrome images."""
+    """The values of `dc1394video_mode_t` for monochrome images."""
 
     MONO8_640X480 = 69
+    MONO16_640X480 = 70
     MONO8_800X600 = 73
     MONO8_1024X768 = 76
+    MONO16_800X600 = 77
+    MONO16_1024X768 = 78
     MONO8_1280X960 = 81
     MONO8_1600X1200 = 84
+    MONO16_1280X960 = 85
+    MONO16_1600X1200 = 86
     FORMAT7_0 = 88
 
 
@@ -170,6 +181,7 @@ class Polarity(IntEnum):
 
 
 COLOR_CODING_MONO8: Final = 352
+COLOR_CODING_MONO16: Final = 357
 FRAMERATE_1_875: Final = 32  #: each of the next numbers is twice as fast, up to 240
 TRIGGER_MODE_0: Final = 384
 TRIGGER_SOURCE_0: Final = 576

@@ -26,6 +26,8 @@ Backend = Literal["aravis", "iidc", "sim", "replay"]
 #: The back ends whose cameras can be told to expose.
 COMMANDED: Final[frozenset[Backend]] = frozenset({"aravis", "iidc"})
 
+#: Grey pixels of 8 bits, or of 16 of which so many are significant.
+_FIREWIRE_FORMATS: Final[tuple[PixelFormatName, ...]] = ("Mono8", "Mono10", "Mono12", "Mono16")
 #: Less than a chunk of a log holds (`recorder.log.mcap_layout.CHUNK_MAX`), with room for the tag.
 _TRIPLET_BYTES_MAX: Final = 255 << 20
 
@@ -71,7 +73,7 @@ class CameraSettings(StrictModel):
     pixel_format: PixelFormatName = Field(
         "Mono8",
         description="what the camera sends. Logs hold 8 bits per pixel as mono8, 10 and 12 as mono16, whether packed "
-        "or not",
+        "or not. iidc: Mono8, or 16 bits of which so many are significant: Mono10, Mono12, Mono16",
     )
     exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
     gain_db: float = Field(0.0, ge=0, le=60)
@@ -110,9 +112,10 @@ class CameraSettings(StrictModel):
             if "iidc" in self.model_fields_set:
                 raise ValueError(f'iidc = ... is for backend "iidc" only, this one is "{self.backend}": remove it')
             return self
-        if self.pixel_format != "Mono8":
+        if self.pixel_format not in _FIREWIRE_FORMATS:
             raise ValueError(
-                f'pixel_format "{self.pixel_format}" is not for backend "iidc": FireWire cameras send "Mono8" here'
+                f'pixel_format "{self.pixel_format}" is not for backend "iidc": FireWire cameras send '
+                f"{', '.join(_FIREWIRE_FORMATS)} here"
             )
         if not re.fullmatch(r"(0x)?[0-9A-Fa-f]{16}", self.address):
             raise ValueError(

@@ -23,14 +23,15 @@ class _TestPattern:
 
     def __init__(self, width: int, height: int, bits: int) -> None:
         self._ramp = np.add.outer(np.arange(height), np.arange(width)).astype(np.uint8)
-        self._scale = 1 << (bits - 8)
+        self._more_bits = bits - 8
 
     def render_into(self, out: Stored, pulse: HillPulse) -> None:
         """See `CameraView`."""
         if out.dtype == np.uint8:
             np.add(self._ramp, np.uint8(pulse % 256), out=out)
         else:
-            np.multiply(self._ramp + np.uint8(pulse % 256), self._scale, out=out, dtype=np.uint16)
+            level = (self._ramp + np.uint8(pulse % 256)).astype(np.uint16)
+            out[...] = level << self._more_bits | level >> 8 - self._more_bits  # white is white, and all bits are used
 
 
 class Painter:

@@ -70,6 +70,7 @@ class BusProgram:
                 _painter(config, scenario, name),
                 FaultPlan(f for f in scenario.faults_of(name) if f.kind not in OF_THE_CAMERA),
                 config.signature,
+                config.deep,
             )
             for name, guid in config.cameras.items()
         }

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field
 from rig.settings.strict_toml import StrictModel
 from rig.transport.message import Message, Quit
 from simrig.firewire.camera.advanced import Signature
+from simrig.firewire.camera.geometry import MARLIN, Deep
 from simrig.firewire.firewire_bus import BusState
 from simrig.gige.camera import CameraConfig
 from simrig.world.faults import Fault
@@ -41,6 +42,7 @@ class BusConfig(StrictModel):
     epoch: int = Field(description="host time of hill pulse 0, ns")
     test_pattern: bool = Field(False, description="show a plain pattern instead of the hill: costs nothing")
     signature: Signature = Field("big", description="byte order of the secure image signature; none: old firmware")
+    deep: Deep = Field(MARLIN, description="how pixels of more than 8 bits are sent")
     permitted: bool = Field(True, description="whether programs may open /dev/fw*")
     cable: bool = Field(True, description="whether the hill's pulses reach the cameras' inputs")
 

@@ -15,6 +15,7 @@ from rig.settings.strict_toml import validate
 from rig.transport.message import Message
 from rig.transport.process_table import Child, ProcessSpec
 from simrig.firewire.camera.advanced import Signature
+from simrig.firewire.camera.geometry import MARLIN, Deep
 from simrig.firewire.firewire_bus import BusState
 from simrig.firewire.host import wire
 from simrig.firewire.host.build import shim
@@ -61,6 +62,7 @@ class SimulatedHill:
         permitted: whether programs may open the FireWire nodes.
         cable: whether the hill's pulses reach the inputs of the FireWire cameras.
         signature: byte order in which FireWire cameras sign their images; "none": their firmware cannot.
+        deep: how FireWire cameras send pixels of more than 8 bits.
         gige: options of the GigE Vision cameras.
 
     Raises:
@@ -79,6 +81,7 @@ class SimulatedHill:
         permitted: bool = True,
         cable: bool = True,
         signature: Signature = "big",
+        deep: Deep = MARLIN,
         **gige: Unpack[GigeOptions],
     ) -> None:
         truth = load_scenario(scenario)
@@ -93,7 +96,7 @@ class SimulatedHill:
         self._socket = f"@svev-firewire-{os.getpid()}-{uuid.uuid4().hex[:8]}"
         bus = common | {
             "cameras": dict(firewire), "socket": self._socket, "permitted": permitted, "signature": signature,
-            "cable": cable,
+            "cable": cable, "deep": deep,
         }  # fmt: skip
         self._bus: CameraProcess | None = None
         self._cameras: dict[str, HillCamera] = {}

@@ -7,7 +7,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from simrig.firewire.camera.geometry import SENSOR, bit, field
+from simrig.firewire.camera.geometry import SENSOR, SignedBytes, bit, field
 
 #: Byte order in which a camera signs its images (the manual does not say which); "none": firmware without signature.
 Signature = Literal["big", "little", "none"]
@@ -56,14 +56,16 @@ class AdvancedRegisters:
 
     Args:
         signature: byte order of the signature; "none": the registers of the signature are missing too.
+        signed_bytes: where its bytes are in images of 16-bit pixels.
 
     Attributes:
         frames: frames read out of the sensor since the last reset of this counter.
         triggers: external triggers seen, likewise.
     """
 
-    def __init__(self, signature: Signature = "big") -> None:
+    def __init__(self, signature: Signature = "big", signed_bytes: SignedBytes = "together") -> None:
         self._signature = signature
+        self._first_and_step = {"together": (0, 1), "high": (0, 2), "low": (1, 2)}[signed_bytes]
         self.reset()
 
     def reset(self) -> None:
@@ -122,16 +124,18 @@ class AdvancedRegisters:
         """Count a frame that was read out of the sensor."""
         self.frames = self.frames + 1 & _COUNT
 
-    def sign(self, image: NDArray[np.uint8], words: tuple[int, int, int]) -> None:
+    def sign(self, image: NDArray[np.uint8], words: tuple[int, int, int], pixel_bytes: int = 1) -> None:
         """Write the enabled words of the signature over the start of its line.
 
         Args:
-            image: shape (rows, columns).
+            image: bytes as they are sent, shape (rows, bytes of a row).
             words: cycle time at the start of the integration, frame counter, trigger counter.
+            pixel_bytes: bytes of a pixel.
         """
         if not any(self._on.values()) or not -len(image) <= self._line < len(image):
             return
-        line = image[self._line]
+        first, step = self._first_and_step if pixel_bytes > 1 else (0, 1)
+        line = image[self._line, first::step]
         for index, (stamp, word) in enumerate(zip(_STAMPS, words, strict=True)):
             if self._on[stamp]:
                 line[4 * index : 4 * index + 4] = np.frombuffer(_WORDS[self._signature].pack(word), np.uint8)

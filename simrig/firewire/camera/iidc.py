@@ -38,6 +38,7 @@ class Register(IntEnum):
     ISO_CHANNEL_SPEED = 0x60C
     ISO_EN = 0x614
     SOFTWARE_TRIGGER = 0x62C
+    DATA_DEPTH = 0x630
     BRIGHTNESS = 0x800
     SHUTTER = 0x81C
     GAIN = 0x820
@@ -50,7 +51,9 @@ _PRESENT, _ABSENT = bit(0), 0
 _ON = bit(6)
 _POLARITY, _LEVEL = bit(7), bit(15)  # in the trigger's register
 _READABLE, _SWITCHABLE, _MANUAL = bit(4), bit(5), bit(7)
-_FORMAT_0, _FORMAT_7, _MODE_5 = 0, 7, 5
+_FORMAT_0, _FORMAT_7, _MODE_5, _MODE_6 = 0, 7, 5, 6
+#: Color codings of Format_7: 8 and 16 bits.
+_MONO8, _MONO16 = 0, 5
 
 
 def _range(low: int, high: int) -> int:
@@ -60,9 +63,9 @@ def _range(low: int, high: int) -> int:
 #: Inquiry registers by offset: formats 0 and 7, their modes, rates, features and their ranges.
 _INQUIRIES: Final[dict[int, int]] = {
     0x100: bit(_FORMAT_0) | bit(_FORMAT_7),
-    0x180: bit(_MODE_5),
+    0x180: bit(_MODE_5) | bit(_MODE_6),
     0x19C: bit(0),
-    0x200 + 4 * _MODE_5: sum(bit(code) for code in RATES_HZ),
+    **{0x200 + 4 * mode: sum(bit(code) for code in RATES_HZ) for mode in (_MODE_5, _MODE_6)},
     0x2E0: FORMAT7_CSR // 4,
     _BASIC_FUNC_INQ: bit(0),  # there are advanced features
     _FEATURE_HI_INQ: bit(0) | bit(7) | bit(8) | bit(12),  # brightness, shutter, gain, trigger
@@ -109,19 +112,22 @@ class Format7Register(IntEnum):
 
 
 _FORMAT7_OFFSETS: Final = frozenset(map(int, Format7Register))
-_MONO8 = bit(0)
 _REGION_ERROR, _PACKET_ERROR = bit(8), bit(9)
 
 
 class Format7:
     """Registers of Format_7 Mode_0. A write takes effect at once; VALUE_SETTING says whether the settings are valid.
 
+    Args:
+        depth: significant bits of 16-bit pixels.
+
     Attributes:
         max_packet_bytes: largest packet at the present speed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, depth: int) -> None:
         self.max_packet_bytes = 4096
+        self._depth = depth
         self.reset()
 
     def reset(self) -> None:
@@ -129,6 +135,7 @@ class Format7:
         self._left = self._top = 0
         self._width, self._height = SENSOR
         self._packet_bytes = 0
+        self._coding = _MONO8
 
     @property
     def readout(self) -> Readout | None:
@@ -136,7 +143,7 @@ class Format7:
         packet_bytes = self._packet_bytes or self._recommended()
         if not self._region_fits() or not self._packet_fits(packet_bytes):
             return None
-        return Readout(self._left, self._top, self._width, self._height, packet_bytes)
+        return Readout(self._left, self._top, self._width, self._height, packet_bytes, self._pixel_bytes)
 
     def read(self, offset: int) -> int:
         """Read a register; an offset without a register reads 0."""
@@ -147,14 +154,14 @@ class Format7:
             Format7Register.UNIT_POSITION: POSITION_UNIT[0] << 16 | POSITION_UNIT[1],
             Format7Register.IMAGE_POSITION: self._left << 16 | self._top,
             Format7Register.IMAGE_SIZE: self._width << 16 | self._height,
-            Format7Register.COLOR_CODING_ID: 0,  # Mono8
-            Format7Register.COLOR_CODING_INQ: _MONO8,
+            Format7Register.COLOR_CODING_ID: self._coding << 24,
+            Format7Register.COLOR_CODING_INQ: bit(_MONO8) | bit(_MONO16),
             Format7Register.PIXEL_NUMBER: self._width * self._height,
             Format7Register.TOTAL_BYTES_LOW: readout.packets * readout.packet_bytes if readout else 0,
             Format7Register.PACKET_PARAMETERS: PACKET_UNIT << 16 | self.max_packet_bytes,
             Format7Register.BYTES_PER_PACKET: (self._packet_bytes or self._recommended()) << 16 | self._recommended(),
             Format7Register.PACKETS_PER_FRAME: readout.packets if readout else 0,
-            Format7Register.DATA_DEPTH: 8 << 24,
+            Format7Register.DATA_DEPTH: self.depth << 24,
             Format7Register.VALUE_SETTING: bit(0) | self._errors(),
         }
         return registers.get(Format7Register(offset), 0) if offset in _FORMAT7_OFFSETS else 0
@@ -167,13 +174,24 @@ class Format7:
                 self._left, self._top = high, low
             case Format7Register.IMAGE_SIZE:
                 self._width, self._height, self._packet_bytes = high, low, 0
+            case Format7Register.COLOR_CODING_ID if field(value, 0, 7) in {_MONO8, _MONO16}:
+                self._coding, self._packet_bytes = field(value, 0, 7), 0
             case Format7Register.BYTES_PER_PACKET:
                 self._packet_bytes = high
             case _:
                 return
 
+    @property
+    def depth(self) -> int:
+        """Significant bits of a pixel."""
+        return self._depth if self._coding == _MONO16 else 8
+
+    @property
+    def _pixel_bytes(self) -> int:
+        return 2 if self._coding == _MONO16 else 1
+
     def _recommended(self) -> int:
-        return recommended_packet_bytes(self._width, self._height, self.max_packet_bytes)
+        return recommended_packet_bytes(self._width * self._height * self._pixel_bytes, self.max_packet_bytes)
 
     def _region_fits(self) -> bool:
         places, sizes = (self._left, self._top), (self._width, self._height)
@@ -199,10 +217,12 @@ class CommandRegisters:
 
     Args:
         on_write: called after each write that has an effect.
+        depth: significant bits of 16-bit pixels.
     """
 
-    def __init__(self, on_write: Callable[[Register, int], None]) -> None:
-        self.format7 = Format7()
+    def __init__(self, on_write: Callable[[Register, int], None], depth: int) -> None:
+        self.format7 = Format7(depth)
+        self._depth = depth
         self._on_write = on_write
         self._values: dict[int, int] = dict(_DEFAULTS)
 
@@ -214,6 +234,8 @@ class CommandRegisters:
 
     def read(self, offset: int) -> int:
         """Read a register; an offset without a register reads 0."""
+        if offset == Register.DATA_DEPTH:
+            return self.depth << 24
         return self._values.get(offset, _INQUIRIES.get(offset, _ABSENT))
 
     def write(self, offset: int, value: int) -> None:
@@ -256,10 +278,27 @@ class CommandRegisters:
     @property
     def readout(self) -> Readout | None:
         """The selected readout; None if the settings are not valid."""
-        if field(self._values[Register.CUR_V_FORMAT], 0, 2) == _FORMAT_7:
+        if self._is_format7:
             return self.format7.readout
-        mode = field(self._values[Register.CUR_V_MODE], 0, 2)
-        return vga(self.rate_hz) if mode == _MODE_5 else None
+        if self._mode not in {_MODE_5, _MODE_6}:
+            return None
+        readout = vga(self.rate_hz, 2 if self._mode == _MODE_6 else 1)
+        return readout if readout.packet_bytes <= MAX_PACKET_BYTES[self.speed] else None
+
+    @property
+    def depth(self) -> int:
+        """Significant bits of a pixel."""
+        if self._is_format7:
+            return self.format7.depth
+        return self._depth if self._mode == _MODE_6 else 8
+
+    @property
+    def _is_format7(self) -> bool:
+        return field(self._values[Register.CUR_V_FORMAT], 0, 2) == _FORMAT_7
+
+    @property
+    def _mode(self) -> int:
+        return field(self._values[Register.CUR_V_MODE], 0, 2)
 
     @property
     def rate_hz(self) -> float:

@@ -10,7 +10,7 @@ from rig.pulse import HillPulse
 from simrig.firewire.camera import advanced, iidc
 from simrig.firewire.camera.advanced import AdvancedRegisters, Signature
 from simrig.firewire.camera.config_rom import COMMAND_BASE, camera_rom
-from simrig.firewire.camera.geometry import bit
+from simrig.firewire.camera.geometry import Deep, bit
 from simrig.firewire.camera.iidc import CommandRegisters, Register
 from simrig.firewire.camera.sensor import Line, Sensor
 from simrig.firewire.loop import Loop
@@ -60,6 +60,7 @@ class Camera:
         painter: draws its images.
         faults: its faults.
         signature: how it signs its images.
+        deep: how it sends pixels of more than 8 bits.
 
     Attributes:
         counters: what it counts for its report.
@@ -68,16 +69,25 @@ class Camera:
     """
 
     def __init__(
-        self, guid: int, loop: Loop, line: Line, painter: Painter, faults: FaultPlan, signature: Signature
+        self,
+        guid: int,
+        loop: Loop,
+        line: Line,
+        painter: Painter,
+        faults: FaultPlan,
+        signature: Signature,
+        deep: Deep,
     ) -> None:
         self.guid = guid
         self.rom = camera_rom(guid, VENDOR, MODEL)
         self.counters = Counters()
         self.plugged, self.frozen = True, False
         self._faults = faults
-        self._command = CommandRegisters(self._written)
-        self._advanced = AdvancedRegisters(signature)
-        self._sensor = Sensor(loop, line, painter, faults, self._command, self._advanced, self.counters)
+        self._command = CommandRegisters(self._written, deep.depth)
+        self._advanced = AdvancedRegisters(signature, deep.signed_bytes)
+        self._sensor = Sensor(
+            loop, line, painter, faults, self._command, self._advanced, self.counters, at_top=deep.at_top
+        )
 
     @property
     def acquiring(self) -> bool:

@@ -60,6 +60,7 @@ class Sensor:
         command: settings.
         advanced: settings, counters in registers, signature.
         counters: the sensor counts here what it reports.
+        at_top: whether the significant bits of 16-bit pixels are the highest ones.
     """
 
     def __init__(
@@ -71,7 +72,10 @@ class Sensor:
         command: CommandRegisters,
         advanced: AdvancedRegisters,
         counters: Counters,
+        *,
+        at_top: bool,
     ) -> None:
+        self._at_top = at_top
         self._loop, self._line, self._painter, self._faults = loop, line, painter, faults
         self._command, self._advanced, self._counters = command, advanced, counters
         self._mode = _HALTED
@@ -172,11 +176,21 @@ class Sensor:
         if len(data) != size:  # the format has changed
             self._free.clear()
             data = np.zeros(size, np.uint8)
-        image = data[: readout.width * readout.height].reshape(readout.height, readout.width)
-        self._painter.paint(image, readout.rows, readout.columns, pulse)
+        image = data[: readout.image_bytes].reshape(readout.height, -1)
+        if readout.pixel_bytes == 1:
+            self._painter.paint(image, readout.rows, readout.columns, pulse)
+        else:
+            self._painter.paint(image.ravel(), readout.rows, readout.columns, pulse, f"Mono{self._command.depth}")
+            self._send_high_byte_first(image.view("<u2"))
         words = self._line.timer.register(begin), self._advanced.frames, self._advanced.triggers
-        self._advanced.sign(image, words)
+        self._advanced.sign(image, words, readout.pixel_bytes)
         return data
+
+    def _send_high_byte_first(self, image: NDArray[np.uint16]) -> None:
+        """Turn the bytes of 16-bit pixels, whose significant bits AVT's cameras have at the top."""
+        if self._at_top:
+            np.left_shift(image, 16 - self._command.depth, out=image)
+        image.byteswap(inplace=True)
 
     def _finish(self, session: int, frame: Transmission) -> None:
         """The last packet has been sent: deliver the frame and free its memory."""

@@ -37,6 +37,29 @@ def test_640_x_480(rate_hz: float, speed: int, packet: int, packets: int, units:
     assert (found.packet_bytes, found.packets, found.units) == (packet, packets, units)
 
 
+@pytest.mark.parametrize(
+    ("region", "rate_hz", "packet", "packets", "units"),
+    [((640, 480), 30.0, 2560, 240, 2572), ((640, 480), 15.0, 1280, 480, 1292), ((1024, 768), 15.0, 3072, 512, 3084)],
+)
+def test_16_bits_take_packets_twice_as_large(
+    region: tuple[int, int], rate_hz: float, packet: int, packets: int, units: int
+) -> None:
+    """The tables of IIDC 1.31 (Format_0 Mode_6, Format_1 Mode_7), and the bus that is full with two at 30 Hz."""
+    width, height = region
+    deep = camera(1, pixel_format="Mono12", region={"width": width, "height": height})
+    found = need(deep, rate_hz)
+    assert (found.packet_bytes, found.packets, found.units) == (packet, packets, units)
+
+
+def test_two_deep_cameras_at_30_hz_are_refused_and_three_at_15_hz_are_not() -> None:
+    deep = [camera(number, pixel_format="Mono10") for number in (1, 2, 3)]
+    check_bandwidth(rig(*deep, rate_hz=15.0))
+    with pytest.raises(
+        BadInputError, match=r"need 5144 of its 4915 .*, or set pixel_format = \"Mono8\", which needs half"
+    ):
+        check_bandwidth(rig(*deep[:2]))
+
+
 def test_a_region_is_sent_within_the_period() -> None:
     found = need(camera(1, region={"x": 100, "y": 50, "width": 800, "height": 400}), 30.0, unit_bytes=4)
     assert found.packet_bytes % 4 == 0

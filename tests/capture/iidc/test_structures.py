@@ -9,7 +9,16 @@ import pytest
 
 from capture.iidc import structures
 from capture.iidc.library import _ARGUMENTS, _OTHERS, SONAME
-from capture.iidc.structures import Camera, CameraId, CameraList, Framerates, TriggerSources, VideoFrame, VideoModes
+from capture.iidc.structures import (
+    Camera,
+    CameraId,
+    CameraList,
+    ColorCodings,
+    Framerates,
+    TriggerSources,
+    VideoFrame,
+    VideoModes,
+)
 from tests.capture.iidc.emulated import GCC
 
 STRUCTURES: dict[str, type[ctypes.Structure]] = {
@@ -20,6 +29,7 @@ STRUCTURES: dict[str, type[ctypes.Structure]] = {
     "dc1394video_modes_t": VideoModes,
     "dc1394framerates_t": Framerates,
     "dc1394trigger_sources_t": TriggerSources,
+    "dc1394color_codings_t": ColorCodings,
 }
 
 #: Names of our constants in the headers.
@@ -36,6 +46,11 @@ NUMBERS: dict[str, int] = {
     "DC1394_VIDEO_MODE_1024x768_MONO8": structures.VideoMode.MONO8_1024X768,
     "DC1394_VIDEO_MODE_1280x960_MONO8": structures.VideoMode.MONO8_1280X960,
     "DC1394_VIDEO_MODE_1600x1200_MONO8": structures.VideoMode.MONO8_1600X1200,
+    "DC1394_VIDEO_MODE_640x480_MONO16": structures.VideoMode.MONO16_640X480,
+    "DC1394_VIDEO_MODE_800x600_MONO16": structures.VideoMode.MONO16_800X600,
+    "DC1394_VIDEO_MODE_1024x768_MONO16": structures.VideoMode.MONO16_1024X768,
+    "DC1394_VIDEO_MODE_1280x960_MONO16": structures.VideoMode.MONO16_1280X960,
+    "DC1394_VIDEO_MODE_1600x1200_MONO16": structures.VideoMode.MONO16_1600X1200,
     "DC1394_VIDEO_MODE_FORMAT7_0": structures.VideoMode.FORMAT7_0,
     "DC1394_OPERATION_MODE_LEGACY": structures.OperationMode.LEGACY,
     "DC1394_OPERATION_MODE_1394B": structures.OperationMode.B_1394,
@@ -49,6 +64,7 @@ NUMBERS: dict[str, int] = {
     "DC1394_TRIGGER_ACTIVE_LOW": structures.Polarity.ACTIVE_LOW,
     "DC1394_TRIGGER_ACTIVE_HIGH": structures.Polarity.ACTIVE_HIGH,
     "DC1394_COLOR_CODING_MONO8": structures.COLOR_CODING_MONO8,
+    "DC1394_COLOR_CODING_MONO16": structures.COLOR_CODING_MONO16,
     "DC1394_FRAMERATE_1_875": structures.FRAMERATE_1_875,
     "DC1394_FRAMERATE_240": structures.FRAMERATE_1_875 + 7,
     "DC1394_TRIGGER_MODE_0": structures.TRIGGER_MODE_0,

@@ -11,6 +11,7 @@ from prometheus_client.metrics_core import Metric
 
 from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.balls import CameraBalls
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.light import CameraLight, LightChange
 from rig.api.looking import Moment, Note, VoiceNote
@@ -336,6 +337,10 @@ class RigService(Protocol):
 
     def close_up(self, camera: str, newer_than: RigPulse, timeout_s: float, *, peaking: bool) -> CloseUp | None:
         """The whole picture of a camera; waits as `preview`. UnknownCameraError: no such one."""
+        ...
+
+    def camera_balls(self, camera: str) -> CameraBalls:
+        """Where a camera should show the balls of the survey. UnknownCameraError: no such camera."""
         ...
 
     def camera_light(self, camera: str) -> CameraLight:

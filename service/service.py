@@ -15,6 +15,7 @@ from recorder.catalogue.folder import Catalogue
 from rig import events
 from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.balls import CameraBalls
 from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
@@ -34,6 +35,7 @@ from rig.picture import shown
 from rig.pulse import RigPulse
 from rig.transport.preview import PreviewImage, PreviewSlot
 from service.aids import aids_of, close_up_of, shown_as
+from service.aiming.balls import BallPlaces
 from service.automatic.barrier import BarrierWatch
 from service.automatic.watch import MotionWatch
 from service.exports.jobs import Exports
@@ -75,6 +77,7 @@ class Service(Archive):
         rehearser: makes rehearsals of the rig.
         lights: exposure and gain of the cameras.
         trains: the pulses, where svev makes them.
+        balls: where the cameras should show the balls.
         examine: the doctor; examines what disturbs nothing in the given state.
     """
 
@@ -89,12 +92,13 @@ class Service(Archive):
         rehearser: Rehearser,
         lights: Lights,
         trains: Trains,
+        balls: BallPlaces,
         examine: Callable[[Status], DoctorReport],
     ) -> None:
         super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
-        self._slot, self._rehearser, self._lights, self._trains = slot, rehearser, lights, trains
-        self._examine = examine
+        self._slot, self._rehearser, self._examine = slot, rehearser, examine
+        self._lights, self._trains, self._balls = lights, trains, balls
         #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
         self._idle, self._examining = threading.Lock(), threading.Lock()
         self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
@@ -282,6 +286,10 @@ class Service(Archive):
         index = self._index(camera)
         image = self._awaited(newer_than, timeout_s)
         return None if image is None else close_up_of(image, self._supervisor.rig, index, peaking=peaking)
+
+    def camera_balls(self, camera: str) -> CameraBalls:
+        """Where a camera should show the balls of the survey."""
+        return self._balls.of(camera)
 
     def camera_light(self, camera: str) -> CameraLight:
         """Exposure and gain of a camera."""

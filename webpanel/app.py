@@ -25,7 +25,7 @@ from webpanel.routes.exports import exports_router
 from webpanel.routes.files import files_router
 from webpanel.routes.login import login_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
-from webpanel.routes.preview import preview_router
+from webpanel.routes.preview import cameras_router, preview_router
 from webpanel.routes.recordings import recordings_router
 from webpanel.routes.rig import rig_router
 from webpanel.routes.start_list import start_list_router
@@ -71,6 +71,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         files_router(service, streams.downloads),
         exports_router(service, streams.downloads),
         preview_router(service, streams),
+        cameras_router(service, streams),
         events_router(service, changes, streams.events),
         login_router(door, service),
         observing_router(service, metrics),

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Protocol
 
+from analysis.cameras.oriented_scene import OrientedScene
 from analysis.procedure.jump import ComputedJump
 from analysis.report.course import course_of
 from analysis.report.figures import EARLY_S, FAR_M
@@ -40,6 +41,9 @@ class Findings(Protocol):
 
     def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
         """Where the cameras stand in the scene from a pulse on, an encoded `foxglove.FrameTransforms`."""
+
+    def oriented(self, recording: str, time: UtcNs, scene: OrientedScene) -> None:
+        """The cameras were oriented, in the pictures of a recording until this time."""
 
     def jump(self, jump: MeasuredJump) -> None:
         """A whole jump."""

@@ -152,6 +152,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             return
         self._scene, moved = standing_in(scene)
         self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
+        self._findings.oriented(recording.id, (recording.last or recording.first).time, self._scene)
         said = (*scene.messages, *(move.message for move in moved))
         if said != self._said:
             self._said = said

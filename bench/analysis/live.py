@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from analysis.cameras.oriented_scene import OrientedScene
 from analysis.candidates.finder import Finder
 from analysis.scene.static_image import static_images
 from analysis.worker.findings import MeasuredJump
@@ -50,6 +51,9 @@ class _Told:
         """Of no interest here."""
 
     def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
+        """Of no interest here."""
+
+    def oriented(self, recording: str, time: UtcNs, scene: OrientedScene) -> None:
         """Of no interest here."""
 
     def message(self, level: Level, said: Phrase) -> None:

@@ -22,11 +22,11 @@ def load_rig(path: Path) -> RigSettings:
     if rig.simulation is not None:
         scenario = (path.parent / rig.simulation.scenario).resolve()
         absolute["simulation"] = rig.simulation.model_copy(update={"scenario": scenario})
-    if rig.calibration is not None:
-        absolute["calibration"] = (path.parent / rig.calibration).resolve()
+    given = {"calibration": rig.calibration, "plan": rig.plan}
+    absolute |= {name: (path.parent / file).resolve() for name, file in given.items() if file is not None}
     if rig.analysis is not None:
-        given = {name: getattr(rig.analysis, name) for name in ("survey", "calibration")}
-        files = {name: (path.parent / file).resolve() for name, file in given.items() if file is not None}
+        named = {name: getattr(rig.analysis, name) for name in ("survey", "calibration")}
+        files = {name: (path.parent / file).resolve() for name, file in named.items() if file is not None}
         absolute["analysis"] = rig.analysis.model_copy(update=files)
     if rig.network.curve_key_file is not None:
         keys = (path.parent / rig.network.curve_key_file).resolve()

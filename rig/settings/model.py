@@ -258,6 +258,11 @@ class RigSettings(StrictModel):
         description="result file of svev calibrate or svev orient, relative to the rig file: its cameras' interior "
         "orientations are written into every log",
     )
+    plan: Path | None = Field(
+        None,
+        description="planned network of svev plan, relative to the rig file: before the cameras are oriented its "
+        "stations and directions say where the page shows the balls",
+    )
 
     @model_validator(mode="after")
     def _cameras_fit_together(self) -> "RigSettings":

@@ -21,6 +21,7 @@ from rig.settings.model import RigSettings
 from rig.settings.webhook import WebhookSettings
 from rig.transport.preview import PreviewSlot
 from rig.transport.recorder_commands import RecorderOptions
+from service.aiming.balls import BallPlaces
 from service.alarms.messenger import Messenger
 from service.alarms.occasions import Occasions
 from service.exports.jobs import Exports
@@ -105,7 +106,10 @@ def serve(settings: ServiceSettings) -> None:
         rehearser = stack.enter_context(closing(Rehearser(REHEARSE, in_use, data, hub.tell, hub.wake)))
         lights, examine = Lights(supervisor, settings.rig), PanelDoctor(lambda: supervisor.rig, data).report
         trains = Trains(supervisor, settings.rig, preroll_s)
-        service = Service(supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, trains, examine)
+        balls = BallPlaces(rig, data)
+        service = Service(
+            supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, trains, balls, examine
+        )
         server = make_server(create_app(service, settings.access), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report

@@ -1,18 +1,27 @@
 """The view that sets up a camera: its bar holds the best sharpness, and its figures are those of the camera chosen."""
 
 import re
+from pathlib import Path
 
 import cv2
 import httpx
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
+from rig.api.balls import BallPlace, BallSource, CameraBalls
 from rig.api.recordings import RecordingOrder
+from rig.api.statement import Statement
 from rig.frame import FrameStatus
+from rig.pulse import HillPulse
+from service.aiming.balls import BallPlaces
+from simrig.images.view import CameraView
+from tests.analysis.scene.hill import SIZE, balls_in, training
 from tests.browser.conftest import Open
 from tests.browser.test_layout import BROKEN
 from tests.browser.test_page import SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.service.test_balls import survey_file, surveyed, true_pose
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused
@@ -138,3 +147,94 @@ def test_a_camera_is_made_brighter_and_kept_so(panel: Panel, service: MemoryServ
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     assert page.evaluate(BROKEN) == []
     assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []
+
+
+def show_hill(service: MemoryService, folder: Path) -> NDArray[np.uint8]:
+    """The simulated hill before the first camera, and a survey with the true poses of the cameras.
+
+    Returns:
+        The picture.
+    """
+    rig = surveyed(survey_file(folder / "hill.json", training(), true_pose))
+    service.balls = BallPlaces(rig, folder).of
+    picture = np.empty(SIZE[::-1], np.uint8)
+    CameraView(training(), 0, *SIZE, 30.0).render_into(picture, HillPulse(1))
+    service.through_the_lens = lambda _: picture
+    service.arm()
+    return picture
+
+
+def circles(page: Page) -> dict[str, NDArray[np.float64]]:
+    """Where the centres of the circles lie in the camera's picture, px."""
+    image = page.locator("#aim-image").bounding_box()
+    assert image is not None
+    found = {}
+    for ring in page.locator("#balls i").all():
+        box = ring.bounding_box()
+        assert box is not None
+        middle = np.array((box["x"] + box["width"] / 2 - image["x"], box["y"] + box["height"] / 2 - image["y"]))
+        found[ring.get_attribute("data-ball") or ""] = middle * SIZE[0] / image["width"] - 0.5
+    return found
+
+
+@pytest.mark.parametrize(("width", "look"), [(360, "dark"), (1280, "light")])
+def test_circles_lie_on_the_balls_of_the_simulated_hill(
+    panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path, width: int, look: str
+) -> None:
+    picture = show_hill(service, tmp_path)
+    page = open_page(f"{panel.url}/#/aim", width=width, height=800, color_scheme=look)
+    true = balls_in(training(), "K1")
+    expect(page.locator("#balls i")).to_have_count(len(true))
+    expect(page.locator("#aim-image")).to_have_js_property("naturalWidth", SIZE[0])
+    for name, place in circles(page).items():
+        assert np.abs(place - true[name]).max() < 0.5, name
+        x, y = np.rint(place).astype(int)
+        around = picture[y - 12 : y + 13, x - 12 : x + 13]
+        assert picture[y - 1 : y + 2, x - 1 : x + 2].mean() > np.percentile(around, 90), "a bright ball is there"
+    names = page.locator("#balls b").all_inner_texts()
+    assert len(names) > 0.9 * len(true)
+    expect(page.locator("#balls-said")).to_have_text(
+        re.compile(r"^21 of 21 balls are in the picture\. By the rough pose in hill\.json")
+    )
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    assert page.evaluate(BROKEN) == []
+    page.locator("#balls-on").uncheck()
+    expect(page.locator("#balls")).to_be_hidden()
+    page.reload()
+    expect(page.locator("#aim-image")).to_have_js_property("naturalWidth", SIZE[0])
+    expect(page.locator("#balls-on")).not_to_be_checked()
+    expect(page.locator("#balls")).to_be_hidden()
+    page.locator("#balls-on").check()
+    expect(page.locator("#balls i")).to_have_count(len(true))
+
+
+def test_balls_beyond_the_picture_are_told_with_an_arrow(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    shown = CameraBalls(camera="K1", width=160, height=120, source=BallSource.CALIBRATION, file="poses.json", balls=(
+        BallPlace(name="B1", x=80.0, y=60.0, sigma=(0.1, 0.2), inside=True, seen=True),
+        BallPlace(name="B7", x=-40.5, y=60.0, inside=False, seen=True),
+        BallPlace(name="B8", x=180.0, y=130.0, inside=False, seen=True),
+        BallPlace(name="B9", x=None, y=None, inside=False),
+        BallPlace(name="T1", x=-3.0, y=20.0, inside=False, seen=False),
+    ))  # fmt: skip
+    unknown = Statement(code="balls_not_oriented", text="-", advice="-", values={"camera": "K2"})
+    nothing = CameraBalls(camera="K2", width=160, height=120, statement=unknown)
+    service.balls = lambda name: shown if name == "K1" else nothing
+    service.arm()
+    page = open_page(f"{panel.url}/#/aim", width=360, height=780)
+    expect(page.locator("#balls-said")).to_have_text(
+        "1 of 5 balls are in the picture. B7: 40 px beyond the left edge; B8: 21 px beyond the right edge, 11 px "
+        "beyond the lower edge; B9: behind the camera. By the poses in poses.json."
+    )
+    expect(page.locator("#balls-said")).to_have_attribute("data-level", "warning")
+    expect(page.locator("#balls s")).to_have_count(3)
+    box, arrow = page.locator("#balls").bounding_box(), page.locator("#balls s").first.bounding_box()
+    assert box is not None
+    assert arrow is not None
+    assert box["x"] <= arrow["x"] < box["x"] + 10
+    page.locator("#aim-cameras button").nth(1).click()
+    expect(page.locator("#balls")).to_be_hidden()
+    expect(page.locator("#balls-said")).to_have_text("-. -.")
+    norwegian = open_page(f"{panel.url}/#/aim", width=360, height=780, locale="nb-NO")
+    expect(norwegian.locator("#balls-said")).to_contain_text("B7: 40 px utenfor venstre kant")
+    norwegian.locator("#aim-cameras button").nth(1).click()
+    expect(norwegian.locator("#balls-said")).to_contain_text("K2 er ikke orientert ennå")

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import aids, jump, recordings, rehearsal, start_list, statement, status
+from rig.api import aids, balls, jump, light, recordings, rehearsal, start_list, statement, status
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"
@@ -190,7 +190,7 @@ def _types() -> dict[str, list[str]]:
     """Properties by name of the typedef."""
     types: dict[str, list[str]] = {}
     name = ""
-    for line in (PAGE / "shared" / "types.js").read_text().splitlines():
+    for line in "".join((PAGE / room / "types.js").read_text() for room in ("shared", "system")).splitlines():
         if found := re.search(r"@typedef \{object\} (\w+)", line):
             name = found[1]
             types[name] = []
@@ -201,7 +201,7 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    rooms = (aids, start_list, recordings, rehearsal, statement, jump, status)
+    rooms = (aids, balls, light, start_list, recordings, rehearsal, statement, jump, status)
     model: type[Any] = next(getattr(room, name) for room in rooms if hasattr(room, name))
     fields = (
         list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]

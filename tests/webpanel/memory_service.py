@@ -18,6 +18,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.api.aids import BINS, CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.balls import CameraBalls
 from rig.api.jump import LastJump
 from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
@@ -81,6 +82,7 @@ class MemoryService(Archive):
         through_the_lens: what the lens makes of the picture of a camera, set by tests.
         lights: exposure and gain of each camera.
         pulses_made: who makes the pulses.
+        balls: where each camera should show the balls, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
 
@@ -100,6 +102,7 @@ class MemoryService(Archive):
         self.preview_calls = 0
         self.pulses_made = TriggerView(source="gpio", rate_hz=30, controls=(TriggerControl.RATE,), saved=True)
         self.lights = {name: CameraLight(camera=name, exposure_us=2000, gain_db=0, saved=True) for name in CAMERAS}
+        self.balls: Callable[[str], CameraBalls] = lambda name: CameraBalls(camera=name, width=160, height=120)
         self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
         self._phase = Phase.now(State.IDLE, 1)
         self._armed_at = time.monotonic()
@@ -276,6 +279,11 @@ class MemoryService(Archive):
         if camera not in CAMERAS:
             raise UnknownCameraError(f"no camera {camera}: the rig has {', '.join(CAMERAS)}")
         return self.lights[camera]
+
+    def camera_balls(self, camera: str) -> CameraBalls:
+        if camera not in CAMERAS:
+            raise UnknownCameraError(f"no camera {camera}: the rig has {', '.join(CAMERAS)}")
+        return self.balls(camera)
 
     def change_light(self, camera: str, change: LightChange) -> CameraLight:
         before = self.camera_light(camera)

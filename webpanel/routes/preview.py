@@ -18,6 +18,7 @@ from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
 
 from rig.api.aids import CameraAids
+from rig.api.balls import CameraBalls
 from rig.api.light import CameraLight, LightChange
 from rig.errors import SvevError
 from rig.pulse import RigPulse
@@ -176,6 +177,12 @@ def preview_router(service: RigService, streams: OpenStreams) -> APIRouter:
             _parts(feed, streams.previews), media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}"
         )
 
+    return router
+
+
+def cameras_router(service: RigService, streams: OpenStreams) -> APIRouter:
+    """The routes of single cameras."""
+    router = strict_router("Watching")
     at_once = anyio.CapacityLimiter(_SETTING_UP)
 
     def wait_for_aids(camera: str, after: int) -> CameraAids | None:
@@ -199,6 +206,16 @@ def preview_router(service: RigService, streams: OpenStreams) -> APIRouter:
         """
         found = await run_sync(wait_for_aids, camera, after, limiter=at_once)
         return Response(status_code=HTTPStatus.NO_CONTENT) if found is None else found
+
+    @router.get("/cameras/{camera}/balls", responses=refusals(404))
+    def get_camera_balls(camera: _Camera) -> CameraBalls:
+        """Where the camera's pictures should show the balls of the survey, to be drawn over the live picture.
+
+        `source` says what this follows from: the poses that the rig file names (`calibration`), the last orientation by
+        the live analysis (`orientation`), the approximate pose in the survey, or the planned station (`plan`). If there
+        is none of these, `statement` says what to do. Works also while the rig is not armed.
+        """
+        return service.camera_balls(camera)
 
     @router.get("/cameras/{camera}", responses=refusals(404))
     def get_camera(camera: _Camera) -> CameraLight:

@@ -6,10 +6,10 @@ It is nice to the others: recorder and grabbers come first, and what it misses c
 import os
 import re
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from analysis.cameras.oriented_scene import OrientedScene
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.live import LiveAnalysis
 from analysis.worker.stream import Source, Stream, connected
@@ -27,6 +27,7 @@ from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
 from rig.transport.message import Quit
 from rig.transport.recorder_commands import TellResult
+from service.aiming.kept import keep
 from service.processes import live_jumps
 
 #: It holds nothing that could be lost.
@@ -38,8 +39,9 @@ _WAKE_S: Final = 0.2
 class _Reports(Findings):
     """Sends what the analysis finds to the service."""
 
-    def __init__(self, control: ControlChannel[AnalysisReport], folders: Sequence[Path]) -> None:
-        self._control, self._folders = control, folders
+    def __init__(self, control: ControlChannel[AnalysisReport], rig: RigSettings, folder: Path) -> None:
+        self._control, self._rig, self._folder = control, rig, folder
+        self._folders = [folder, *filter(None, (rig.recorder.fallback_directory,))]
 
     def state(self, state: JumperState) -> None:
         """A measured pulse."""
@@ -57,6 +59,15 @@ class _Reports(Findings):
         """Where the cameras stand from a pulse on."""
         name = JUMPER_CAMERAS.name
         self._control.send(TellResult(recording=recording, topic=name, pulse=pulse, time=time, data=frames))
+
+    def oriented(self, recording: str, time: UtcNs, scene: OrientedScene) -> None:
+        """The cameras were oriented: whoever aims them sees from now on where they showed the balls."""
+        if not scene.given:  # by poses, which say that better
+            return
+        try:
+            keep(scene, recording, time, self._rig, self._folder)
+        except StorageError as error:
+            self.message(Level.WARNING, error.said)
 
     def jump(self, jump: MeasuredJump) -> None:
         """A whole jump: also kept beside its log, which may be closed already."""
@@ -78,8 +89,7 @@ def main() -> None:
     rig = child.config.rig
     if rig.analysis is None:
         raise SystemExit("analysis: the rig file has no [analysis] table")
-    folders = [child.config.directory, *filter(None, (rig.recorder.fallback_directory,))]
-    reports = _Reports(child.control, folders)
+    reports = _Reports(child.control, rig, child.config.directory)
     if (analysis := _opened(child, rig, rig.analysis, reports)) is not None:
         with analysis, connected(_source(rig.network)) as stream:
             _measure(child, stream, analysis)

@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import typer
 import zmq
 
+from analysis.cameras.oriented_scene import OrientedScene
 from analysis.result import file as result_file
 from analysis.worker.findings import MeasuredJump
 from analysis.worker.live import LiveAnalysis
@@ -120,6 +121,9 @@ class _Published:
 
     def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
         """So is where the cameras stand in it."""
+
+    def oriented(self, recording: str, time: UtcNs, scene: OrientedScene) -> None:
+        """Whoever aims the cameras asks the service, which has an analysis of its own."""
 
     def jump(self, jump: MeasuredJump) -> None:
         """Publish a whole jump, and write it."""

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.cameras.oriented_scene import OrientedScene
 from analysis.worker.findings import MeasuredJump
 from analysis.worker.live import LiveAnalysis
 from analysis.worker.stream import Received
@@ -42,6 +43,9 @@ class Told:
 
     def cameras(self, recording: str, pulse: PulseNumber, time: UtcNs, frames: bytes) -> None:
         """Where cameras stand."""
+
+    def oriented(self, recording: str, time: UtcNs, scene: OrientedScene) -> None:
+        """The cameras were oriented."""
 
     def jump(self, jump: MeasuredJump) -> None:
         """A whole jump."""

@@ -6,6 +6,8 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from analysis.result import file as result_file
 from recorder.checking.verify import verify
 from recorder.log.jumper_path import jumper_path
@@ -14,7 +16,7 @@ from rig.jumper import JumperState
 from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
 from service.recordings import live_results
 from simrig.world.survey import survey
-from tests.analysis.simulated import training
+from tests.analysis.scene.hill import balls_in, training
 from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
@@ -34,6 +36,7 @@ def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopb
         surveyed.write_text(json.dumps(survey(training())))
         recording = service.post("/api/recordings", {"preroll_s": 0.0})["id"]
         jump, pid = _await_jump(service), service.pids()["analysis"]
+        _balls_are_where_they_should_be(service, recording)
         os.kill(pid, signal.SIGKILL)
         wait_until(lambda: service.pids()["analysis"] != pid, "a new process", PATIENCE_S, 0.1)
         assert service.state() == "recording"
@@ -47,6 +50,19 @@ def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopb
     _figures_are_true(jump, recording)
     _result_is_beside_the_log(service.data / f"{recording}.mcap", jump)
     _results_are_in_the_log(service.data / f"{recording}.mcap", jump)
+
+
+def _balls_are_where_they_should_be(service: Serving, recording: str) -> None:
+    """By the orientation from the first four seconds, within 2 px and within what the sigmas say."""
+    for name in ("K1", "K2", "K3"):
+        found = service.get(f"/api/cameras/{name}/balls")
+        assert (found["source"], found["recording"]) == ("orientation", recording)
+        true, told = balls_in(training(), name), {ball["name"]: ball for ball in found["balls"] if ball["inside"]}
+        assert {ball for ball in true if ball.startswith("B")} <= told.keys()
+        for ball in (ball for ball in told if ball.startswith("B")):
+            error = np.subtract((told[ball]["x"], told[ball]["y"]), true[ball])
+            assert np.abs(error).max() < 2.0, (name, ball)
+            assert (np.abs(error) < 5 * np.array(told[ball]["sigma"])).all(), (name, ball)
 
 
 def _await_jump(service: Serving) -> dict[str, Any]:

@@ -46,6 +46,10 @@ export const statements = {
   camera_absent: ["{camera} er borte", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
   camera_absent_why: ["{camera} er borte: {reason}", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
 
+  balls_no_file: ["hvor ballene skal være, er ikke kjent: riggfilen nevner ingen innmåling av dem", "skriv den inn, survey = \"hill.json\" under [analysis]; før den finnes, skriv inn planen, plan = \"hill.toml\""],
+  balls_not_oriented: ["{camera} er ikke orientert ennå, så hvor det viser ballene, er ikke kjent", "gjør ett opptak på fem sekunder med ballene i sikte; eller gi kameraets omtrentlige plass i innmålingen, eller planen i riggfilen, plan = \"hill.toml\""],
+  balls_unknown: ["hvor {camera} viser ballene, er ikke kjent: {why}"],
+
   recording_running: ["tar opp: {pulses} pulser, {partial} mangler et bilde"],
   recording_paused: ["tar opp: {pulses} pulser, {partial} mangler et bilde; {pauses} ganger kom det ingen pulser en stund"],
   verdict_complete: ["Komplett: alle {pulses} pulser"],

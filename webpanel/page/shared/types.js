@@ -230,16 +230,6 @@
  * @property {number|null} spread_us
  * @property {Finding[]} findings
  *
- * @typedef {object} CameraAids
- * @property {string} camera
- * @property {number} pulse
- * @property {"ok"|"lost"|"missed"|"damaged"|"absent"} status
- * @property {number|null} focus
- * @property {number|null} mean
- * @property {number|null} clipped
- * @property {number|null} black
- * @property {number[]} histogram
- *
  * @typedef {object} RigView
  * @property {string} name
  * @property {string} toml

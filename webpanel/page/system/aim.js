@@ -6,6 +6,7 @@ import { $, fillList, make, setText } from "../shared/dom.js";
 import { number, quantity } from "../shared/format.js";
 import { tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
+import { ballsOf, startBalls } from "./balls.js";
 import { earlierOf } from "./earlier.js";
 import { lightOf, startLight } from "./light.js";
 
@@ -17,7 +18,7 @@ const NEAR_BEST = 0.97;
 const MUCH_CLIPPED = 1;
 const HEIGHT = 24;
 
-/** @typedef {import("../shared/types.js").CameraAids} CameraAids */
+/** @typedef {import("./types.js").CameraAids} CameraAids */
 
 /** Name of the camera that is shown. */
 let camera = "";
@@ -31,6 +32,7 @@ let picture = "";
 
 export function startAim() {
   startLight();
+  startBalls();
   $("aim-again").addEventListener("click", () => { best.delete(camera); draw(); });
   watch(() => {
     draw();
@@ -109,6 +111,7 @@ function draw() {
   setText($("aim-empty"), t(on ? "aim.no_pulses" : "aim.when_armed"));
   $("aim-empty").hidden = on && (shown !== null || (status?.pulses.arriving ?? false));
   $("aiming").hidden = !shown;
+  ballsOf(camera);
   if (shown) drawFigures(shown);
 }
 

@@ -11,13 +11,7 @@ import { known } from "../shared/store.js";
 const STEP = 2 ** (1 / 3);
 const GAIN_STEP_DB = 1;
 
-/**
- * @typedef {object} CameraLight
- * @property {string} camera
- * @property {number} exposure_us
- * @property {number} gain_db
- * @property {boolean} saved
- */
+/** @typedef {import("./types.js").CameraLight} CameraLight */
 
 /** Name of the camera that is shown. */
 let camera = "";

@@ -1,0 +1,1 @@
+"""Where the cameras should show the balls, for those who aim them."""

@@ -1,0 +1,55 @@
+"""Tells where the cameras should show the balls; reads the files again when they have changed."""
+
+import threading
+from pathlib import Path
+from typing import Final
+
+from rig.api.balls import CameraBalls
+from rig.settings.light import camera_of
+from rig.settings.model import RigSettings
+
+#: In the folder of the recordings: where the cameras showed the balls when they were oriented last.
+ORIENTATION: Final = ".svev-orientation.json"
+
+
+class BallPlaces:
+    """Any thread may call any method.
+
+    Args:
+        rig: the rig.
+        folder: of the recordings.
+    """
+
+    def __init__(self, rig: RigSettings, folder: Path) -> None:
+        self._rig, self._folder = rig, folder
+        given = [] if rig.analysis is None else [rig.analysis.survey, rig.analysis.calibration]
+        self._files = [file for file in (folder / ORIENTATION, rig.plan, *given) if file is not None]
+        self._lock = threading.Lock()
+        self._known: dict[str, CameraBalls] = {}
+        self._read: list[tuple[int, int] | None] = []
+
+    def of(self, name: str) -> CameraBalls:
+        """Where a camera should show the balls.
+
+        Raises:
+            UnknownCameraError: the rig has no such camera.
+        """
+        camera = camera_of(self._rig, name)
+        # Imported here because photogrammetry and its libraries take memory and half a second to load.
+        from service.aiming.sources import known_balls  # noqa: PLC0415
+
+        with self._lock:
+            if (now := [_state(file) for file in self._files]) != self._read:
+                self._known, self._read = {}, now
+            if name not in self._known:
+                self._known[name] = known_balls(self._rig, camera, self._folder)
+            return self._known[name]
+
+
+def _state(file: Path) -> tuple[int, int] | None:
+    """What is another one after a file was written; None: it is not there."""
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ino

@@ -1,0 +1,40 @@
+/**
+ * The shapes of what the REST API says of single cameras, as in rig/api (a test compares them).
+ *
+ * @typedef {object} CameraAids
+ * @property {string} camera
+ * @property {number} pulse
+ * @property {"ok"|"lost"|"missed"|"damaged"|"absent"} status
+ * @property {number|null} focus
+ * @property {number|null} mean
+ * @property {number|null} clipped
+ * @property {number|null} black
+ * @property {number[]} histogram
+ *
+ * @typedef {object} CameraLight
+ * @property {string} camera
+ * @property {number} exposure_us
+ * @property {number} gain_db
+ * @property {boolean} saved
+ *
+ * @typedef {object} BallPlace
+ * @property {string} name
+ * @property {number|null} x
+ * @property {number|null} y
+ * @property {[number, number]|null} sigma
+ * @property {boolean} inside
+ * @property {boolean|null} seen
+ *
+ * @typedef {object} CameraBalls
+ * @property {string} camera
+ * @property {number} width
+ * @property {number} height
+ * @property {"calibration"|"orientation"|"survey"|"plan"|null} source
+ * @property {string|null} file
+ * @property {string|null} oriented
+ * @property {string|null} recording
+ * @property {BallPlace[]} balls
+ * @property {import("../shared/types.js").Statement|null} statement
+ */
+
+export {};

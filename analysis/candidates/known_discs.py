@@ -4,40 +4,50 @@ A ski or a limb before a marker leaves a part of its disc. A spot fitted to that
 far outside its standard deviation. All markers of a jumper have one size, and the exposure time tells the streak; so
 here the disc is given, blurred by the lens and smeared by the motion, and pixels that do not agree with it (what covers
 it, what lies beside it) lose their weight; their neighbours, into which the lens blurs them, are left out. The size
-keeps its uncertainty, which is what limits a centre that is covered on one side.
+keeps its uncertainty, which is what limits a centre that is covered on one side. What is behind is a plane with bends:
+of all that it may be, only terms that are odd in one direction can be taken for a shift of the centre.
 
 The problem has several minima where much is covered. It is started from several places, and what other minima explain
 about as well as the best one makes the covariance larger.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chndtr
 
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 
-UNKNOWNS: Final = 7  #: x, y, logarithm of the radius, contrast, and the plane behind: level and slopes
+UNKNOWNS: Final = 9  #: x, y, logarithm of the radius, contrast, and what is behind: level, slopes and bends
+_BEHIND = 5  # index of the first slope
 BLUR_PX: Final = 0.62  #: of lens and pixel, typical; what differs is absorbed by the size that was learned with it
-_MARGIN = 2.2  # px beyond the disc that are fitted
+_MARGIN = 1.6  # px beyond the disc that are fitted: what lies farther away tells of other things, not of the disc
 _STARTS_AWAY = 0.55  # radii, of the starts in eight directions about a place
 _MOVED = 1.3  # radii: a centre that ends farther from its start belongs to something else
 _STEPS, _LAST_STEPS, _ENOUGH = 12, 4, 3e-3  # iterations, with all pixels and with those that agree; px
-_NODES = np.array((-1.0, 0.0, 1.0)) * np.sqrt(0.15)  # of a streak, in its lengths, and their weights (Gauss-Legendre)
-_WEIGHTS = np.array((5.0, 8.0, 5.0)) / 18
+_STREAKS = 0.1, 1.5  # px; a longer streak is the mean of two discs, and of three (Gauss-Legendre)
+_BLOCK = 48  # windows whose pixels are computed at a time: they stay in the processor's cache
+_TINY = np.float32(1e-12)
 _GRID = 0.04  # px, of the table of profiles
 _SIZE_STEP = 0.03  # of the logarithm of the radius, likewise
-_MODEL = 0.03  # of the contrast, standard deviation: uneven light on marker and suit, pixels cut by a border
-_HALF = 3.0  # standard deviations at which a pixel counts half and less (Geman and McClure 1987)
-_REJECTED = 0.3  # a pixel that counts less does not belong to disc or background
-_SLOPE = 0.03  # of the contrast per px, standard deviation of the slopes of the plane
+_MODEL = 0.015  # of the contrast, standard deviation: uneven light on marker and suit, pixels cut by a border
+_HALF = 3.0  # standard deviations at which a pixel counts a quarter and less (Geman and McClure 1987)
+_USUAL = 0.84  # so much counts a pixel on average whose residual is but noise
+_ALONE, _TOGETHER = 4.0, 3.0  # standard deviations: a pixel, or the mean of 3 x 3, that is off by more does not belong
+_SLOPE = 0.015  # of the contrast per px, standard deviation of the slopes of what is behind
+_BEND = 0.05  # of the contrast, standard deviation of what bends add to them where the fitted pixels end
 _UNCOVERED = 0.8  # share of the disc that counts, with which one start is enough
 _NEARLY = 4.0  # pixels that another minimum may explain worse than the best one
 _SHARE = 0.4  # of the disc and of its border that must agree: of less than a half, other circles explain as much
 _LIKE = 2.0  # standard deviations by which its contrast may differ
 _WORST = 1.0  # radii; a centre that is less certain than this says nothing
 _FIRST_STEPS, _KEPT = 4, 3  # iterations after which only so many of the starts of a place go on
+_TELLING = 24  # places that tell how much larger or smaller all discs are than expected
+_COMMON = 0.1  # standard deviation of the logarithm of that
+
+_Pixels = NDArray[np.float32]  # (k, p) a number for each pixel of each window
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,9 +120,11 @@ def fit_known_discs(windows: Windows, shape: DiscShape) -> KnownDiscs:
         windows: about the places.
         shape: of the discs.
     """
-    tables = _Profiles(shape.radius)
     n = len(windows.xy)
     owner = np.arange(n)
+    larger = _larger(windows, shape, owner[:: max(1, n // _TELLING)])
+    shape = replace(shape, radius=larger * shape.radius)
+    tables = _Profiles(shape.radius)
     found = _solved(windows, shape, tables, owner, windows.xy)
     doubtful = np.flatnonzero(found.share < _UNCOVERED)
     if len(doubtful):
@@ -120,6 +132,24 @@ def fit_known_discs(windows: Windows, shape: DiscShape) -> KnownDiscs:
         others = _solved(windows, shape, tables, more, starts)
         owner, found = np.concatenate((owner, more)), found.joined(others)
     return _best(windows, shape, owner, found)
+
+
+def _larger(windows: Windows, shape: DiscShape, places: Integers) -> float:
+    """How many times as large as expected the discs are, by some places where they are not covered.
+
+    What is expected comes from spots that are no discs yet, and a lens may blur otherwise than `BLUR_PX`.
+    """
+    found = _solved(windows, shape, _Profiles(shape.radius), places, windows.xy[places])
+    off = found.theta[:, 2] - np.log(shape.radius[places] / _middle(shape.radius))
+    # Each is weighted towards what was expected; without that its image alone tells more, and less surely.
+    told = 1 / found.covariance[:, 2, 2]
+    clear = (found.share >= _UNCOVERED) & (told > shape.spread**-2)
+    alone = told[clear] - shape.spread**-2
+    sizes = np.append((off * told)[clear] / alone, 0.0)
+    weights = np.append(1 / (1 / alone + shape.spread**2), _COMMON**-2)
+    order = np.argsort(sizes)
+    middle = np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2)
+    return float(np.exp(sizes[order[middle]]))
 
 
 def _promising(windows: Windows, shape: DiscShape, tables: "_Profiles", places: Integers) -> tuple[Integers, Floats]:
@@ -136,7 +166,7 @@ def _promising(windows: Windows, shape: DiscShape, tables: "_Profiles", places: 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solutions:
-    """k solutions: unknowns (k, 7), their covariances, costs (k,) and visible shares (k,)."""
+    """k solutions: unknowns (k, 9), their covariances, costs (k,) and visible shares (k,)."""
 
     theta: Floats
     covariance: Floats
@@ -187,50 +217,72 @@ def _solved(windows: Windows, shape: DiscShape, tables: "_Profiles", which: Inte
     pulled = theta - whole
     # The border of what covers a disc pulls at it; by how much is known no better than what leaving it out changes.
     covariance = np.asarray(np.linalg.inv(normal) + pulled[:, :, None] * pulled[:, None])
+    # What is behind is no plane with a bend either: what these do to the disc is known no better than its own size.
+    of_disc, behind = normal[:, :_BEHIND, :_BEHIND], normal[:, :_BEHIND, _BEHIND:] @ theta[:, _BEHIND:, None]
+    bent = np.linalg.solve(of_disc, behind)
+    covariance[:, :_BEHIND, :_BEHIND] += bent @ bent.swapaxes(1, 2)
     return _Solutions(theta, covariance, cost, share)
+
+
+def _around(images: _Pixels) -> _Pixels:
+    """Sums over 3 x 3 pixels of images (k, s, s)."""
+    wide = np.pad(images, ((0, 0), (1, 1), (1, 1)))
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(wide, (3, 3), (1, 2)).sum(axis=(-1, -2)))
+
+
+def _middle(radius: Floats) -> float:
+    """Geometric mean of radii (n,)."""
+    return float(np.exp(np.log(radius).mean())) if len(radius) else 1.0
 
 
 class _Profiles:
     """Profiles of blurred discs of several sizes about a middle one, as a table over distances and sizes."""
 
     def __init__(self, radius: Floats) -> None:
-        self.middle = float(np.exp(np.log(radius).mean())) if len(radius) else 1.0
+        self.middle = _middle(radius)
         most = float(np.abs(np.log(radius / self.middle)).max(initial=0.0)) + 0.15
         self._half = int(np.ceil(most / _SIZE_STEP))
         sizes = self.middle * np.exp(np.arange(-self._half, self._half + 1) * _SIZE_STEP)
         self._length = int(np.ceil((sizes[-1] + 5 * BLUR_PX) / _GRID)) + 2
         rho = np.asarray(np.arange(self._length) * _GRID, float)
-        profile = np.stack([blurred_disc(rho, size) for size in sizes])
+        # A blurred disc is the probability that a normally distributed shift leads into it: a noncentral chi-square.
+        profile = np.stack([chndtr((size / BLUR_PX) ** 2, 2.0, (rho / BLUR_PX) ** 2) for size in sizes])
         by_size, by_rho = np.gradient(profile, _SIZE_STEP, _GRID)
-        self._table = np.stack((profile, by_rho, by_size), axis=-1).reshape(-1, 3)
+        self._tables = [table.astype(np.float32).ravel() for table in (profile, by_rho, by_size)]
 
-    def at(self, rho: Floats, size: Floats) -> tuple[Floats, Floats, Floats]:
+    def at(self, rho: _Pixels, size: Floats) -> tuple[_Pixels, _Pixels, _Pixels]:
         """Values and derivatives by distance and logarithm of the radius, at distances (k, p) for sizes (k,)."""
         row = np.clip(np.rint(size / _SIZE_STEP).astype(int) + self._half, 0, 2 * self._half)
-        column = np.minimum(np.rint(rho / _GRID), self._length - 1).astype(int)
-        value, by_rho, by_size = np.moveaxis(self._table[row[:, None] * self._length + column], -1, 0)
-        off = np.minimum(rho - column * _GRID, _GRID)
-        value = value + by_rho * off + by_size * (size - (row - self._half) * _SIZE_STEP)[:, None]
+        column = np.minimum(np.rint(rho * np.float32(1 / _GRID)), np.float32(self._length - 1))
+        place = column.astype(np.int32) + (row * self._length).astype(np.int32)[:, None]
+        value, by_rho, by_size = (table.take(place) for table in self._tables)
+        value += by_rho * np.minimum(rho - column * np.float32(_GRID), np.float32(_GRID))
+        value += by_size * (size - (row - self._half) * _SIZE_STEP).astype(np.float32)[:, None]
         return value, by_rho, by_size
 
 
 class _Fit:
-    """The model of a disc in k windows: Levenberg-Marquardt with weights by the residuals."""
+    """The model of a disc in k windows: Levenberg-Marquardt with weights by the residuals.
+
+    Unknowns and equations are 64 bits wide, pixels 32: they are noisier than that.
+    """
 
     def __init__(self, windows: Windows, shape: DiscShape, tables: _Profiles, which: Integers) -> None:
         self._shape, self._tables = shape, tables
-        k, side = len(which), windows.grey.shape[1]
-        steps = np.arange(side, dtype=float)
-        x, y = np.meshgrid(steps, steps)
-        self._x, self._y = x.ravel(), y.ravel()
-        self._grey, self._side = windows.grey[which].reshape(k, -1), side
-        self._noise = windows.noise[which].reshape(k, -1)
-        place = windows.xy[which]
+        self._side, place, noise = windows.grey.shape[1], windows.xy[which], windows.noise[which]
+        steps = np.arange(self._side, dtype=np.float32)
+        x, y = (part.ravel() for part in np.meshgrid(steps, steps))
         reach = (1 + _STARTS_AWAY) * shape.radius + np.linalg.norm(shape.streak, axis=1) / 2 + _MARGIN
-        away = np.hypot(self._x - place[:, :1], self._y - place[:, 1:])
-        self._used = np.isfinite(self._noise) & (away < reach[:, None])
-        self._noise = np.where(self._used, self._noise, 1.0)
+        noise = noise.reshape(len(which), -1)
+        used = np.isfinite(noise) & (np.hypot(x - place[:, :1], y - place[:, 1:]) < reach[:, None])
+        self._at = np.flatnonzero(used.any(axis=0))
+        self._x, self._y, self._used = x[self._at], y[self._at], used[:, self._at]
+        self._grey = windows.grey[which].reshape(len(which), -1)[:, self._at].astype(np.float32)
+        self._noise = np.where(self._used, noise[:, self._at], 1.0).astype(np.float32)
         self._size = np.log(shape.radius / tables.middle)
+        longest = float(np.linalg.norm(shape.streak, axis=1).max(initial=0.0))
+        nodes, weights = np.polynomial.legendre.leggauss(1 + int(np.searchsorted(_STREAKS, longest)))
+        self._nodes = [(node / 2, weight / 2) for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True)]
 
     def started(self, xy: Floats) -> Floats:
         """Unknowns to begin with at xy (k, 2): the level behind is the median of what lies around."""
@@ -250,7 +302,11 @@ class _Fit:
         normal, gradient = np.tile(np.eye(UNKNOWNS), (k, 1, 1)), np.zeros((k, UNKNOWNS))
         active = np.arange(k)
         for _ in range(steps):
-            new = self._equations(trial[active], active)
+            if not len(active):
+                break
+            blocks = [active[first : first + _BLOCK] for first in range(0, len(active), _BLOCK)]
+            parts = zip(*(self._equations(trial[block], block) for block in blocks), strict=True)
+            new = tuple(np.concatenate(part) for part in parts)
             better = new[0] <= cost[active]
             won = active[better]
             theta[won] = trial[won]
@@ -262,21 +318,25 @@ class _Fit:
             step[:, :2] = np.clip(step[:, :2], -0.7, 0.7)
             trial[active] = theta[active] + step
             active = active[(np.abs(step[:, :2]).max(axis=1) > _ENOUGH) & (damping[active] < 1e6)]
-            if not len(active):
-                break
         return theta, cost, normal
 
     def leave_out(self, theta: Floats) -> None:
         """Use neither what does not agree with the discs nor its neighbours any more."""
-        everything = np.arange(len(theta))
-        _, _, share, _ = self._residuals(theta, everything)
-        rejected = (self._used & (share < _REJECTED)).reshape(-1, self._side, self._side)
-        wide = np.pad(rejected, ((0, 0), (1, 1), (1, 1)))
-        near = np.zeros_like(rejected)
-        for dy in range(3):
-            for dx in range(3):
-                near |= wide[:, dy : dy + self._side, dx : dx + self._side]
-        self._used &= ~near.reshape(len(theta), -1)
+        value, _ = self._model(theta, np.arange(len(theta)))
+        parts = (self._used, (self._grey - value) * self._used, self._noise**2 * self._used)
+        used, off, noise = (self._image(part) for part in parts)
+        model = (_MODEL * self._shape.contrast) ** 2
+        rejected = off**2 > _ALONE**2 * (noise + model)
+        # A lens spreads everything over some pixels: their mean tells more of it, and noise tells less.
+        count = np.maximum(_around(used), 1)
+        rejected |= (_around(off) / count) ** 2 > _TOGETHER**2 * (_around(noise) / count**2 + model)
+        self._used &= _around(rejected * used).reshape(len(theta), -1)[:, self._at] == 0
+
+    def _image(self, values: _Pixels | Flags) -> _Pixels:
+        """Values of the pixels (k, p) as images (k, s, s)."""
+        image = np.zeros((len(values), self._side**2), np.float32)
+        image[:, self._at] = values
+        return image.reshape(-1, self._side, self._side)
 
     def shares(self, theta: Floats) -> Floats:
         """Shares (k,) of the discs and of their borders that agree with the image, the lesser of both."""
@@ -285,19 +345,19 @@ class _Fit:
         of_disc, of_border = (
             (share * part).sum(axis=1) / np.maximum(part.sum(axis=1), 1e-9) for part in (area, border)
         )
-        return np.asarray(np.minimum(of_disc, of_border))
+        return np.asarray(np.minimum(1.0, np.minimum(of_disc, of_border) / _USUAL))
 
-    def _model(self, theta: Floats, which: Integers) -> tuple[Floats, Floats]:
-        """Grey values (k, p) and derivatives (k, 7, p)."""
-        x, y, _, contrast, level, right, down = theta.T[..., None]
+    def _model(self, theta: Floats, which: Integers) -> tuple[_Pixels, _Pixels]:
+        """Grey values (k, p) and derivatives (k, 9, p)."""
+        x, y, _, contrast, level, right, down, right_bend, down_bend = theta.T.astype(np.float32)[..., None]
+        streak_x, streak_y = self._shape.streak[which].T.astype(np.float32)[..., None]
         dx, dy = self._x - x, self._y - y
-        design = np.zeros((len(theta), UNKNOWNS, dx.shape[1]))
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            sx, sy = (node * self._shape.streak[which]).T[..., None]
-            ux, uy = dx - sx, dy - sy
-            rho = np.hypot(ux, uy)
+        design = np.zeros((len(theta), UNKNOWNS, dx.shape[1]), np.float32)
+        for node, weight in self._nodes:
+            ux, uy = dx - node * streak_x, dy - node * streak_y
+            rho = np.sqrt(ux * ux + uy * uy + _TINY)
             value, by_rho, by_size = self._tables.at(rho, theta[:, 2])
-            by_rho = weight * by_rho / np.maximum(rho, 1e-9)
+            by_rho *= weight / rho
             design[:, 0] -= by_rho * ux
             design[:, 1] -= by_rho * uy
             design[:, 2] += weight * by_size
@@ -305,15 +365,17 @@ class _Fit:
         design[:, :3] *= contrast[:, None]
         design[:, 0] -= right
         design[:, 1] -= down
-        design[:, 4], design[:, 5], design[:, 6] = 1.0, dx, dy
-        return contrast * design[:, 3] + level + right * dx + down * dy, design
+        bend = (dx * dx + dy * dy) * ((self._shape.radius[which] + _MARGIN) ** -3).astype(np.float32)[:, None]
+        design[:, 4], design[:, 5], design[:, 6], design[:, 7], design[:, 8] = 1.0, dx, dy, bend * dx, bend * dy
+        behind = level + right * dx + down * dy + right_bend * design[:, 7] + down_bend * design[:, 8]
+        return contrast * design[:, 3] + behind, design
 
-    def _residuals(self, theta: Floats, which: Integers) -> tuple[Floats, Floats, Floats, Floats]:
-        """Residuals over their standard deviations (k, p), these, shares that they count, derivatives (k, 7, p)."""
+    def _residuals(self, theta: Floats, which: Integers) -> tuple[_Pixels, _Pixels, _Pixels, _Pixels]:
+        """Residuals over their standard deviations (k, p), these, shares that they count, derivatives (k, 9, p)."""
         value, design = self._model(theta, which)
-        sigma = np.hypot(self._noise[which], _MODEL * abs(self._shape.contrast))
+        sigma = np.sqrt(self._noise[which] ** 2 + np.float32((_MODEL * self._shape.contrast) ** 2))
         v = (self._grey[which] - value) / sigma
-        share = self._used[which] / (1 + (v / _HALF) ** 2) ** 2
+        share = self._used[which] / (1 + (v / np.float32(_HALF)) ** 2) ** 2
         return v, sigma, share, design
 
     def _equations(self, theta: Floats, which: Integers) -> tuple[Floats, Floats, Floats]:
@@ -321,23 +383,15 @@ class _Fit:
         v, sigma, share, design = self._residuals(theta, which)
         design /= sigma[:, None]
         weighted = design * share[:, None]
-        normal = weighted @ design.swapaxes(1, 2)
-        gradient = (weighted @ v[..., None])[..., 0]
-        prior = np.full(UNKNOWNS, 1e-9)
-        prior[2], prior[3] = self._shape.spread**-2, self._shape.sigma_contrast**-2
-        prior[5:] = (_SLOPE * abs(self._shape.contrast)) ** -2
-        off = theta.copy()
-        off[:, [0, 1, 4]] = 0.0
-        off[:, 2] -= self._size[which]
-        off[:, 3] -= self._shape.contrast
+        normal = (weighted @ design.swapaxes(1, 2)).astype(float)
+        gradient = (weighted @ v[..., None])[..., 0].astype(float)
+        off = np.zeros_like(theta)
+        off[:, 2], off[:, 3] = theta[:, 2] - self._size[which], theta[:, 3] - self._shape.contrast
+        prior = np.full(theta.shape, 1e-9)
+        prior[:, 2], prior[:, 3] = self._shape.spread**-2, self._shape.sigma_contrast**-2
+        prior[:, 5:7], prior[:, 7:] = (_SLOPE * self._shape.contrast) ** -2, (_BEND * self._shape.contrast) ** -2
+        off[:, _BEHIND:] = theta[:, _BEHIND:]
+        robust = self._used[which] * v**2 / (1 + (v / np.float32(_HALF)) ** 2)
+        cost = robust.sum(axis=1, dtype=float) + (prior * off**2).sum(axis=1)
         gradient -= prior * off
-        cost = (self._used[which] * v**2 / (1 + (v / _HALF) ** 2)).sum(axis=1) + (prior * off**2).sum(axis=1)
-        return cost, normal + np.diag(prior), gradient
-
-
-def blurred_disc(rho: Floats, radius: float) -> Floats:
-    """Profile of a disc of height 1 that lens and pixels blur, at distances `rho` from its centre, px.
-
-    It is the probability that a normally distributed shift leads into the disc: a noncentral chi-square.
-    """
-    return np.asarray(chndtr((radius / BLUR_PX) ** 2, 2.0, (rho / BLUR_PX) ** 2), float)
+        return cost, normal + prior[:, :, None] * np.eye(UNKNOWNS), gradient

@@ -21,7 +21,7 @@ from analysis.measurements.model import POINTS
 from rig.arrays import Floats, Integers
 
 _SPREAD = 0.04  #: standard deviation of the logarithm of a marker's radius: they are made alike, cloth bends them
-_FEW = 6  #: spots of a camera that tell the size in its images; below, those of all cameras do
+_FEW = 6  #: spots of a marker that tell its size; likewise of a camera, below which those of all cameras do
 _SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
 _NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
 _SURE = 1.5  #: radii; where a prediction is less certain, a disc beside it would be another one's
@@ -71,8 +71,8 @@ def refined(
 
 
 def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sights: Sequence[Sight]) -> list[float]:
-    """Radius of the markers, m, as each camera shows it: the median of the spots that have a name."""
-    found: list[Floats] = []
+    """Radius of the markers, m, as each camera shows it: the median of the spots of a marker that is in full view."""
+    found: list[tuple[Floats, Integers]] = []
     for k, (name, sight) in enumerate(zip(views.names, sights, strict=True)):
         steps, which = np.nonzero(markers.assigned.rays[..., k] >= 0)
         spots = markers.assigned.rays[steps, which, k]
@@ -87,9 +87,21 @@ def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sight
         # A streak makes the spot longer, and with it the radius of the disc of the same area.
         more = (streak**2).sum(axis=1) / 12
         size = (np.sqrt(more**2 + 4 * (radius**2 / 4 + BLUR_PX**2) ** 2) - more) / 2
-        found.append(2 * np.sqrt(np.maximum(size - BLUR_PX**2, _SMALLEST_PX**2 / 4)) / _scale(sight)[at])
-    everywhere = float(np.median(np.concatenate(found))) if any(len(of) for of in found) else np.nan
-    return [float(np.median(of)) if len(of) >= _FEW else everywhere for of in found]
+        found.append((2 * np.sqrt(np.maximum(size - BLUR_PX**2, _SMALLEST_PX**2 / 4)) / _scale(sight)[at], which))
+    everywhere = _in_full_view(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    return [_in_full_view(*of) if len(of[0]) >= _FEW else everywhere for of in found]
+
+
+def _in_full_view(radius: Floats, which: Integers) -> float:
+    """Radius of the markers out of those of n spots and their markers.
+
+    What covers a marker makes its spots smaller, perhaps in most pulses, and what is alike beside one makes them
+    larger. So it is the second largest of the markers' medians.
+    """
+    medians = [np.median(radius[which == i]) for i in range(len(POINTS)) if np.count_nonzero(which == i) >= _FEW]
+    if not medians:
+        return float(np.median(radius)) if len(radius) else np.nan
+    return float(sorted(medians)[-2:][0])
 
 
 def _scale(sight: Sight) -> Floats:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from rig.arrays import Floats
 
@@ -41,7 +41,8 @@ class Solution:
         shared_covariance: (b, b).
         cross: (n, s, b) covariance of pulses and shared unknowns.
         inverse: (n, s, s) inverses of the Cholesky factors L.
-        coupling: (n - 1, s, s) L^-1 of the next pulse's block.
+        carried: (n - 1, s, s) what the next pulse's reduced right-hand side gets of that of a pulse.
+        gain: (n - 1, s, s) what a pulse's unknowns get of those of the next.
         response: (n, s, b): the change of the states by the shared unknowns is minus this.
     """
 
@@ -52,19 +53,20 @@ class Solution:
     shared_covariance: Floats
     cross: Floats
     inverse: Floats
-    coupling: Floats
+    carried: Floats
+    gain: Floats
     response: Floats
 
-    def moved_by(self, by_states: Floats, by_shared: Floats) -> Floats:
-        """Changes of the states (n, s, f) by f right-hand sides.
+    def effects_of(self, by_states: Floats, by_shared: Floats) -> tuple[Floats, Floats]:
+        """Changes of the states (n, s, f) by f right-hand sides, and covariance (f, f) of these as linear functions.
 
         Args:
             by_states: (n, s, f) right-hand sides of the equations of all pulses.
             by_shared: (b, f) of those of the shared unknowns.
         """
-        alone = _back(self.inverse, self.coupling, _forward(self.inverse, self.coupling, by_states))
-        pull = by_shared - np.einsum("nsb,nsf->bf", self.response, by_states)
-        return np.asarray(alone - self.response @ (self.shared_covariance @ pull))
+        reduced, pull = self._reduced(by_states, by_shared)
+        moved = _back(self.inverse, self.gain, reduced) - self.response @ (self.shared_covariance @ pull)
+        return np.asarray(moved), self._covariance(reduced, pull)
 
     def covariance_of(self, by_states: Floats, by_shared: Floats | None = None) -> Floats:
         """Covariance (f, f) of f linear functions.
@@ -73,68 +75,82 @@ class Solution:
             by_states: (n, s, f) their derivatives by the states of all pulses.
             by_shared: (b, f) by the shared unknowns; none if left out.
         """
+        return self._covariance(*self._reduced(by_states, 0.0 if by_shared is None else by_shared))
+
+    def _reduced(self, by_states: Floats, by_shared: Floats | float) -> tuple[Floats, Floats]:
         f = by_states.shape[-1]
-        reduced = _forward(self.inverse, self.coupling, by_states).reshape(-1, f)
-        by_all = -self.response.reshape(-1, self.response.shape[-1]).T @ by_states.reshape(-1, f)
-        if by_shared is not None:
-            by_all += by_shared
-        return np.asarray(reduced.T @ reduced + by_all.T @ self.shared_covariance @ by_all)
+        pull = by_shared - self.response.reshape(-1, self.response.shape[-1]).T @ by_states.reshape(-1, f)
+        return _forward(self.inverse, self.carried, by_states), np.asarray(pull)
+
+    def _covariance(self, reduced: Floats, pull: Floats) -> Floats:
+        flat = reduced.reshape(-1, reduced.shape[-1])
+        return np.asarray(flat.T @ flat + pull.T @ self.shared_covariance @ pull)
 
 
 def solve(normals: Normals) -> Solution:
-    """Solve by block Cholesky; covariances by selected inversion: only the blocks that the matrix itself has."""
+    """Solve by block Cholesky; covariances by selected inversion: only the blocks that the matrix itself has.
+
+    Raises:
+        LinAlgError: the normal equations are not positive definite.
+    """
     inverse, coupling = _factors(normals.diagonal, normals.lower)
+    carried, gain = inverse[1:] @ coupling.swapaxes(1, 2), inverse[:-1].swapaxes(1, 2) @ coupling
     right = np.concatenate((normals.right[..., None], normals.border), axis=-1)
-    both = _back(inverse, coupling, _forward(inverse, coupling, right))
+    both = _back(inverse, gain, _forward(inverse, carried, right))
     states, response = both[..., 0], both[..., 1:]
-    reduced = normals.corner - np.einsum("nsb,nsc->bc", normals.border, response)
+    border = normals.border.reshape(-1, normals.border.shape[-1])
+    reduced = normals.corner - border.T @ response.reshape(border.shape)
     shared_covariance = _inverted((reduced + reduced.T) / 2)
-    shared = shared_covariance @ (normals.right_corner - np.einsum("nsb,ns->b", normals.border, states))
+    shared = shared_covariance @ (normals.right_corner - border.T @ states.ravel())
     states = states - response @ shared
-    covariance, following = _selected_inverse(inverse, coupling)
+    covariance, following = _selected_inverse(inverse, gain)
     cross = -response @ shared_covariance
-    covariance -= cross @ response.transpose(0, 2, 1)
-    following -= cross[:-1] @ response[1:].transpose(0, 2, 1)
-    return Solution(states, shared, covariance, following, shared_covariance, cross, inverse, coupling, response)
+    covariance -= cross @ response.swapaxes(1, 2)
+    following -= cross[:-1] @ response[1:].swapaxes(1, 2)
+    return Solution(states, shared, covariance, following, shared_covariance, cross, inverse, carried, gain, response)
 
 
 def _inverted(matrix: Floats) -> Floats:
-    factor = np.linalg.cholesky(matrix)
-    inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    inverse = _inverse_factor(matrix)
     return np.asarray(inverse.T @ inverse)
 
 
+def _inverse_factor(matrix: Floats) -> Floats:
+    """The inverse of the Cholesky factor L."""
+    factor, failed = dpotrf(matrix, lower=1)
+    inverse, singular = dtrtri(factor, lower=1)
+    if failed or singular:
+        raise np.linalg.LinAlgError("normal equations are not positive definite")
+    return np.asarray(inverse)
+
+
 def _factors(diagonal: Floats, lower: Floats) -> tuple[Floats, Floats]:
+    """Inverses of the factors L of all pulses, and L^-1 of the blocks that couple them with the next ones."""
     inverse, coupling = np.empty_like(diagonal), np.empty_like(lower)
-    unit = np.eye(diagonal.shape[1])
     for k, block in enumerate(diagonal):
-        left = block - coupling[k - 1].T @ coupling[k - 1] if k else block
-        inverse[k] = solve_triangular(np.linalg.cholesky(left), unit, lower=True, check_finite=False)
+        inverse[k] = _inverse_factor(block - coupling[k - 1].T @ coupling[k - 1] if k else block)
         if k < len(lower):
-            coupling[k] = inverse[k] @ lower[k].T
+            np.matmul(inverse[k], lower[k].T, out=coupling[k])
     return inverse, coupling
 
 
-def _forward(inverse: Floats, coupling: Floats, right: Floats) -> Floats:
-    out = np.empty_like(right)
-    for k, part in enumerate(right):
-        out[k] = inverse[k] @ (part - coupling[k - 1].T @ out[k - 1] if k else part)
+def _forward(inverse: Floats, carried: Floats, right: Floats) -> Floats:
+    out = np.asarray(inverse @ right)
+    for k, by_last in enumerate(carried, start=1):
+        out[k] -= by_last @ out[k - 1]
     return out
 
 
-def _back(inverse: Floats, coupling: Floats, reduced: Floats) -> Floats:
-    out = np.empty_like(reduced)
-    last = len(reduced) - 1
-    for k in range(last, -1, -1):
-        out[k] = inverse[k].T @ (reduced[k] - coupling[k] @ out[k + 1] if k < last else reduced[k])
+def _back(inverse: Floats, gain: Floats, reduced: Floats) -> Floats:
+    out = np.asarray(inverse.swapaxes(1, 2) @ reduced)
+    for k in range(len(gain) - 1, -1, -1):
+        out[k] -= gain[k] @ out[k + 1]
     return out
 
 
-def _selected_inverse(inverse: Floats, coupling: Floats) -> tuple[Floats, Floats]:
-    covariance, following = np.empty_like(inverse), np.empty_like(coupling)
-    covariance[-1] = inverse[-1].T @ inverse[-1]
-    for k in range(len(inverse) - 2, -1, -1):
-        gain = inverse[k].T @ coupling[k]
-        following[k] = -gain @ covariance[k + 1]
-        covariance[k] = inverse[k].T @ inverse[k] - following[k] @ gain.T
+def _selected_inverse(inverse: Floats, gain: Floats) -> tuple[Floats, Floats]:
+    covariance, following = np.asarray(inverse.swapaxes(1, 2) @ inverse), np.empty_like(gain)
+    for k in range(len(gain) - 1, -1, -1):
+        np.matmul(-gain[k], covariance[k + 1], out=following[k])
+        covariance[k] -= following[k] @ gain[k].T
     return covariance, following

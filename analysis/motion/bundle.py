@@ -150,7 +150,7 @@ def _rows_by_shared(model: Model, equations: Equations, states: Floats, instants
     out[..., :rank] = equations.by_u
     for i in range(m):
         speed = x[:, 1] + 2 * instants[i, 1] * x[:, 2]
-        out[:, i, :, :, rank + i] = np.einsum("ngac,nc->nga", equations.by_channels[:, i], speed)
+        out[:, i, :, :, rank + i] = (equations.by_channels[:, i].reshape(n, 12, -1) @ speed[..., None]).reshape(n, 6, 2)
     return out
 
 
@@ -174,7 +174,7 @@ def _predicted(model: Model, equations: Equations, solution: Solution, instants:
     n = len(states)
     change = np.einsum("id,ndc->nic", instants, solution.states.reshape(n, 3, CHANNELS))
     rows = _rows_by_shared(model, equations, states, instants)
-    moved = np.einsum("nigac,nic->niga", equations.by_channels, change) + rows @ solution.shared
+    moved = (equations.by_channels @ change[:, :, None, :, None])[..., 0] + rows @ solution.shared
     return np.asarray(equations.v + moved)
 
 
@@ -185,11 +185,13 @@ def _normals(
     take = used[..., None, None]
     rows = np.where(take, equations.by_channels, 0.0).reshape(n, m, 12, CHANNELS)
     by_shared = np.where(take, _rows_by_shared(model, equations, states, instants), 0.0).reshape(n, m, 12, -1)
-    v = np.where(used[..., None], equations.v, 0.0).reshape(n, m, 12)
-    back = rows.transpose(0, 1, 3, 2)
-    diagonal = np.einsum("id,ie,nicf->ndcef", instants, instants, back @ rows, optimize=True).reshape(n, STATE, STATE)
-    border = np.einsum("id,nicb->ndcb", instants, back @ by_shared).reshape(n, STATE, -1)
-    right = -np.einsum("id,nicr,nir->ndc", instants, back, v, optimize=True).reshape(n, STATE)
+    v = np.where(used[..., None], equations.v, 0.0).reshape(n, m, 12, 1)
+    back = rows.swapaxes(2, 3)
+    both = np.einsum("id,ie->dei", instants, instants).reshape(-1, m)
+    blocks = (both @ (back @ rows).reshape(n, m, -1)).reshape(n, 3, 3, CHANNELS, CHANNELS)
+    diagonal = blocks.swapaxes(2, 3).reshape(n, STATE, STATE)
+    by_time = (instants.T @ (back @ np.concatenate((by_shared, v), axis=3)).reshape(n, m, -1)).reshape(n, STATE, -1)
+    border, right = by_time[..., :-1], -by_time[..., -1]
     flat = by_shared.reshape(n * m * 12, -1)
     corner, right_corner = flat.T @ flat, -flat.T @ v.ravel()
     lower = _add_motion(model.prior, states, diagonal, right)

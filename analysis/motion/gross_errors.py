@@ -18,7 +18,6 @@ from analysis.motion.bundle import MEDIAN, Adjusted, rows_by_shared, settled
 from analysis.motion.channels import CHANNELS
 from analysis.motion.lasting import LASTING_S, pulls, runs
 from analysis.motion.observations import GROUPS
-from analysis.motion.prior import STATE
 from rig.arrays import Flags, Floats, Integers
 
 #: Probability that a jump without gross errors loses any measurement that others of the pulse control.
@@ -126,7 +125,7 @@ def statistics(adjusted: Adjusted) -> Statistics:
     v, unit = adjusted.equations.v, np.eye(2)
     used = adjusted.used[..., None, None]
     free = np.where(used, unit * (1 + _FLOOR) - spread, unit + spread)
-    test = np.einsum("...a,...ab,...b->...", v, np.linalg.inv(free), v)
+    test = (v * np.linalg.solve(free, v[..., None])[..., 0]).sum(axis=-1)
     redundancy = np.where(adjusted.used, 2.0 - np.trace(spread, axis1=-2, axis2=-1), 0.0)
     return Statistics((v**2).sum(axis=-1), redundancy, test)
 
@@ -136,18 +135,16 @@ def _of_adjusted(adjusted: Adjusted) -> Floats:
     solution, instants = adjusted.solution, adjusted.instants
     rows, border = adjusted.equations.by_channels, rows_by_shared(adjusted)
     n, m = adjusted.used.shape[:2]
-    spread = np.empty((n, m, 6, 2, 2))
-    for i in range(m):
-        own = np.einsum(
-            "d,ndcef,e->ncf", instants[i], solution.covariance.reshape(n, 3, CHANNELS, 3, CHANNELS), instants[i]
-        )
-        cross = np.einsum("d,ndcb->ncb", instants[i], solution.cross.reshape(n, 3, CHANNELS, -1))
-        flat, shared = rows[:, i].reshape(n, 12, CHANNELS), border[:, i].reshape(n, 12, -1)
-        half = (flat @ cross @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
-        whole = (flat @ own @ flat.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
-        whole += half + half.transpose(0, 3, 4, 1, 2)
-        whole += (shared @ solution.shared_covariance @ shared.transpose(0, 2, 1)).reshape(n, 6, 2, 6, 2)
-        spread[:, i] = np.einsum("ngagb->ngab", whole)
+    covariance = solution.covariance.reshape(n, 3, CHANNELS, 3, CHANNELS)
+    cross = solution.cross.reshape(n, 3, CHANNELS, -1)
+    spread = np.empty((n, m, len(GROUPS), 2, 2))
+    for i, (at, own) in enumerate(zip(instants, border.swapaxes(0, 1), strict=True)):
+        of_channels = np.tensordot(np.tensordot(covariance, at, (3, 0)), at, (1, 0)).swapaxes(1, 2)
+        of_both = np.tensordot(cross, at, (1, 0)).swapaxes(1, 2)[:, None]
+        back, own_back = rows[:, i].swapaxes(2, 3), own.swapaxes(2, 3)
+        half = own @ (of_both @ back)
+        spread[:, i] = rows[:, i] @ (of_channels[:, None] @ back) + own @ (solution.shared_covariance @ own_back)
+        spread[:, i] += half + half.swapaxes(2, 3)
     return spread
 
 
@@ -159,16 +156,16 @@ def lasting_errors(adjusted: Adjusted) -> Flags:
     """
     windows = _windows(adjusted)
     out = np.zeros_like(adjusted.used)
-    if not windows.middle.size:
+    if windows is None:
         return out
-    tests = np.array([windows.test((w,)) for w in range(len(windows.middle))])
+    tests = windows.tests(np.arange(len(windows.middle))[:, None])
     limit, rival = float(chdtri(2, FALSE_REMOVAL_P / len(tests))), float(chdtri(2, _RIVAL_P))
     for w in np.flatnonzero(tests > limit):
         near = np.flatnonzero(np.abs(windows.middle - windows.middle[w]) < LASTING_S)
         if tests[w] < tests[near].max():
             continue
         for other in near[tests[near] > tests[w] - rival]:
-            if other == w or windows.test((int(w), int(other))) - tests[other] < rival:
+            if other == w or windows.tests(np.array([[w, other]]))[0] - tests[other] < rival:
                 out |= windows.members == other
     return out
 
@@ -191,19 +188,22 @@ class _Windows:
     normal: Floats
     single: Floats
 
-    def test(self, which: tuple[int, ...]) -> float:
-        """Chi-squared of two degrees of freedom for each window: that they have errors that single ones have not."""
-        size, chosen = 2 * len(which), list(which)
-        normal = self.normal[np.ix_(chosen, chosen)].transpose(0, 2, 1, 3).reshape(size, size)
-        allowed = np.zeros((size, size))
-        for k, w in enumerate(chosen):
-            allowed[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = self.single[w]
-        pull = self.pull[chosen].ravel()
-        return float(pull @ np.linalg.solve(normal + normal @ allowed @ normal, pull))
+    def tests(self, which: Integers) -> Floats:
+        """Tests (t,) of windows (t, k) together: that they have errors that single measurements have not.
+
+        Chi-squared of two degrees of freedom for each of the k windows.
+        """
+        t, k = which.shape
+        normal = self.normal[which[:, :, None], which[:, None]].swapaxes(2, 3).reshape(t, 2 * k, 2 * k)
+        allowed = np.zeros((t, k, 2, k, 2))
+        allowed[:, range(k), :, range(k)] = self.single[which].swapaxes(0, 1)
+        pull = self.pull[which].reshape(t, 2 * k, 1)
+        expected = normal + normal @ allowed.reshape(normal.shape) @ normal
+        return np.asarray((pull * np.linalg.solve(expected, pull)).sum(axis=(1, 2)))
 
 
-def _windows(adjusted: Adjusted) -> _Windows:
-    """Eliminate all unknowns of the bundle from the normal equations of the windows' errors."""
+def _windows(adjusted: Adjusted) -> _Windows | None:
+    """Eliminate all unknowns of the bundle from the normal equations of the windows' errors; None without windows."""
     observed, used = adjusted.model.observed, adjusted.used
     members = np.full(used.shape, -1)
     found = [
@@ -213,21 +213,15 @@ def _windows(adjusted: Adjusted) -> _Windows:
         for run in runs(adjusted, i, g, LASTING_S)
         if len(run.pulses) > 1
     ]
-    count = len(found)
-    pull, own = np.zeros((count, 2)), np.zeros((count, 2, 2))
+    if not found:
+        return None
     for w, run in enumerate(found):
-        at = run.pulses, run.camera, run.group
-        members[at] = w
-        white = observed.whitener[at]
-        pull[w] = np.einsum("pab,pa->b", white, adjusted.equations.v[at])
-        own[w] = np.einsum("pab,pac->bc", white, white)
-    by_states, by_shared = pulls(adjusted, found, [np.tile(np.eye(2), (len(run.pulses), 1, 1)) for run in found])
-    spread = adjusted.solution.covariance_of(
-        by_states.reshape(len(used), STATE, -1), by_shared.reshape(len(by_shared), -1)
-    )
+        members[run.pulses, run.camera, run.group] = w
+    count, sizes = len(found), np.array([len(run.pulses) for run in found])
+    pulled = pulls(adjusted, found, [np.tile(np.eye(2), (size, 1, 1)) for size in sizes])
+    spread = adjusted.solution.covariance_of(pulled.by_states, pulled.by_shared)
     normal = -spread.reshape(count, 2, count, 2).transpose(0, 2, 1, 3)
-    normal[range(count), range(count)] += (1 + _FLOOR) * own
-    sizes = np.array([len(run.pulses) for run in found])
-    single = np.linalg.inv(own) * sizes[:, None, None] if count else own
+    normal[range(count), range(count)] += (1 + _FLOOR) * pulled.normal
+    single = np.linalg.inv(pulled.normal) * sizes[:, None, None]
     middle = np.array([observed.times[run.pulses].mean() for run in found])
-    return _Windows(members, middle, pull, normal, single)
+    return _Windows(members, middle, pulled.right, normal, single)

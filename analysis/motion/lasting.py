@@ -20,6 +20,7 @@ import numpy as np
 from analysis.candidates.ski_fit import AXIS_PX
 from analysis.measurements.model import POINTS
 from analysis.motion.bundle import Adjusted, rows_by_shared
+from analysis.motion.lasting_variances import Residuals, covariance_of, variances_of
 from analysis.motion.observations import GROUPS
 from analysis.motion.prior import STATE
 from rig.arrays import Floats, Integers
@@ -32,9 +33,6 @@ _POINTS, _SKIS = range(len(POINTS)), range(len(POINTS), len(GROUPS))
 #: `AXIS_PX` a factor for what their images tell. Half of each fades, half stays.
 _OF_POINTS: Final = (0.01, 0.01)
 _TOLD: Final = 1.0
-_PSEUDO: Final = 1.0  # observations that they count as
-_STEPS, _SETTLED = 12, 0.02  # of the iteration of variances, and the relative change that ends it
-_RANK: Final = 1e-9  # of the greatest eigenvalue
 _GAP_S, _GAP_PULSES = 0.05, 1.5  # behind a longer gap it may be another error
 
 
@@ -66,27 +64,50 @@ def runs(adjusted: Adjusted, camera: int, group: int, longest_s: float) -> list[
     return [Run(np.array(run), camera, group) for run in found]
 
 
-def pulls(adjusted: Adjusted, found: list[Run], errors: list[Floats]) -> tuple[Floats, Floats]:
-    """Right-hand sides J' W e of the normal equations: by states (n, 48, w, f) and by shared unknowns (b, w, f).
+@dataclass(frozen=True, slots=True, eq=False)
+class Pulls:
+    """What errors that the measurements of w runs share, f each, do in the normal equations.
+
+    Attributes:
+        by_states: (n, 48, w f) J' W e of the states.
+        by_shared: (b, w f) of the shared unknowns.
+        normal: (w, f, f) E' W E of the errors of each run.
+        right: (w, f) E' W v.
+    """
+
+    by_states: Floats
+    by_shared: Floats
+    normal: Floats
+    right: Floats
+
+
+def pulls(adjusted: Adjusted, found: list[Run], errors: list[Floats]) -> Pulls:
+    """What errors do in the normal equations.
 
     Args:
         adjusted: the bundle.
-        found: w runs.
+        found: w runs, one at least.
         errors: of each run (k, 2, f): both observations of each pulse (rows) by f errors (columns), px.
     """
-    shared = rows_by_shared(adjusted)
-    f = errors[0].shape[-1] if errors else 0
-    by_states = np.zeros((len(adjusted.used), STATE, len(found), f))
-    by_shared = np.zeros((shared.shape[-1], len(found), f))
-    for w, (run, error) in enumerate(zip(found, errors, strict=True)):
-        at = run.pulses, run.camera, run.group
-        white = adjusted.model.observed.whitener[at] @ error
-        rows = np.einsum("pac,pab->pcb", adjusted.equations.by_channels[at], white)
-        by_states[run.pulses, :, w] = np.einsum("d,pcb->pdcb", adjusted.instants[run.camera], rows).reshape(
-            -1, STATE, f
-        )
-        by_shared[:, w] = np.einsum("pas,pab->sb", shared[at], white)
-    return by_states, by_shared
+    n, w, f = len(adjusted.used), len(found), errors[0].shape[-1]
+    size = np.array([len(run.pulses) for run in found])
+    number, first = np.repeat(np.arange(w), size), np.cumsum(size) - size
+    pulse = np.concatenate([run.pulses for run in found])
+    camera, group = np.array([(run.camera, run.group) for run in found])[number].T
+    at = pulse, camera, group
+    white = adjusted.model.observed.whitener[at] @ np.concatenate(errors)
+    back = white.swapaxes(1, 2)
+    rows = adjusted.equations.by_channels[at].swapaxes(1, 2) @ white
+    by_states = np.zeros((n, STATE, w, f))
+    by_states[pulse, :, number] = (adjusted.instants[camera][:, :, None, None] * rows[:, None]).reshape(-1, STATE, f)
+    by_shared = np.add.reduceat(rows_by_shared(adjusted)[at].swapaxes(1, 2) @ white, first)
+    right = np.add.reduceat((back @ adjusted.equations.v[at][..., None])[..., 0], first)
+    return Pulls(
+        by_states.reshape(n, STATE, -1),
+        by_shared.swapaxes(0, 1).reshape(-1, w * f),
+        np.add.reduceat(back @ white, first),
+        right,
+    )
 
 
 def lasting_covariance(adjusted: Adjusted, square: Floats, redundancy: Floats) -> Floats:
@@ -125,22 +146,17 @@ def _effect(adjusted: Adjusted, series: list[list[Run]], start: Floats, square: 
     """
     found = [run for own in series for run in own]
     errors = [error for own in series for error in _shapes(adjusted, own)]
-    by_states, by_shared = (part.reshape(*part.shape[:-2], -1) for part in pulls(adjusted, found, errors))
-    normal = -adjusted.solution.covariance_of(by_states, by_shared)
-    f = start.shape[-1]
-    pull = np.empty((len(found), f))
-    for w, (run, error) in enumerate(zip(found, errors, strict=True)):
-        at, own = (run.pulses, run.camera, run.group), slice(w * f, (w + 1) * f)
-        white = adjusted.model.observed.whitener[at] @ error
-        normal[own, own] += np.einsum("pab,pac->bc", white, white)
-        pull[w] = np.einsum("pab,pa->b", white, adjusted.equations.v[at])
+    pulled = pulls(adjusted, found, errors)
+    moved, spread = adjusted.solution.effects_of(pulled.by_states, pulled.by_shared)
+    w, f = pulled.right.shape
+    normal = -spread
+    normal.reshape(w, f, w, f)[range(w), :, range(w)] += pulled.normal
     alike = [_alike(adjusted, own) for own in series]
-    variances = _variances(_Residuals.of(normal, pull.ravel(), square, redundancy), alike, start)
-    moved = adjusted.solution.moved_by(by_states, by_shared)
+    variances = variances_of(Residuals.of(normal, pulled.right.ravel(), square, redundancy), alike, start)
     total = np.zeros((len(moved), STATE, STATE))
     first = 0
     for correlation, variance in zip(alike, variances, strict=True):
-        covariance = _covariance(correlation, variance)
+        covariance = covariance_of(correlation, variance)
         part = moved[:, :, first : first + len(covariance)]
         total += (part @ covariance) @ part.transpose(0, 2, 1)
         first += len(covariance)
@@ -152,96 +168,6 @@ def _alike(adjusted: Adjusted, own: list[Run]) -> Floats:
     middle = np.array([adjusted.model.observed.times[run.pulses].mean() for run in own])
     fading = np.exp(-np.abs(middle[:, None] - middle) / LASTING_S)
     return np.stack((fading, np.ones_like(fading)))
-
-
-def _covariance(alike: Floats, variance: Floats) -> Floats:
-    """(w f, w f) of the errors of w runs with variances (2, f), run by run."""
-    w, f = alike.shape[-1], variance.shape[-1]
-    return np.asarray(np.einsum("kvw,ke,ef->vewf", alike, variance, np.eye(f)).reshape(w * f, w * f))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Residuals:
-    """What the residuals v say about lasting errors e of r runs in all.
-
-    Attributes:
-        normal: (r f, r f) N = E' W Qv W E, the normal equations of e when all other unknowns are eliminated.
-        pull: (r f,) E' W v, their right-hand side p.
-        errors: (r f,) e, if nothing but the residuals is known.
-        rank: of N.
-        square: v' W v - p' e, what lasting errors have no part in.
-        redundancy: of it.
-    """
-
-    normal: Floats
-    pull: Floats
-    errors: Floats
-    rank: int
-    square: float
-    redundancy: float
-
-    @classmethod
-    def of(cls, normal: Floats, pull: Floats, square: float, redundancy: float) -> "_Residuals":
-        """From v' W v and the redundancy of all residuals."""
-        values, vectors = np.linalg.eigh(normal)
-        use = values > _RANK * values[-1]
-        vectors = vectors[:, use]
-        errors = vectors @ ((vectors.T @ pull) / values[use])
-        rank = int(use.sum())
-        inside = max(square - float(pull @ errors), 0.0), max(redundancy - rank, 0.0)
-        return cls(normal, pull, errors, rank, *inside)
-
-
-def _variances(residuals: _Residuals, alike: list[Floats], start: Floats) -> Floats:
-    """Variances (s, 2, f) of the errors of each series: restricted maximum likelihood with a prior.
-
-    If independent errors have q times the variances that the weights say, and lasting ones B, variances times
-    correlations C, the right-hand sides p have the covariance V = q N + N B N. Each variance gets its square sum over
-    its redundancy: with g = N V^-1 p and G = N V^-1 N, s becomes s (g' C g) / tr(C G), and likewise q, of which the
-    rest of the residuals knows, too. All series together come first, with `start` as one observation; then each for
-    itself, with what all say as one observation.
-    """
-    pooled, independent = start, 1.0
-    variances = np.tile(start, (len(alike), 1, 1))
-    for alone in (False, True):
-        for _ in range(_STEPS):
-            before = variances
-            square, redundancy, independent = _squares(residuals, alike, variances, independent)
-            if alone:
-                variances = (square + _PSEUDO * pooled) / (redundancy + _PSEUDO)
-            else:
-                pooled = (square.sum(axis=0) + _PSEUDO * start) / (redundancy.sum(axis=0) + _PSEUDO)
-                variances = np.tile(pooled, (len(alike), 1, 1))
-            if np.allclose(variances, before, rtol=_SETTLED, atol=0.0):
-                break
-    return variances
-
-
-def _squares(
-    residuals: _Residuals, alike: list[Floats], variances: Floats, independent: float
-) -> tuple[Floats, Floats, float]:
-    """Square sums (s, 2, f) times the squares of the variances, redundancies times the variances, and a better q."""
-    f, normal = variances.shape[-1], residuals.normal
-    by_lasting = np.empty_like(normal)
-    first = 0
-    for correlation, variance in zip(alike, variances, strict=True):
-        own = slice(first, first := first + f * correlation.shape[-1])
-        by_lasting[:, own] = normal[:, own] @ _covariance(correlation, variance)
-    together = independent * np.eye(len(normal)) + by_lasting
-    inverse = np.linalg.inv(together)
-    pulled, weights = inverse @ residuals.pull, inverse @ normal
-    unbent = float(inverse.T @ residuals.errors @ pulled)
-    free = independent * float(np.trace(inverse)) - (len(normal) - residuals.rank)
-    better = (residuals.square + independent**2 * unbent + _PSEUDO) / (residuals.redundancy + free + _PSEUDO)
-    square, redundancy = np.empty_like(variances), np.empty_like(variances)
-    first = 0
-    for i, correlation in enumerate(alike):
-        w = correlation.shape[-1]
-        own = slice(first, first := first + f * w)
-        g, weight = pulled[own].reshape(w, f), weights[own, own].reshape(w, f, w, f)
-        square[i] = np.einsum("kvw,ve,we->ke", correlation, g, g)
-        redundancy[i] = np.einsum("kvw,vewe->ke", correlation, weight)
-    return square * variances**2, redundancy * variances, better
 
 
 def _shapes(adjusted: Adjusted, own: list[Run]) -> list[Floats]:

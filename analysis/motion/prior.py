@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.motion.channels import CHANNELS, ORIGIN, START_MEAN, START_SIGMA
 from analysis.result.model import EDGE_S
-from rig.arrays import Floats
+from rig.arrays import Floats, Integers
 
 STATE: Final = 3 * CHANNELS
 REGIMES: Final = ("table", "edge", "flight")
@@ -32,6 +32,7 @@ _WITHIN_S: Final = 0.1
 _PSEUDO: Final = 1.0  #: observations that the start values count as
 _BREAK: Final = np.array((20, 10, 40, 20, 10, 10, 20, 20), float)[SHARE]  # m/s^2, rad/s^2: at the take-off
 _BODY_S: Final = 1.0
+_ALL: Final = np.arange(CHANNELS)
 _SMALLEST: Final = 1e-4  # of the start value: below, a density is as good as none
 
 
@@ -42,13 +43,13 @@ def start_densities() -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """The motion between n pulses.
+    """The motion between n pulses; of g possible times of the take-off, see `prior`.
 
     Attributes:
         unit: h, s.
         transition: (n - 1, 3, 3) of a channel's state.
-        by_density: (n - 1, 3, 3, 3) covariance that a density 1 of each regime adds.
-        by_break: (n - 1, 3, 3) covariance that a break of variance 1 adds.
+        by_density: (..., n - 1, 3, 3, 3) covariance that a density 1 of each regime adds.
+        by_break: (..., n - 1, 3, 3) covariance that a break of variance 1 adds.
         density: (3, 8) by regime and share.
     """
 
@@ -58,10 +59,10 @@ class Prior:
     by_break: Floats
     density: Floats
 
-    def noise(self) -> Floats:
-        """(n - 1, 16, 3, 3) covariance that each channel's state gains between two pulses."""
-        jerk = np.einsum("krij,rc->kcij", self.by_density, self.density[:, SHARE])
-        return np.asarray(jerk + np.einsum("kij,c->kcij", self.by_break, _BREAK**2))
+    def noise(self, channels: Integers = _ALL) -> Floats:
+        """(..., n - 1, c, 3, 3) covariance that the state of each channel gains between two pulses."""
+        jerk = np.einsum("...krij,rc->...kcij", self.by_density, self.density[:, SHARE[channels]])
+        return np.asarray(jerk + np.einsum("...kij,c->...kcij", self.by_break, _BREAK[channels] ** 2))
 
     def with_density(self, density: Floats) -> "Prior":
         """The same with other densities."""
@@ -83,27 +84,25 @@ class Prior:
         return weight.ravel()
 
 
-def prior(times: Floats, unit: float, takeoff: float | None, density: Floats, airborne: float = -np.inf) -> Prior:
-    """The prior between pulses at `times` (n,), s, with the take-off at `takeoff`.
+def prior(
+    times: Floats, unit: float, takeoff: float | Floats | None, density: Floats, airborne: float = -np.inf
+) -> Prior:
+    """The prior between pulses at `times` (n,), s, with the take-off at `takeoff`; (g,) for g possible times of it.
 
     Without one everything from `airborne` on is flight; before, he may have passed the edge at any time.
     """
     start, end = times[:-1], times[1:]
-    if takeoff is None:
-        bounds = np.clip(np.array((-np.inf, -np.inf, airborne, np.inf))[:, None], start, end)
-    else:
-        bounds = np.clip(np.array((-np.inf, takeoff, takeoff + EDGE_S, np.inf))[:, None], start, end)
-    after = end - bounds[1:]  # time left at the end of each regime's part
-    by_density = np.stack(
-        [_carried(white_jerk(bounds[r + 1] - bounds[r], unit), after[r] / unit) for r in range(len(REGIMES))],
-        axis=1,
-    )
-    by_break = np.zeros((len(start), 3, 3))
+    first = np.asarray(-np.inf if takeoff is None else takeoff)[..., None]
+    last = np.full_like(first, airborne) if takeoff is None else first + EDGE_S
+    bounds = np.stack(np.broadcast_arrays(start, np.clip(first, start, end), np.clip(last, start, end), end))
+    after = (end - bounds[1:]) / unit  # time left at the end of each regime's part
+    by_density = np.moveaxis(_carried(white_jerk(np.diff(bounds, axis=0), unit), after), 0, -3)
+    by_break = np.zeros(by_density[..., 0, :, :].shape)
     if takeoff is not None:
-        inside = (start < takeoff) & (takeoff <= end)
+        inside = (start < first) & (first <= end)
         gain = np.zeros((3, 3))
         gain[2, 2] = (unit**2 / 2) ** 2
-        by_break[inside] = _carried(np.broadcast_to(gain, by_break.shape), after[0] / unit)[inside]
+        by_break[inside] = _carried(gain, after[0][inside])
     return Prior(unit, transitions((end - start) / unit), by_density, by_break, density)
 
 
@@ -116,16 +115,16 @@ def transitions(steps: Floats) -> Floats:
 
 
 def white_jerk(seconds: Floats, unit: float) -> Floats:
-    """(n, 3, 3) covariance that white noise of density 1 on the jerk adds in so many seconds."""
+    """(..., 3, 3) covariance that white noise of density 1 on the jerk adds in so many seconds (...)."""
     powers = np.array(((20.0, 8.0, 6.0), (8.0, 3.0, 2.0), (6.0, 2.0, 1.0)))
     exponents = np.array(((5, 4, 3), (4, 3, 2), (3, 2, 1)))
     scale = np.array((1.0, unit, unit**2 / 2))
-    return np.asarray(seconds[:, None, None] ** exponents / powers * np.outer(scale, scale))
+    return np.asarray(seconds[..., None, None] ** exponents / powers * np.outer(scale, scale))
 
 
 def _carried(covariance: Floats, steps: Floats) -> Floats:
     move = transitions(steps)
-    return np.asarray(move @ covariance @ move.transpose(0, 2, 1))
+    return np.asarray(move @ covariance @ move.swapaxes(-1, -2))
 
 
 def re_estimated(given: Prior, states: Floats, covariance: Floats, following: Floats) -> Floats:

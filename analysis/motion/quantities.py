@@ -64,9 +64,8 @@ def smoothed_states(
     inputs = states[:, pick] * scale
     spread = covariance[:, pick][:, :, pick] * np.outer(scale, scale)
     given = by_calibration[:, pick] * scale[:, None]
-    values = _evaluated(frame, inputs)
-    by = _derivatives(frame, inputs) * _DEGREES[:, None]
-    values = values * _DEGREES
+    values, by = _evaluated(frame, inputs)
+    values, by = values * _DEGREES, by * _DEGREES[:, None]
     out = by @ spread @ by.transpose(0, 2, 1)
     gradient = (by @ given)[:, _QUANTITY_ROWS]
     return [
@@ -80,38 +79,23 @@ def known_groups(used: Flags) -> Flags:
     return np.asarray((used.sum(axis=1) >= 2).any(axis=0))
 
 
-def _evaluated(frame: MotionFrame, inputs: Floats) -> Floats:
-    """All results (..., 30) of inputs (..., 19), SI units."""
-    channels, velocity = inputs[..., :CHANNELS], inputs[..., CHANNELS:] @ frame.rotation.T
+def _evaluated(frame: MotionFrame, inputs: Floats) -> tuple[Floats, Floats]:
+    """All results (n, 30) of inputs (n, 19), SI units, and their derivatives (n, 30, 19)."""
+    channels, velocity = inputs[:, :CHANNELS], inputs[:, CHANNELS:] @ frame.rotation.T
     points, skis = frame.points(channels), frame.skis(channels)
     turned = slopes_and_headings(channels) + np.array((0.0, frame.heading))
     turned[..., 1] = (turned[..., 1] + np.pi) % (2 * np.pi) - np.pi
-    origin = (points[..., 2, :] + points[..., 3, :]) / 2
-    angles = body_angles(points[..., 0, :], points[..., 1, :], origin, skis[..., 0, :], skis[..., 1, :])
-    flat = inputs.shape[:-1]
-    last = np.concatenate(
-        (
-            (angles[..., 4] - slope(velocity))[..., None],
-            origin[..., 2:],
-            np.linalg.norm(velocity, axis=-1, keepdims=True),
-            velocity,
-        ),
-        axis=-1,
-    )
-    return np.concatenate((points.reshape(*flat, 12), turned.reshape(*flat, 4), origin, angles, last), axis=-1)
-
-
-def _derivatives(frame: MotionFrame, inputs: Floats) -> Floats:
-    """(n, 30, 19) of what `_evaluated` gives by its inputs."""
-    channels, velocity = inputs[:, :CHANNELS], inputs[:, CHANNELS:] @ frame.rotation.T
-    points, skis = frame.points(channels), frame.skis(channels)
+    origin = (points[:, 2] + points[:, 3]) / 2
+    body = points[:, 0], points[:, 1], origin, skis[:, 0], skis[:, 1]
+    angles, speed = body_angles(*body), np.linalg.norm(velocity, axis=1, keepdims=True)
+    attack = angles[:, ANGLES.index("phi")] - slope(velocity)
+    parts = (points.reshape(-1, 12), turned.reshape(-1, 4), origin, angles, attack[:, None], origin[:, 2:], speed)
     by = np.zeros((len(inputs), len(_DEGREES), _INPUTS))
     by_points = frame.by_vectors(np.tile(np.eye(3), (len(POINTS), 1, 1)), np.arange(len(POINTS)))
     by[:, _POINT_ROWS, :VECTORS] = by_points.reshape(-1, VECTORS)
     by[:, _SKI_ROWS, VECTORS:CHANNELS] = SKI_WEIGHTS.reshape(-1, CHANNELS - VECTORS)
     by[:, _ORIGIN_ROWS, ORIGIN] = frame.rotation
-    body = (*points[:, :2].swapaxes(0, 1), points[:, 2:].mean(axis=1))
-    of_angles = body_angle_derivatives(*body, *skis.swapaxes(0, 1))
+    of_angles = body_angle_derivatives(*body)
     by_body = np.concatenate((by_points[0], by_points[1], by_points[2:].mean(axis=0)))
     by[:, _ANGLE_ROWS, :VECTORS] = of_angles[:, :, :3].reshape(len(by), len(ANGLES), -1) @ by_body
     by_skis = frame.by_skis(channels).reshape(len(by), -1, CHANNELS - VECTORS)
@@ -119,9 +103,9 @@ def _derivatives(frame: MotionFrame, inputs: Floats) -> Floats:
     by[:, _ATTACK_ROW] = by[:, _ANGLE_ROWS][:, ANGLES.index("phi")]
     by[:, _ATTACK_ROW, CHANNELS:] = -slope_gradient(velocity) @ frame.rotation
     by[:, _HEIGHT_ROW, ORIGIN] = frame.rotation[2]
-    by[:, _SPEED_ROW, CHANNELS:] = velocity @ frame.rotation / np.linalg.norm(velocity, axis=1, keepdims=True)
+    by[:, _SPEED_ROW, CHANNELS:] = velocity @ frame.rotation / speed
     by[:, _VELOCITY_ROWS, CHANNELS:] = frame.rotation
-    return by
+    return np.concatenate((*parts, velocity), axis=1), by
 
 
 def _state(

@@ -61,23 +61,22 @@ def _flat(observed: Observations, system: CameraSystem) -> Floats:
 
 def _shifted(observed: Observations, flat: Floats, late: Floats) -> Floats:
     """The points as they would be, were the cameras not late: between pulses interpolated."""
-    if not late.any():
-        return flat
     out = flat.copy()
     for i in np.flatnonzero(late):
-        for label in range(_POINTS):
-            for axis in range(2):
-                out[:, i, label, axis] = _interpolated(
-                    observed.times - late[i], observed.times, flat[:, i, label, axis]
-                )
+        out[:, i] = _earlier(observed.times, flat[:, i], late[i : i + 1])[0]
     return out
 
 
-def _interpolated(at: Floats, times: Floats, values: Floats) -> Floats:
-    """Linear between neighbouring pulses; NaN where one of them has no value."""
+def _earlier(times: Floats, values: Floats, late: Floats) -> Floats:
+    """Values (t, n, ...) at times (n,) of what is t times late, from those (n, ...) with lateness.
+
+    Linear between neighbouring pulses; NaN where one of them has no value.
+    """
+    at = times - late[:, None]
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
-    share = (at - times[after - 1]) / (times[after] - times[after - 1])
-    inside = (at >= times[0]) & (at <= times[-1])
+    more = (1,) * (values.ndim - 1)
+    share = ((at - times[after - 1]) / (times[after] - times[after - 1])).reshape(*at.shape, *more)
+    inside = ((at >= times[0]) & (at <= times[-1])).reshape(*at.shape, *more)
     return np.where(inside, (1 - share) * values[after - 1] + share * values[after], np.nan)
 
 
@@ -86,26 +85,29 @@ def _lateness(observed: Observations, system: CameraSystem, flat: Floats) -> Flo
     m = len(observed.names)
     unit = float(np.median(np.diff(observed.times)))
     tries = np.arange(-_LATEST_FRAMES, _LATEST_FRAMES + _LATENESS_STEP / 2, _LATENESS_STEP) * unit
-    best = (_misfit(observed, system, flat), np.zeros(m))
-    synchronous = best[0]
+    synchronous = least = float(_misfits(observed, system, flat[None])[0])
+    late = np.zeros(m)
     for camera in range(1 if m == 2 else 0, m):
-        for seconds in tries:
-            late = np.where(np.arange(m) == camera, seconds, 0.0)
-            if (misfit := _misfit(observed, system, _shifted(observed, flat, late))) < best[0]:
-                best = misfit, late
-    return best[1] if _CLEAR_GAIN * best[0] < synchronous else np.zeros(m)
+        tried = np.repeat(flat[None], len(tries), axis=0)
+        tried[:, :, camera] = _earlier(observed.times, flat[:, camera], tries)
+        misfits = _misfits(observed, system, tried)
+        if misfits.min() < least:
+            least = float(misfits.min())
+            late = np.where(np.arange(m) == camera, tries[misfits.argmin()], 0.0)
+    return late if _CLEAR_GAIN * least < synchronous else np.zeros(m)
 
 
-def _misfit(observed: Observations, system: CameraSystem, flat: Floats) -> float:
-    """Median residual of the intersections; infinite where too few of them are left."""
-    xy = flat.transpose(0, 2, 1, 3).reshape(-1, flat.shape[1], 2)
+def _misfits(observed: Observations, system: CameraSystem, tried: Floats) -> Floats:
+    """Median residuals (t,) of the intersections of t sets of points; infinite where too few of a set are left."""
+    xy = tried.swapaxes(2, 3).reshape(-1, tried.shape[2], 2)
     seen = np.asarray(np.isfinite(xy).all(axis=-1))
     use = seen.sum(axis=1) >= 2
-    if use.sum() < FEWEST:
-        return np.inf
     found = intersect_points([system[name].ideal() for name in observed.names], xy[use], seen=seen[use])
     redundancy = 2 * seen[use].sum(axis=1) - 3
-    return float(np.median(np.sqrt(np.nansum(found.residuals**2, axis=(1, 2)) / redundancy)))
+    size = np.sqrt(np.nansum(found.residuals**2, axis=(1, 2)) / redundancy)
+    count = use.reshape(len(tried), -1).sum(axis=1)
+    sets = np.split(size, np.cumsum(count)[:-1])
+    return np.array([np.median(one) if len(one) >= FEWEST else np.inf for one in sets])
 
 
 def _intersected(observed: Observations, system: CameraSystem, flat: Floats) -> Floats:
@@ -194,8 +196,12 @@ def _filled(times: Floats, channels: Floats) -> Floats:
 
 
 def _without_gross_errors(values: Floats, far: float) -> Floats:
-    width = 2 * _NEIGHBOURS + 1
-    padded = np.pad(values, _NEIGHBOURS, constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    usual = np.array([np.median(w[np.isfinite(w)]) if np.isfinite(w).any() else np.nan for w in windows])
+    windows = np.sort(
+        np.lib.stride_tricks.sliding_window_view(
+            np.pad(values, _NEIGHBOURS, constant_values=np.nan), 2 * _NEIGHBOURS + 1
+        )
+    )  # NaN last
+    count = np.isfinite(windows).sum(axis=1)
+    middle = np.stack(((count - 1) // 2, count // 2), axis=-1)
+    usual = np.where(count > 0, np.take_along_axis(windows, np.maximum(middle, 0), axis=1).mean(axis=1), np.nan)
     return np.where(np.abs(values - usual) <= far, values, np.nan)

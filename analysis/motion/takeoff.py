@@ -61,13 +61,13 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
     known = _known(adjusted)
     first, last = known[0] + _AT_END * unit, known[-1] - _AT_END * unit
     coarse = np.arange(times[0], times[-1], max(_COARSE_S, unit / 2))
-    likelihood = _log_likelihood(path, times, [prior(times, unit, t, densities) for t in coarse], _ON_TABLE)
+    likelihood = _log_likelihood(path, times, prior(times, unit, coarse, densities), _ON_TABLE)
     if likelihood.max() < _without(path, times, unit, densities):
         return None
     possible = coarse[likelihood > likelihood.max() - _SUPPORT]
     step = coarse[1] - coarse[0] if len(coarse) > 1 else unit
     fine = np.linspace(max(possible[0] - step, times[0]), min(possible[-1] + step, times[-1]), _FINE)
-    likelihood = _log_likelihood(path, times, [prior(times, unit, t, densities) for t in fine], _ON_TABLE)
+    likelihood = _log_likelihood(path, times, prior(times, unit, fine, densities), _ON_TABLE)
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()
     mean = float(weight @ fine)
@@ -150,40 +150,43 @@ def _without(path: _Path, times: Floats, unit: float, densities: Floats) -> floa
     best = -np.inf
     for regime, start in ((0, _ON_TABLE), (2, _IN_FLIGHT)):
         only = prior(times, unit, None, np.repeat(densities[regime : regime + 1], 3, axis=0))
-        best = max(best, float(_log_likelihood(path, times, [only], start)[0]))
+        best = max(best, float(_log_likelihood(path, times, only, start)[0]))
     return best
 
 
-def _log_likelihood(path: _Path, times: Floats, priors: list[Prior], start: tuple[Floats, Floats]) -> Floats:
-    """Logarithm of the likelihood of a path for each prior (g,), up to a constant.
+def _log_likelihood(path: _Path, times: Floats, given: Prior, start: tuple[Floats, Floats]) -> Floats:
+    """Logarithm of the likelihood of a path for a prior, of g possible times of the take-off (g,), up to a constant.
 
     `start` holds mean and standard deviation of the acceleration of O in the first pulse.
     """
-    c = len(_SELECTED)
-    unit = priors[0].unit
-    scale = np.array((1.0, unit, unit**2 / 2))
-    noise = _spread(np.stack([p.noise()[:, list(_SELECTED)] for p in priors]))
-    move = np.einsum("kij,cd->kicjd", priors[0].transition, np.eye(c)).reshape(-1, 3 * c, 3 * c)
+    c, n = len(_SELECTED), len(times)
+    scale = np.array((1.0, given.unit, given.unit**2 / 2))
+    noise = given.noise(np.array(_SELECTED))
+    noise = _spread(noise.reshape(-1, *noise.shape[-4:]))
+    g = len(noise)
+    move = np.einsum("kij,cd->kicjd", given.transition, np.eye(c)).reshape(-1, 3 * c, 3 * c)
     sigma = START_SIGMA[:, list(_SELECTED)].copy()
     sigma[2, ORIGIN] = start[1]
-    mean = np.zeros((len(priors), 3 * c))
+    mean = np.zeros((g, 3 * c))
     mean[:, :c] = path.value[0]
     mean[:, 2 * c : 2 * c + 3] = start[0] * scale[2]
-    covariance = np.broadcast_to(np.diag((sigma * scale[:, None]).ravel() ** 2), (len(priors), 3 * c, 3 * c))
-    total = np.zeros(len(priors))
-    for k in range(len(times)):
+    covariance = np.broadcast_to(np.diag((sigma * scale[:, None]).ravel() ** 2), (g, 3 * c, 3 * c))
+    innovation, spread = np.empty((n, g, c)), np.empty((n, g, c, c))
+    for k in range(n):
         if k:
             mean = mean @ move[k - 1].T
-            covariance = move[k - 1] @ covariance @ move[k - 1].T + noise[:, k - 1]
-        innovation = path.value[k] - mean[:, :c]
-        spread = covariance[:, :c, :c] + path.covariance[k]
-        inverse = np.linalg.inv(spread)
-        gain = covariance[:, :, :c] @ inverse
-        total -= (np.einsum("gi,gij,gj->g", innovation, inverse, innovation) + np.linalg.slogdet(spread)[1]) / 2
-        mean = mean + np.einsum("gsi,gi->gs", gain, innovation)
-        covariance = covariance - gain @ covariance[:, :c]
-        covariance = (covariance + covariance.transpose(0, 2, 1)) / 2
-    return total
+            for _ in range(2):  # the columns, then the rows: one product for all g
+                covariance = (covariance.reshape(-1, 3 * c) @ move[k - 1].T).reshape(g, 3 * c, 3 * c).swapaxes(1, 2)
+            covariance = covariance + noise[:, k - 1]
+        innovation[k] = path.value[k] - mean[:, :c]
+        spread[k] = covariance[:, :c, :c] + path.covariance[k]
+        cross = covariance[:, :, :c]
+        gain = cross @ np.linalg.inv(spread[k])
+        mean = mean + (gain @ innovation[k][..., None])[..., 0]
+        covariance = covariance - gain @ cross.swapaxes(1, 2)
+        covariance = (covariance + covariance.swapaxes(1, 2)) / 2
+    pull = np.linalg.solve(spread, innovation[..., None])[..., 0]
+    return np.asarray(-((innovation * pull).sum(axis=-1) + np.linalg.slogdet(spread)[1]).sum(axis=0) / 2)
 
 
 def _spread(noise: Floats) -> Floats:

@@ -30,34 +30,32 @@ def body_angles(helmet: Floats, hip: Floats, origin: Floats, right: Floats, left
     Returns:
         (..., 5) rad, in the order of `ANGLES`.
     """
-    forward = _unit(right) + _unit(left)
-    return np.stack(
-        (
-            _between(forward, hip - origin),
-            _between(origin - hip, helmet - hip),
-            _between(right, left),
-            slope(right) - slope(left),
-            slope(forward),
-        ),
-        axis=-1,
-    )
+    ahead = _unit(right) + _unit(left)
+    one = np.stack((ahead, origin - hip, right), axis=-2)
+    other = np.stack((hip - origin, helmet - hip, left), axis=-2)
+    slopes = slope(np.stack((right, left, ahead), axis=-2))
+    between = _between(one, other)
+    return np.concatenate((between, slopes[..., :1] - slopes[..., 1:2], slopes[..., 2:]), axis=-1)
 
 
 def body_angle_derivatives(helmet: Floats, hip: Floats, origin: Floats, right: Floats, left: Floats) -> Floats:
     """Derivatives (..., 5, 5, 3) of the angles by the five arguments of `body_angles`; zero where there is none."""
-    ahead = _unit(right) + _unit(left)
-    by = np.zeros((*np.shape(helmet)[:-1], len(ANGLES), 5, 3))
-    by_ahead, by_legs = _between_gradients(ahead, hip - origin)
-    by[..., 0, 1, :], by[..., 0, 2, :] = by_legs, -by_legs
-    by_thigh, by_back = _between_gradients(origin - hip, helmet - hip)
-    by[..., 1, 0, :], by[..., 1, 1, :], by[..., 1, 2, :] = by_back, -by_thigh - by_back, by_thigh
-    by[..., 2, 3, :], by[..., 2, 4, :] = _between_gradients(right, left)
-    by[..., 3, 3, :], by[..., 3, 4, :] = slope_gradient(right), -slope_gradient(left)
-    of_mean = np.stack((by_ahead, slope_gradient(ahead)), axis=-2)
-    for ski, direction in ((3, right), (4, left)):
-        along = _unit(direction)
-        across = of_mean - (of_mean @ along[..., None]) * along[..., None, :]
-        by[..., (0, 4), ski, :] = across / np.linalg.norm(direction, axis=-1)[..., None, None]
+    skis = np.stack((right, left), axis=-2)
+    length = np.linalg.norm(skis, axis=-1)[..., None]
+    along = skis / length
+    ahead = along.sum(axis=-2)
+    one = np.stack((ahead, origin - hip, right), axis=-2)
+    other = np.stack((hip - origin, helmet - hip, left), axis=-2)
+    by_one, by_other = _between_gradients(one, other)
+    steeper = slope_gradient(np.concatenate((skis, ahead[..., None, :]), axis=-2))
+    by = np.zeros((*ahead.shape[:-1], len(ANGLES), 5, 3))
+    by[..., 0, 1, :], by[..., 0, 2, :] = by_other[..., 0, :], -by_other[..., 0, :]
+    by[..., 1, 0, :], by[..., 1, 2, :] = by_other[..., 1, :], by_one[..., 1, :]
+    by[..., 1, 1, :] = -by_one[..., 1, :] - by_other[..., 1, :]
+    by[..., 2, 3, :], by[..., 2, 4, :] = by_one[..., 2, :], by_other[..., 2, :]
+    by[..., 3, 3, :], by[..., 3, 4, :] = steeper[..., 0, :], -steeper[..., 1, :]
+    for angle, by_ahead in ((0, by_one[..., :1, :]), (4, steeper[..., 2:, :])):
+        by[..., angle, 3:, :] = (by_ahead - (by_ahead * along).sum(axis=-1, keepdims=True) * along) / length
     return by
 
 
@@ -68,11 +66,13 @@ def slope(direction: Floats) -> Floats:
 
 def slope_gradient(direction: Floats) -> Floats:
     """Derivatives (..., 3) of `slope` by the direction; zero where there is none."""
-    x, y, z = np.moveaxis(direction, -1, 0)
+    x, y, z = direction[..., 0], direction[..., 1], direction[..., 2]
     level = np.hypot(x, y)
     square = level**2 + z**2
     steep = _divided(z, level * square)
-    return np.stack((-x * steep, -y * steep, _divided(level, square)), axis=-1)
+    out = np.empty_like(direction)
+    out[..., 0], out[..., 1], out[..., 2] = -x * steep, -y * steep, _divided(level, square)
+    return out
 
 
 def slope_and_heading(direction: Floats) -> Floats:
@@ -113,7 +113,9 @@ def _cross(one: Floats, other: Floats) -> Floats:
     """As `np.cross`, which takes several times as long for a few vectors."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]
     x, y, z = other[..., 0], other[..., 1], other[..., 2]
-    return np.stack((b * z - c * y, c * x - a * z, a * y - b * x), axis=-1)
+    out = np.empty(np.broadcast_shapes(one.shape, other.shape))
+    out[..., 0], out[..., 1], out[..., 2] = b * z - c * y, c * x - a * z, a * y - b * x
+    return out
 
 
 def _divided(numerator: Floats, by: Floats) -> Floats:

@@ -38,5 +38,6 @@ def test_solution_and_covariances_are_those_of_the_dense_inverse() -> None:
     expected = functions.T @ inverse[: N * S, : N * S] @ functions
     assert np.allclose(found.covariance_of(functions.reshape(N, S, 2)), expected)
     other = rng.standard_normal((N * S + B, 2))
-    moved = found.moved_by(other[: N * S].reshape(N, S, 2), other[N * S :])
+    moved, spread = found.effects_of(other[: N * S].reshape(N, S, 2), other[N * S :])
     assert np.allclose(moved.reshape(N * S, 2), (inverse @ other)[: N * S])
+    assert np.allclose(spread, other.T @ inverse @ other)

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
-from analysis.motion.bundle import Model, begun, near, root_of, settled
-from analysis.motion.camera_arrays import CameraArrays, own_root
-from analysis.motion.channels import CHANNELS, SLOPE, MotionFrame
-from analysis.motion.equations import linearised
-from analysis.motion.gross_errors import without_gross_errors
-from analysis.motion.observations import GROUPS, Observations, by_hand, observations, used_cameras
-from analysis.motion.prior import SHARE, STATE, prior, start_densities, transitions, white_jerk
+from analysis.motion.adjustment.bundle import Model, begun, near, root_of, settled
+from analysis.motion.adjustment.gross_errors import without_gross_errors
+from analysis.motion.model.camera_arrays import CameraArrays, own_root
+from analysis.motion.model.channels import CHANNELS, SLOPE, MotionFrame
+from analysis.motion.model.equations import linearised
+from analysis.motion.model.observations import GROUPS, Observations, by_hand, observations, used_cameras
+from analysis.motion.model.prior import SHARE, STATE, prior, start_densities, transitions, white_jerk
 from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import start_values
 from analysis.result.model import SmoothedState

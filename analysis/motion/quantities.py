@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES
-from analysis.motion.channels import CHANNELS, ORIGIN, SKI_WEIGHTS, VECTORS, MotionFrame, slopes_and_headings
-from analysis.motion.observations import GROUPS
+from analysis.motion.model.channels import CHANNELS, ORIGIN, SKI_WEIGHTS, VECTORS, MotionFrame, slopes_and_headings
+from analysis.motion.model.observations import GROUPS
 from analysis.result.model import QUANTITIES, PointState, Quantity, SkiState, SmoothedState, Status, Vector
 from photogrammetry.jumper.stick_model import ANGLES, body_angle_derivatives, body_angles, slope, slope_gradient
 from rig.arrays import Flags, Floats

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri
 
 from analysis.measurements.model import JumpMeasurements, Measurements
-from analysis.motion.bundle import (
+from analysis.motion.adjustment.bundle import (
     Adjusted,
     Model,
     begun,
@@ -17,11 +17,11 @@ from analysis.motion.bundle import (
     settled,
     with_prior,
 )
-from analysis.motion.camera_arrays import CameraArrays, own_root
-from analysis.motion.gross_errors import fitting_sigmas, statistics, with_factors, without_gross_errors
-from analysis.motion.lasting import lasting_covariance
-from analysis.motion.observations import GROUPS, Observations, by_hand, observations, used_cameras
-from analysis.motion.prior import Prior, prior, re_estimated, start_densities
+from analysis.motion.adjustment.gross_errors import fitting_sigmas, statistics, with_factors, without_gross_errors
+from analysis.motion.adjustment.lasting import lasting_covariance
+from analysis.motion.model.camera_arrays import CameraArrays, own_root
+from analysis.motion.model.observations import GROUPS, Observations, by_hand, observations, used_cameras
+from analysis.motion.model.prior import Prior, prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import FEWEST, Start, start_values
 from analysis.motion.synchrony import Synchrony, judged

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from analysis.motion.channels import CHANNELS, START_MEAN, VECTORS, MotionFrame, ski_channels
-from analysis.motion.observations import Observations
+from analysis.motion.model.channels import CHANNELS, START_MEAN, VECTORS, MotionFrame, ski_channels
+from analysis.motion.model.observations import Observations
 from analysis.scene.camera_system import CameraSystem
 from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.jumper.stick_model import slope_and_heading

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from analysis.motion.bundle import Adjusted
-from analysis.motion.channels import CHANNELS
+from analysis.motion.adjustment.bundle import Adjusted
+from analysis.motion.model.channels import CHANNELS
 from analysis.motion.takeoff import Break
 from analysis.result.model import EDGE_S, Quantity, Vector
 from rig.arrays import Floats

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from analysis.motion.bundle import Adjusted
-from analysis.motion.channels import CHANNELS, ORIGIN, SLOPE, START_SIGMA
-from analysis.motion.observations import GROUPS
-from analysis.motion.prior import Prior, prior
+from analysis.motion.adjustment.bundle import Adjusted
+from analysis.motion.model.channels import CHANNELS, ORIGIN, SLOPE, START_SIGMA
+from analysis.motion.model.observations import GROUPS
+from analysis.motion.model.prior import Prior, prior
 from analysis.result.model import EDGE_S
 from rig.arrays import Floats
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from analysis.measurements.model import ImageMeasurements, JumpMeasurements
-from analysis.motion.observations import GROUPS
+from analysis.motion.model.observations import GROUPS
 from analysis.motion.smoother import Motion, smooth
 from analysis.result.model import Phase, SmoothedState, Status, phase_at
 from bench.analysis.simulated import RATE_HZ, TrueJump, drawn, simulated_measurements, training, true_cameras, true_jump

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.motion.blocks import Normals, solve
+from analysis.motion.adjustment.blocks import Normals, solve
 
 N, S, B = 5, 4, 3
 

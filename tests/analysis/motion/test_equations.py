@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements
-from analysis.motion.bundle import root_of
-from analysis.motion.camera_arrays import CameraArrays, own_root
-from analysis.motion.channels import CHANNELS, VECTORS, MotionFrame
-from analysis.motion.equations import linearised
-from analysis.motion.observations import GROUPS, observations
-from analysis.motion.prior import STATE
+from analysis.motion.adjustment.bundle import root_of
+from analysis.motion.model.camera_arrays import CameraArrays, own_root
+from analysis.motion.model.channels import CHANNELS, VECTORS, MotionFrame
+from analysis.motion.model.equations import linearised
+from analysis.motion.model.observations import GROUPS, observations
+from analysis.motion.model.prior import STATE
 from analysis.motion.quantities import smoothed_states
 from analysis.motion.start_values import start_values
 from analysis.result.model import QUANTITIES, SmoothedState

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.measurements.model import JumpMeasurements
-from analysis.motion.lasting import LASTING_S
+from analysis.motion.adjustment.lasting import LASTING_S
 from analysis.motion.smoother import smooth
 from bench.analysis.smoothing import Honesty, judge
 from rig.arrays import Floats

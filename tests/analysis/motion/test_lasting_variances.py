@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.motion.lasting_variances import Residuals, covariance_of, squares
+from analysis.motion.adjustment.lasting_variances import Residuals, covariance_of, squares
 
 RUNS, ERRORS, FREE = (3, 5, 4), 2, 60  # runs of each series, errors of a run, other residuals
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.motion.prior import prior, start_densities, transitions, white_jerk
+from analysis.motion.model.prior import prior, start_densities, transitions, white_jerk
 from analysis.result.model import EDGE_S
 
 UNIT = 1 / 30

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.measurements.model import POINTS, SIDES
-from analysis.motion.bundle import MEDIAN, Adjusted, rows_by_shared, settled
-from analysis.motion.channels import CHANNELS
-from analysis.motion.lasting import LASTING_S, pulls, runs
-from analysis.motion.observations import GROUPS
+from analysis.motion.adjustment.bundle import MEDIAN, Adjusted, rows_by_shared, settled
+from analysis.motion.adjustment.lasting import LASTING_S, pulls, runs
+from analysis.motion.model.channels import CHANNELS
+from analysis.motion.model.observations import GROUPS
 from rig.arrays import Flags, Floats, Integers
 
 #: Probability that a jump without gross errors loses any measurement that others of the pulse control.

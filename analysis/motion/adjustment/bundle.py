@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.motion.blocks import Normals, Solution, solve
-from analysis.motion.camera_arrays import CameraArrays
-from analysis.motion.channels import CHANNELS, MotionFrame
-from analysis.motion.equations import Equations, linearised
-from analysis.motion.observations import Observations
-from analysis.motion.prior import STATE, Prior, transitions
+from analysis.motion.adjustment.blocks import Normals, Solution, solve
+from analysis.motion.model.camera_arrays import CameraArrays
+from analysis.motion.model.channels import CHANNELS, MotionFrame
+from analysis.motion.model.equations import Equations, linearised
+from analysis.motion.model.observations import Observations
+from analysis.motion.model.prior import STATE, Prior, transitions
 from rig.arrays import Flags, Floats
 
 _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance

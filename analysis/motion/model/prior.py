@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.motion.channels import CHANNELS, ORIGIN, START_MEAN, START_SIGMA
+from analysis.motion.model.channels import CHANNELS, ORIGIN, START_MEAN, START_SIGMA
 from analysis.result.model import EDGE_S
 from rig.arrays import Floats, Integers
 

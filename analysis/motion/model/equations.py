@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from analysis.measurements.model import POINTS
-from analysis.motion.camera_arrays import CameraArrays
-from analysis.motion.channels import CHANNELS, VECTORS, MotionFrame
-from analysis.motion.observations import GROUPS, Observations
+from analysis.motion.model.camera_arrays import CameraArrays
+from analysis.motion.model.channels import CHANNELS, VECTORS, MotionFrame
+from analysis.motion.model.observations import GROUPS, Observations
 from rig.arrays import Floats, Integers
 
 _POINTS = len(POINTS)

@@ -19,10 +19,10 @@ import numpy as np
 
 from analysis.candidates.ski_fit import AXIS_PX
 from analysis.measurements.model import POINTS
-from analysis.motion.bundle import Adjusted, rows_by_shared
-from analysis.motion.lasting_variances import Residuals, covariance_of, variances_of
-from analysis.motion.observations import GROUPS
-from analysis.motion.prior import STATE
+from analysis.motion.adjustment.bundle import Adjusted, rows_by_shared
+from analysis.motion.adjustment.lasting_variances import Residuals, covariance_of, variances_of
+from analysis.motion.model.observations import GROUPS
+from analysis.motion.model.prior import STATE
 from rig.arrays import Floats, Integers
 
 #: Errors last so long: an arm, a leg or the other ski is beside a thing for some tenths of a second.

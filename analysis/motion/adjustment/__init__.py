@@ -1,0 +1,1 @@
+"""The bundle over time: normal equations, gross errors, errors that last."""

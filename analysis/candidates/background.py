@@ -142,7 +142,8 @@ class Background:
             np.greater(cv2.multiply(difference, difference), variance, out=front[part].view(np.bool_))
         if stamped is not None:
             front[stamped[0], stamped[1] : stamped[1] + stamped[2]] = 0
-        return [self._region(image, moment, front, box) for box in _boxes(front)]
+        looked_at = (left, first, right, last)
+        return [self._region(image, moment, front, box) for box in _boxes(front, looked_at)]
 
     def _region(
         self, image: Grey, moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]
@@ -216,10 +217,12 @@ def _usual(grey: GreyImage, noise: GreyImage) -> GreyImage:
     return np.interp(grey, at, [float(np.median(spread[part])) for part in parts]).astype(np.float32)
 
 
-def _boxes(front: NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
-    """Boxes around what moves: columns and rows of the first and behind the last pixel, the largest first."""
+def _boxes(front: NDArray[np.uint8], within: tuple[int, int, int, int]) -> list[tuple[int, int, int, int]]:
+    """Boxes around what moves in a part of an image, the largest first; a box is as `within` of `regions`."""
+    left, top, right, bottom = within
     # this algorithm takes a third of the time of the usual one where snow makes a thousand specks
-    stats = cv2.connectedComponentsWithStatsWithAlgorithm(front, 8, cv2.CV_32S, cv2.CCL_BBDT)[2][1:]
+    labelled = cv2.connectedComponentsWithStatsWithAlgorithm(front[top:bottom, left:right], 8, cv2.CV_32S, cv2.CCL_BBDT)
+    stats = np.add(labelled[2][1:], (left, top, 0, 0, 0))
     sides = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
     large = (sides.max(axis=1) >= _SMALLEST) & (sides.min(axis=1) >= _THINNEST)
     boxes = [(x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area) for x, y, w, h, area in stats[large].tolist()]
@@ -227,8 +230,8 @@ def _boxes(front: NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
     grown = sorted(_joined(boxes), key=lambda box: -box[4])[:_MOST]
     spare = _MARGIN - _JOIN
     return [
-        (max(0, x - spare), max(0, y - spare), min(columns, right + spare), min(rows, bottom + spare))
-        for x, y, right, bottom, _ in grown
+        (max(0, x - spare), max(0, y - spare), min(columns, behind + spare), min(rows, below + spare))
+        for x, y, behind, below, _ in grown
     ]
 
 

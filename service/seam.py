@@ -19,7 +19,7 @@ from rig.api.recordings import Pulses, Recording, RecordingOrder, RecordingQuery
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
-from rig.api.trigger import TriggerChange, TriggerView
+from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
 from rig.frame import FrameStatus
 from rig.phrase import Phrase
 from rig.pulse import RigPulse
@@ -360,11 +360,15 @@ class RigService(Protocol):
         ...
 
     def change_trigger(self, change: TriggerChange) -> TriggerView:
-        """Change the rate of the pulses, and keep it in the rig file if that is wished.
+        """Change the rate of the pulses, and keep it in the rig file if that is wished; stop or start them.
 
         BadInputError: source, cameras or memory do not take the rate. StateForbidsError: a recording runs, or others
         make the pulses. StorageError: the rig file cannot be written.
         """
+        ...
+
+    def burst(self, order: BurstOrder) -> TriggerView:
+        """Have so many pulses made. StateForbidsError: they run, or the rig is not armed, or others make them."""
         ...
 
     def events(self, after: int) -> list[Event]:

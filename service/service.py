@@ -20,7 +20,7 @@ from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
-from rig.api.trigger import TriggerChange, TriggerView
+from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
 from rig.errors import (
     BadInputError,
@@ -179,6 +179,7 @@ class Service(Archive):
 
         def start(opened: "Future[Recording]") -> None:
             supervisor.recordings.start(order, opened)
+            supervisor.train.needed(order)
 
         return supervisor.commands.ask(start, _OPEN_S)
 
@@ -306,10 +307,14 @@ class Service(Archive):
         return self._trains.view()
 
     def change_trigger(self, change: TriggerChange) -> TriggerView:
-        """Change the rate of the pulses; if the rig is armed, it is armed anew."""
+        """Change the rate of the pulses; if the rig is armed, it is armed anew. Stop or start them."""
         if self._rehearser.progress is not None:
             raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change the rate")
         return self._trains.change(change)
+
+    def burst(self, order: BurstOrder) -> TriggerView:
+        """Have so many pulses made."""
+        return self._trains.burst(order.pulses)
 
     def _index(self, camera: str) -> int:
         names = [each.name for each in self._supervisor.rig.cameras]

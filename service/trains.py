@@ -1,5 +1,6 @@
-"""The train of pulses, where svev makes it: its rate is changed while the rig runs, and kept in the rig file."""
+"""The train of pulses, where svev makes it: stopped and started while armed, at another rate, kept in the rig file."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -42,11 +43,12 @@ class Trains:
             source=trigger.source,
             rate_hz=trigger.rate_hz,
             controls=tuple(sorted(trigger_source(trigger).controls)),
+            running=self._supervisor.status.pulses.running,
             saved=trigger.rate_hz == self._kept_hz,
         )
 
     def change(self, change: TriggerChange) -> TriggerView:
-        """Change the rate, and write it into the rig file if that is wished.
+        """Change the rate, and write it into the rig file if that is wished; stop or start the train.
 
         Raises:
             BadInputError: source, cameras or memory of this computer do not take the rate.
@@ -54,17 +56,39 @@ class Trains:
             StorageError: the rig file cannot be written; the rate is changed all the same.
         """
         with self._supervisor.changing:
-            self._check_made_here()
+            self._check_made_here(TriggerControl.RATE)
+            if change.running is not None:
+                self._check_made_here(TriggerControl.RUNNING)
+                self._ask(partial(self._supervisor.train.run, running=change.running))
             if change.rate_hz is not None and change.rate_hz != self._supervisor.rig.trigger.rate_hz:
                 self._change_rate(change.rate_hz)
             if change.save:
                 self._keep(self._supervisor.rig.trigger.rate_hz)
             return self.view()
 
-    def _check_made_here(self) -> None:
+    def burst(self, pulses: int) -> TriggerView:
+        """Have so many pulses made, while the train stands still.
+
+        Raises:
+            StateForbidsError: it does not, the rig is not armed, a recording runs, or others make the pulses.
+        """
+        with self._supervisor.changing:
+            self._check_made_here(TriggerControl.RUNNING)
+            self._ask(partial(self._supervisor.train.burst, pulses))
+            return self.view()
+
+    def _ask(self, command: Callable[[], None]) -> None:
+        self._supervisor.commands.ask(at_once(command), _SOON_S)
+
+    def _check_made_here(self, control: TriggerControl) -> None:
         rig = self._supervisor.rig
-        if TriggerControl.RATE in trigger_source(rig.trigger).controls:
+        controls = trigger_source(rig.trigger).controls
+        if control in controls:
             return
+        if controls:
+            raise StateForbidsError(
+                f'with trigger.source = "{rig.trigger.source}" only the rate can be changed: disarm to stop the pulses'
+            )
         if any(camera.backend == "replay" for camera in rig.cameras):
             raise StateForbidsError("the pulses are those of the replayed log: replay a log of another rate")
         raise StateForbidsError(
@@ -80,7 +104,7 @@ class Trains:
         _check_dead_time(rig)
         check_memory(rig, self._preroll_s)
         text = written_rate(supervisor.rig_toml, rate_hz)
-        supervisor.commands.ask(at_once(partial(supervisor.change_rate, rig, text)), _SOON_S)
+        self._ask(partial(supervisor.change_rate, rig, text))
         said = phrase("event_rate", "is to make {rate_hz:g} pulses per second from now on", rate_hz=rate_hz)
         supervisor.hub.tell(Event.now(Level.INFO, TRIGGER, said))
 

@@ -83,6 +83,7 @@ class PulseStatus(Model):
     """The trigger pulses of the last second."""
 
     arriving: bool
+    running: bool = Field(True, description="false: svev has stopped them on request; a recording starts them again")
     rate_hz: float | None = None
     spread_us: float | None = Field(None, description="median spread of the trigger times within a pulse")
     number: int = Field(0, description="pulses seen since arming")

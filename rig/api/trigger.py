@@ -3,15 +3,16 @@
 from enum import StrEnum
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
-from rig.api.fields import Model
+from rig.api.fields import WHOLE, Model
 
 
 class TriggerControl(StrEnum):
     """What can be changed of the pulses while the rig is armed."""
 
     RATE = "rate"  #: their rate
+    RUNNING = "running"  #: whether they come by themselves; else they come on request, so many as are asked for
 
 
 class TriggerChange(Model):
@@ -21,9 +22,16 @@ class TriggerChange(Model):
         None, description="pulses per second; exposures and readout must be shorter than from pulse to pulse",
         examples=[50],
     )  # fmt: skip
-    save: Annotated[bool, Field(strict=True)] = Field(
-        False, description="write the rate into the rig file as well", examples=[False]
+    running: StrictBool | None = Field(
+        None, description="false: stop the pulses, which come on request then; true: start them", examples=[None]
     )
+    save: StrictBool = Field(False, description="write the rate into the rig file as well", examples=[False])
+
+
+class BurstOrder(Model):
+    """Pulses on request."""
+
+    pulses: Annotated[int, Field(ge=1, le=10_000), WHOLE] = Field(10, description="so many", examples=[10])
 
 
 class TriggerView(Model):
@@ -32,4 +40,5 @@ class TriggerView(Model):
     source: str = Field(description="`[trigger] source` of the rig file")
     rate_hz: float = Field(description="pulses per second that the source is to make")
     controls: tuple[TriggerControl, ...] = Field(description="what can be changed here; none: others make the pulses")
+    running: bool = Field(description="whether pulses come by themselves while armed; else on request only")
     saved: bool = Field(description="whether the rig file says the same rate, so that a restart keeps it")

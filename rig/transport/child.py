@@ -9,6 +9,7 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any, Final, Generic, TypeVar
 
 import msgspec
@@ -34,12 +35,14 @@ class ChildContext(Generic[Config]):
         name: name of the process.
         control: channel to the parent.
         config: first message of the parent.
+        on_command: called with each message but `Quit` by `stopping` and `stops_within`.
     """
 
     def __init__(self, name: str, control: ControlChannel[Any], config: Config, grace_s: float) -> None:
         self.name, self.control, self.config = name, control, config
         self._grace_s = grace_s
         self._stop = False
+        self.on_command: Callable[[Any], None] = lambda _: None
 
     def stopping(self) -> bool:
         """Whether the parent asked to quit, is gone, or the process got SIGTERM.
@@ -48,7 +51,12 @@ class ChildContext(Generic[Config]):
         that is dead.
         """
         if not self._stop:
-            self._stop = any(isinstance(message, Quit) for message in self.control.receive(0)) or self.control.ended
+            for message in self.control.receive(0):
+                if isinstance(message, Quit):
+                    self._stop = True
+                else:
+                    self.on_command(message)
+            self._stop = self._stop or self.control.ended
             if self._stop:
                 end_in(self._grace_s)
         return self._stop

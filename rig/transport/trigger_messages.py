@@ -19,10 +19,12 @@ class TriggerBoxConfig(Message):
     Attributes:
         rig: the rig.
         port: device file of the serial line: the rig file's, or that of an emulated box.
+        still: pulses are made on request only.
     """
 
     rig: RigSettings
     port: str
+    still: bool = False
 
 
 class TriggerConfig(Message):
@@ -31,10 +33,12 @@ class TriggerConfig(Message):
     Attributes:
         rig: the rig.
         epoch: as the grabbers have it.
+        still: pulses are made on request only.
     """
 
     rig: RigSettings
     epoch: HostNs
+    still: bool = False
 
 
 class CamerasSeen(Message):
@@ -59,11 +63,21 @@ class CamerasSeen(Message):
         )
 
 
+class LetPulses(Message):
+    """To the process that makes the pulses: make so many from now on.
+
+    Attributes:
+        pulses: 0: none; None: without end.
+    """
+
+    pulses: int | None
+
+
 class TriggerTold(Message):
     """Something that people should know of the pulses that are sent."""
 
     event: Event
 
 
-TriggerCommand = CamerasSeen | Quit
+TriggerCommand = CamerasSeen | LetPulses | Quit
 TriggerReport = TellActions | TellPulses | PulsesFired | TriggerTold

@@ -41,14 +41,17 @@ class AlarmKeeper:
         known = self._known.values()
         return tuple(sorted(known, key=lambda alarm: (alarm.statement.level is not Level.ERROR, -alarm.number)))
 
-    def look(self, health: Health, overloaded: Sequence[int]) -> None:
+    def look(self, health: Health, overloaded: Sequence[int], *, still: bool = False) -> None:
         """Enter a health record.
 
         Args:
             health: the record.
             overloaded: indices of the cameras that suffer from a computer that is too slow.
+            still: pulses come on request only, so that they stop is no alarm.
         """
         self._watch = self._watch or AlarmWatch(self._rig)
+        if still:
+            self._watch.expect_pauses()
         begun, over = self._watch.look(health, overloaded, time.monotonic())
         for alarm in begun:
             self._numbers += 1

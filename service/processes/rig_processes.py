@@ -46,7 +46,14 @@ from rig.transport.recorder_reports import (
     RecorderWarm,
 )
 from rig.transport.ring import CameraRing
-from rig.transport.trigger_messages import CamerasSeen, TriggerBoxConfig, TriggerConfig, TriggerReport, TriggerTold
+from rig.transport.trigger_messages import (
+    CamerasSeen,
+    LetPulses,
+    TriggerBoxConfig,
+    TriggerConfig,
+    TriggerReport,
+    TriggerTold,
+)
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
 from triggering.timeline.pulse_train import RHYTHM, RHYTHM_LEAST
@@ -103,6 +110,7 @@ class RigProcesses:
         recorder_died: whether the recorder is dead; the presence of cameras is not known then.
         health: the recorder's last health record.
         rate: of the pulses, as measured last; None: not known.
+        still: whether pulses are made on request only.
 
     Raises:
         BadInputError: libdc1394 is missing, or a log that is to be replayed does not fit.
@@ -136,6 +144,7 @@ class RigProcesses:
         self.warm = self.ready = self.recorder_died = False
         self.health: Health | None = None
         self.rate: SteadyRate | None = None
+        self.still = False
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -196,6 +205,11 @@ class RigProcesses:
         for helper in (name, *([] if rig.analysis is None else [ANALYSIS])):
             self._renewed.add(helper)
             self._processes[helper].control.send(Quit())
+
+    def let_pulses(self, pulses: int | None) -> None:
+        """Have the process that makes the pulses make so many from now on; None: without end."""
+        self.still = pulses is not None
+        self._processes[TRIGGER].control.send(LetPulses(pulses=pulses))
 
     def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
@@ -315,13 +329,15 @@ class RigProcesses:
     def _start_trigger(self) -> None:
         trigger = self._rig.trigger
         if isinstance(trigger, TriggerBoxTrigger):
-            config = TriggerBoxConfig(rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port))
+            config = TriggerBoxConfig(
+                rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port), still=self.still
+            )
             box = ProcessSpec(TRIGGER, "service.processes.programs.triggerbox", config, reports=TriggerReport)
             self._processes.start(box)
         else:
             by_line = isinstance(trigger, GpioTrigger)
             program = "service.processes.programs.gpio" if by_line else "service.processes.programs.actions"
-            even = TriggerConfig(rig=self._rig, epoch=self._epoch)
+            even = TriggerConfig(rig=self._rig, epoch=self._epoch, still=self.still)
             self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport))
 
     def _start_recorder(self) -> None:

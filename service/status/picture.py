@@ -53,6 +53,7 @@ class Facts:
         health: the recorder's last health record, None if there is none.
         warm: whether whole triplets have come.
         pulses: rate of the pulses.
+        still: whether pulses are made on request only.
         alarms: what is wrong with pulses, clocks and cameras.
         overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
         room: on the disk.
@@ -69,6 +70,7 @@ class Facts:
     health: Health | None
     warm: bool
     pulses: PulseRate
+    still: bool
     alarms: tuple[Alarm, ...]
     overloaded: Sequence[int]
     room: Room
@@ -90,7 +92,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
     arriving = facts.heard is not None and (pulses.arriving or (facts.warm and not facts.health))
     rate = pulses.rate_hz if arriving else None
     if state is not State.FAULT:
-        statement = about_state(state, rig.cameras, states, arriving, rate, facts.overloaded)
+        statement = about_state(state, rig.cameras, states, arriving, rate, facts.overloaded, still=facts.still)
         if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
             statement = facts.notice
         if statement.level is Level.GOOD and (wrong := _wrong(rig, facts)) is not None:
@@ -113,6 +115,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
         cameras=cameras,
         pulses=PulseStatus(
             arriving=arriving,
+            running=not facts.still,
             rate_hz=rate and round(rate, 2),
             spread_us=None if pairing is None else pairing.spread_median_us,
             number=0 if pairing is None else pairing.seen,

@@ -83,6 +83,8 @@ def about_state(
     arriving: bool,
     rate_hz: float | None,
     overloaded: Sequence[int],
+    *,
+    still: bool = False,
 ) -> Statement:
     """The state of the rig in words; a fault is stated by `no_camera` or `failed`.
 
@@ -93,6 +95,7 @@ def about_state(
         arriving: whether pulses arrive.
         rate_hz: pulses per second, None while unknown.
         overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
+        still: pulses are stopped, and come on request only.
     """
     match state:
         case State.IDLE:
@@ -106,11 +109,24 @@ def about_state(
             return Statement(code="state_disarming", text="disconnecting the cameras")
         case State.RECORDING:
             return _working("state_recording", "recording", cameras, states, overloaded)
-        case _ if not arriving:
-            return _working("state_waiting", "armed, waiting for trigger pulses", cameras, states, overloaded)
+        case _ if still or not arriving:
+            return (
+                _still()
+                if still
+                else _working("state_waiting", "armed, waiting for trigger pulses", cameras, states, overloaded)
+            )
         case _:
             pulses = "pulses arrive" if rate_hz is None else f"{rate_hz:.1f} pulses per second"
             return _working("state_armed", f"armed, {pulses}", cameras, states, overloaded, rate_hz)
+
+
+def _still() -> Statement:
+    return Statement(
+        level=Level.WARNING,
+        code="state_still",
+        text="armed, but the pulses are stopped: nothing is held of the past; a recording starts them again",
+        advice="start them under Check, or begin a recording",
+    )
 
 
 def rehearsing() -> Statement:
@@ -368,6 +384,11 @@ FORBIDDEN: dict[tuple[str, State], str] = {
     ("rate", State.RECORDING): "a recording is running: stop it, then change the rate",
     ("rate", State.DISARMING): "the rig is being disarmed: wait until that is done, then change the rate",
     ("rate", State.FAULT): "the rig is being tried again: wait a moment, then change the rate",
+    ("pulses", State.IDLE): "the rig is not armed: arm it, then stop or ask for pulses",
+    ("pulses", State.ARMING): "the rig is being armed: wait until it is armed, then stop or ask for pulses",
+    ("pulses", State.RECORDING): "a recording is running: stop it, then stop or ask for pulses",
+    ("pulses", State.DISARMING): "the rig is being disarmed: arm it again, then stop or ask for pulses",
+    ("pulses", State.FAULT): "the rig has a fault: see its statement for what to do, then stop or ask for pulses",
     ("disarm", State.RECORDING): "a recording is running: stop it, then disarm",
     ("start", State.IDLE): "the rig is not armed: arm it, then start recording",
     ("start", State.ARMING): "the rig is being armed: wait until it is armed, then start recording",

@@ -35,6 +35,7 @@ from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.state_machine import StateMachine
+from service.supervision.train_control import TrainControl
 from service.supervision.warm_up import WarmUp
 from service.supervision.watching import STUCK_S, RecorderWatch, Settling, why_not_armed
 
@@ -69,6 +70,7 @@ class Supervisor:
         commands: through which other threads give commands.
         changing: held by the thread that changes settings of the rig in use.
         recordings: starts and ends recordings; only for commands in the supervisor's thread.
+        train: stops and starts the pulses; only for commands in the supervisor's thread.
         truths: writes the truth beside the logs of simulated cameras; any thread may wait for it.
     """
 
@@ -100,6 +102,7 @@ class Supervisor:
         self._fault, self._wanted = Fault(), False
         self._least = rig.least_cameras
         self._settling, self._watch = Settling(rig), RecorderWatch(rig, self._session.tell)
+        self.train = TrainControl(self._machine, self._session, self.recordings, self._refresh)
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
@@ -296,7 +299,7 @@ class Supervisor:
             else:
                 self._hear(report)
             if isinstance(report, RecorderHealth):
-                self._watch.look(report.health, processes.pids)
+                self._watch.look(report.health, processes.pids, still=processes.still)
         if not processes.recorder_died and self._watch.stuck(processes):
             said = phrase("event_recorder_stuck", "no sign of life for {seconds:g} s: it is ended", seconds=STUCK_S)
             self._session.tell(Event.now(Level.FATAL, RECORDER, said))
@@ -381,6 +384,7 @@ class Supervisor:
             health=self.health,
             warm=processes is not None and processes.warm,
             pulses=self._watch.pulses,
+            still=self.train.still,
             alarms=self._watch.alarms.present,
             overloaded=self._watch.overload.cameras,
             room=room_for(self.rig, free or 0),

@@ -91,12 +91,13 @@ class RecorderWatch:
         if isinstance(report, RecorderHealth):
             self.pulses.count(report.health.pairing.seen, self._reported)
 
-    def look(self, health: Health, pids: Mapping[str, int]) -> None:
+    def look(self, health: Health, pids: Mapping[str, int], *, still: bool) -> None:
         """Look what is wrong, and whether the computer is too slow; say so when that begins.
 
         Args:
             health: the recorder's record.
             pids: process ids by row of the process table.
+            still: pulses come on request only.
         """
         before = self.overload.cameras
         fetching = {name: pid for name, pid in pids.items() if name not in {ANALYSIS, TRIGGER}}
@@ -104,7 +105,7 @@ class RecorderWatch:
         if self.overload.cameras and not before:
             late = [self._rig.cameras[index].name for index in self.overload.cameras]
             self._tell(Event.now(Level.WARNING, "computer", too_slow(late)))
-        self.alarms.look(health, self.overload.cameras)
+        self.alarms.look(health, self.overload.cameras, still=still)
 
     def expect_nothing(self) -> None:
         """Note that there is no recorder now, so that no report is late."""

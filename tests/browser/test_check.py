@@ -103,7 +103,9 @@ def test_what_is_wrong_comes_first_with_what_to_do(panel: Panel, service: Memory
     assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
 
 
-def test_the_rate_of_the_pulses_is_changed_and_kept(panel: Panel, service: MemoryService, open_page: Open) -> None:
+def test_the_rate_of_the_pulses_is_changed_and_kept_and_they_are_stopped_and_started(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
     page = open_page(f"{panel.url}/#/doctor", width=360, height=780, locale="nb-NO")
     wanted, use, save, said = (page.locator(f"#pulses-{name}") for name in ("wanted", "use", "save", "said"))
     expect(page.locator("#pulses-source")).to_have_text("En linje på denne datamaskinen lager 30 i sekundet.")
@@ -121,7 +123,18 @@ def test_the_rate_of_the_pulses_is_changed_and_kept(panel: Panel, service: Memor
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     assert page.evaluate(BROKEN) == []
     assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []
+    expect(page.locator("#pulses-run")).to_be_hidden()
     service.arm()
+    state, run = page.locator("#pulses-state"), page.locator("#pulses-run")
+    expect(state).to_have_text("Pulsene går")
+    run.click()
+    expect(state).to_have_text("Pulsene er stoppet")
+    page.locator("#pulses-burst").click()
+    expect(page.locator("#snacks")).to_contain_text("10 pulser lages")
+    assert (service.pulses_made.running, service.bursts) == (False, [10])
+    assert page.evaluate(BROKEN) == []
+    run.click()
+    expect(state).to_have_text("Pulsene går")
     service.start_recording(RecordingOrder())
     expect(page.locator("#pulses-slower")).to_be_disabled()
     expect(said).to_have_text("Ikke mens et opptak går.")

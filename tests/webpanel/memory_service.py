@@ -43,7 +43,7 @@ from rig.api.status import (
     State,
     Status,
 )
-from rig.api.trigger import TriggerChange, TriggerControl, TriggerView
+from rig.api.trigger import BurstOrder, TriggerChange, TriggerControl, TriggerView
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StateForbidsError, UnknownCameraError, UnknownRecordingError
 from rig.frame import FrameStatus
@@ -82,6 +82,7 @@ class MemoryService(Archive):
         through_the_lens: what the lens makes of the picture of a camera, set by tests.
         lights: exposure and gain of each camera.
         pulses_made: who makes the pulses.
+        bursts: pulses that were asked for.
         balls: where each camera should show the balls, set by tests.
         preview_calls: how often somebody asked for a picture.
     """
@@ -100,7 +101,10 @@ class MemoryService(Archive):
         self.rehearsal: RehearsalProgress | None = None
         self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
-        self.pulses_made = TriggerView(source="gpio", rate_hz=30, controls=(TriggerControl.RATE,), saved=True)
+        self.pulses_made = TriggerView(
+            source="gpio", rate_hz=30, controls=tuple(TriggerControl), running=True, saved=True
+        )
+        self.bursts: list[int] = []
         self.lights = {name: CameraLight(camera=name, exposure_us=2000, gain_db=0, saved=True) for name in CAMERAS}
         self.balls: Callable[[str], CameraBalls] = lambda name: CameraBalls(camera=name, width=160, height=120)
         self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
@@ -136,7 +140,10 @@ class MemoryService(Archive):
                 version="0",
                 cameras=tuple(self._camera(name, block, armed) for name, block in zip(CAMERAS, COLUMNS, strict=True)),
                 pulses=PulseStatus(
-                    arriving=armed, rate_hz=30.0 if armed else None, number=self._pulse() if armed else 0
+                    arriving=armed,
+                    running=self.pulses_made.running,
+                    rate_hz=30.0 if armed else None,
+                    number=self._pulse() if armed else 0,
                 ),
                 preroll=PrerollStatus(seconds=held_s, limit_s=5.0, memory_mb=20.0),
                 disk=DiskStatus(free_gb=100.0, reserve_gb=2.0, seconds_left=3500.0, jumps_left=350, jump_s=10.0),
@@ -189,6 +196,7 @@ class MemoryService(Archive):
                 raise StateForbidsError("a recording is under way: stop it first")
             if self.state is not State.ARMED:
                 raise StateForbidsError(f"the rig is {self.state.value}: arm it first")
+            self.pulses_made = self.pulses_made.model_copy(update={"running": True})
             now = datetime.now(UTC)
             name = f"{now:%Y%m%d-%H%M%S-%f}"
             session, _ = self.jumpers.take(name, order)
@@ -301,8 +309,16 @@ class MemoryService(Archive):
         if self._recording is not None:
             raise StateForbidsError("a recording is running: stop it, then change the rate")
         rate_hz = before.rate_hz if change.rate_hz is None else change.rate_hz
+        running = before.running if change.running is None else change.running
         saved = change.save or (before.saved and rate_hz == before.rate_hz)
-        self.pulses_made = before.model_copy(update={"rate_hz": rate_hz, "saved": saved})
+        self.pulses_made = before.model_copy(update={"rate_hz": rate_hz, "saved": saved, "running": running})
+        self._wake()
+        return self.pulses_made
+
+    def burst(self, order: BurstOrder) -> TriggerView:
+        if self.pulses_made.running:
+            raise StateForbidsError("the pulses run: stop them, then ask for a number of pulses")
+        self.bursts.append(order.pulses)
         return self.pulses_made
 
     def events(self, after: int) -> list[Event]:

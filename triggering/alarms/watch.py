@@ -47,7 +47,8 @@ class AlarmWatch:
         source = trigger_source(rig.trigger)
         self._names = [camera.name for camera in rig.cameras]
         self._rate_hz, self._one_edge = rig.trigger.rate_hz, not source.set_up_only
-        self._stopped = None if rig.trigger.gated else Stopped(commanded=source.set_up_only)
+        self._commanded = source.set_up_only
+        self._stopped = None if rig.trigger.gated else Stopped(commanded=self._commanded)
         self._drift = Drift()
         self._missing = Missing(self._names, [camera.exposure_us for camera in rig.cameras])
         self._present: dict[str, _Present] = {}
@@ -56,6 +57,10 @@ class AlarmWatch:
     def present(self) -> list[Alarm]:
         """The alarms at present, the oldest first."""
         return [found.alarm for found in self._present.values()]
+
+    def expect_pauses(self) -> None:
+        """Note that pulses may have stopped on purpose since the last record: what was their rhythm is over."""
+        self._stopped = self._stopped and Stopped(commanded=self._commanded)
 
     def look(self, health: Health, overloaded: Sequence[int], now: float) -> tuple[list[Alarm], list[Alarm]]:
         """Enter a record.

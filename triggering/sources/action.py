@@ -17,7 +17,7 @@ class ActionPulses:
         settings: of the rig file.
     """
 
-    controls = frozenset({TriggerControl.RATE})
+    controls = frozenset(TriggerControl)
     advice = (
         "see in the live log what the cameras answer to the action commands, and lower trigger.rate_hz in the rig file "
         "if they come too late"

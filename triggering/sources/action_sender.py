@@ -19,6 +19,7 @@ from rig.settings.trigger import ActionTrigger
 from triggering.sources.action import ActionPulses
 from triggering.sources.action_account import ActionAccount
 from triggering.sources.action_command import GVCP_PORT, LAST_REQUEST_ID, decode_acknowledge, encode_action
+from triggering.sources.gate import Gate
 from triggering.sources.ptp_time import PtpTime, ScheduledTrain
 
 _READ_BYTES: Final = 1024
@@ -47,11 +48,12 @@ class ActionSender:
         settings: of the rig file.
         origin: time of a pulse, the same for all programs of the rig.
         cameras: IPv4 address and name of each camera, in the order of the rig.
+        gate: lets pulses through.
     """
 
-    def __init__(self, settings: ActionTrigger, origin: HostNs, cameras: Sequence[tuple[str, str]]) -> None:
+    def __init__(self, settings: ActionTrigger, origin: HostNs, cameras: Sequence[tuple[str, str]], gate: Gate) -> None:
         self._settings, self._origin, self._keys = settings, origin, ActionKeys.of(origin)
-        self._names = [name for _, name in cameras]
+        self._gate, self._names = gate, [name for _, name in cameras]
         self._targets = settings.broadcast or tuple(address for address, _ in cameras)
         self._account = ActionAccount(cameras)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -152,7 +154,7 @@ class ActionSender:
             raise RuntimeError("scheduled commands are not sent at once")
         while True:
             now = host_now()
-            if train.is_due(now):
+            if train.is_due(now) and self._gate.passes():
                 self._send(None)
             if self._wait(now + train.until_next_ns(now)):
                 return
@@ -163,7 +165,7 @@ class ActionSender:
         while True:
             now, wait_ns, ptp = host_now(), _LOOK_NS, self._ptp
             if ptp is not None:
-                if (time := train.due(now, ptp)) is not None:
+                if (time := train.due(now, ptp)) is not None and self._gate.passes():
                     self._send(time)
                 wait_ns = min(wait_ns, train.until_next_ns(now, ptp))
             if self._wait(now + wait_ns):

@@ -41,6 +41,7 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         lambda camera: phrase("act_light", "changed exposure or gain of {camera}", camera=camera),
     ),
     (r"PATCH /api/trigger", lambda: phrase("act_trigger", "changed the pulses")),
+    (r"POST /api/trigger/burst", lambda: phrase("act_burst", "asked for pulses")),
     (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),
     (
         r"POST /api/recordings/([^/]+)/stop",

@@ -8,7 +8,7 @@ from fastapi import APIRouter
 
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, RigView, Status
-from rig.api.trigger import TriggerChange, TriggerView
+from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
 from service.seam import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 
@@ -52,8 +52,21 @@ def rig_router(service: RigService) -> APIRouter:
         others make the pulses. A rate that source, cameras or this computer's memory do not take is refused (422). The
         logs from then on hold the rig file with the new rate. `save` writes it into the rig file too; else it holds
         until the service ends.
+
+        `running` false stops the pulses while armed, true starts them again, both at once. While they are stopped they
+        come on request (`POST /api/trigger/burst`), that they stop is no alarm, and beginning a recording starts them,
+        unless its `duration_s` is 0.
         """
         return service.change_trigger(change)
+
+    @router.post("/trigger/burst", status_code=HTTPStatus.ACCEPTED, responses=CHANGING)
+    def burst(order: BurstOrder | None = None) -> TriggerView:
+        """Have so many pulses made at the rate of the rig, e.g. for pictures of a scene in which nothing moves.
+
+        Only while the rig is armed and its pulses are stopped. The triplets are held in memory as part of the past, for
+        `preroll.limit_s` seconds: a recording with `duration_s` 0 keeps them.
+        """
+        return service.burst(order or BurstOrder())
 
     @router.get("/rig")
     def get_rig() -> RigView:

@@ -11,9 +11,10 @@ from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
 from rig.transport.message import Quit
 from rig.transport.recorder_commands import TellActions
-from rig.transport.trigger_messages import CamerasSeen, TriggerCommand, TriggerConfig, TriggerTold
+from rig.transport.trigger_messages import CamerasSeen, LetPulses, TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import allowed_priority, prefer_this_process
 from triggering.sources.action_sender import ActionSender
+from triggering.sources.gate import Gate
 
 #: Nothing is lost when it ends.
 _GRACE_S: Final = 2.0
@@ -29,15 +30,16 @@ def main() -> None:
         raise SystemExit(f'trigger: source "{rig.trigger.source}" needs no process that sends pulses')
     prefer_this_process(allowed_priority())
     cameras = [(camera.address, camera.name) for camera in rig.cameras]
-    sender = ActionSender(rig.trigger, child.config.epoch, cameras)
+    gate = Gate(still=child.config.still)
+    sender = ActionSender(rig.trigger, child.config.epoch, cameras, gate)
     sender.start()
     try:
-        _attend(child, sender)
+        _attend(child, sender, gate)
     finally:
         sender.stop()
 
 
-def _attend(child: ChildContext[TriggerConfig], sender: ActionSender) -> None:
+def _attend(child: ChildContext[TriggerConfig], sender: ActionSender, gate: Gate) -> None:
     """Read answers and orders, and report, until told to quit or until the service is gone."""
     control, next_report = child.control, HostNs(0)
     poll = select.poll()
@@ -50,6 +52,8 @@ def _attend(child: ChildContext[TriggerConfig], sender: ActionSender) -> None:
             match command:
                 case CamerasSeen():
                     _tell(control, sender.seen(command.connected, command.offsets_ns))
+                case LetPulses():
+                    gate.let(command.pulses)
                 case Quit():
                     quitting = True
         _tell(control, sender.read())

@@ -4,6 +4,7 @@ import gc
 import itertools
 import sys
 import threading
+from functools import partial
 from typing import Final
 
 from rig.clocks import HostNs
@@ -13,8 +14,9 @@ from rig.phrase import Phrase, phrase
 from rig.settings.trigger import GpioTrigger
 from rig.transport.child import ChildContext, begin
 from rig.transport.recorder_commands import PulsesFired, TellPulses
-from rig.transport.trigger_messages import TriggerCommand, TriggerConfig, TriggerTold
+from rig.transport.trigger_messages import LetPulses, TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
+from triggering.sources.gate import Gate
 from triggering.sources.gpio.lines import OutputLine
 from triggering.sources.gpio.pulser import Pulser
 from triggering.sources.gpio.telling import LatenessTeller
@@ -45,11 +47,12 @@ def main() -> None:
             "allow it in this shell with sudo prlimit --rtprio=20 --pid $$"
         )
         _tell(child, Level.WARNING, phrase("gpio_no_realtime", text))
-    said = ""
+    said, gate = "", Gate(still=child.config.still)
+    child.on_command = partial(_obey, gate)
     while True:
         try:
             with OutputLine(trigger.chip, trigger.line, active_low=trigger.active_low) as line, Timer() as timer:
-                maker = _Maker(line, timer, trigger, child.config.epoch)
+                maker = _Maker(line, timer, trigger, child.config.epoch, gate)
                 maker.make(child, realtime=realtime)
                 return
         except TriggerError as error:
@@ -60,12 +63,17 @@ def main() -> None:
             return
 
 
+def _obey(gate: Gate, command: TriggerCommand) -> None:
+    if isinstance(command, LetPulses):
+        gate.let(command.pulses)
+
+
 class _Maker:
     """A line and the thread that makes its pulses."""
 
-    def __init__(self, line: OutputLine, timer: Timer, trigger: GpioTrigger, origin: HostNs) -> None:
+    def __init__(self, line: OutputLine, timer: Timer, trigger: GpioTrigger, origin: HostNs, gate: Gate) -> None:
         self._line, self._timer = line, timer
-        self._pulser = Pulser(line.set, timer, origin, trigger.rate_hz, trigger.width_ns)
+        self._pulser = Pulser(line.set, timer, origin, trigger.rate_hz, trigger.width_ns, gate)
         self._failure: TriggerError | None = None
 
     def make(self, child: ChildContext[TriggerConfig], *, realtime: bool) -> None:

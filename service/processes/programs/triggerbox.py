@@ -6,10 +6,10 @@ from rig.errors import BadInputError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase
 from rig.transport.child import begin
-from rig.transport.message import Quit
 from rig.transport.recorder_commands import PulsesFired
-from rig.transport.trigger_messages import TriggerBoxConfig, TriggerTold
+from rig.transport.trigger_messages import LetPulses, TriggerBoxConfig, TriggerCommand, TriggerTold
 from triggering.sources.choice import trigger_source
+from triggering.sources.gate import Gate
 from triggering.sources.triggerbox.keeper import Fired, TrainKeeper
 from triggering.sources.triggerbox.source import TriggerBoxPulses
 
@@ -23,7 +23,7 @@ def main() -> None:
     Raises:
         BadInputError: the rig has no trigger box.
     """
-    child = begin(TriggerBoxConfig, Quit, _GRACE_S)
+    child = begin(TriggerBoxConfig, TriggerCommand, _GRACE_S)
     trigger = child.config.rig.trigger
     source = trigger_source(trigger)
     if not isinstance(source, TriggerBoxPulses):
@@ -39,7 +39,16 @@ def main() -> None:
             )
         )
 
-    TrainKeeper(child.config.port, source.rate, trigger.rate_hz, tell=tell, fired=fired, wait=child.stops_within).run()
+    def obey(command: TriggerCommand) -> None:
+        if isinstance(command, LetPulses):
+            gate.let(command.pulses)
+
+    gate = Gate(still=child.config.still)
+    child.on_command = obey
+    keeper = TrainKeeper(
+        child.config.port, source.rate, trigger.rate_hz, gate, tell=tell, fired=fired, wait=child.stops_within
+    )
+    keeper.run()
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from tests.capture.station import Station
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 from triggering.sources.action_sender import ActionSender
+from triggering.sources.gate import Gate
 
 PTP_NS = 1_795_216_434_000_000_000
 NAMES = ["K1", "K2"]
@@ -51,7 +52,7 @@ class _Hill:
     def sender(self, trigger: ActionTrigger, origin: HostNs | None = None) -> Iterator[ActionSender]:
         """The sender of the commands; `origin`: as another program has it."""
         places = [(camera.address, camera.name) for camera in self.rig.cameras]
-        sender = ActionSender(trigger, origin or self.origin, places)
+        sender = ActionSender(trigger, origin or self.origin, places, Gate())
         sender.start()
         try:
             yield sender
@@ -173,7 +174,7 @@ def test_commands_of_another_rig_expose_nothing(tmp_path: Path, loopback: Loopba
 
 def test_commands_that_cannot_be_sent_are_told() -> None:
     """The system refuses to send to such an address."""
-    sender, told = ActionSender(_trigger(), host_now(), [("::1", "K1")]), list[str]()
+    sender, told = ActionSender(_trigger(), host_now(), [("::1", "K1")], Gate()), list[str]()
     sender.start()
     try:
 

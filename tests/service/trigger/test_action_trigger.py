@@ -53,7 +53,7 @@ def _are_told(rig: RigSettings, health: Health) -> None:
     status = picture(
         rig,
         Facts(
-            phase=Phase.now(State.ARMED, 1), fault=None, notice=None, heard=None, health=health, warm=True,
+            phase=Phase.now(State.ARMED, 1), still=False, fault=None, notice=None, heard=None, health=health, warm=True,
             pulses=PulseRate(), alarms=(), overloaded=(), room=Room(10**9, 1.0, 1), preroll_s=0.0, holding_s=0.0,
             recording=None, last_recording=None, last_jump=None, next_jumper=NextJumper(), pids={}, restarts={},
         ),

@@ -124,6 +124,19 @@ def test_pulses_are_not_missed_that_need_not_come() -> None:
     assert waiting.told == by_hand.told == gated.told == away.told == []
 
 
+def test_pulses_that_are_stopped_on_purpose_are_no_alarm_and_those_that_do_not_come_back_are_one() -> None:
+    rig = Running()
+    for _ in range(10):
+        rig.second()
+    for _ in range(40):
+        rig.watch.expect_pauses()
+        rig.second(0)
+    assert rig.told == []
+    for _ in range(3):
+        rig.second(0)
+    assert rig.told == [("alarm_stopped", False)]
+
+
 def test_a_rate_that_leaves_its_history_but_not_the_rig_file() -> None:
     rig = Running()
     scatter = random.Random(4)

@@ -10,14 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rig.clocks import HostNs
+from rig.clocks import HostNs, host_now
 from rig.errors import BadInputError
 from rig.events import Level
 from rig.phrase import Phrase
 from rig.settings.trigger import TriggerBoxTrigger
 from simrig.triggerbox.box import BoxSettings, EmulatedBox
 from simrig.triggerbox.timer import CrystalTimer
+from tests.support.waiting import wait_until
 from triggering.sources.choice import trigger_source
+from triggering.sources.gate import Gate
 from triggering.sources.triggerbox.clock import BoxClock, Reading
 from triggering.sources.triggerbox.keeper import Fired, TrainKeeper
 from triggering.sources.triggerbox.protocol import Answer, AnswerReader, crc8, encode, name_in, nearest_rate
@@ -96,12 +98,13 @@ class Listener:
     def __init__(self, port: Path, timer: CrystalTimer, hz: float) -> None:
         self._timer, self._news = timer, threading.Condition()
         self._stop = threading.Event()
+        self.gate = Gate()
         self.said: list[tuple[Level, Phrase]] = []
         self.numbers: list[int] = []
         self.errors: list[float] = []
         self.bound = 0
         keeper = TrainKeeper(
-            str(port), nearest_rate(hz), hz, tell=self._tell, fired=self._fired, wait=self._stop.wait
+            str(port), nearest_rate(hz), hz, self.gate, tell=self._tell, fired=self._fired, wait=self._stop.wait
         )  # fmt: skip
         self._thread = threading.Thread(target=keeper.run)
         self._thread.start()
@@ -189,6 +192,23 @@ def test_what_is_wrong_is_said_once(tmp_path: Path, box: BoxSettings | None, cod
             return
         listener.hears(lambda: code in listener.codes)
         assert listener.said[0][0] is Level.ERROR
+
+
+def test_a_train_stands_still_and_makes_pulses_on_request(tmp_path: Path) -> None:
+    with driven(BoxSettings(), tmp_path, hz=20.0) as (_, timer, listener):
+        listener.hears(lambda: len(listener.numbers) > 5)
+        listener.gate.let(0)
+        wait_until(lambda: not timer.runs, "the pulses stop", LONG_S)
+        listener.gate.let(6)
+        wait_until(lambda: timer.runs, "the burst begins", LONG_S)
+        wait_until(lambda: not timer.runs, "the burst ends", LONG_S)
+        made = timer.read(host_now())[0]
+        told = len(listener.numbers)
+        listener.gate.let(None)
+        listener.hears(lambda: len(listener.numbers) > told + 5)
+        assert max(listener.errors) <= listener.bound + 2 * MS
+    assert ("trigger_burst" in listener.codes) == (made != 6), "the machine is busy: one pulse more or less is told"
+    assert abs(made - 6) <= 3
 
 
 def test_a_box_that_falls_silent_is_told(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Final
 
 from rig.clocks import NS_PER_S, NS_PER_US, HostNs
 from rig.health import PulsesMade
+from triggering.sources.gate import Gate
 from triggering.sources.gpio.timer import Waiting
 
 #: A pulse begins so late at most, as a share of the period, or it is left out. The alarm for pulses that have no even
@@ -45,14 +46,21 @@ class Pulser:
         origin: time of a pulse.
         rate_hz: pulses per second.
         width_ns: length of a pulse, at most half of the period.
+        gate: lets pulses through.
 
     One thread makes the pulses, another may ask for `figures` and `fetch` them.
     """
 
     def __init__(
-        self, set_line: Callable[[bool], None], waiting: Waiting, origin: HostNs, rate_hz: float, width_ns: int
+        self,
+        set_line: Callable[[bool], None],
+        waiting: Waiting,
+        origin: HostNs,
+        rate_hz: float,
+        width_ns: int,
+        gate: Gate,
     ) -> None:
-        self._set_line, self._waiting = set_line, waiting
+        self._set_line, self._waiting, self._gate = set_line, waiting, gate
         self._origin, self._rate_hz, self._width_ns = origin, rate_hz, width_ns
         self._latest_ns = round(LATEST * NS_PER_S / rate_hz)
         self._nearest_ns = round((1 - LATEST) * NS_PER_S / rate_hz)
@@ -72,8 +80,8 @@ class Pulser:
         while self._waiting.wait(self._due(pulse), precisely=True):
             now = self._waiting.now()
             if now > self._due(pulse) + self._latest_ns or (self._free_from is not None and now < self._free_from):
-                self._skipped += 1
-            elif not self._pulse(self._due(pulse)):
+                self._skipped += not self._gate.still
+            elif self._gate.passes() and not self._pulse(self._due(pulse)):
                 return
             pulse += 1
 

@@ -9,7 +9,7 @@ class GpioPulses:
 
     spread_ns = 0
     set_up_only = False
-    controls = frozenset({TriggerControl.RATE})
+    controls = frozenset(TriggerControl)
     advice = (
         "see in the live log whether the pulses are made, and check trigger.line in the rig file and the trigger cables"
     )

@@ -10,15 +10,17 @@
 Whoever stops it stops the pulses.
 """
 
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-from rig.clocks import HostNs
+from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import TriggerError
 from rig.events import Level
 from rig.phrase import Phrase, phrase
+from triggering.sources.gate import Gate
 from triggering.sources.triggerbox.box import TriggerBox
 from triggering.sources.triggerbox.clock import BoxClock, ClockLine
 from triggering.sources.triggerbox.line import SerialLine
@@ -31,6 +33,9 @@ _EVERY_S: Final = 0.1
 _UNANSWERED: Final = 10
 #: Time from a fault to the next try.
 _AGAIN_S: Final = 2.0
+#: A burst whose counts are not answered is ended so long after its time.
+_ANSWERS_S: Final = 1.0
+_HALF: Final = 0.5
 #: A rate that differs by more than this share from the wanted one is told as a warning.
 _OFF: Final = 1e-3
 
@@ -59,6 +64,7 @@ class TrainKeeper:
         port: its device file.
         rate: of the pulses.
         wanted_hz: the rate of the rig file.
+        gate: lets pulses through.
         tell: called with level and words of what people should know.
         fired: called with what the box has fired.
         wait: waits so many seconds; tells whether to stop.
@@ -69,13 +75,14 @@ class TrainKeeper:
         port: str,
         rate: Rate,
         wanted_hz: float,
+        gate: Gate,
         *,
         tell: Callable[[Level, Phrase], None],
         fired: Callable[[Fired], None],
         wait: Callable[[float], bool],
     ) -> None:
         self._port, self._rate, self._wanted_hz = port, rate, wanted_hz
-        self._tell, self._fired, self._wait = tell, fired, wait
+        self._tell, self._fired, self._wait, self._gate = tell, fired, wait, gate
         self._fault: Phrase | None = None
         self._sent = 0
         self.line: ClockLine | None = None
@@ -102,17 +109,27 @@ class TrainKeeper:
         box.wake()
         try:
             while not self._wait(0):
-                box.start(self._rate)
-                self._run_train(box)
+                pulses = self._gate.take()
+                if pulses is None:
+                    box.start(self._rate)
+                    self._run_train(box)
+                    box.stop()
+                elif pulses:
+                    self._run_burst(box, pulses)
+                else:
+                    self._wait(_HURRY_S)
         finally:
             with suppress(TriggerError):  # where the line is gone nothing can be stopped
                 box.stop()
 
     def _run_train(self, box: TriggerBox) -> None:
-        """Tell the pulses of one train, until it is contradicted or we are told to stop."""
+        """Tell the pulses of one train, until it is contradicted, closed by the gate, or we are told to stop."""
         clock, told, unanswered = BoxClock(self._rate.period_ns), None, 0
         before = self._sent + 1
         while not self._wait(_HURRY_S if clock.line is None else _EVERY_S):
+            if not self._gate.open:
+                self.line = None
+                return
             read = box.read()
             unanswered = unanswered + 1 if read is None else 0
             if unanswered >= _UNANSWERED:
@@ -138,6 +155,29 @@ class TrainKeeper:
             times = tuple(clock.line.at(number) for number in numbers)
             self._fired(Fired(before + told + 1, times, round(clock.line.uncertainty_ns), reading.asked))
             told, self._sent = last, before + last
+
+    def _run_burst(self, box: TriggerBox, pulses: int) -> None:
+        """Make so many pulses, or one more or less where the box is asked too late; they are not told.
+
+        The box knows no number of pulses (protocol 14), so it is stopped half a period after the last one.
+        """
+        box.start(self._rate)
+        end = time.monotonic() + _ANSWERS_S + (pulses + 1) * self._rate.period_ns / NS_PER_S
+        while time.monotonic() < end and not self._wait(0):
+            if (read := box.read()) is None:
+                continue
+            reading, _ = read
+            left_s = (pulses + _HALF - reading.phase) * self._rate.period_ns / NS_PER_S
+            left_s -= (host_now() - reading.middle) / NS_PER_S
+            if left_s <= _EVERY_S:
+                self._wait(max(0.0, left_s))
+                break
+            self._wait(left_s - _EVERY_S / 2)
+        box.stop()
+        made = box.read()
+        if made is not None and made[1] != pulses:
+            text = "the trigger box has made {made} pulses, {wanted} were wanted: ask for them again"
+            self._tell(Level.WARNING, phrase("trigger_burst", text, made=made[1], wanted=pulses))
 
     def _say_running(self) -> None:
         """Tell that the train runs, and how far its rate is from the wanted one."""

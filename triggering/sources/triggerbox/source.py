@@ -21,7 +21,7 @@ class TriggerBoxPulses:
 
     spread_ns = 0
     set_up_only = False
-    controls = frozenset({TriggerControl.RATE})
+    controls = frozenset(TriggerControl)
     advice = "see what is said of the trigger box, and check the cable from it to the cameras"
 
     def __init__(self, settings: TriggerBoxTrigger) -> None:

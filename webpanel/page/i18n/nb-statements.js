@@ -14,6 +14,7 @@ export const statements = {
   state_idle: ["kameraene er av", "gjør riggen klar for å koble dem til"],
   state_arming: ["kobler til {cameras}"],
   state_disarming: ["kobler fra kameraene"],
+  state_still: ["klar, men pulsene er stoppet: ingenting holdes av fortiden; et opptak starter dem igjen", "start dem under Sjekk, eller begynn et opptak"],
   state_waiting: ["klar, venter på pulser"],
   state_waiting_partly: ["klar med {present} av {cameras} kameraer, venter på pulser: uten {missing}", "opptak går likevel; se på kameraet hva som må gjøres"],
   state_armed: ["klar, {rate_hz} pulser i sekundet"],

@@ -40,6 +40,7 @@
  *
  * @typedef {object} PulseStatus
  * @property {boolean} arriving
+ * @property {boolean} running
  * @property {number|null} rate_hz
  * @property {number|null} spread_us
  * @property {number} number

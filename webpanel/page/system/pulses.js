@@ -1,4 +1,4 @@
-/** Who makes the pulses, and at what rate: slower, faster, and kept in the rig file when somebody wishes that. */
+/** Who makes the pulses: slower, faster, kept in the rig file when somebody wishes that; stopped, started, on request. */
 
 import { t } from "../i18n/i18n.js";
 import { call } from "../shared/api.js";
@@ -9,6 +9,8 @@ import { known, watch } from "../shared/store.js";
 
 /** Rates that people use, pulses per second; every other one is for the REST API. */
 const RATES = [1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 75, 90, 100, 120, 150, 200];
+/** Pulses on request: some pictures of a scene in which nothing moves. */
+const BURST = 10;
 /** States in which a change is refused. */
 const BUSY = ["arming", "recording", "disarming"];
 
@@ -30,6 +32,8 @@ export function startPulses() {
   $("pulses-slower").addEventListener("click", () => choose(RATES.findLast((rate) => rate < wanted)));
   $("pulses-faster").addEventListener("click", () => choose(RATES.find((rate) => rate > wanted)));
   $("pulses-use").addEventListener("click", () => void take({ rate_hz: wanted }));
+  $("pulses-run").addEventListener("click", () => void take({ running: !running() }));
+  $("pulses-burst").addEventListener("click", () => void burst());
   $("pulses-save").addEventListener("click", () => void take({ save: true }));
   watch(drawPulses);
 }
@@ -51,6 +55,25 @@ export function drawPulses() {
   $("pulses-use").disabled = locked || wanted === trigger?.rate_hz;
   $("pulses-save").disabled = locked || (trigger?.saved ?? true);
   setText($("pulses-said"), words(state));
+  drawTrain(state);
+}
+
+/** @param {string} state */
+function drawTrain(state) {
+  $("pulses-train").hidden = !(trigger?.controls.includes("running") && state === "armed");
+  setText($("pulses-state"), t(running() ? "pulses.running" : "pulses.still"));
+  $("pulses-state").dataset.level = running() ? "good" : "warning";
+  setText($("pulses-run"), t(running() ? "pulses.stop" : "pulses.start"));
+  $("pulses-run").classList.toggle("primary", !running());
+  $("pulses-run").disabled = changing;
+  setText($("pulses-burst"), t("pulses.burst", { pulses: BURST }));
+  $("pulses-burst").hidden = running();
+  $("pulses-burst").disabled = changing;
+}
+
+/** Whether pulses come by themselves: anybody may have stopped them. */
+function running() {
+  return known.status?.pulses.running ?? true;
 }
 
 /** @param {string} state */
@@ -68,7 +91,19 @@ function choose(rate) {
   drawPulses();
 }
 
-/** @param {{rate_hz?: number, save?: boolean}} change */
+async function burst() {
+  if (changing) return; // a double tap
+  changing = true;
+  drawPulses();
+  await attempt(async () => {
+    await call("POST", "trigger/burst", { pulses: BURST });
+    tell("good", t("pulses.asked", { pulses: BURST }));
+  });
+  changing = false;
+  drawPulses();
+}
+
+/** @param {{rate_hz?: number, running?: boolean, save?: boolean}} change */
 async function take(change) {
   if (changing) return; // a double tap
   changing = true;

@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 
 from rig.clocks import HostNs
+from triggering.sources.gate import Gate
 from triggering.sources.gpio.pulser import LATEST, Pulser
 
 US = 1_000
@@ -47,10 +48,33 @@ class _Computer:
         return [time for time, active in self.edges if active]
 
 
-def _run(computer: _Computer, rate_hz: float, width_us: int = 1000) -> Pulser:
-    pulser = Pulser(computer.set_line, computer, ORIGIN, rate_hz, width_us * US)
+def _run(computer: _Computer, rate_hz: float, width_us: int = 1000, gate: Gate | None = None) -> Pulser:
+    pulser = Pulser(computer.set_line, computer, ORIGIN, rate_hz, width_us * US, gate or Gate())
     pulser.run()
     return pulser
+
+
+def test_what_the_gate_lets_through_is_at_the_times_of_the_train() -> None:
+    gate, sets = Gate(still=True), 0
+
+    def opens() -> int:
+        nonlocal sets
+        sets += 1
+        if sets == 10:
+            gate.let(3)
+        if sets == 100:
+            gate.let(None)
+        return 0
+
+    computer = _Computer(opens, lambda: 0, HostNs(ORIGIN + 20_000_000 * US))
+    pulser = _run(computer, 10.0, gate=gate)
+    pulses = [(time - ORIGIN) / 1e8 for time in computer.rises]
+    first, after = pulses[0], pulses[3]
+    assert first >= 10 - 1
+    assert pulses[:3] == [first, first + 1, first + 2]
+    assert after > first + 3
+    assert pulses[3:] == [after + number for number in range(len(pulses) - 3)]
+    assert pulser.figures(realtime=False).skipped == 0
 
 
 @pytest.mark.parametrize("rate_hz", [0.1, 29.97, 30.0, 200.0])

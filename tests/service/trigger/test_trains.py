@@ -1,9 +1,10 @@
-"""The rate of the pulses changed while the rig is armed: everything follows it, and no triplet is mixed."""
+"""The train of pulses while the rig is armed: another rate, stopped and started, a number of pulses on request."""
 
 import tomllib
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,11 +19,11 @@ from service.status.event_hub import EventHub
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains
 from tests.capture.rigs import write_rig
-from tests.service.serving import PATIENCE_S, serving
+from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
-TRIGGER = "/api/trigger"
+TRIGGER, BURST = "/api/trigger", "/api/trigger/burst"
 
 
 def test_the_rate_is_changed_while_armed(tmp_path: Path, loopback: Loopback) -> None:
@@ -30,7 +31,7 @@ def test_the_rate_is_changed_while_armed(tmp_path: Path, loopback: Loopback) -> 
     first = path.read_text()
     with serving(tmp_path, path, loopback) as service:
         service.arm()
-        now = {"source": "triggerbox", "rate_hz": 20, "controls": ["rate"], "saved": True}
+        now = {"source": "triggerbox", "rate_hz": 20, "controls": ["rate", "running"], "running": True, "saved": True}
         assert service.get(TRIGGER) == now
         status, answer = service.call("PATCH", TRIGGER, {"rate_hz": 600})
         assert (status, "camera K1 exposes for 2 ms" in answer["detail"]) == (422, True)
@@ -99,3 +100,45 @@ def test_what_cannot_be_is_refused_before_anything_ends(
         Trains(supervisor, path, 5.0).change(TriggerChange(rate_hz=rate_hz, save=True))
     assert supervisor.rig.trigger.rate_hz == tomllib.loads(path.read_text())["trigger"]["rate_hz"] == 20
     assert hub.after(0) == []
+
+
+def test_pulses_are_stopped_made_on_request_and_started_by_a_recording(tmp_path: Path, loopback: Loopback) -> None:
+    """Real Aravis and simulated cameras, which expose at each command and at nothing else."""
+    path = write_rig(tmp_path, "aravis", loopback, source="action", rate_hz=20, names=["K1", "K2"])
+    with serving(tmp_path, path, loopback) as service:
+        assert service.call("PATCH", TRIGGER, {"running": False})[0] == 409
+        service.arm()
+        status, answer = service.call("POST", BURST, {"pulses": 5})
+        assert (status, "the pulses run: stop them" in answer["detail"]) == (409, True)
+        assert service.call("PATCH", TRIGGER, {"running": False})[1]["running"] is False
+        service.await_statement("state_still")
+        before = _at_rest(service)
+        assert service.call("POST", BURST, {"pulses": 5})[0] == 202
+        wait_until(lambda: _pulses(service)["number"] == before + 5, "five pulses", PATIENCE_S, 0.05)
+        assert _at_rest(service) == before + 5
+        past = service.post("/api/recordings", {"duration_s": 0})["id"]
+        service.await_state("armed")
+        assert service.get(TRIGGER)["running"] is False
+        recording = service.post("/api/recordings", {"preroll_s": 0})["id"]
+        assert service.get(TRIGGER)["running"] is True
+        service.await_pulses(10)
+        status, answer = service.call("PATCH", TRIGGER, {"running": False})
+        assert (status, "a recording is running: stop it" in answer["detail"]) == (409, True)
+        service.post(f"/api/recordings/{recording}/stop", {"confirm": True})
+        assert service.get("/api/status")["alarms"] == []
+        assert service.get(f"/api/recordings/{past}")["counts"]["pulses"] >= 5
+    with LogReader(service.data / f"{recording}.mcap") as reader:
+        tags = [TripletTag.decode(message.data or b"") for message in reader.messages(TAG.name)]
+    assert sum(tag.complete for tag in tags) > len(tags) / 2  # the busy machine may hold a command up
+
+
+def _pulses(service: Serving) -> dict[str, Any]:
+    pulses: dict[str, Any] = service.get("/api/status")["pulses"]
+    return pulses
+
+
+def _at_rest(service: Serving) -> int:
+    """Number of the pulses so far, when none come any more."""
+    wait_until(lambda: not _pulses(service)["arriving"], "no pulses come", PATIENCE_S, 0.05)
+    number: int = _pulses(service)["number"]
+    return number

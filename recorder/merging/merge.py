@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from recorder.log.extent import CONTINUES, CONTINUES_AFTER, extent
+from recorder.merging.calibration_file import Attached, joined_calibration
 from recorder.merging.joined import JoinedTriplets, check_fit
 from recorder.merging.rig_file import joined_rig_toml
 from recorder.merging.source import LogStream, Note, Part, look_at
@@ -193,12 +194,19 @@ class _Merging:
         rigs = [part.about.rig for part in self._parts]
         names = ", ".join(name for name, _ in self._joined.cameras)
         name = " + ".join(rig["name"] for rig in rigs if rig.get("name"))
-        calibrations = {stream.attachments.get(CALIBRATION_ATTACHMENT) for stream in streams} - {None}
+        calibrations = [
+            Attached(
+                part.path.name,
+                [camera.name for camera in part.first.cameras],
+                stream.attachments.get(CALIBRATION_ATTACHMENT),
+            )
+            for part, stream in zip(self._parts, streams, strict=True)
+        ]
         return LogDescription(
             session=session,
             rig={**rigs[0], "name": name, "cameras": names},
             rig_toml=joined_rig_toml(*(stream.attachments.get(RIG_ATTACHMENT, b"") for stream in streams)),
-            calibration_json=calibrations.pop() if len(calibrations) == 1 else None,
+            calibration_json=joined_calibration(calibrations),
             calibrations={**streams[1].calibrations, **streams[0].calibrations},
         )
 

@@ -20,7 +20,8 @@ from bench.photogrammetry.planning import run_planning
 from bench.recording.capture import run_capture
 from bench.recording.firewire import run_firewire
 from bench.recording.gstreamer import SINKS
-from bench.recording.loads import LOADS
+from bench.recording.loads import LOADS, MANY
+from bench.recording.many import many_table, run_many
 from bench.recording.parts import run_parts
 from bench.results import write_results
 from bench.service.api import run_api
@@ -37,6 +38,11 @@ def _capture(name: str, seconds: float, directory: Path) -> dict[str, Any]:
     result = run_capture(LOADS[name], seconds, directory, free_address())
     result["file"] = str(write_results(f"capture-{name}", [result], directory))
     return result | {"table": _capture_table(result)}
+
+
+def _many(name: str, seconds: float, directory: Path) -> dict[str, Any]:
+    result = run_many(MANY[name], seconds, directory)
+    return result | {"file": str(write_results(name, [result], directory)), "table": many_table(result)}
 
 
 def _capture_table(result: dict[str, Any]) -> list[str]:
@@ -164,6 +170,7 @@ def _gross_errors(draws: int, directory: Path) -> dict[str, Any]:
 #: Suites that go on for some seconds.
 SUITES: dict[str, Suite] = {
     **{name: partial(_capture, name) for name in LOADS},
+    **{name: partial(_many, name) for name in MANY},
     "firewire": _firewire,
     "parts": _parts,
     "api": _api,

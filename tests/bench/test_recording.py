@@ -7,10 +7,23 @@ from pathlib import Path
 
 import pytest
 
+from bench.recording.loads import MANY
+from bench.recording.many import scenario_of
+from simrig.world.scenario import load_scenario
+
 
 def _may_have_a_network() -> bool:
     command = ["unshare", "--net", "true"]
     return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def test_eight_cameras_have_a_hill_and_a_rig(tmp_path: Path) -> None:
+    load = MANY["cameras-8"]
+    scenario = load_scenario(scenario_of(tmp_path, load.cameras))
+    names = [f"K{number}" for number in range(1, 9)]
+    assert [camera.name for camera in scenario.cameras] == names
+    assert [camera.name for camera in load.rig(tmp_path, "tcp://127.0.0.1:5556").cameras] == names
+    assert load.bytes_per_s == 8 * 640 * 480 * 30
 
 
 def test_all_cases_of_the_paper_s_load_are_measured(tmp_path: Path) -> None:

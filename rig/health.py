@@ -138,6 +138,15 @@ class PulsesMade(msgspec.Struct, frozen=True):
     realtime: Annotated[bool, Meta(description="whether the thread that makes them has a real-time priority")]
 
 
+class ToldPulses(msgspec.Struct, frozen=True):
+    """Pulses of which the source told at once, on this computer's monotonic clock."""
+
+    first: Annotated[int, Meta(description="number of the first one, as the source counts")]
+    times_ns: Annotated[tuple[DecimalNs, ...], Meta(description="when they fired; none: there were no more")]
+    uncertainty_us: Annotated[float, Meta(description="largest error of the times")]
+    until_ns: Annotated[DecimalNs, Meta(description="all pulses up to this time have been told")]
+
+
 class PrerollHealth(msgspec.Struct, frozen=True):
     """Triplets that are held in memory for a recording that begins in the past."""
 
@@ -185,6 +194,13 @@ class Health(msgspec.Struct, frozen=True):
     disk: DiskHealth
     latency: Latency
     made: Annotated[PulsesMade | None, Meta(description='null: trigger.source is not "gpio"')] = None
+    host_time_ns: Annotated[
+        DecimalNs | None, Meta(description="this computer's monotonic clock when the record was made")
+    ] = None
+    fired: Annotated[
+        tuple[ToldPulses, ...] | None,
+        Meta(description="what the source told since the last record; null: it does not tell of its pulses"),
+    ] = None
 
 
 #: The JSON schema of a health record.

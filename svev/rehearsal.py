@@ -226,7 +226,7 @@ def judge_pulses(rig: RigSettings, alarms: list[str], report: VerifyReport) -> I
     if not report.recounted.agrees:
         what = "the recomputed ledger does not agree: {why}"
         remedy = "look for a trigger input that bounces, and for clocks that are set while pulses come"
-        why = report.recounted.differences[0].in_words()
+        why = next(report.recounted.in_words())
         yield failure(Topic.CAMERAS, "check_ledger", what, remedy, why=why)
 
 

@@ -18,9 +18,11 @@ from typing import Any, Final
 from rig.clocks import NS_PER_S, UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
+from rig.health import Health
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 from rig.transport.recorder_reports import CameraNews
+from triggering.source_recount import SourceAccount, SourceRecount
 
 #: News after which numbers and clock of a camera prove nothing about the frames before it.
 _BREAKS: Final = frozenset(
@@ -79,6 +81,7 @@ class Recounted:
         unproven: missing frames whose state rests on the tag alone.
         differences: where tag and evidence differ, the first ten thousand.
         disagreements: how many there are.
+        source: what the source of the pulses says of them; None: it tells nothing, or the log does not hold it.
     """
 
     pulses: int
@@ -86,11 +89,18 @@ class Recounted:
     unproven: int
     differences: tuple[Difference, ...]
     disagreements: int
+    source: SourceAccount | None = None
 
     @property
     def agrees(self) -> bool:
-        """Whether no tag is contradicted."""
-        return self.disagreements == 0
+        """Whether no tag is contradicted, and the source's own count bears them out."""
+        return self.disagreements == 0 and (self.source is None or self.source.agrees)
+
+    def in_words(self) -> Iterator[str]:
+        """One line for each disagreement that is kept."""
+        yield from (difference.in_words() for difference in self.differences)
+        if self.source is not None:
+            yield from self.source.findings
 
     def to_json(self) -> dict[str, Any]:
         """The recomputed ledger as JSON."""
@@ -100,6 +110,7 @@ class Recounted:
             "unproven": self.unproven,
             "disagreements": self.disagreements,
             "differences": [difference.to_json() for difference in self.differences],
+            "source": None if self.source is None else self.source.to_json(),
         }
 
     def summary_line(self) -> str:
@@ -108,7 +119,11 @@ class Recounted:
         for states in self.states.values():
             total.update(states)
         counts = ", ".join(f"{total[status]} {status.value}" for status in FrameStatus)
-        verdict = "agrees with the tags" if self.agrees else f"differs from the tags at {self.disagreements} places"
+        verdict = (
+            "agrees with the tags"
+            if self.disagreements == 0
+            else f"differs from the tags at {self.disagreements} places"
+        )
         alone = f"; {self.unproven} of them by the tag alone" if self.unproven else ""
         return f"the recomputed ledger {verdict}: {self.pulses} pulses, {len(self.states)} cameras: {counts}{alone}"
 
@@ -189,6 +204,7 @@ class Recount:
         self._held: TripletTag | None = None
         self._differences: list[Difference] = []
         self._disagreements = self._unproven = 0
+        self._source = SourceRecount()
 
     def add(self, tag: TripletTag) -> None:
         """Take the next tag; one that comes twice or too late is left out."""
@@ -196,6 +212,7 @@ class Recount:
             if tag.pulse <= self._held.pulse:
                 return
             self._take(self._held, tag)
+        self._source.add(tag)
         self._earlier, self._held = self._held, tag
 
     def happened(self, event: Event) -> None:
@@ -203,8 +220,16 @@ class Recount:
         if event.message.partition(":")[0] in _BREAKS:
             self._camera(event.name).breaks.append(event.time)
 
-    def finish(self) -> Recounted:
-        """Judge everything; for use once, at the end of the log."""
+    def told(self, health: Health, written: UtcNs) -> None:
+        """Take a health record, written at a time: it says what the source of the pulses told."""
+        self._source.told(health, written)
+
+    def finish(self, *, merged: bool = False) -> Recounted:
+        """Judge everything; for use once, at the end of the log.
+
+        Args:
+            merged: the log is one of two computers, whose health records have two clocks.
+        """
         if self._held is not None:
             self._take(self._held, None)
         for camera in self._cameras.values():
@@ -214,7 +239,8 @@ class Recount:
             for gap in camera.gaps:
                 self._judge(camera, gap)
         seen = {name: camera.states for name, camera in self._cameras.items() if camera.states}
-        return Recounted(self._pulses, seen, self._unproven, tuple(self._differences), self._disagreements)
+        source = None if merged else self._source.finish()
+        return Recounted(self._pulses, seen, self._unproven, tuple(self._differences), self._disagreements, source)
 
     def _camera(self, name: str) -> _Camera:
         return self._cameras.setdefault(name, _Camera(name))

@@ -18,14 +18,17 @@ from recorder.reading.triplets import (
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
+from rig.health import Health
 from rig.jumper import JumperState
 from rig.pixels import Stored
 from rig.tag import CameraTag, TripletTag
 from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
+from rig.transport import wire
 from triggering.ledger import Ledger
 from triggering.recount import Recount
 
 _EVENTS_MAX = 1000
+_HEALTH = wire.decoder(Health)
 
 
 class _Said(msgspec.Struct):
@@ -147,8 +150,14 @@ class PulseCheck:
             self.events.append(event)
 
     def _health(self, message: Message) -> None:
-        if not is_json(message.data or b""):
+        data = message.data or b""
+        if not is_json(data):
             self._report(f"health record {message.sequence}: cannot be read")
+            return
+        try:
+            self.recount.told(_HEALTH.decode(data), UtcNs(message.log_time))
+        except msgspec.ValidationError:
+            return  # of another version of svev: what it says of the source is not used
 
     def _jumper(self, message: Message) -> None:
         try:

@@ -14,6 +14,7 @@ from recorder.reading.items import Chunk, Item, printable
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
 from rig.events import Event
+from rig.topics import MERGE_METADATA
 from rig.transport import wire
 from triggering.ledger import Ledger, numbers
 from triggering.recount import Recounted
@@ -142,7 +143,8 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         if not reader.closed:
             findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
         return VerifyReport(
-            path, reader.size, reader.closed, reader.truncated, pulses.ledger, pulses.recount.finish(),
+            path, reader.size, reader.closed, reader.truncated, pulses.ledger,
+            pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
             known_lost(reader),
         )  # fmt: skip

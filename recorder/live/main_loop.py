@@ -18,10 +18,10 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.keys import check_publication, load_keys
 from recorder.publishing.publisher import Publisher
 from rig.action import ActionCounts
-from rig.clocks import NS_PER_S, HostNs, host_now
+from rig.clocks import NS_PER_S, DecimalNs, HostNs, host_now
 from rig.errors import SvevError
 from rig.events import TRIGGER, Event, Level
-from rig.health import PulsesMade
+from rig.health import PulsesMade, ToldPulses
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
@@ -56,6 +56,8 @@ from triggering.timeline.steady_rate import steady_rate
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000
 _WARM_PULSES: Final = 3
+#: Words of the source of the pulses that wait for the next health record; it has about ten a second.
+_WORDS_KEPT: Final = 100
 #: Their rate is measured from so many, and told again; at first from those that there are.
 _RATE_PULSES: Final = 17
 #: How long the recorder waits for the disk when it is told to quit; less than its parent waits for its end.
@@ -95,6 +97,7 @@ class RecorderLoop:
         self._spread = SpreadTeller(self._source)
         self._actions: tuple[ActionCounts, ...] | None = None
         self._made: PulsesMade | None = None
+        self._fired: deque[ToldPulses] | None = None
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
@@ -178,6 +181,8 @@ class RecorderLoop:
                 for number, time in enumerate(command.times, start=command.first):
                     self._assembler.pairer.fired(number, time, command.uncertainty_ns)
                 self._assembler.pairer.fired_until(command.until)
+                self._fired = deque(maxlen=_WORDS_KEPT) if self._fired is None else self._fired
+                self._fired.append(command.told())
             case TellResult():
                 self._recordings.result(command)
             case TellActions():
@@ -198,12 +203,16 @@ class RecorderLoop:
             self._assembler.connected,
             self._actions,
             made=self._made,
+            host_time_ns=DecimalNs(now),
+            fired=None if self._fired is None else tuple(self._fired),
             pairing=self._assembler.pairer.health(),
             free_triplets=self._buffers.free_count,
             unpublished=self._publisher.dropped,
             preroll=self._preroll.health(now),
             recording=self._recordings.statistics(),
         )
+        if self._fired is not None:
+            self._fired.clear()
         self._tell(RecorderHealth(health=health))
         if (said := self._spread.tell(health.pairing)) is not None:
             self._warn(TRIGGER, said)

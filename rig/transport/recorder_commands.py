@@ -7,9 +7,9 @@ from typing import ClassVar
 import msgspec
 
 from rig.action import ActionCounts
-from rig.clocks import HostNs, UtcNs
+from rig.clocks import NS_PER_US, DecimalNs, HostNs, UtcNs
 from rig.events import Event
-from rig.health import PulsesMade
+from rig.health import PulsesMade, ToldPulses
 from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 from rig.settings.model import RigSettings
@@ -192,6 +192,11 @@ class PulsesFired(Message):
     times: tuple[HostNs, ...]
     uncertainty_ns: int
     until: HostNs
+
+    def told(self) -> ToldPulses:
+        """As a health record says it."""
+        times = tuple(DecimalNs(time) for time in self.times)
+        return ToldPulses(self.first, times, self.uncertainty_ns / NS_PER_US, DecimalNs(self.until))
 
 
 RecorderCommand = (

@@ -63,7 +63,8 @@ def verify_command(
     "damaged" (not closed, unreadable in part, or inconsistent).
 
     With --ledger it also recomputes from frame numbers, clocks, arrivals and trigger counts what became of every pulse
-    in every camera, and names each pulse whose tag says something else.
+    in every camera, and names each pulse whose tag says something else. Where the log holds what the source of the
+    pulses told (a trigger box, a line of the computer), that is compared as well.
 
     Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
     was killed leaves a log that is not closed); 7 with --ledger: sound, but a tag is contradicted. What can be read is
@@ -85,7 +86,7 @@ def verify_command(
     if report.damaged:
         raise LogDamagedError(f"{log}: damaged: {_first_flaw(report)}; the pulses counted above are readable")
     if with_ledger and not report.recounted.agrees:
-        first = report.recounted.differences[0].in_words()
+        first = next(report.recounted.in_words())
         raise LedgerDiffersError(
             f"{log}: its ledger does not agree with its tags: {first}; measure nothing at the pulses that are named, "
             "and look at the events of that time"
@@ -188,6 +189,12 @@ def _print_recounted(recounted: Recounted) -> None:
         console.say(f"  {difference.in_words()}")
     if recounted.disagreements > _LINES_MAX:
         console.say(f"  and {recounted.disagreements - _LINES_MAX} more; see them with --json")
+    if recounted.source is not None:
+        console.say(recounted.source.summary_line())
+        for finding in recounted.source.findings[:_LINES_MAX]:
+            console.say(f"  {finding}")
+        if len(recounted.source.findings) > _LINES_MAX:
+            console.say(f"  and {len(recounted.source.findings) - _LINES_MAX} more; see them with --json")
 
 
 def _first_flaw(report: VerifyReport) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
+from recorder.checking.verify import verify
 from rig.clocks import UtcAnchor
 from simrig.gpio.build import environment
 from simrig.gpio.chip import GpioChip
@@ -76,6 +77,10 @@ def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_cam
     source, made = healths[-1]["pairing"]["source"], healths[-1]["made"]
     assert source["unfired"] == source["untagged"] == 0
     assert source["unseen"] > 0
+    recounted = verify(Path(json.loads(output)["log"])).recounted
+    assert recounted.agrees, list(recounted.in_words())
+    assert recounted.source is not None
+    assert 0 < recounted.source.unseen <= fates["missed", "missed"]
     assert 0 < made["made"] <= len(rises)
     assert made["late_median_us"] <= made["late_p99_us"] <= made["late_max_us"]
     assert made["late_max_us"] >= 0

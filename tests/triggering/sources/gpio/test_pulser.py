@@ -139,7 +139,7 @@ def test_no_time_is_said_to_be_told_before_its_pulse_is() -> None:
             told.append(([pulse.time for pulse in fired], until))
 
     computer = Asked(lambda: 300 * US, lambda: 200 * US, HostNs(ORIGIN + 1_000_000_000))
-    pulser = Pulser(computer.set_line, computer, ORIGIN, 30.0, 1000 * US)
+    pulser = Pulser(computer.set_line, computer, ORIGIN, 30.0, 1000 * US, Gate())
     pulser.run()
     computer.ask()
     untold = HostNs(0)

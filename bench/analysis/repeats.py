@@ -1,7 +1,8 @@
 """Whether comparing jumps finds what it says: one jump filmed again and again, and with another leg angle.
 
 The images of either jump are rendered once; each recording has noise of its own. The cameras are oriented once, as for
-a day of training, so that the errors of the calibration are the same in all recordings.
+a day of training, so that the errors of the calibration are the same in all recordings. Beside them stand simulated
+measurements of many jumps: these comparisons are independent.
 """
 
 import tempfile
@@ -21,6 +22,7 @@ from analysis.result.model import QUANTITIES
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.analysis.jumps import PULSES, scenario_of
 from bench.analysis.same_images import SameImages
+from bench.analysis.simulated_repeats import measured_twice
 from photogrammetry.reports.procedures import orientation_to_json
 from photogrammetry.reports.result_file import write_result
 from simrig.world.scenario import Jumper, Scenario, Variation
@@ -42,7 +44,8 @@ def run_repeats(comparisons: int) -> list[dict[str, Any]]:
     four comparisons. Each changed jump is compared with eight of them.
 
     Args:
-        comparisons: of jumps that are alike; there are half as many such jumps, and a sixteenth with each change.
+        comparisons: of jumps that are alike; there are half as many such jumps, and a sixteenth with each change. Of
+            simulated measurements there are as many comparisons.
 
     Returns:
         Cases with name, pairs, the share in which a difference was found, what share was to be expected, in how many
@@ -55,7 +58,7 @@ def run_repeats(comparisons: int) -> list[dict[str, Any]]:
         poses = hill.oriented()
         ring = [hill.measured(number, poses) for number in range(count)]
         same = [_compared(one, ring[(k + step) % count]) for step in _NEXT for k, one in enumerate(ring)]
-        cases = [_case("jumps that are alike", same, lambda each: bool(each.found()), LEVEL)]
+        cases = [_case("jumps that are alike", same, _anything, LEVEL)]
         power = _mean_power(same)
         for change_deg, expected in ((power.change, power.probability), (power.change_80, FOUND)):
             hill = _Hill(folder, change_deg)
@@ -63,7 +66,12 @@ def run_repeats(comparisons: int) -> list[dict[str, Any]]:
             different = [_compared(one, others[k // _PER_CHANGED]) for k, one in enumerate(ring)]
             title = f"leg angle changed by {change_deg:.3g} degrees"
             cases.append(_case(title, different, lambda each: _LEG in each.found(), expected))
-    return cases
+    simulated = [_compared(*measured_twice(draw)) for draw in range(comparisons)]
+    return [*cases, _case("simulated measurements, jumps that are alike", simulated, _anything, LEVEL)]
+
+
+def _anything(compared: Difference) -> bool:
+    return bool(compared.found())
 
 
 def _compared(one: MeasuredJump, other: MeasuredJump) -> Difference:

@@ -41,7 +41,7 @@ def bench(
     networks. adjustment: free networks with full covariance; the baseline is scipy's least_squares. jumps,
     jump-faults: rendered jumps are measured, without and with faults. jump-honesty: the same with many drawn
     surveys, errors beside their sigmas. jump-repeats: one jump filmed again and again, and with another leg angle:
-    how often comparisons find a difference; some seven seconds a draw. live: how soon a worker tells the state of
+    how often comparisons find a difference; about seven seconds a draw. live: how soon a worker tells the state of
     each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all measurements and with a
     marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with exchanged names, wrong
     survey, wrong image points or wrong units: what the search for gross errors makes of them. pairing: triplets

@@ -87,6 +87,9 @@ class PulseStatus(Model):
     rate_hz: float | None = None
     spread_us: float | None = Field(None, description="median spread of the trigger times within a pulse")
     number: int = Field(0, description="pulses seen since arming")
+    fired: int | None = Field(
+        None, description="pulses that the source says it made since arming; null: it does not tell of its pulses"
+    )
     made: MadePulses | None = Field(None, description='null: trigger.source is not "gpio"')
 
 

@@ -70,6 +70,10 @@ def _of_recorder(status: Status, health: Health | None) -> Iterator[Metric]:
         yield GaugeMetricFamily("svev_triplet_buffers_free", "Free buffers for triplets.", health.free_triplets)
         yield CounterMetricFamily("svev_unpublished", "Triplets dropped before a slow subscriber.", health.unpublished)
     yield CounterMetricFamily("svev_pulses", "Pulses since arming.", status.pulses.number)
+    if status.pulses.fired is not None:
+        yield CounterMetricFamily("svev_pulses_fired", "Pulses that their source says it made.", status.pulses.fired)
+    if (made := status.pulses.made) is not None:
+        yield CounterMetricFamily("svev_pulses_left_out", "Pulses that would have come too late.", made.skipped)
     if health is not None:
         yield HistogramMetricFamily(
             "svev_latency_seconds",

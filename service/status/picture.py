@@ -119,6 +119,7 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
             rate_hz=rate and round(rate, 2),
             spread_us=None if pairing is None else pairing.spread_median_us,
             number=0 if pairing is None else pairing.seen,
+            fired=None if facts.health is None else _fired(facts.health),
             made=None if facts.health is None else _made(facts.health.made),
         ),
         preroll=_preroll(facts),
@@ -171,6 +172,13 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
 
 def _answers(counts: ActionCounts | None) -> ActionAnswers | None:
     return None if counts is None else ActionAnswers(**msgspec.structs.asdict(counts))
+
+
+def _fired(health: Health) -> int | None:
+    """How many pulses the source says it made; what a line has made is known before the pairing has heard of it."""
+    if health.made is not None:
+        return health.made.made
+    return None if health.pairing.source is None else health.pairing.source.fired
 
 
 def _made(pulses: PulsesMade | None) -> MadePulses | None:

@@ -123,8 +123,12 @@ def test_the_rate_of_the_pulses_is_changed_and_kept_and_they_are_stopped_and_sta
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     assert page.evaluate(BROKEN) == []
     assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []
+    made = page.locator("#pulses-fired")
+    expect(made).to_be_hidden()
     expect(page.locator("#pulses-run")).to_be_hidden()
     service.arm()
+    expect(made).to_contain_text(re.compile("laget 1.203 siden riggen ble gjort klar, og utelatt 2 "))
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
     state, run = page.locator("#pulses-state"), page.locator("#pulses-run")
     expect(state).to_have_text("Pulsene går")
     run.click()

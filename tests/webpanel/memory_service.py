@@ -34,6 +34,7 @@ from rig.api.status import (
     DoctorReport,
     Event,
     Finding,
+    MadePulses,
     PrerollStatus,
     ProcessStatus,
     PulseStatus,
@@ -63,6 +64,8 @@ COLUMNS = ((0, 160), (160, 320), (320, 480))
 CAMERAS = ("K1", "K2", "K3")
 KEPT_EVENTS = 1000
 LINK = phrase("check_link", "{cameras} by {port}: MTU {mtu}", cameras="K1", port="enp2s0", mtu="1500")
+#: What the line that makes the pulses has made.
+MADE = MadePulses(made=1203, skipped=2, late_median_us=8.0, late_p99_us=31.0, late_max_us=44.0, realtime=True)
 
 
 class MemoryService(Archive):
@@ -144,6 +147,8 @@ class MemoryService(Archive):
                     running=self.pulses_made.running,
                     rate_hz=30.0 if armed else None,
                     number=self._pulse() if armed else 0,
+                    fired=1203 if armed else None,
+                    made=MADE if armed else None,
                 ),
                 preroll=PrerollStatus(seconds=held_s, limit_s=5.0, memory_mb=20.0),
                 disk=DiskStatus(free_gb=100.0, reserve_gb=2.0, seconds_left=3500.0, jumps_left=350, jump_s=10.0),

@@ -7,18 +7,13 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-from rig.api.recordings import NextJumper
-from rig.api.status import State
 from rig.health import Health
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.transport import wire
-from service.recordings.storage import Room
 from service.status.measurements import measurements
-from service.status.picture import Facts, picture
-from service.supervision.state_machine import Phase
-from service.supervision.watching import PulseRate
 from tests.capture.rigs import write_rig
+from tests.service.trigger.armed import armed
 from tests.support.loopback import Loopback
 from tests.support.stamps import hill_pulses
 
@@ -50,14 +45,7 @@ def test_scheduled_commands_by_broadcast_are_recorded_unmixed_and_their_answers_
 
 def _are_told(rig: RigSettings, health: Health) -> None:
     """Status and metrics show the answers of a health record."""
-    status = picture(
-        rig,
-        Facts(
-            phase=Phase.now(State.ARMED, 1), still=False, fault=None, notice=None, heard=None, health=health, warm=True,
-            pulses=PulseRate(), alarms=(), overloaded=(), room=Room(10**9, 1.0, 1), preroll_s=0.0, holding_s=0.0,
-            recording=None, last_recording=None, last_jump=None, next_jumper=NextJumper(), pids={}, restarts={},
-        ),
-    )  # fmt: skip
+    status = armed(rig, health)
     wanted = {camera.name: camera.actions.acknowledged for camera in health.cameras if camera.actions}
     assert {camera.name: camera.actions.acknowledged for camera in status.cameras if camera.actions} == wanted
     (family,) = (each for each in measurements(status, health) if each.name == "svev_actions_acknowledged")

@@ -14,12 +14,19 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from msgspec.structs import replace
 
 from recorder.checking.verify import verify
 from rig.clocks import UtcAnchor
+from rig.health import Health, PulsesMade
+from rig.settings.file import load_rig
+from rig.settings.model import RigSettings
+from rig.transport import wire
+from service.status.measurements import measurements
 from simrig.gpio.build import environment
 from simrig.gpio.chip import GpioChip
 from tests.capture.rigs import write_rig
+from tests.service.trigger.armed import armed
 from tests.support.loopback import Loopback
 from triggering.sources.gpio.pulser import LATEST
 
@@ -65,7 +72,7 @@ def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_cam
     assert min(after - before for before, after in pairwise(rises)) > (1 - 2 * LATEST) * 1e9 / RATE_HZ
     with Path(json.loads(output)["log"]).open("rb") as file:
         reader = make_reader(file)
-        healths = [json.loads(message.data) for _, _, message in reader.iter_messages(topics=["/health"])]
+        healths = [message.data for _, _, message in reader.iter_messages(topics=["/health"])]
         tags = [json.loads(message.data) for _, _, message in reader.iter_messages(topics=["/triplet/tag"])]
     to_utc = UtcAnchor.take().offset_ns
     pulses = [min(range(len(rises)), key=lambda n: abs(rises[n] + to_utc - int(tag["time_ns"]))) for tag in tags]
@@ -74,16 +81,33 @@ def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_cam
     fates = Counter(tuple(camera["status"] for camera in tag["cameras"]) for tag in tags)
     assert set(fates) == {("ok", "ok"), ("missed", "missed"), ("ok", "missed")}, fates
     assert 0.1 < fates["missed", "missed"] / len(tags) < 0.3
-    source, made = healths[-1]["pairing"]["source"], healths[-1]["made"]
-    assert source["unfired"] == source["untagged"] == 0
-    assert source["unseen"] > 0
+    health = wire.decoder(Health).decode(healths[-1])
+    source, made = health.pairing.source, health.made
+    assert source is not None
+    assert made is not None
+    assert source.unfired == source.untagged == 0
+    assert source.unseen > 0
     recounted = verify(Path(json.loads(output)["log"])).recounted
     assert recounted.agrees, list(recounted.in_words())
     assert recounted.source is not None
     assert 0 < recounted.source.unseen <= fates["missed", "missed"]
-    assert 0 < made["made"] <= len(rises)
-    assert made["late_median_us"] <= made["late_p99_us"] <= made["late_max_us"]
-    assert made["late_max_us"] >= 0
+    assert 0 < made.made <= len(rises)
+    assert made.late_median_us is not None
+    assert made.late_p99_us is not None
+    assert made.late_max_us is not None
+    assert made.late_median_us <= made.late_p99_us <= made.late_max_us
+    assert made.late_max_us >= 0
+    _are_told(load_rig(tmp_path / "rig.toml"), health, made)
+
+
+def _are_told(rig: RigSettings, health: Health, made: PulsesMade) -> None:
+    """Status and metrics show how many pulses were made, and left out; without these figures, what the source told."""
+    status = armed(rig, health)
+    assert status.pulses.fired == made.made
+    told = {each.name: each.samples[0].value for each in measurements(status, health) if each.samples}
+    assert (told["svev_pulses_fired"], told["svev_pulses_left_out"]) == (made.made, made.skipped)
+    assert health.pairing.source is not None
+    assert armed(rig, replace(health, made=None)).pulses.fired == health.pairing.source.fired
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])

@@ -74,6 +74,8 @@ export const check = {
   "pulses.action": "This computer sends {rate} per second over the network.",
   "pulses.triggerbox": "A trigger box makes {rate} per second.",
   "pulses.gpio": "A line of this computer makes {rate} per second.",
+  "pulses.fired": "It has made {count} since the rig was armed.",
+  "pulses.left_out": "It has made {count} since the rig was armed, and left out {skipped} that would have come too late.",
   "pulses.per_second": "{rate} /s",
   "pulses.slower": "Slower",
   "pulses.faster": "Faster",

@@ -74,6 +74,8 @@ export const check = {
   "pulses.action": "Denne datamaskinen sender {rate} i sekundet over nettverket.",
   "pulses.triggerbox": "En triggerboks lager {rate} i sekundet.",
   "pulses.gpio": "En linje på denne datamaskinen lager {rate} i sekundet.",
+  "pulses.fired": "Den har laget {count} siden riggen ble gjort klar.",
+  "pulses.left_out": "Den har laget {count} siden riggen ble gjort klar, og utelatt {skipped} som ville ha kommet for sent.",
   "pulses.per_second": "{rate} /s",
   "pulses.slower": "Saktere",
   "pulses.faster": "Raskere",

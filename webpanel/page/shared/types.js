@@ -44,6 +44,7 @@
  * @property {number|null} rate_hz
  * @property {number|null} spread_us
  * @property {number} number
+ * @property {number|null} fired
  * @property {MadePulses|null} made
  * @typedef {object} MadePulses
  * @property {number} made

@@ -49,6 +49,8 @@ export function drawPulses() {
   const locked = !trigger || changing || BUSY.includes(state);
   $("pulses-rate").hidden = !controlled;
   setText($("pulses-source"), trigger ? t(`pulses.${trigger.source}`, { rate: number(trigger.rate_hz, digits(trigger.rate_hz)) }) : "");
+  setText($("pulses-fired"), fired());
+  $("pulses-fired").hidden = !fired();
   setText($("pulses-wanted"), trigger ? t("pulses.per_second", { rate: number(wanted, digits(wanted)) }) : "–");
   $("pulses-slower").disabled = locked || wanted <= RATES[0];
   $("pulses-faster").disabled = locked || wanted >= RATES[RATES.length - 1];
@@ -74,6 +76,14 @@ function drawTrain(state) {
 /** Whether pulses come by themselves: anybody may have stopped them. */
 function running() {
   return known.status?.pulses.running ?? true;
+}
+
+/** What the source says of its own pulses. */
+function fired() {
+  const { fired: count = null, made = null } = known.status?.pulses ?? {};
+  if (count === null) return "";
+  if (!made?.skipped) return t("pulses.fired", { count: number(count) });
+  return t("pulses.left_out", { count: number(count), skipped: number(made.skipped) });
 }
 
 /** @param {string} state */

@@ -47,6 +47,7 @@ def probes(rig: RigSettings, directory: Path) -> list[Probe]:
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("trigger box", Topic.CAMERAS, lambda: trigger_box.look_at_trigger_box(rig)),
         Probe("trigger line", Topic.CAMERAS, lambda: gpio.look_at_gpio(rig)),
+        Probe("light barrier", Topic.CAMERAS, lambda: gpio.look_at_barrier(rig)),
         Probe("discovery", Topic.CAMERAS, lambda: gige_cameras.look_for_cameras(rig), limit_s=10.0),
         Probe("clock", Topic.TIME, machine.look_at_clock),
         Probe("processor", Topic.PROCESSOR, machine.look_at_processor),

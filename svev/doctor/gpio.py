@@ -1,4 +1,4 @@
-"""Examines the line of the computer that makes the pulses, where the rig file names one."""
+"""Examines the lines of the computer that the rig file names: that of the pulses, and that of a light barrier."""
 
 from collections.abc import Iterator
 
@@ -28,3 +28,29 @@ def look_at_gpio(rig: RigSettings) -> Iterator[Finding]:
         what = "line {line} of {chip} is taken by {consumer}"
         remedy = "end that, or name another line as trigger.line in the rig file"
         yield failure(Topic.CAMERAS, "check_gpio_taken", what, remedy, consumer=consumer, line=line, chip=chip)
+
+
+def look_at_barrier(rig: RigSettings) -> Iterator[Finding]:
+    """Is the chip there, may it be opened, and is the line free or with svev? The line is left as it is."""
+    barrier = rig.automatic.barrier
+    if barrier is None:
+        return
+    line, chip = barrier.line, barrier.chip
+    try:
+        consumer = consumer_of(chip, line)
+    except TriggerError as error:
+        remedy = "correct barrier under [automatic] in the rig file; it begins no recordings until then"
+        yield failure(Topic.CAMERAS, "check_barrier_chip", "light barrier: {why}", remedy, why=error.said)
+        return
+    trigger = rig.trigger
+    if isinstance(trigger, GpioTrigger) and (trigger.chip, trigger.line) == (chip, line):
+        what = "line {line} of {chip} is to make the pulses and to watch the light barrier"
+        remedy = "name another line for one of them in the rig file"
+        yield failure(Topic.CAMERAS, "check_barrier_twice", what, remedy, line=line, chip=chip)
+    elif consumer in {"", CONSUMER}:
+        what = "line {line} of {chip} is there for the light barrier"
+        yield passed(Topic.CAMERAS, "check_barrier", what, line=line, chip=chip)
+    else:
+        what = "line {line} of {chip}, of the light barrier, is taken by {consumer}"
+        remedy = "end that, or name another line as barrier under [automatic] in the rig file"
+        yield failure(Topic.CAMERAS, "check_barrier_taken", what, remedy, consumer=consumer, line=line, chip=chip)

@@ -14,9 +14,9 @@ _PROGRAM = """
 import sys
 from pathlib import Path
 from rig.settings.file import load_rig
-from rig.settings.trigger import ExternalTrigger, GpioTrigger
-from svev.doctor.gpio import look_at_gpio
-from triggering.sources.gpio.lines import OutputLine
+from rig.settings.trigger import BarrierSettings, ExternalTrigger, GpioTrigger
+from svev.doctor.gpio import look_at_barrier, look_at_gpio
+from triggering.sources.gpio.lines import EdgeLine, OutputLine
 rig, chip = load_rig(Path(sys.argv[1])), sys.argv[2]
 def look(trigger):
     for found in look_at_gpio(rig.model_copy(update={"trigger": trigger})):
@@ -29,10 +29,20 @@ with OutputLine(chip, 0, active_low=False):
     look(gpio(chip, 0))
 look(gpio(chip, "FAN"))
 look(gpio(chip, 9))
+def watch(line, trigger=ExternalTrigger()):
+    automatic = rig.automatic.model_copy(update={"barrier": BarrierSettings(chip=chip, line=line)})
+    for found in look_at_barrier(rig.model_copy(update={"automatic": automatic, "trigger": trigger})):
+        print(found.level, found.code, found.what.replace(chip, "CHIP"), sep="|")
+watch(0)
+with EdgeLine(chip, 0, active_low=False, debounce_ms=5):
+    watch(0)
+watch(0, gpio(chip, 0))
+watch(1)
+watch(9)
 """
 
 
-def test_the_doctor_says_whether_the_line_can_make_pulses() -> None:
+def test_the_doctor_says_whether_the_lines_can_make_pulses_and_watch_a_barrier() -> None:
     with (
         tempfile.TemporaryDirectory() as folder,
         GpioChip(Path(folder) / "gpiochip0", lines=("", "FAN"), taken={1: "fan"}) as chip,
@@ -53,5 +63,13 @@ def test_the_doctor_says_whether_the_line_can_make_pulses() -> None:
         (
             "FAIL|check_gpio_chip|trigger line: GPIO chip CHIP has no line 9, but lines 0 to 1: name one that gpioinfo "
             "lists in the rig file|no pulses are made until then"
+        ),
+        "PASS|check_barrier|line 0 of CHIP is there for the light barrier",
+        "PASS|check_barrier|line 0 of CHIP is there for the light barrier",
+        "FAIL|check_barrier_twice|line 0 of CHIP is to make the pulses and to watch the light barrier",
+        "FAIL|check_barrier_taken|line 1 of CHIP, of the light barrier, is taken by fan",
+        (
+            "FAIL|check_barrier_chip|light barrier: GPIO chip CHIP has no line 9, but lines 0 to 1: name one that "
+            "gpioinfo lists in the rig file"
         ),
     ]

@@ -38,6 +38,10 @@ export const findings = {
   check_fallback_same_disk: ["{folder} (recorder.fallback_directory) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
 
   check_gpio: ["linje {line} på {chip} er klar for triggerpulsene"],
+  check_barrier: ["linje {line} på {chip} er klar for lysporten"],
+  check_barrier_chip: ["lysport: {why}", "rett barrier under [automatic] i riggfilen; til da starter den ingen opptak"],
+  check_barrier_twice: ["linje {line} på {chip} skal både lage pulsene og vokte lysporten", "sett en annen linje for en av dem i riggfilen"],
+  check_barrier_taken: ["linje {line} på {chip}, for lysporten, er opptatt av {consumer}", "avslutt det, eller sett en annen linje som barrier under [automatic] i riggfilen"],
   check_gpio_chip: ["triggerlinje: {why}", "til det er rettet, lages ingen pulser"],
   check_gpio_taken: ["linje {line} på {chip} er opptatt av {consumer}", "avslutt det, eller sett en annen linje som trigger.line i riggfilen"],
 

@@ -360,11 +360,7 @@ class RigService(Protocol):
         ...
 
     def change_trigger(self, change: TriggerChange) -> TriggerView:
-        """Change the rate of the pulses, and keep it in the rig file if that is wished; stop or start them.
-
-        BadInputError: source, cameras or memory do not take the rate. StateForbidsError: a recording runs, or others
-        make the pulses. StorageError: the rig file cannot be written.
-        """
+        """Change the rate of the pulses, keep it in the rig file, stop or start them. BadInputError: it cannot be."""
         ...
 
     def burst(self, order: BurstOrder) -> TriggerView:

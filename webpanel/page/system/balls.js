@@ -14,12 +14,14 @@ import { known, load, save } from "../shared/store.js";
 /** An orientation that was made meanwhile is seen after so long a time. */
 const AGAIN_MS = 5000;
 /** Radii of circles on the screen, px; so many sigmas of a place make one larger. */
-const LEAST_PX = 9;
+const LEAST_PX = 10;
 const MOST_PX = 60;
 const SIGMAS = 3;
 /** From circles to their names, and of arrows to the edge, px. */
 const GAP_PX = 2;
 const INSET_PX = 12;
+/** Where a name may stand beside its circle, right and down, the best place first. */
+const SIDES = [[1, 0], [-1, 0], [0, -1], [0, 1], [1, -1], [-1, -1], [1, 1], [-1, 1], [0.5, 1], [-0.5, 1], [0.5, -1], [-0.5, -1]];
 
 /** Name of the camera that is shown. */
 let camera = "";
@@ -62,13 +64,12 @@ function draw() {
   const shown = $("balls-on").checked ? balls : null;
   const layer = $("balls");
   layer.hidden = !shown?.balls.length;
-  setText($("balls-said"), shown ? words(shown) : "");
-  $("balls-said").dataset.level = shown?.balls.some(isMissing) || shown?.statement?.level === "warning" ? "warning" : "";
-  $("balls-said").hidden = !shown;
+  $("balls-words").hidden = !shown;
+  if (shown) drawWords(shown);
   if (!shown || layer.hidden) return;
   layer.style.aspectRatio = `${shown.width} / ${shown.height}`;
   const state = JSON.stringify([shown, layer.clientWidth]);
-  if (state === drawn) return;
+  if (state === drawn || !layer.clientWidth) return;
   drawn = state;
   layer.classList.toggle("rough", shown.source === "survey" || shown.source === "plan");
   place(layer, shown);
@@ -105,7 +106,7 @@ function place(layer, shown) {
     layer.append(name);
     const half = { x: name.offsetWidth / 2, y: name.offsetHeight / 2 };
     const away = { x: radius + GAP_PX + half.x, y: radius + GAP_PX + half.y };
-    const boxes = [[1, 0], [-1, 0], [0, -1], [0, 1], [1, -1], [-1, -1], [1, 1], [-1, 1]].map(([right, down]) => around(x + right * away.x, y + down * away.y, half.x, half.y));
+    const boxes = SIDES.map(([right, down]) => around(x + right * away.x, y + down * away.y, half.x, half.y));
     const free = boxes.find((box) => box.left >= 0 && box.top >= 0 && box.right <= width && box.bottom <= height && !taken.some((other) => overlap(box, other)));
     if (!free) {
       name.remove();
@@ -124,7 +125,7 @@ function place(layer, shown) {
  * @param {number} radius
  */
 function circle(ball, x, y, radius) {
-  const ring = make("i", { class: ball.seen === false ? "unseen" : "", "data-ball": ball.name });
+  const ring = make("i", { class: ball.seen === false ? "unfound" : "", "data-ball": ball.name });
   Object.assign(ring.style, { left: `${x}px`, top: `${y}px`, width: `${2 * radius}px`, height: `${2 * radius}px` });
   return ring;
 }
@@ -144,26 +145,37 @@ function arrow(x, y, towardsX, towardsY) {
 }
 
 /**
- * What stands below the picture: how many balls are in it, which are not and by how much, and how that is known.
+ * Say below the picture how many balls are in it, which are not and by how much, and how that is known; or what to do.
  *
  * @param {CameraBalls} shown
  */
-function words(shown) {
-  const { statement, source, oriented, file } = shown;
-  if (statement || !source) {
-    const { text, advice } = statement ? say(statement) : { text: "", advice: "" };
-    return [text, advice].filter(Boolean).map((part) => `${part[0].toUpperCase()}${part.slice(1)}.`).join(" ");
-  }
-  const inside = shown.balls.filter((ball) => ball.inside).length;
-  const when = oriented ? `${day(oriented)} ${timeOfDay(oriented)}` : "";
-  const known_by = {
-    calibration: () => t("balls.by_calibration", { file: file ?? "" }),
-    orientation: () => t("balls.by_orientation", { when }),
-    survey: () => t("balls.by_survey", { file: file ?? "" }),
-    plan: () => t("balls.by_plan", { file: file ?? "" }),
-  };
+function drawWords(shown) {
   const missing = shown.balls.filter(isMissing).map((ball) => `${ball.name}: ${beyond(ball, shown)}`);
-  return [t("balls.inside", { inside, all: shown.balls.length }), ...(missing.length ? [`${missing.join("; ")}.`] : []), known_by[source]()].join(" ");
+  const { text, advice } = shown.statement ? say(shown.statement) : { text: counted(shown, missing), advice: source(shown) };
+  setText($("balls-said"), sentence(text));
+  setText($("balls-by"), sentence(advice));
+  $("balls-said").dataset.level = missing.length || shown.statement?.level === "warning" ? "warning" : "";
+}
+
+/**
+ * @param {CameraBalls} shown
+ * @param {string[]} missing
+ */
+function counted({ balls: all }, missing) {
+  const inside = t("balls.inside", { inside: all.filter((ball) => ball.inside).length, all: all.length });
+  return missing.length ? `${inside} ${missing.join("; ")}` : inside;
+}
+
+/** What the places follow from. @param {CameraBalls} shown */
+function source({ source: kind, file, oriented }) {
+  if (kind === "orientation") return t("balls.by_orientation", { when: oriented ? `${day(oriented)} ${timeOfDay(oriented)}` : "" });
+  if (kind === "calibration") return t("balls.by_calibration", { file: file ?? "" });
+  return kind === "survey" ? t("balls.by_survey", { file: file ?? "" }) : t("balls.by_plan", { file: file ?? "" });
+}
+
+/** @param {string} text */
+function sentence(text) {
+  return text && `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
 }
 
 /** Whether the camera should show a ball and does not. @param {BallPlace} ball */

@@ -108,6 +108,7 @@ def test_what_cannot_be_is_refused_before_anything_ends(
 def test_pulses_are_stopped_made_on_request_and_started_by_a_recording(tmp_path: Path, loopback: Loopback) -> None:
     """Real Aravis and simulated cameras, which expose at each command and at nothing else."""
     path = write_rig(tmp_path, "aravis", loopback, source="action", rate_hz=20, names=["K1", "K2"])
+    path.write_text(path.read_text() + "[recorder]\npreroll_s = 60\n")  # a busy machine is slow to say that none come
     with serving(tmp_path, path, loopback) as service:
         assert service.call("PATCH", TRIGGER, {"running": False})[0] == 409
         service.arm()

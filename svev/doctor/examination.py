@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.settings.model import RigSettings
-from svev.doctor import disk, firewire, gige_cameras, gpio, machine, network, trigger_box, webhook
+from svev.doctor import disk, gpio, machine, network, trigger_box, webhook
+from svev.doctor.cameras import firewire, gige
 from svev.doctor.finding import Finding, Topic, failure
 
 
@@ -43,12 +44,12 @@ def probes(rig: RigSettings, directory: Path) -> list[Probe]:
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),
         Probe("publication", Topic.NETWORK, lambda: network.look_at_publication(rig)),
         Probe("webhook", Topic.NETWORK, lambda: webhook.look_at_webhook(rig), limit_s=webhook.LOOK_S + 2),
-        Probe("cameras", Topic.CAMERAS, lambda: gige_cameras.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
+        Probe("cameras", Topic.CAMERAS, lambda: gige.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("trigger box", Topic.CAMERAS, lambda: trigger_box.look_at_trigger_box(rig)),
         Probe("trigger line", Topic.CAMERAS, lambda: gpio.look_at_gpio(rig)),
         Probe("light barrier", Topic.CAMERAS, lambda: gpio.look_at_barrier(rig)),
-        Probe("discovery", Topic.CAMERAS, lambda: gige_cameras.look_for_cameras(rig), limit_s=10.0),
+        Probe("discovery", Topic.CAMERAS, lambda: gige.look_for_cameras(rig), limit_s=10.0),
         Probe("clock", Topic.TIME, machine.look_at_clock),
         Probe("processor", Topic.PROCESSOR, machine.look_at_processor),
     ]

@@ -10,9 +10,9 @@ from recorder.publishing.keys import make_keys
 from rig.settings.file import CONFIG, load_rig, rig_schema
 from service.alarms.delivery import DEADLINE_S
 from svev import console
+from svev.doctor.cameras.gige import look_for_cameras
 from svev.doctor.examination import Probe, firewire_probes, probes, run_probe
 from svev.doctor.finding import Finding, Topic
-from svev.doctor.gige_cameras import look_for_cameras
 from svev.doctor.printing import counts_of, end_with, print_findings
 from svev.doctor.webhook import send_test, target_of
 

@@ -15,7 +15,7 @@ from rig.settings.model import RigSettings
 from simrig.programs.simulated_hill import SimulatedHill
 from simrig.world.faults import Fault, FaultKind
 from svev import cli
-from svev.doctor import firewire, firewire_cameras
+from svev.doctor.cameras import firewire, firewire_cameras
 from svev.doctor.finding import Finding, Level
 
 RIG = load_rig(CONFIG / "rigs" / "hill-iidc.toml")

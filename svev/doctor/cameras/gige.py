@@ -29,7 +29,7 @@ def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
             case "aravis":
                 yield _look_at_gige(camera)
             case "iidc":
-                pass  # `svev.doctor.firewire` examines these together
+                pass  # `svev.doctor.cameras.firewire` examines these together
             case "replay":
                 pass  # `_look_at_log` examines these together
 

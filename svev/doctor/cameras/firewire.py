@@ -12,8 +12,8 @@ from rig.clocks import host_now
 from rig.settings.model import RigSettings
 from rig.transport.process_table import Child, ProcessSpec
 from service.processes.simulation import hill_environment
+from svev.doctor.cameras.firewire_process import Examination, Found
 from svev.doctor.finding import Finding, Topic, failure, passed
-from svev.doctor.firewire_process import Examination, Found
 
 #: Time limits, s: of the examination without trial, and of the trial of each camera.
 LOOK_S: Final = 15.0
@@ -60,8 +60,8 @@ def _ask(rig: RigSettings, variables: Mapping[str, str], *, trial: bool) -> Iter
         config = Examination(rig=rig, trial=trial)
         child = Child(
             ProcessSpec(
-                "FireWire examination", "svev.doctor.firewire_process", config, environment=variables, reports=Found,
-                output=output,
+                "FireWire examination", "svev.doctor.cameras.firewire_process", config, environment=variables,
+                reports=Found, output=output,
             )
         )  # fmt: skip
         try:

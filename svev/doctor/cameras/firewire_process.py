@@ -3,9 +3,9 @@
 from rig.settings.model import RigSettings
 from rig.transport.child import begin
 from rig.transport.message import Message, Quit
+from svev.doctor.cameras.firewire_cameras import look_at_cameras
+from svev.doctor.cameras.firewire_trial import try_camera
 from svev.doctor.finding import Finding
-from svev.doctor.firewire_cameras import look_at_cameras
-from svev.doctor.firewire_trial import try_camera
 
 
 class Examination(Message):

@@ -17,8 +17,8 @@ from rig.errors import BadInputError, CameraError
 from rig.phrase import phrase
 from rig.settings.model import CameraSettings
 from rig.transport.ring import CameraRing
+from svev.doctor.cameras.firewire_cameras import told
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
-from svev.doctor.firewire_cameras import told
 
 _TRIAL_NS: Final = 2 * NS_PER_S
 _AFTER_RESET_NS: Final = NS_PER_S

@@ -24,8 +24,8 @@ from rig.pixels import Stored
 from rig.tag import CameraTag, TripletTag
 from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
 from rig.transport import wire
-from triggering.ledger import Ledger
-from triggering.recount import Recount
+from triggering.ledger.account import Ledger
+from triggering.ledger.recount import Recount
 
 _EVENTS_MAX = 1000
 _HEALTH = wire.decoder(Health)

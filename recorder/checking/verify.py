@@ -16,8 +16,8 @@ from recorder.reading.records import Damage
 from rig.events import Event
 from rig.topics import MERGE_METADATA
 from rig.transport import wire
-from triggering.ledger import Ledger, numbers
-from triggering.recount import Recounted
+from triggering.ledger.account import Ledger, numbers
+from triggering.ledger.recounted import Recounted
 
 _PULSES_MAX = 10_000
 _FINDINGS_MAX = 500

@@ -29,7 +29,7 @@ from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
 from rig.transport.recorder_commands import GoesOn, StartRecording, TellResult
 from rig.transport.recorder_reports import LogPart
 from rig.utc_clock import utc_fields
-from triggering.ledger import Ledger
+from triggering.ledger.account import Ledger
 from triggering.pairing.pairer import ClosedPulse
 
 #: A pulse generator may be slower than the rig file says by this share: the recording still gets all its pulses.

@@ -7,7 +7,7 @@ from typing import Final
 from rig.clocks import NS_PER_S, UtcNs
 from rig.pulse import PulseNumber
 from rig.topics import RECORDING_METADATA, RIG_METADATA, SESSION_METADATA
-from triggering.ledger import Ledger
+from triggering.ledger.account import Ledger
 
 #: Field of the record: after so many seconds the recording ended by itself, because nobody had stopped it.
 FORGOTTEN: Final = "forgotten_s"

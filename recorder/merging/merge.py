@@ -38,7 +38,7 @@ from rig.topics import (
     TROUBLE_METADATA,
 )
 from triggering.alignment import Alignment, align
-from triggering.ledger import Ledger, span
+from triggering.ledger.account import Ledger, span
 
 #: Name of a log in the making, with the number of its process in it.
 _UNFINISHED: Final = ".{name}.{pid}.part"

@@ -15,7 +15,7 @@ from rig.tag import TripletTag
 from rig.topics import MERGE_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
 from rig.transport import wire
 from rig.utc_clock import UtcState
-from triggering.ledger import Ledger, runs_from_text
+from triggering.ledger.account import Ledger, runs_from_text
 
 
 @dataclass(frozen=True, slots=True)

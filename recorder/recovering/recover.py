@@ -38,7 +38,7 @@ from rig.topics import (
     RIG_METADATA,
     SESSION_METADATA,
 )
-from triggering.ledger import Ledger, numbers, runs_to_text
+from triggering.ledger.account import Ledger, numbers, runs_to_text
 
 _PULSES_MAX: Final = 10_000
 

@@ -37,7 +37,7 @@ from service.recordings.download import download_of, file_name, sha256_of, zippe
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
 from service.recordings.notes import check_voices, noted, notes_of, spoken, voice_file
 from service.seam import Download, FoundRecordings
-from triggering.ledger import pauses_in_words
+from triggering.ledger.account import pauses_in_words
 
 _STATES = {
     LogState.CLOSED: RecordingState.FINISHED,

@@ -7,8 +7,9 @@ from rig.events import Event
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
+from triggering.ledger.recount import Recount
+from triggering.ledger.recounted import Recounted
 from triggering.pairing.outcomes import ClosedPulse
-from triggering.recount import Recount, Recounted
 
 OK = FrameStatus.OK
 

@@ -14,7 +14,7 @@ from rig.clocks import NS_PER_S
 from rig.errors import LedgerDiffersError, LogDamagedError, LogTruncatedError
 from service.recordings import live_results
 from svev import console
-from triggering.recount import Recounted
+from triggering.ledger.recounted import Recounted
 
 _LINES_MAX = 60
 

@@ -12,10 +12,10 @@ from bench.triggering.hill import Case, Hill, Result
 from bench.triggering.pairing import CASES, pairing_table, run_case
 from tests.support.reliability import FaultTable
 from tests.triggering.tags import recount, tags_of
+from triggering.ledger.recounted import Recounted
 from triggering.pairing.alarms import alarms
 from triggering.pairing.belief import Witness
 from triggering.pairing.outcomes import ClosedPulse
-from triggering.recount import Recounted
 
 PULSES = 1500
 NAMES = ["K1", "K2", "K3"]

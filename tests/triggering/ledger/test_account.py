@@ -11,7 +11,7 @@ from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 from tests.triggering.feed import PERIOD
-from triggering.ledger import Ledger
+from triggering.ledger.account import Ledger
 
 START = 1_795_216_434 * NS_PER_S
 NAMES = ("K1", "K2", "K3")

@@ -13,7 +13,8 @@ from rig.transport.recorder_commands import PulsesFired
 from tests.triggering.feed import Feed
 from tests.triggering.simulation import MS, US
 from tests.triggering.tags import tags_of
-from triggering.recount import Recount, Recounted
+from triggering.ledger.recount import Recount
+from triggering.ledger.recounted import Recounted
 
 PULSES = 300
 #: Cameras expose so long after the edge of a pulse.

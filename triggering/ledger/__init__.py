@@ -1,0 +1,1 @@
+"""What became of every pulse in every camera: counted from the tags, and recomputed from what a log holds."""

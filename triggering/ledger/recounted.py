@@ -1,0 +1,103 @@
+"""The recomputed ledger of a log: what became of each pulse by the evidence, beside what its tags say."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rig.frame import FrameStatus
+from rig.pulse import PulseNumber
+from triggering.ledger.source_recount import SourceAccount
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A pulse and camera in which the tag and the recomputed ledger differ.
+
+    Attributes:
+        pulse: the pulse; where frames have no pulse, the one before them.
+        camera: name of the camera.
+        tagged: what the tag says.
+        found: what follows from the log; None: no state of this pulse says it.
+        why: the evidence, in words.
+    """
+
+    pulse: PulseNumber
+    camera: str
+    tagged: FrameStatus
+    found: FrameStatus | None
+    why: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The difference as JSON."""
+        found = None if self.found is None else self.found.value
+        return {
+            "pulse": self.pulse, "camera": self.camera, "tagged": self.tagged.value, "found": found, "why": self.why,
+        }  # fmt: skip
+
+    def in_words(self) -> str:
+        """The difference as one line, e.g. "pulse 61: K2 is tagged lost and was missed: (why)"."""
+        found = "" if self.found is None else f" and was {self.found.value}"
+        return f"pulse {self.pulse}: {self.camera} is tagged {self.tagged.value}{found}: {self.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class Recounted:
+    """The recomputed ledger, beside the tags.
+
+    Attributes:
+        pulses: tags that were compared.
+        states: recomputed, by camera: how many pulses have which state.
+        unproven: missing frames whose state rests on the tag alone.
+        differences: where tag and evidence differ, the first ten thousand.
+        disagreements: how many there are.
+        source: what the source of the pulses says of them; None: it tells nothing, or the log does not hold it.
+    """
+
+    pulses: int
+    states: dict[str, Counter[FrameStatus]]
+    unproven: int
+    differences: tuple[Difference, ...]
+    disagreements: int
+    source: SourceAccount | None = None
+
+    @property
+    def agrees(self) -> bool:
+        """Whether no tag is contradicted, and the source's own count bears them out."""
+        return self.disagreements == 0 and (self.source is None or self.source.agrees)
+
+    def in_words(self) -> Iterator[str]:
+        """One line for each disagreement that is kept."""
+        yield from (difference.in_words() for difference in self.differences)
+        if self.source is not None:
+            yield from self.source.findings
+
+    def to_json(self) -> dict[str, Any]:
+        """The recomputed ledger as JSON."""
+        return {
+            "agrees": self.agrees,
+            "states": {name: states_json(states) for name, states in self.states.items()},
+            "unproven": self.unproven,
+            "disagreements": self.disagreements,
+            "differences": [difference.to_json() for difference in self.differences],
+            "source": None if self.source is None else self.source.to_json(),
+        }
+
+    def summary_line(self) -> str:
+        """Agreement or not with the counts, one line."""
+        total: Counter[FrameStatus] = Counter()
+        for states in self.states.values():
+            total.update(states)
+        counts = ", ".join(f"{total[status]} {status.value}" for status in FrameStatus)
+        verdict = (
+            "agrees with the tags"
+            if self.disagreements == 0
+            else f"differs from the tags at {self.disagreements} places"
+        )
+        alone = f"; {self.unproven} of them by the tag alone" if self.unproven else ""
+        return f"the recomputed ledger {verdict}: {self.pulses} pulses, {len(self.states)} cameras: {counts}{alone}"
+
+
+def states_json(states: Counter[FrameStatus]) -> dict[str, int]:
+    """How many pulses have which of the five states, as JSON."""
+    return {status.value: states[status] for status in FrameStatus}

@@ -28,6 +28,8 @@ _SETTLED_NS: Final = NS_PER_S
 _SETTLED_PERIODS: Final = 12
 #: Pulses that are named one by one.
 _KEPT: Final = 1000
+#: Times and pulse numbers of a recorder have 63 bits; others stand in damaged logs only, and prove nothing.
+_LARGEST: Final = (1 << 63) - 1
 #: The interval of the pulses is known from so many.
 _TIMED: Final = 3
 
@@ -99,8 +101,8 @@ class SourceRecount:
         self._live: list[tuple[int, SourcePairing]] = []
 
     def add(self, tag: TripletTag) -> None:
-        """Take the next tag; one that is not later than the last is left out."""
-        if self._times and tag.time <= self._times[-1]:
+        """Take the next tag; one that is not later than the last, or that no recorder writes, is left out."""
+        if not _credible(tag.pulse, tag.time) or (self._times and tag.time <= self._times[-1]):
             return
         statuses = {camera.status for camera in tag.cameras}
         self._pulses.append(tag.pulse)
@@ -121,7 +123,7 @@ class SourceRecount:
             return
         behind = written - health.host_time_ns  # a record is written at once, or a little later
         self._to_utc = behind if self._to_utc is None else min(self._to_utc, behind)
-        self._words += health.fired or ()
+        self._words += [word for word in health.fired or () if _credible(*word.times_ns, word.until_ns)]
 
     def finish(self) -> SourceAccount | None:
         """Compare everything; None: the log does not hold what the source told, or too inexactly."""
@@ -215,6 +217,10 @@ def _stretches(words: Sequence[ToldPulses], error_ns: float) -> Iterator[_Stretc
             stretch.until = word.until_ns
     if stretch is not None:
         yield stretch
+
+
+def _credible(*numbers: int) -> bool:
+    return all(abs(number) <= _LARGEST for number in numbers)
 
 
 def _nearest(times: Sequence[int], place: int) -> int:

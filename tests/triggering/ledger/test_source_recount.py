@@ -4,10 +4,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from rig.clocks import DecimalNs, UtcNs
-from rig.health import DiskHealth, Health, Latency, PrerollHealth, SourcePairing
+from rig.health import DiskHealth, Health, Latency, PrerollHealth, SourcePairing, ToldPulses
 from rig.tag import TripletTag
 from rig.transport.recorder_commands import PulsesFired
 from tests.triggering.feed import Feed
@@ -148,3 +150,20 @@ def test_times_that_are_too_uncertain_and_logs_without_them_prove_nothing() -> N
     for health in log.healths:
         old.told(health, UtcNs(1))
     assert old.finish().source is None
+
+
+_TIMES = st.one_of(st.integers(0, 10**10), st.integers(-(10**20) + 1, 10**20 - 1))
+
+
+@settings(deadline=None, max_examples=60)
+@example([(1, [5, 10**19, 6], 10**19)], 10**19)
+@given(st.lists(st.tuples(st.integers(-(10**20), 10**20), st.lists(_TIMES, max_size=6), _TIMES), max_size=6), _TIMES)
+def test_whatever_a_log_says_of_the_source_is_judged(words: list[tuple[int, list[int], int]], now: int) -> None:
+    """Damaged and hostile logs hold words that no recorder wrote."""
+    log = run([], error_ns=0)
+    told = tuple(
+        ToldPulses(first, tuple(DecimalNs(time) for time in times), 1.0, DecimalNs(until))
+        for first, times, until in words
+    )
+    log.healths = [replace(health, fired=told, host_time_ns=DecimalNs(now)) for health in log.healths]
+    assert all(log.recounted().in_words())

@@ -131,6 +131,8 @@ class Assembler:
             hold_ns=self.hold_ns,
             spread_ns=source.spread_ns,
             exposes=None if commands is None else commands.exposes,
+            # The others say themselves when an exposure began.
+            exposures_ns=[round(each.exposure_us * 1000) * (each.backend == "aravis") for each in rig.cameras],
         )
         self.connected = [False] * len(rings)
         self.settled = HostNs(0)

@@ -62,6 +62,8 @@ class Scenario:
     damage_tells_time: bool = False  # as on FireWire: a damaged frame has an approximate trigger time
     batch_ns: int = 0  # the recorder wakes at this interval and then reads camera after camera
     hold_periods: float = 3.0
+    exposures_ns: tuple[int, ...] = ()  # a camera's frames come after its exposure and `latency_ns`
+    note_the_end: tuple[int, ...] = ()  # cameras whose time of a frame is that of the end of its exposure
 
     @property
     def period_ns(self) -> int:
@@ -197,7 +199,10 @@ class _Camera:
         self.hill.pulse_of[slot] = pulse
         retention = self.scenario.retention_ns if fate is FrameStatus.DAMAGED else 0
         # Frames come in the camera's order: a late one holds up those behind it.
-        arrival = max(self.last_arrival, HostNs(time + self.rng.randint(*self.scenario.latency_ns) + retention))
+        exposure = self.scenario.exposures_ns[self.camera] if self.scenario.exposures_ns else 0
+        arrival = max(
+            self.last_arrival, HostNs(time + exposure + self.rng.randint(*self.scenario.latency_ns) + retention)
+        )
         self.last_arrival = arrival
         if fate is FrameStatus.DAMAGED:
             # ids and times of a damaged frame are those of an earlier one
@@ -206,7 +211,8 @@ class _Camera:
                 about = self.device(time + self.rng.randint(-MS // 5, MS // 5))
                 record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, about, value=1)
         else:
-            device = self.device(time + self.rng.random() * self.scenario.jitter_ns)
+            noted = time + exposure * (self.camera in self.scenario.note_the_end)
+            device = self.device(noted + self.rng.random() * self.scenario.jitter_ns)
             count = self.triggers if self.scenario.trigger_counts else -1
             record = Record(
                 RecordKind.FRAME, self.epoch, arrival, slot, frame_id, self.scenario.modulus, device, count
@@ -253,7 +259,9 @@ class Run:
 
     def __post_init__(self) -> None:
         scenario = self.hill.scenario
-        self.pairer = Pairer(scenario.cameras, scenario.period_ns, hold_ns=scenario.hold_ns)
+        self.pairer = Pairer(
+            scenario.cameras, scenario.period_ns, hold_ns=scenario.hold_ns, exposures_ns=scenario.exposures_ns
+        )
         for now, batch in _batches(self.hill.events, scenario.batch_ns):
             if scenario.batch_ns == 0:
                 self.pass_deadlines(now)

@@ -19,6 +19,7 @@ from triggering.pairing.gaps import DamageMatcher, Gap
 from triggering.pairing.outcomes import NO_FRAME, Outcome
 from triggering.timeline.device_clock import DeviceClock
 from triggering.timeline.pulse_train import PulseTrain
+from triggering.timeline.stamping import Stamping
 
 #: Damaged arrivals kept until their pulse is decided; only a camera that sends nothing else has more.
 _MOST_DAMAGED: Final = 64
@@ -39,9 +40,11 @@ class CameraTrack:
 
     Args:
         train: the rhythm of the pulses.
+        exposure_ns: exposure of the camera; 0: the times of its frames are those of the beginning of the exposure.
 
     Attributes:
         clock: the camera's clock in this epoch.
+        stamping: which end of the exposure the camera notes.
         counters: totals since the start.
         epoch: number of the present connection, 0 before the first.
         connected: whether the camera is there.
@@ -53,12 +56,10 @@ class CameraTrack:
         set_at: when its clock was last found to have been set; None: never.
     """
 
-    def __init__(self, train: PulseTrain) -> None:
-        self.clock = DeviceClock()
+    def __init__(self, train: PulseTrain, exposure_ns: int = 0) -> None:
+        self.clock, self.stamping = DeviceClock(), Stamping(train, exposure_ns)
         self.counters = CameraCounters()
-        self.epoch = 0
-        self.connected = False
-        self.silent = False
+        self.epoch, self.connected, self.silent = 0, False, False
         self.unanswered = 0
         self.alive = self.heard = HostNs(0)
         self.lag_ns = 0.0
@@ -129,13 +130,12 @@ class CameraTrack:
         steps = self.clock.steps
         agrees = self.clock.latch(latch)
         self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
-        if self.clock.steps != steps:
-            # Times before and after the step cannot be compared: the next frame counts as a first one.
+        if stepped := self.clock.steps != steps:
             self.counters.clock_steps += 1
-            self.set_at = latch.host
-            self._last = None
-            self._broken = True
-            self._unsettled_until = HostNs(latch.host + round(self._witness.longest_ns))
+            self.set_at, self._unsettled_until = latch.host, HostNs(latch.host + round(self._witness.longest_ns))
+        if self.stamping.confirmed(agrees=agrees) or stepped:
+            # Times before and after it cannot be compared: the next frame counts as a first one.
+            self._last, self._broken = None, True
         return agrees and latch.round_trip_ns < self._train.shortest_ns
 
     def damaged(self, host: HostNs, device: DeviceNs | None = None) -> None:
@@ -146,7 +146,7 @@ class CameraTrack:
             device: the camera's clock at its trigger, if known.
         """
         if device is not None and self.clock.known:
-            host = self._matcher.arrival_of(self.clock.to_host(device))
+            host = self._matcher.arrival_of(self.trigger_time(device))
         if len(self._damaged) >= _MOST_DAMAGED:
             del self._damaged[0]
             self.counters.unassigned += 1
@@ -159,6 +159,10 @@ class CameraTrack:
         """Enter the record of a damaged arrival, of which only the times are used."""
         self.damaged(record.host_time, record.device_time if record.value == 1 else None)
 
+    def trigger_time(self, device: DeviceNs) -> HostNs:
+        """When the exposure of a frame began on the common time line, by its device time."""
+        return HostNs(self.clock.to_host(device) - self.stamping.late_ns)
+
     def anchor(self, record: Record) -> HostNs | None:
         """Trigger time of a whole frame on the common time line, None if the clock cannot tell."""
         clock, first = self.clock, self._last is None
@@ -166,8 +170,9 @@ class CameraTrack:
             self.counters.unanchored += 1
             self._broken = self._broken or first  # the ids of later frames no longer count from the beginning
             return None
-        time = clock.to_host(record.device_time)
-        if time > record.host_time + self._train.widest_ns or record.host_time <= self._unsettled_until:
+        time, arrival = self.trigger_time(record.device_time), record.host_time
+        settled = arrival > self._unsettled_until and time <= arrival + self._train.widest_ns
+        if not settled or self.stamping.contradicts(time, arrival, 2 * clock.uncertainty_at(record.device_time)):
             self.refuse(record)
             return None
         return time

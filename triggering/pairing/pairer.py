@@ -7,7 +7,7 @@ been read again. The class is pure: records and times go in, decisions come out.
 """
 
 from bisect import bisect_left, insort
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from operator import attrgetter
 from typing import Final
 
@@ -49,6 +49,7 @@ class Pairer:
         exposes: whether the trigger can have exposed a camera at a time that is known so well, ns; None: at any time.
             Other frames are of commands that came too late, and are refused: they could be taken for those of the next
             pulse.
+        exposures_ns: exposure of each camera that may note the end of it as the time of a frame; 0 for the others.
 
     Raises:
         BadInputError: an argument makes no sense.
@@ -63,6 +64,7 @@ class Pairer:
         tolerance_ns: int | None = None,
         spread_ns: int = 0,
         exposes: Callable[[HostNs, float], bool] | None = None,
+        exposures_ns: Sequence[int] = (),
     ) -> None:
         tolerance = 1 if tolerance_ns is None else tolerance_ns
         if (
@@ -77,7 +79,7 @@ class Pairer:
             )
         self._least_hold_ns, self._nominal_ns, self._exposes = hold_ns, period_ns, exposes
         self._train = PulseTrain(period_ns, tolerance_ns, spread_ns)
-        self._tracks = [CameraTrack(self._train) for _ in range(cameras)]
+        self._tracks = [CameraTrack(self._train, exposure_ns) for exposure_ns in exposures_ns or [0] * cameras]
         self._held = HeldFrames(cameras)
         self._silence = Silence(self._tracks, self._held, self._train)
         self._fired = FiredPulses(self._train)
@@ -268,7 +270,7 @@ class Pairer:
         track = self._tracks[camera]
         if self._held.count:
             while (first := self._held.first(camera)) is not None:
-                if not track.believes(first, track.clock.to_host(first.device_time)):
+                if not track.believes(first, track.trigger_time(first.device_time)):
                     return False
                 self._release(camera)
         return track.believes(record, time)
@@ -276,7 +278,7 @@ class Pairer:
     def _release(self, camera: int) -> None:
         """Place the first frame of a camera that waits, and enter the damaged arrivals behind it."""
         track, record = self._tracks[camera], self._held.take(camera)
-        time = track.clock.to_host(record.device_time)
+        time = track.trigger_time(record.device_time)
         self._held.release(camera, record, self._place(camera, record, time))
         while (behind := self._held.first(camera)) is not None and behind.kind is RecordKind.DAMAGED:
             track.note_damage(self._held.take(camera))

@@ -34,7 +34,9 @@ from rig.tag import CameraTag, TripletTag
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
 
 _THINNEST = 4  # px; a smaller part of an image holds no spot
-_FITS_OF_OTHERS = 6  # places that are fitted in a region, but for the largest one of an image
+_FITS_OF_OTHERS = (
+    20  # places that are fitted in other regions than the largest one of an image: four markers, and what beats them
+)
 
 
 class Finder:

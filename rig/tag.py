@@ -11,7 +11,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from rig.clocks import DeviceNs, UtcNs
 from rig.frame import FrameStatus
-from rig.pixels import Pixels
+from rig.images.pixels import Pixels
 from rig.pulse import PulseNumber
 from rig.topics import TAG
 from rig.transport import wire

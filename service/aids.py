@@ -1,13 +1,13 @@
 """Pictures and figures of single cameras, from the triplets that the recorder leaves for people to look at."""
 
 from analysis.images.aids import Image, exposure, focus, sharp
-from rig.api.aids import BINS, CameraAids
+from rig.api.cameras.aids import BINS, CameraAids
 from rig.frame import FrameStatus
-from rig.picture import shown
-from rig.pixels import MONO8, Pixels
+from rig.images.picture import shown
+from rig.images.pixels import MONO8, Pixels
 from rig.settings.model import RigSettings
 from rig.transport.preview import PreviewImage
-from service.seam import CloseUp
+from service.seam.cameras import CloseUp
 
 
 def shown_as(rig: RigSettings) -> Pixels:

@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from rig.api.light import CameraLight, LightChange
+from rig.api.cameras.light import CameraLight, LightChange
 from rig.events import Event, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.light import camera_of, with_light, written

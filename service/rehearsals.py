@@ -20,9 +20,9 @@ from pydantic import ValidationError
 from rig.api.rehearsal import Rehearsal, Rehearsals, RehearsalVerdict
 from rig.api.statement import Level, Statement
 from rig.api.status import Finding, RehearsalProgress, RehearsalStage
-from rig.disk import replace_file
 from rig.events import Event
 from rig.events import Level as EventLevel
+from rig.host.disk import replace_file
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from rig.disk import replace_file
 from rig.errors import StorageError
+from rig.host.disk import replace_file
 from rig.phrase import Phrase
 from rig.settings.strict_toml import read_text
 

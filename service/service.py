@@ -1,4 +1,4 @@
-"""The service as the panel sees it (`service.seam.RigService`): turns calls into commands to the supervisor."""
+"""The service as the panel sees it (`service.seam.rig.RigService`): turns calls into commands to the supervisor."""
 
 import threading
 import time
@@ -13,10 +13,10 @@ from prometheus_client.metrics_core import Metric
 
 from recorder.catalogue.folder import Catalogue
 from rig import events
-from rig.api.aids import CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
-from rig.api.balls import CameraBalls
-from rig.api.light import CameraLight, LightChange
+from rig.api.cameras.aids import CameraAids
+from rig.api.cameras.balls import CameraBalls
+from rig.api.cameras.light import CameraLight, LightChange
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
@@ -30,8 +30,8 @@ from rig.errors import (
     UnknownCameraError,
     UnknownRecordingError,
 )
+from rig.images.picture import shown
 from rig.phrase import Phrase, phrase
-from rig.picture import shown
 from rig.pulse import RigPulse
 from rig.transport.preview import PreviewImage, PreviewSlot
 from service.aids import aids_of, close_up_of, shown_as
@@ -45,7 +45,7 @@ from service.recordings.archive import Archive, as_recording
 from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
 from service.rehearsals import Rehearser
-from service.seam import CloseUp, Preview
+from service.seam.cameras import CloseUp, Preview
 from service.status.measurements import measurements
 from service.status.statements import FORBIDDEN, rehearsing
 from service.supervision.commands import at_once

@@ -19,8 +19,8 @@ from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import tag_of
 from rig.clocks import NS_PER_US
-from rig.disk import free_bytes
 from rig.frame import FrameStatus
+from rig.host.disk import free_bytes
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.tag import TripletTag

@@ -10,7 +10,7 @@ from typing import Final
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.documentation import DESCRIPTION, serve_documentation
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard

@@ -19,7 +19,7 @@ from analysis.cameras.pose_change import FEWEST, Displacements
 from analysis.scene.camera_system import PlacedCamera
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Flags, Floats
-from rig.picture import Grey
+from rig.images.picture import Grey
 
 _LARGEST = 16  # px, radius of a ball
 _AROUND = 3  # px around a ball that are matched too

@@ -7,7 +7,7 @@ from typing import Protocol
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.frame import FrameStatus
-from rig.picture import Grey, measurable
+from rig.images.picture import Grey, measurable
 from rig.pulse import PulseNumber
 
 #: Images (rows, columns) by camera; valid until the next pulse is taken.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.candidates.median import median
 from analysis.scene.static_image import GreyImage, StaticImage
 from rig.arrays import Floats, Integers
-from rig.picture import Grey
+from rig.images.picture import Grey
 
 _SAMPLES = 8_000  # pixels of the grid
 _ROUNDS, _CLIP = 4, 3.0  # of the robust adjustment; sigmas

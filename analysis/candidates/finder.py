@@ -27,7 +27,7 @@ from recorder.reading.triplets import stored_triplets, triplets
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
-from rig.picture import Grey, measurable
+from rig.images.picture import Grey, measurable
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 

@@ -17,7 +17,7 @@ from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.clocks import NS_PER_S
 from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
-from rig.picture import shown
+from rig.images.picture import shown
 from rig.tag import CameraTag
 from rig.topics import SESSION_METADATA
 

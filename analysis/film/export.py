@@ -15,7 +15,7 @@ from analysis.film.video_file import FFV1, VideoFile, h264
 from analysis.film.whole import whole_file, whole_folder
 from analysis.film.words import caption, write_caption, write_lacking
 from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 
 #: Told how many pulses are done, and of how many.
 Progress = Callable[[int, int], None]

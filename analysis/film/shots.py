@@ -14,8 +14,8 @@ from rig.api.export import LOSSLESS, ExportOrder
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError
 from rig.frame import FrameStatus
-from rig.picture import exported, shown
-from rig.pixels import Stored
+from rig.images.picture import exported, shown
+from rig.images.pixels import Stored
 from rig.tag import TripletTag
 
 #: Pulses without a tag that are shown: an hour at 30 Hz. More come from a damaged number, not from lost pulses.

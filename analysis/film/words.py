@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.film.shots import Shot
 from rig.clocks import NS_PER_S
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 
 FONT: Final = cv2.FONT_HERSHEY_DUPLEX
 _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)

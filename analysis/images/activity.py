@@ -11,7 +11,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.errors import LogDamagedError, UnknownRecordingError
 from rig.frame import FrameStatus
-from rig.picture import measurable
+from rig.images.picture import measurable
 
 #: Number of pulses whose images are compared, in the whole log and once more in the stretch found there.
 _SAMPLES = 240

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets
 from rig.frame import FrameStatus
-from rig.picture import shown
+from rig.images.picture import shown
 from rig.tag import TripletTag
 
 Grey = NDArray[np.uint8]

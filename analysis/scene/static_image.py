@@ -22,7 +22,7 @@ from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.arrays import Floats
 from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
-from rig.picture import Grey, measurable
+from rig.images.picture import Grey, measurable
 
 GreyImage = NDArray[np.float32]
 

@@ -35,8 +35,8 @@ from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
 from rig.frame import FrameStatus
+from rig.images.picture import Grey, measurable
 from rig.phrase import phrase, plain
-from rig.picture import Grey, measurable
 from rig.tag import TripletTag
 
 #: A jumper is sought so often, in the candidates of so long a time, and followed once so many pulses show him.

@@ -11,7 +11,7 @@ import zmq
 from zmq.auth import load_certificate
 
 from rig.errors import BadInputError
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.tag import TripletTag
 from rig.topics import TRIPLET
 

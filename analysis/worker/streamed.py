@@ -13,7 +13,7 @@ from analysis.worker.following import Follower
 from rig.clocks import NS_PER_S
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
-from rig.picture import Grey
+from rig.images.picture import Grey
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 

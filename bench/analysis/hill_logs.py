@@ -13,7 +13,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, DeviceNs, UtcNs
 from rig.frame import FrameStatus
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse, PulseNumber
 from rig.tag import CameraTag, TripletTag
 from simrig.images.view import CameraView

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images.sensor import Sensor
 from simrig.images.view import CameraView

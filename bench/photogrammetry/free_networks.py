@@ -6,7 +6,7 @@ from photogrammetry.geometry.camera_model import INTERIOR, image_point
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.model import Camera, Datum, DatumType, Image, ImageObservations, Network, Point, Role
 from rig.arrays import Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 _SIGMA_PX = 0.2
 _OFF_M, _OFF_RAD = 0.02, 0.01

@@ -10,7 +10,7 @@ from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.model import Camera, Image, ImageFrame, ImageObservations, Network, Point, Role
 from photogrammetry.network.selection import only_points, rays
 from rig.arrays import Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 _SIGMA_PX, _SIGMA_SURVEY_M = 0.33, 0.012
 _SIZE = (640, 480)

@@ -13,7 +13,7 @@ from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.intersection.line_intersection import intersect_lines_in_one_step
 from photogrammetry.intersection.point_intersection import intersect_points
 from rig.arrays import Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 _POINTS = 100_000
 _LINES = 200

@@ -11,7 +11,7 @@ from isal.isal_zlib import crc32
 from numpy.typing import NDArray
 
 from recorder.live.unpacking import Unpack, unpacker
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.settings.model import CameraSettings, Region
 
 _SHAPE = (1216, 1936)

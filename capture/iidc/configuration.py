@@ -18,7 +18,7 @@ from capture.iidc.structures import (
 )
 from rig.clocks import NS_PER_US
 from rig.errors import CameraError
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from rig.settings.model import CameraSettings
 
 #: Time from the end of the exposure to the first packet (Marlin manual: 500 us +- 62.5 us).

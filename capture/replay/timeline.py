@@ -15,7 +15,7 @@ import numpy as np
 
 from rig.clocks import NS_PER_US, DeviceNs, HostNs, UtcNs
 from rig.frame import FrameStatus
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.tag import CameraTag
 
 #: A device clock that jumps by more than this plus the drift of a crystal was set anew: a new connection begins.

@@ -23,7 +23,7 @@ from photogrammetry.planning.description import Description, JumperEntry
 from photogrammetry.planning.sight import Obstacle, in_picture, in_sight
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 
 @dataclass(frozen=True, slots=True)

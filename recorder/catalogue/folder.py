@@ -34,7 +34,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.errors import BadInputError, LogDamagedError, StorageError, UnknownRecordingError
-from rig.picture import shown
+from rig.images.picture import shown
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 

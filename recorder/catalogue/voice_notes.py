@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from rig.disk import replace_file
 from rig.errors import BadInputError
+from rig.host.disk import replace_file
 
 _NAME: Final = re.compile(r"([1-9][0-9]{0,5})_pulse-([1-9][0-9]{0,15})\.webm")
 #: How a WebM file begins: the EBML head (RFC 8794, 11.2.1), which names its document type within the first bytes.

@@ -19,8 +19,8 @@ from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
 from rig.health import Health
+from rig.images.pixels import Stored
 from rig.jumper import JumperState
-from rig.pixels import Stored
 from rig.tag import CameraTag, TripletTag
 from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
 from rig.transport import wire

@@ -15,8 +15,8 @@ from recorder.live.unpacking import unpacker
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
+from rig.images.pixels import Stored
 from rig.phrase import Phrase, phrase, plain
-from rig.pixels import Stored
 from rig.settings.model import RigSettings
 from rig.tag import CameraTag
 from rig.transport.recorder_reports import CameraChanged, CameraNews

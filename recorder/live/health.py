@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from rig.action import ActionCounts
 from rig.clocks import NS_PER_S, NS_PER_US
-from rig.disk import free_bytes
 from rig.health import CameraHealth, DiskHealth, Health, Latency
+from rig.host.disk import free_bytes
 from rig.settings.model import RigSettings
 from rig.transport.ring import CameraRing
 from triggering.pairing.pairer import ClosedPulse
@@ -47,7 +47,7 @@ class FreeRoom:
     """Asks once a second, in a thread of its own, how much room a disk has: the answer may take long.
 
     Attributes:
-        free_bytes: as `rig.disk.free_bytes`, about a second ago; None until the first answer.
+        free_bytes: as `rig.host.disk.free_bytes`, about a second ago; None until the first answer.
     """
 
     def __init__(self, directory: Path) -> None:

@@ -22,13 +22,13 @@ from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
 from rig.errors import FileVanishedError, StorageError
 from rig.events import Event
 from rig.health import WritingHealth
+from rig.host.utc_clock import utc_fields
 from rig.phrase import phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
 from rig.transport.recorder_commands import GoesOn, StartRecording, TellResult
 from rig.transport.recorder_reports import LogPart
-from rig.utc_clock import utc_fields
 from triggering.ledger.account import Ledger
 from triggering.pairing.pairer import ClosedPulse
 

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.settings.model import CameraSettings
 
 #: Called with the bytes of a frame as the camera sent it, and its place in the triplet, (rows, columns).

@@ -25,7 +25,7 @@ from mcap.records import McapRecord
 from recorder.log.crc import combined_crc
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
-from rig.pixels import MONO8, Pixels
+from rig.images.pixels import MONO8, Pixels
 from rig.pulse import PulseNumber
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -7,7 +7,7 @@ from recorder.log.mcap_layout import SlotLayout
 from rig.clocks import DeviceNs, UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
-from rig.pixels import Pixels
+from rig.images.pixels import Pixels
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recorder.log.mcap_layout import PAGE, SlotLayout, round_up
-from rig.pixels import MONO8, Pixels, Stored
+from rig.images.pixels import MONO8, Pixels, Stored
 
 _HUGE_PAGE = 2 * 1024 * 1024
 

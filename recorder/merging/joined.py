@@ -12,7 +12,7 @@ from recorder.merging.source import Part, Pulse
 from rig.clocks import NS_PER_US, UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
-from rig.pixels import Pixels, Stored
+from rig.images.pixels import Pixels, Stored
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 from triggering.alignment import Alignment

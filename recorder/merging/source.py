@@ -19,7 +19,7 @@ from recorder.recovering.scan import picture_of
 from rig.clocks import NS_PER_US, UtcNs
 from rig.errors import BadInputError, LogDamagedError
 from rig.frame import FrameStatus
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.tag import TripletTag
 from rig.topics import NOTES, TAG
 from triggering.alignment import Train

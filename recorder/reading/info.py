@@ -11,10 +11,10 @@ from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import tag_of
+from rig.host.utc_clock import UtcState
 from rig.tag import TripletTag
 from rig.topics import MERGE_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
 from rig.transport import wire
-from rig.utc_clock import UtcState
 from triggering.ledger.account import Ledger, runs_from_text
 
 

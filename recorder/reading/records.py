@@ -16,8 +16,8 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from recorder.log.mcap_layout import CHUNK_MAX, MAGIC, PADDING_OPCODE, PAGE, RECORD, round_up
-from rig.disk import set_direct
 from rig.errors import BadInputError
+from rig.host.disk import set_direct
 
 #: The window reads so much more than it was asked for, so that it holds the head of the next record too.
 _READ_ON = 4 * PAGE

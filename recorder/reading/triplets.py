@@ -15,7 +15,7 @@ from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from rig.clocks import UtcNs
 from rig.events import Event
-from rig.pixels import Pixels, Stored
+from rig.images.pixels import Pixels, Stored
 from rig.tag import TripletTag
 from rig.topics import CAMERA_TOPIC, TAG, TRIPLET
 

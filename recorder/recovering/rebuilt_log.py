@@ -10,7 +10,7 @@ from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Event
-from rig.pixels import MONO8, Pixels, Stored
+from rig.images.pixels import MONO8, Pixels, Stored
 from rig.tag import TripletTag
 
 _SLOTS: Final = 4

@@ -26,8 +26,8 @@ from recorder.writing.log_writer import LogDescription
 from rig.errors import BadInputError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
+from rig.images.pixels import Stored
 from rig.phrase import plain
-from rig.pixels import Stored
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,

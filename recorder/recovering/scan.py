@@ -22,7 +22,7 @@ from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from recorder.recovering.salvage import pulse_of, tags_in
 from recorder.recovering.sightings import Constants, Rank, Sighting
 from rig.frame import FrameStatus
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.tag import TripletTag
 from rig.topics import CAMERA_TOPIC, NOTES, RESULTS, TAG, TRIPLET
 

@@ -14,7 +14,7 @@ from typing import Self
 
 from rig.clocks import UtcNs
 from rig.frame import FrameStatus
-from rig.pixels import Pixels
+from rig.images.pixels import Pixels
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 

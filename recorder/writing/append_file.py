@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from recorder.log.mcap_layout import PAGE
-from rig.disk import ask_free_bytes, set_direct
 from rig.errors import BadInputError, FileVanishedError, StorageError
+from rig.host.disk import ask_free_bytes, set_direct
 from rig.phrase import phrase
 
 _REMEDIES = {

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
-from rig.pixels import FORMATS, PixelFormat, PixelFormatName, Pixels
+from rig.images.pixels import FORMATS, PixelFormat, PixelFormatName, Pixels
 from rig.settings.strict_toml import StrictModel
 from rig.settings.trigger import (
     ActionTrigger,

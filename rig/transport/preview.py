@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import RigPulse
 
 _MAGIC: Final = 0x3156_4552_5056_5653  # "SVVPREV1" read as a little-endian word

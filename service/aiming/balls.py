@@ -4,7 +4,7 @@ import threading
 from pathlib import Path
 from typing import Final
 
-from rig.api.balls import CameraBalls
+from rig.api.cameras.balls import CameraBalls
 from rig.settings.light import camera_of
 from rig.settings.model import RigSettings
 

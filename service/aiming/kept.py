@@ -12,11 +12,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from analysis.cameras.oriented_scene import OrientedScene
-from rig.api.balls import BallPlace
+from rig.api.cameras.balls import BallPlace
 from rig.api.fields import Model
 from rig.clocks import NS_PER_S, UtcNs
-from rig.disk import replace_file
 from rig.errors import StorageError
+from rig.host.disk import replace_file
 from rig.phrase import phrase
 from rig.settings.model import Region, RigSettings
 from service.aiming.balls import ORIENTATION

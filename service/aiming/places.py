@@ -9,7 +9,7 @@ import numpy as np
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import camera_coordinates, distort, ideal_point
 from photogrammetry.network.model import Camera
-from rig.api.balls import BallPlace
+from rig.api.cameras.balls import BallPlace
 from rig.arrays import Floats
 
 #: Part of half the picture's diagonal up to which the distortion of a lens is believed. It is known in the picture

@@ -17,7 +17,7 @@ from analysis.scene.survey import Survey, read_survey
 from photogrammetry.network.model import Camera, Image, Point
 from photogrammetry.planning.description import read_description
 from photogrammetry.planning.plan import plan_from
-from rig.api.balls import BallPlace, BallSource, CameraBalls
+from rig.api.cameras.balls import BallPlace, BallSource, CameraBalls
 from rig.api.statement import Level, Statement
 from rig.arrays import Floats
 from rig.errors import BadInputError

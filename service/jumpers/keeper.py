@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from rig.api.fields import Model
 from rig.api.start_list import StartList
 from rig.api.statement import Statement
-from rig.disk import replace_file
 from rig.events import Event, Level
+from rig.host.disk import replace_file
 from rig.phrase import phrase, plain
 
 NAME: Final = ".svev-start-list.json"

@@ -15,7 +15,7 @@ from recorder.reading.log_reader import UNREADABLE, LogReader
 from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, CameraError
-from rig.pixels import FORMATS, Stored
+from rig.images.pixels import FORMATS, Stored
 from rig.settings.model import CameraSettings, RigSettings
 from rig.tag import CameraTag, TripletTag
 from rig.topics import TAG

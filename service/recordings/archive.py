@@ -36,7 +36,7 @@ from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
 from service.recordings.notes import check_voices, noted, notes_of, spoken, voice_file
-from service.seam import Download, FoundRecordings
+from service.seam.archive import Download, FoundRecordings
 from triggering.ledger.account import pauses_in_words
 
 _STATES = {
@@ -60,7 +60,7 @@ _LONGEST_SHOWN: Final = 4000
 
 
 class Archive(ABC):
-    """The reading part of `service.seam.RigService`: all recordings of the folder, with the one in progress.
+    """The reading part of `service.seam.rig.RigService`: all recordings of the folder, with the one in progress.
 
     Attributes:
         exports: what is being exported, and what has been.

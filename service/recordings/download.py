@@ -13,7 +13,7 @@ from recorder.catalogue.entry import Entry
 from recorder.log.session_changes import session_changes
 from recorder.reading.corrected_log import corrected_log
 from rig.errors import BadInputError
-from service.seam import Download
+from service.seam.archive import Download
 
 #: What a part of a file's name may hold on every system; letters are those of any language.
 _NOT_IN_NAMES: Final = re.compile(r"[^\w.]+")

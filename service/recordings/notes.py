@@ -7,7 +7,7 @@ from typing import Final
 from recorder.catalogue.voice_notes import StoredVoice
 from rig.api.looking import VOICES_MAX, Note, VoiceNote
 from rig.errors import StateForbidsError, UnknownRecordingError
-from service.seam import Download
+from service.seam.archive import Download
 
 #: How the names of fields with notes begin.
 NOTE_FIELD: Final = "note."

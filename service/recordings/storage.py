@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from recorder.catalogue.trash import trash_contents
-from rig.disk import free_bytes
 from rig.errors import BadInputError, StorageError
+from rig.host.disk import free_bytes
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 

@@ -7,9 +7,9 @@ from typing import Final
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from rig.api.status import DiskStatus, Status
-from rig.disk import free_bytes
 from rig.errors import StorageError
 from rig.events import Event, Level
+from rig.host.disk import free_bytes
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from service.recordings.storage import bytes_per_s, room_for, usable_bytes

@@ -13,10 +13,10 @@ from typing import Final
 from rig.api.jump import LastJump
 from rig.api.statement import Statement
 from rig.api.status import State, Status
-from rig.disk import free_bytes
 from rig.errors import ProcessDiedError, StateForbidsError, SvevError
 from rig.events import Event, Level
 from rig.health import Health
+from rig.host.disk import free_bytes
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.transport.analysis_messages import JumpMeasured

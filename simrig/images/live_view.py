@@ -7,7 +7,7 @@ lens; then the light of the moment, and the sensor's noise.
 import cv2
 import numpy as np
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import exposure
 from simrig.images.scene.background import paint

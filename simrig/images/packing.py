@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import FORMATS, Stored
+from rig.images.pixels import FORMATS, Stored
 
 #: What the filters of a sensor let through, of blue, green and red, 1/256; a grey hill is not grey behind them.
 _THROUGH: Final = {"B": 205, "G": 256, "R": 179}

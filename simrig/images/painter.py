@@ -8,7 +8,7 @@ from itertools import cycle
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import FORMATS, Stored
+from rig.images.pixels import FORMATS, Stored
 from rig.pulse import HillPulse
 from simrig.images import stamp
 from simrig.images.packing import Packing

@@ -6,7 +6,7 @@ import zlib
 import cv2
 import numpy as np
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images.scene.drawing import Image
 from simrig.world.scenario import ImageEffects

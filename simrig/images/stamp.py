@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 
 STAMP_BYTES = 16

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import exposure
 from simrig.images.scene.background import paint

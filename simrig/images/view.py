@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rig.pixels import Stored
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import stamp
 from simrig.images.live_view import LiveView

@@ -14,9 +14,9 @@ from pydantic import Field, model_validator
 
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.images.viewing import look_at
 from rig.pulse import HillPulse
 from rig.settings.strict_toml import read_toml, validate
-from rig.viewing import look_at
 from simrig.world.conditions.effects import (
     FiniteModel,
     LensErrors,

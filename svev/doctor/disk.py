@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.disk import free_bytes, set_direct
+from rig.host.disk import free_bytes, set_direct
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from service.recordings.storage import bytes_per_s, room_for

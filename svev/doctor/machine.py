@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+from rig.host.utc_clock import utc_state
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.utc_clock import utc_state
 from service.processes.memory import available_bytes, memory_needed
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 

@@ -13,8 +13,8 @@ from typing import Final
 from recorder.catalogue.folder import Catalogue
 from recorder.publishing.keys import check_publication
 from rig.api.status import ArmOrder
-from rig.disk import free_bytes
 from rig.events import Event, Level
+from rig.host.disk import free_bytes
 from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings

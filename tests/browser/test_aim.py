@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
-from rig.api.balls import BallPlace, BallSource, CameraBalls
+from rig.api.cameras.balls import BallPlace, BallSource, CameraBalls
 from rig.api.recordings import RecordingOrder
 from rig.api.statement import Statement
 from rig.frame import FrameStatus

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import aids, balls, jump, light, recordings, rehearsal, start_list, statement, status
+from rig.api import jump, recordings, rehearsal, start_list, statement, status
+from rig.api.cameras import aids, balls, light
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "webpanel" / "page"

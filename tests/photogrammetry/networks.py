@@ -19,7 +19,7 @@ from photogrammetry.network.model import (
     Role,
 )
 from rig.arrays import Flags, Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 from tests.photogrammetry.scenes import flight_points, frame_points, hill_cameras, lab_cameras, observe
 
 

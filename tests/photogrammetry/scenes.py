@@ -6,7 +6,7 @@ import numpy as np
 
 from photogrammetry.geometry.ideal_camera import IdealCamera
 from rig.arrays import Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 SIGMA_PX = 0.33
 HALF_SKI_M = 2.63 / 2

@@ -26,7 +26,7 @@ from photogrammetry.network.model import (
     Role,
 )
 from rig.arrays import Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 SIZE = (640, 480)
 SIGMA_PX = 0.33

@@ -14,7 +14,7 @@ import zmq
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from rig.frame import FrameStatus
-from rig.utc_clock import UtcState
+from rig.host.utc_clock import UtcState
 from svev.cli import main
 from tests.recorder.logs import ALL_OK, DESCRIPTION, LOST, OK, write_log
 from tests.support.loopback import Loopback

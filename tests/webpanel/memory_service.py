@@ -16,11 +16,11 @@ from analysis.images.aids import exposure, focus, sharp
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
-from rig.api.aids import BINS, CameraAids
 from rig.api.automatic import AutomaticChange, Mark, Marked
-from rig.api.balls import CameraBalls
+from rig.api.cameras.aids import BINS, CameraAids
+from rig.api.cameras.balls import CameraBalls
+from rig.api.cameras.light import CameraLight, LightChange
 from rig.api.jump import LastJump
-from rig.api.light import CameraLight, LightChange
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals
 from rig.api.statement import Level, Statement
@@ -53,7 +53,7 @@ from rig.pulse import RigPulse
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
-from service.seam import CloseUp, Preview
+from service.seam.cameras import CloseUp, Preview
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
 from svev.doctor.finding import Topic, passed, warning
@@ -69,7 +69,7 @@ MADE = MadePulses(made=1203, skipped=2, late_median_us=8.0, late_p99_us=31.0, la
 
 
 class MemoryService(Archive):
-    """See `service.seam.RigService`.
+    """See `service.seam.rig.RigService`.
 
     Attributes:
         catalogue: the recordings, real logs in a real folder.

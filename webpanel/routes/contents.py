@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rig.api.looking import Moment, NewNote, Note, VoiceNote
 from rig.api.recordings import Pulses, RecordingState
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, RecordingId, Responses, jpeg_answer, refusals, strict_router
 from webpanel.routes.events import Changes

@@ -11,7 +11,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from rig.api.status import Status
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.door.streams import Streams
 from webpanel.routes.common import refusals, strict_router
 

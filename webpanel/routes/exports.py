@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Path
 from fastapi.responses import FileResponse
 
 from rig.api.export import ExportJob, ExportOrder
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.door.streams import Streams
 from webpanel.routes.common import CHANGING, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.files import attachment

@@ -18,7 +18,8 @@ from fastapi.responses import FileResponse, PlainTextResponse, StreamingResponse
 from starlette.datastructures import Headers
 from starlette.types import Receive, Scope, Send
 
-from service.seam import Download, RigService
+from service.seam.archive import Download
+from service.seam.rig import RigService
 from webpanel.door.streams import Streams
 from webpanel.problems import problem
 from webpanel.routes.common import ID_PATTERN, RecordingId, Responses, refusals, strict_router

@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 
 from rig.api.fields import Model
 from rig.phrase import phrase
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.door.logins import COOKIE, SESSION_S, Caller, Door
 from webpanel.door.roles import Role
 from webpanel.routes.common import NoFields, refusals, strict_router

@@ -14,7 +14,7 @@ from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.api.fields import Model
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.routes.common import Responses, StrictRoute
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE", "PUT", "OPTIONS"})

@@ -17,12 +17,13 @@ from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
 
-from rig.api.aids import CameraAids
-from rig.api.balls import CameraBalls
-from rig.api.light import CameraLight, LightChange
+from rig.api.cameras.aids import CameraAids
+from rig.api.cameras.balls import CameraBalls
+from rig.api.cameras.light import CameraLight, LightChange
 from rig.errors import SvevError
 from rig.pulse import RigPulse
-from service.seam import CloseUp, RigService
+from service.seam.cameras import CloseUp
+from service.seam.rig import RigService
 from webpanel.door.streams import OpenStreams, Streams
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, Responses, jpeg_answer, refusals, strict_router

@@ -13,7 +13,7 @@ from rig.api.fields import LONGEST_LINE, LONGEST_TAG
 from rig.api.recordings import Recording, RecordingOrder, RecordingQuery, SessionChange, Sorting, StopOrder
 from rig.api.statement import Level
 from rig.api.status import Status
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.routes.common import CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.events import Changes
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, RigView, Status
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 
 

@@ -8,7 +8,8 @@ from starlette.concurrency import run_in_threadpool
 
 from rig.api.recordings import NextJumper
 from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
-from service.seam import Jumpers, RigService
+from service.seam.rig import RigService
+from service.seam.start_list import Jumpers
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 

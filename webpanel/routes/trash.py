@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from rig.api.recordings import Trash
-from service.seam import RigService
+from service.seam.rig import RigService
 from webpanel.routes.common import CHANGING, RecordingId, refusals, strict_router
 from webpanel.routes.events import Changes
 

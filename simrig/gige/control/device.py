@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 
 from rig.clocks import NS_PER_S, HostNs, host_now
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from simrig.gige.control.control_channel import ControlChannel, Peer
 from simrig.gige.imaging.camera_clock import CameraClock
 from simrig.gige.imaging.frame_store import FrameStore

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from simrig.gige.protocol.gvcp import Status
 
 IP_UDP_BYTES = 28  #: headers below GVSP that the packet size includes
@@ -45,7 +45,7 @@ class FrameFormat:
         offset_y: first row on the sensor.
         packet_size: bytes on the network layer, IP and UDP headers included.
         extended: 64-bit block ids and 32-bit packet ids.
-        pixel_format: how its pixels are sent, by the name in `rig.pixels.FORMATS`.
+        pixel_format: how its pixels are sent, by the name in `rig.images.pixels.FORMATS`.
     """
 
     width: int

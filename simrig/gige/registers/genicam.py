@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from xml.etree import ElementTree as ET
 
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from simrig.gige.registers.makers import Dialect
 from simrig.gige.registers.register_map import WORD, Kind, Register
 from simrig.gige.registers.register_table import (

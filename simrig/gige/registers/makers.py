@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from simrig.gige.registers.register_map import Kind, Register
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from itertools import count
 
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from simrig.gige.registers.register_map import Kind, Register
 
 VENDOR = "Svev"

@@ -14,7 +14,7 @@ from photogrammetry.geometry.ideal_camera import unit_rays
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.model import Camera
 from rig.arrays import Floats
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 SIZE = (640, 480)
 SIGMA = 0.012

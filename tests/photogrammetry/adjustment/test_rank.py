@@ -13,7 +13,7 @@ from photogrammetry.adjustment.solution.rank import check_rank
 from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.diagnosis import Defect, DefectKind, NotSolvableError
 from photogrammetry.network.model import Datum, Image, Network, Point, Role
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 from tests.photogrammetry.dense import analytic_jacobian
 from tests.photogrammetry.synthetic import FREE, camera, hill, lab_frame, observed, rods
 

@@ -12,7 +12,7 @@ from photogrammetry.intersection.line_intersection import LineState, SpaceLines,
 from photogrammetry.intersection.line_start import start_lines
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 from tests.photogrammetry.scenes import SIGMA_PX, Ski, hill_cameras, ski
 from tests.photogrammetry.two_steps import intersect_lines
 

@@ -12,7 +12,7 @@ from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.intersection.point_intersection import CHUNK, PointState, intersect_points
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 from tests.photogrammetry.scenes import SIGMA_PX, flight_points, hill_cameras, observe
 
 seeds = st.integers(0, 2**32 - 1)

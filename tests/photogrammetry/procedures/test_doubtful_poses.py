@@ -13,7 +13,7 @@ from photogrammetry.network.file_writer import write_network
 from photogrammetry.network.model import Camera, Image, ImageFrame, ImageObservations, Network, Point, Role
 from photogrammetry.procedures.orientation import orient
 from photogrammetry.procedures.stages import snoop_network
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 from svev.cli import main
 from tests.photogrammetry.synthetic import hill
 

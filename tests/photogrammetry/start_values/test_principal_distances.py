@@ -10,7 +10,7 @@ from photogrammetry.start_values.principal_distances import plane_directions, pr
 from photogrammetry.start_values.projective import plane_homography
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 
 seeds = st.integers(0, 2**32 - 1)
 SQUARE = np.array([[-0.25, -0.25], [0.25, -0.25], [0.25, 0.25], [-0.25, 0.25]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from recorder.live.unpacking import unpacker
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from rig.settings.model import CameraSettings, Region
 from simrig.images.packing import Packing
 

@@ -21,10 +21,10 @@ from rig.clocks import DeviceNs, UtcNs
 from rig.errors import BadInputError, LogDamagedError, StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
+from rig.host.utc_clock import UtcState
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 from rig.topics import RECORDING_METADATA
-from rig.utc_clock import UtcState
 from svev.cli import main
 from tests.recorder.logs import ABSENT, LOST, OK, PERIOD_NS, SESSION, START, acquire
 from tests.support.waiting import wait_until

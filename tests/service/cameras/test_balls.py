@@ -13,7 +13,7 @@ from analysis.cameras.oriented_scene import OrientedScene, survey_id
 from analysis.scene.orientation import Ball
 from analysis.scene.survey import read_survey
 from photogrammetry.network.model import Role
-from rig.api.balls import BallSource, CameraBalls
+from rig.api.cameras.balls import BallSource, CameraBalls
 from rig.clocks import UtcNs
 from rig.errors import StorageError, UnknownCameraError
 from rig.settings.file import CONFIG, load_rig

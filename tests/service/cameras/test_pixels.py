@@ -20,7 +20,7 @@ from recorder.checking.verify import verify
 from recorder.reading.triplets import triplets
 from recorder.recovering.recover import recover
 from rig.api.export import ExportOrder, Kind
-from rig.pixels import FORMATS
+from rig.images.pixels import FORMATS
 from rig.settings.file import load_rig
 from simrig.images import stamp
 from tests.capture.rigs import write_rig

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from recorder.catalogue.folder import Catalogue
-from rig.disk import ask_free_bytes
 from rig.errors import StorageError
 from rig.events import Event
+from rig.host.disk import ask_free_bytes
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from service.recordings.storage import bytes_per_s, check_room_for

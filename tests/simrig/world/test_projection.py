@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rig.viewing import look_at
+from rig.images.viewing import look_at
 from simrig.world.projection import Projection
 
 COORDINATES = st.floats(-80, 80)

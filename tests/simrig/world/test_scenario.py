@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rig.errors import BadInputError
+from rig.images.viewing import look_at
 from rig.settings.file import CONFIG
-from rig.viewing import look_at
 from simrig.world.faults import FaultKind
 from simrig.world.scenario import Scenario, SceneCamera, load_scenario
 

@@ -1,6 +1,6 @@
 """A process that writes preview images thousands of times a second, until its standard input ends.
 
-python -m tests.rig.hammering_process FD
+python -m tests.rig.transport.hammering_process FD
 
 Image number n is of one grey value, n % 251, its time is n, and its statuses go round with n. Between two images it
 pauses for none to a few tenths of a millisecond: a reader that needs longer than that for a copy finds no whole one.

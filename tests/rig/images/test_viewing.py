@@ -5,8 +5,8 @@ import pytest
 
 from photogrammetry.planning.description import Description
 from photogrammetry.planning.plan import plan_from
+from rig.images.viewing import look_at
 from rig.settings.strict_toml import validate
-from rig.viewing import look_at
 from simrig.world.scenario import SceneCamera
 
 X0, TARGET = (-21.7, -30.9, 8.5), (8.1, 0.0, -2.9)

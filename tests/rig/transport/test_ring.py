@@ -73,7 +73,7 @@ def test_another_process_sees_pixels_and_records() -> None:
     ring = CameraRing.create("K1", 640, 4)
     program = f"""
 from rig.transport.ring import CameraRing
-from tests.rig.test_ring import _record
+from tests.rig.transport.test_ring import _record
 ring = CameraRing({ring.fd})
 slot = ring.take_slot()
 ring.frame(slot)[:] = 7

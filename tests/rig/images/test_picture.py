@@ -7,8 +7,8 @@ import pytest
 
 from rig.clocks import HostNs
 from rig.frame import FrameStatus
-from rig.picture import exported, measurable, shown
-from rig.pixels import MONO8, Pixels, Stored
+from rig.images.picture import exported, measurable, shown
+from rig.images.pixels import MONO8, Pixels, Stored
 from rig.pulse import RigPulse
 from rig.transport.preview import PreviewSlot
 

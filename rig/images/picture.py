@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.pixels import Pixels, Stored
+from rig.images.pixels import Pixels, Stored
 
 #: Grey values in levels of eight bits, (rows, columns): uint8, or float32 where a level is divided.
 Grey: TypeAlias = NDArray[np.uint8] | NDArray[np.float32]

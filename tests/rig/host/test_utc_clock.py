@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from rig.utc_clock import UtcState, utc_fields, utc_state
+from rig.host.utc_clock import UtcState, utc_fields, utc_state
 
 STATE = UtcState(True, "chrony", -12.5, 20.0, 812.0)
 

@@ -12,10 +12,10 @@ import pytest
 from rig.errors import ProcessDiedError
 from rig.transport.message import Quit
 from rig.transport.process_table import Child, ProcessSpec, ProcessTable
-from tests.rig.echo_process import EchoConfig
+from tests.rig.transport.echo_process import EchoConfig
 from tests.support.waiting import wait_until
 
-ECHO = "tests.rig.echo_process"
+ECHO = "tests.rig.transport.echo_process"
 
 
 def _spec(name: str, *, value: int = 0, deaf: bool = False) -> ProcessSpec:
@@ -52,7 +52,7 @@ def test_a_child_that_does_not_stop_is_killed_at_the_deadline(monkeypatch: pytes
 PARENT = f"""
 import os, signal, sys
 from rig.transport.process_table import ProcessSpec, ProcessTable
-from tests.rig.echo_process import EchoConfig
+from tests.rig.transport.echo_process import EchoConfig
 table = ProcessTable()
 environment = dict(variable.split("=") for variable in sys.argv[1:])
 spec = ProcessSpec("echo", {ECHO!r}, EchoConfig(value=1), reports=EchoConfig, environment=environment)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.disk import free_bytes
+from rig.host.disk import free_bytes
 
 
 def test_room_is_what_df_says_is_available(tmp_path: Path) -> None:

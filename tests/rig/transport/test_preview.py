@@ -17,9 +17,9 @@ from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.pulse import RigPulse
 from rig.transport.preview import MAX_PER_S, PreviewSlot
-from tests.rig.hammering_process import KINDS
+from tests.rig.transport.hammering_process import KINDS
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 OK, LOST = FrameStatus.OK, FrameStatus.LOST
 SHAPE = (480, 1920)
 IMAGES = 40
@@ -34,7 +34,7 @@ def slot() -> Iterator[PreviewSlot]:
 
 @contextmanager
 def _writer(slot: PreviewSlot) -> Iterator["subprocess.Popen[str]"]:
-    command = [sys.executable, "-m", "tests.rig.hammering_process", str(slot.fd)]
+    command = [sys.executable, "-m", "tests.rig.transport.hammering_process", str(slot.fd)]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY, pass_fds=(slot.fd,)
     ) as process:

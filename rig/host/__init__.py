@@ -1,0 +1,1 @@
+"""What this computer has: its disk, and how well it knows UTC."""

@@ -1,0 +1,1 @@
+"""Pictures: what their pixels are, how they are looked at, and where a camera looks."""

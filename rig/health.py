@@ -139,6 +139,10 @@ class PulsesMade(msgspec.Struct, frozen=True):
     late_p99_us: Annotated[float | None, Meta(description="likewise; 1 of 100 was later")]
     late_max_us: Annotated[float | None, Meta(description="the latest of all")]
     realtime: Annotated[bool, Meta(description="whether the thread that makes them has a real-time priority")]
+    gate_open: Annotated[
+        bool | None,
+        Meta(description="whether the gate let the last pulse pass that was due; null: no gate, or no pulse"),
+    ] = None
 
 
 class ToldPulses(msgspec.Struct, frozen=True):

@@ -46,8 +46,9 @@ from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
 from service.rehearsals import Rehearser
 from service.seam.cameras import CloseUp, Preview
+from service.status.forbidden import FORBIDDEN
 from service.status.measurements import measurements
-from service.status.statements import FORBIDDEN, rehearsing
+from service.status.statements import rehearsing
 from service.supervision.commands import at_once
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains

@@ -77,6 +77,10 @@ class MadePulses(Model):
     late_p99_us: float | None = Field(description="likewise; 1 of 100 was later")
     late_max_us: float | None = Field(description="the latest of all")
     realtime: bool = Field(description="whether the thread that makes them has a real-time priority")
+    gate_open: bool | None = Field(
+        None,
+        description="whether the gate let the last pulse pass that was due; null: no gate, or no pulse was due yet",
+    )
 
 
 class PulseStatus(Model):

@@ -40,6 +40,11 @@ class TriggerSettings(StrictModel):
         """Nominal time between two pulses, ns."""
         return round(1e9 / self.rate_hz)
 
+    @property
+    def pauses(self) -> bool:
+        """Whether pulses may stop at any time and nothing is wrong."""
+        return self.gated
+
 
 class ExternalTrigger(TriggerSettings):
     """A pulse generator, whose cable leads to all cameras: the edge of a pulse exposes all at the same instant."""
@@ -99,6 +104,13 @@ class ActionTrigger(CommandedTrigger):
         return self
 
 
+class GateSettings(StrictModel):
+    """An input of the same chip from outside, e.g. of a start gate: pulses are made only while it is active."""
+
+    line: GpioLine = Field(description="line of the gate: its number on the chip, or its name (gpioinfo)")
+    active_low: bool = Field(False, description="pulses are made while the line is low")
+
+
 class GpioTrigger(TriggerSettings):
     """A line of this computer: its cable leads to all cameras, and a process of svev makes the pulses."""
 
@@ -109,11 +121,28 @@ class GpioTrigger(TriggerSettings):
     line: GpioLine = Field(description="line of the pulses: its number on the chip, or its name (gpioinfo)")
     active_low: bool = Field(False, description="the line is low during a pulse")
     pulse_ms: float = Field(1.0, ge=0.05, le=100, description="length of a pulse; at most half of the period")
+    gate: GateSettings | None = Field(None, description="pulses are made only while another line is active")
+
+    @property
+    def lines(self) -> tuple[int | str, ...]:
+        """The lines of the chip that are needed, as they are named."""
+        return (self.line,) if self.gate is None else (self.line, self.gate.line)
+
+    @property
+    def pauses(self) -> bool:
+        """See `TriggerSettings.pauses`; the gate closes when somebody outside likes."""
+        return self.gated or self.gate is not None
 
     @property
     def width_ns(self) -> int:
         """Length of a pulse, ns."""
         return round(self.pulse_ms * 1e6)
+
+    @model_validator(mode="after")
+    def _gate_is_another_line(self) -> "GpioTrigger":
+        if self.gate is not None and self.gate.line == self.line:
+            raise ValueError(f"trigger.gate.line = {self.line!r} is the line of the pulses: name another one")
+        return self
 
     @model_validator(mode="after")
     def _pulses_end(self) -> "GpioTrigger":

@@ -46,8 +46,8 @@ from service.recordings.interruption import (
 )
 from service.recordings.storage import check_room_for, new_log_path
 from service.recordings.truth import TruthWriter
+from service.status.forbidden import FORBIDDEN
 from service.status.statements import (
-    FORBIDDEN,
     recording_continued,
     recording_ended,
     recording_forgotten,

@@ -92,7 +92,11 @@ def picture(rig: RigSettings, facts: Facts) -> Status:
     arriving = facts.heard is not None and (pulses.arriving or (facts.warm and not facts.health))
     rate = pulses.rate_hz if arriving else None
     if state is not State.FAULT:
-        statement = about_state(state, rig.cameras, states, arriving, rate, facts.overloaded, still=facts.still)
+        made = None if facts.health is None else facts.health.made
+        closed = made is not None and made.gate_open is False
+        statement = about_state(
+            state, rig.cameras, states, arriving, rate, facts.overloaded, still=facts.still, gate_closed=closed
+        )
         if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
             statement = facts.notice
         if statement.level is Level.GOOD and (wrong := _wrong(rig, facts)) is not None:

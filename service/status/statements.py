@@ -85,6 +85,7 @@ def about_state(
     overloaded: Sequence[int],
     *,
     still: bool = False,
+    gate_closed: bool = False,
 ) -> Statement:
     """The state of the rig in words; a fault is stated by `no_camera` or `failed`.
 
@@ -96,6 +97,7 @@ def about_state(
         rate_hz: pulses per second, None while unknown.
         overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
         still: pulses are stopped, and come on request only.
+        gate_closed: the gate outside lets no pulses through.
     """
     match state:
         case State.IDLE:
@@ -108,16 +110,17 @@ def about_state(
         case State.DISARMING:
             return Statement(code="state_disarming", text="disconnecting the cameras")
         case State.RECORDING:
-            return _working("state_recording", "recording", cameras, states, overloaded)
-        case _ if still or not arriving:
-            return (
-                _still()
-                if still
-                else _working("state_waiting", "armed, waiting for trigger pulses", cameras, states, overloaded)
-            )
+            code, text, rate = "state_recording", "recording", None
+        case _ if still:
+            return _still()
+        case _ if gate_closed:
+            code, text, rate = "state_gate_closed", "armed; pulses come when the gate opens", None
+        case _ if not arriving:
+            code, text, rate = "state_waiting", "armed, waiting for trigger pulses", None
         case _:
             pulses = "pulses arrive" if rate_hz is None else f"{rate_hz:.1f} pulses per second"
-            return _working("state_armed", f"armed, {pulses}", cameras, states, overloaded, rate_hz)
+            code, text, rate = "state_armed", f"armed, {pulses}", rate_hz
+    return _working(code, text, cameras, states, overloaded, rate)
 
 
 def _still() -> Statement:
@@ -364,35 +367,3 @@ def process_restarted(name: str, restarts: int) -> Statement:
         advice="if it recurs, run the doctor",
         values={"process": name, "restarts": restarts},
     )
-
-
-#: Why a state forbids a call, and what to do, by call and state.
-FORBIDDEN: dict[tuple[str, State], str] = {
-    ("arm", State.DISARMING): "the rig is being disarmed: wait until that is done, then arm",
-    ("rehearse", State.ARMING): "the rig is being armed: disarm it, then rehearse",
-    ("rehearse", State.ARMED): "the rig is armed, and a rehearsal needs the cameras for itself: disarm, then rehearse",
-    ("rehearse", State.RECORDING): "a recording is running: stop it and disarm, then rehearse",
-    ("rehearse", State.DISARMING): "the rig is being disarmed: wait until that is done, then rehearse",
-    ("rehearse", State.FAULT): "the rig has a fault: disarm it, then rehearse",
-    ("expose", State.ARMING): "the rig is being armed: wait until it is armed, then change exposure or gain",
-    ("expose", State.ARMED): "a recording is about to start: stop it, then change exposure or gain",
-    ("expose", State.RECORDING): "a recording is running: stop it, then change exposure or gain",
-    ("expose", State.DISARMING): "the rig is being disarmed: wait until that is done, then change exposure or gain",
-    ("expose", State.FAULT): "the rig is being tried again: wait a moment, then change exposure or gain",
-    ("rate", State.ARMING): "the rig is being armed: wait until it is armed, then change the rate",
-    ("rate", State.ARMED): "a recording is about to start: stop it, then change the rate",
-    ("rate", State.RECORDING): "a recording is running: stop it, then change the rate",
-    ("rate", State.DISARMING): "the rig is being disarmed: wait until that is done, then change the rate",
-    ("rate", State.FAULT): "the rig is being tried again: wait a moment, then change the rate",
-    ("pulses", State.IDLE): "the rig is not armed: arm it, then stop or ask for pulses",
-    ("pulses", State.ARMING): "the rig is being armed: wait until it is armed, then stop or ask for pulses",
-    ("pulses", State.RECORDING): "a recording is running: stop it, then stop or ask for pulses",
-    ("pulses", State.DISARMING): "the rig is being disarmed: arm it again, then stop or ask for pulses",
-    ("pulses", State.FAULT): "the rig has a fault: see its statement for what to do, then stop or ask for pulses",
-    ("disarm", State.RECORDING): "a recording is running: stop it, then disarm",
-    ("start", State.IDLE): "the rig is not armed: arm it, then start recording",
-    ("start", State.ARMING): "the rig is being armed: wait until it is armed, then start recording",
-    ("start", State.RECORDING): "a recording is running: stop it before starting another",
-    ("start", State.DISARMING): "the rig is being disarmed: arm it again, then start recording",
-    ("start", State.FAULT): "the rig has a fault: see its statement for what to do, then start recording",
-}

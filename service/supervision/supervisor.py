@@ -29,8 +29,9 @@ from service.recordings.control import RecordingControl, read_calibration
 from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
+from service.status.forbidden import FORBIDDEN
 from service.status.picture import Facts, picture
-from service.status.statements import FORBIDDEN, measured, moved
+from service.status.statements import measured, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.rig_session import RigSession, StartHill

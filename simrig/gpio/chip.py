@@ -6,6 +6,7 @@ kernel, a line that is given back keeps its level: whoever wants it inactive has
 """
 
 import errno
+import os
 import selectors
 import socket
 import struct
@@ -96,6 +97,8 @@ class GpioChip:
 
     def __enter__(self) -> Self:
         self._lines = [_Line(name, self.taken.get(offset, "")) for offset, name in enumerate(self.lines)]
+        self._levels = os.memfd_create("levels", os.MFD_CLOEXEC)
+        os.truncate(self._levels, len(self.lines))
         self._changed = threading.Condition()
         self._selector = selectors.DefaultSelector()
         self._wake, self._waker = socket.socketpair()
@@ -120,13 +123,14 @@ class GpioChip:
                 key.fileobj.close()
         self._selector.close()
         self._waker.close()
+        os.close(self._levels)
         self.path.unlink()
 
     def drive(self, line: int, *, high: bool) -> None:
         """Change the level of an input, from outside."""
         with self._changed:
             state, now = self._lines[line], host_now()
-            state.high = high
+            self._level(line, high=high)
             wait_us = 0 if state.request is None else state.request.debounce_us
             state.due = None if high == state.reported else HostNs(now + wait_us * NS_PER_US)
         self._waker.send(b"!")
@@ -208,13 +212,17 @@ class GpioChip:
     def _put(self, line: _Line, request: LineRequest, time: HostNs, *, active: bool) -> None:
         high = active != (LineFlag.ACTIVE_LOW in request.flags)
         if high != line.high:
-            line.high = high
+            self._level(request.offset, high=high)
             self.edges.append(Edge(request.offset, high, time))
             for cable in line.cables:
                 with suppress(
                     BlockingIOError, BrokenPipeError, ConnectionResetError
                 ):  # a camera that hangs, or is gone
                     cable.send(encode_edge(time, high=high), socket.MSG_DONTWAIT)
+
+    def _level(self, offset: int, *, high: bool) -> None:
+        self._lines[offset].high = high
+        os.pwrite(self._levels, bytes([high]), offset)
 
     def _answer(self, sock: socket.socket, data: bytes) -> None:
         code, _ = _HEAD.unpack_from(data)
@@ -234,7 +242,7 @@ class GpioChip:
                 error = self._connect(sock, argument.decode())
             case _:
                 error = errno.ENOTTY
-        descriptors = [] if theirs is None else [theirs.fileno()]
+        descriptors = [] if theirs is None else [theirs.fileno(), self._levels]
         try:
             socket.send_fds(sock, [_HEAD.pack(error, len(given)) + given], descriptors)
         except (BrokenPipeError, ConnectionResetError):

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rig.errors import TriggerError
 from rig.settings.model import RigSettings
-from rig.settings.trigger import GpioTrigger
+from rig.settings.trigger import GpioLine, GpioTrigger
 from svev.doctor.finding import Finding, Topic, failure, passed
 from triggering.sources.gpio.lines import CONSUMER, consumer_of
 
@@ -14,20 +14,28 @@ def look_at_gpio(rig: RigSettings) -> Iterator[Finding]:
     trigger = rig.trigger
     if not isinstance(trigger, GpioTrigger):
         return
-    line, chip = trigger.line, trigger.chip
+    yield from _look_at_line(trigger, "trigger.line", trigger.line)
+    if trigger.gate is not None:
+        yield from _look_at_line(trigger, "trigger.gate", trigger.gate.line)
+
+
+def _look_at_line(trigger: GpioTrigger, setting: str, line: GpioLine) -> Iterator[Finding]:
+    chip = trigger.chip
     try:
         consumer = consumer_of(chip, line)
     except TriggerError as error:
-        remedy = "no pulses are made until then"
-        yield failure(Topic.CAMERAS, "check_gpio_chip", "trigger line: {why}", remedy, why=error.said)
+        what, remedy = "{setting}: {why}", "no pulses are made until then"
+        yield failure(Topic.CAMERAS, "check_gpio_chip", what, remedy, setting=setting, why=error.said)
         return
     if consumer in {"", CONSUMER}:
-        what = "line {line} of {chip} is there for the trigger pulses"
-        yield passed(Topic.CAMERAS, "check_gpio", what, line=line, chip=chip)
+        what = "line {line} of {chip} is there ({setting})"
+        yield passed(Topic.CAMERAS, "check_gpio", what, line=line, chip=chip, setting=setting)
     else:
         what = "line {line} of {chip} is taken by {consumer}"
-        remedy = "end that, or name another line as trigger.line in the rig file"
-        yield failure(Topic.CAMERAS, "check_gpio_taken", what, remedy, consumer=consumer, line=line, chip=chip)
+        remedy = "end that, or name another line as {setting} in the rig file"
+        yield failure(
+            Topic.CAMERAS, "check_gpio_taken", what, remedy, consumer=consumer, line=line, chip=chip, setting=setting
+        )
 
 
 def look_at_barrier(rig: RigSettings) -> Iterator[Finding]:
@@ -43,8 +51,8 @@ def look_at_barrier(rig: RigSettings) -> Iterator[Finding]:
         yield failure(Topic.CAMERAS, "check_barrier_chip", "light barrier: {why}", remedy, why=error.said)
         return
     trigger = rig.trigger
-    if isinstance(trigger, GpioTrigger) and (trigger.chip, trigger.line) == (chip, line):
-        what = "line {line} of {chip} is to make the pulses and to watch the light barrier"
+    if isinstance(trigger, GpioTrigger) and trigger.chip == chip and line in trigger.lines:
+        what = "line {line} of {chip} is to serve both the pulses and the light barrier"
         remedy = "name another line for one of them in the rig file"
         yield failure(Topic.CAMERAS, "check_barrier_twice", what, remedy, line=line, chip=chip)
     elif consumer in {"", CONSUMER}:

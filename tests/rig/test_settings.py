@@ -212,6 +212,11 @@ def test_the_schema_is_a_schema() -> None:
             id="too many scheduled commands",
         ),
         pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'gpio'\nline = 18\ngate = { line = 18 }\n",
+            '"trigger": trigger.gate.line = 18 is the line of the pulses: name another one',
+            id="a gate at the line of the pulses",
+        ),
+        pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'gpio'\nline = 18\nrate_hz = 200\npulse_ms = 3\n",
             '"trigger": trigger.pulse_ms = 3 is more than half of the time between two pulses at 200 Hz: make it 2.5',
             id="pulses without an end",

@@ -48,7 +48,7 @@ class AlarmWatch:
         self._names = [camera.name for camera in rig.cameras]
         self._rate_hz, self._one_edge = rig.trigger.rate_hz, not source.set_up_only
         self._commanded = source.set_up_only
-        self._stopped = None if rig.trigger.gated else Stopped(commanded=self._commanded)
+        self._stopped = None if rig.trigger.pauses else Stopped(commanded=self._commanded)
         self._drift = Drift()
         self._missing = Missing(self._names, [camera.exposure_us for camera in rig.cameras])
         self._present: dict[str, _Present] = {}

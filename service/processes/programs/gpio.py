@@ -4,6 +4,8 @@ import gc
 import itertools
 import sys
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Final
 
@@ -17,7 +19,7 @@ from rig.transport.recorder_commands import PulsesFired, TellPulses
 from rig.transport.trigger_messages import LetPulses, TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
 from triggering.sources.gate import Gate
-from triggering.sources.gpio.lines import OutputLine
+from triggering.sources.gpio.lines import GateLine, OutputLine
 from triggering.sources.gpio.pulser import Pulser
 from triggering.sources.gpio.telling import LatenessTeller
 from triggering.sources.gpio.timer import Timer
@@ -51,8 +53,12 @@ def main() -> None:
     child.on_command = partial(_obey, gate)
     while True:
         try:
-            with OutputLine(trigger.chip, trigger.line, active_low=trigger.active_low) as line, Timer() as timer:
-                maker = _Maker(line, timer, trigger, child.config.epoch, gate)
+            with (
+                _outer_gate(trigger) as is_open,
+                OutputLine(trigger.chip, trigger.line, active_low=trigger.active_low) as line,
+                Timer() as timer,
+            ):
+                maker = _Maker(line, timer, trigger, child.config.epoch, gate, is_open)
                 maker.make(child, realtime=realtime)
                 return
         except TriggerError as error:
@@ -68,12 +74,30 @@ def _obey(gate: Gate, command: TriggerCommand) -> None:
         gate.let(command.pulses)
 
 
+@contextmanager
+def _outer_gate(trigger: GpioTrigger) -> Iterator[Callable[[], bool] | None]:
+    """What says whether the gate outside is open; None: there is no gate."""
+    if trigger.gate is None:
+        yield None
+        return
+    with GateLine(trigger.chip, trigger.gate) as line:
+        yield line.is_open
+
+
 class _Maker:
     """A line and the thread that makes its pulses."""
 
-    def __init__(self, line: OutputLine, timer: Timer, trigger: GpioTrigger, origin: HostNs, gate: Gate) -> None:
+    def __init__(
+        self,
+        line: OutputLine,
+        timer: Timer,
+        trigger: GpioTrigger,
+        origin: HostNs,
+        gate: Gate,
+        is_open: Callable[[], bool] | None,
+    ) -> None:
         self._line, self._timer = line, timer
-        self._pulser = Pulser(line.set, timer, origin, trigger.rate_hz, trigger.width_ns, gate)
+        self._pulser = Pulser(line.set, timer, origin, trigger.rate_hz, trigger.width_ns, gate, is_open)
         self._failure: TriggerError | None = None
 
     def make(self, child: ChildContext[TriggerConfig], *, realtime: bool) -> None:

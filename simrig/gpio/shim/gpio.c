@@ -1,16 +1,18 @@
 /* Emulated GPIO chips: a socket named gpiochipN looks like a character device of the GPIO subsystem.
  *
  * Of the kernel's interface (linux/gpio.h, version 2) there is what a program needs that makes pulses or waits for edges:
- * information on chip and lines, requests of lines, output values, edge events. The chip is a process that listens at the
+ * information on chip and lines, requests of lines, values, edge events. The chip is a process that listens at the
  * socket (simrig/gpio/chip.py). An open chip is a connection to it, and every ioctl an exchange. A requested line is one
  * end of a socket pair: the chip sends edge events into it, so that poll() and read() need no emulation, and sees its end
  * when the program closes it or dies. Output values go the other way, with the time at which they were set, and are not
- * answered: setting a line takes no longer than a real one would.
+ * answered: setting a line takes no longer than a real one would. Levels are read from a file in memory that the chip keeps
+ * up to date, one byte for each line: reading takes no longer either.
  */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/gpio.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stddef.h>
@@ -41,6 +43,13 @@
 enum kind { NONE, CHIP, LINE };
 
 static atomic_int kinds[MAX_DESCRIPTORS];
+
+/* Of the descriptor of a line: where its level stands. Written before the descriptor becomes a LINE. */
+static struct {
+    int file; /* one byte for each line of the chip: 1 is high */
+    off_t offset;
+    int active_low;
+} levels[MAX_DESCRIPTORS];
 
 struct message {
     uint32_t code; /* of a request: of the ioctl; of a reply: 0 or an error number */
@@ -114,15 +123,18 @@ SHIM char *realpath(const char *path, char *resolved) {
 
 /* ---- exchanges with the chip ---- */
 
-/* Sends a request and waits for the reply, which takes its place; a descriptor that comes along goes into `descriptor`.
+/* Descriptors that come along with the reply to a request: of the line, and of the levels. */
+enum { LINE_END, LEVELS, GIVEN };
+
+/* Sends a request and waits for the reply, which takes its place; descriptors that come along go into `given`.
  * Returns 0 or an error number. */
-static int exchange(int connection, struct message *message, int *descriptor) {
+static int exchange(int connection, struct message *message, int given[GIVEN]) {
     size_t bytes = offsetof(struct message, payload) + message->bytes;
     ssize_t received = -1;
     struct iovec part = {.iov_base = message, .iov_len = sizeof *message};
     union {
         struct cmsghdr head; /* for its alignment */
-        char bytes[CMSG_SPACE(sizeof(int))];
+        char bytes[CMSG_SPACE(GIVEN * sizeof(int))];
     } ancillary = {0};
     struct msghdr whole = {
         .msg_iov = &part, .msg_iovlen = 1, .msg_control = ancillary.bytes, .msg_controllen = sizeof ancillary.bytes};
@@ -133,8 +145,8 @@ static int exchange(int connection, struct message *message, int *descriptor) {
     if (received != (ssize_t)(offsetof(struct message, payload) + message->bytes))
         return ENODEV;
     struct cmsghdr *head = CMSG_FIRSTHDR(&whole);
-    if (head != NULL && head->cmsg_type == SCM_RIGHTS)
-        memcpy(descriptor, CMSG_DATA(head), sizeof *descriptor);
+    if (head != NULL && head->cmsg_type == SCM_RIGHTS && head->cmsg_len == CMSG_LEN(GIVEN * sizeof(int)))
+        memcpy(given, CMSG_DATA(head), GIVEN * sizeof(int));
     return (int)message->code;
 }
 
@@ -145,7 +157,7 @@ static int open_chip(const char *path) {
     if (strlen(path) >= sizeof address.sun_path)
         return fail(ENAMETOOLONG);
     strcpy(address.sun_path, path);
-    int connection = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0), none = -1, error = 0;
+    int connection = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0), none[GIVEN], error = 0;
     if (connection < 0)
         return -1;
     setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
@@ -154,7 +166,7 @@ static int open_chip(const char *path) {
     else if (connect(connection, (struct sockaddr *)&address, sizeof address) < 0)
         error = errno == ECONNREFUSED ? ENODEV : errno;
     else
-        error = exchange(connection, &message, &none);
+        error = exchange(connection, &message, none);
     if (error != 0) {
         REAL(close)(connection);
         return fail(error);
@@ -171,8 +183,11 @@ int svev_open(const char *path, int flags, mode_t mode) {
 }
 
 SHIM int close(int descriptor) {
-    if (kind_of(descriptor) != NONE)
+    enum kind kind = kind_of(descriptor);
+    if (kind != NONE)
         atomic_store(&kinds[descriptor], NONE);
+    if (kind == LINE)
+        REAL(close)(levels[descriptor].file);
     return REAL(close)(descriptor);
 }
 
@@ -181,13 +196,15 @@ SHIM int close(int descriptor) {
 static int chip_ioctl(int connection, unsigned code, void *argument) {
     size_t bytes = _IOC_SIZE(code);
     struct message message = {.code = code, .bytes = (uint32_t)bytes};
-    int line = -1;
+    int given[GIVEN] = {-1, -1}, line;
     if (bytes > sizeof message.payload)
         return fail(ENOTTY);
     memcpy(message.payload, argument, bytes);
-    int error = exchange(connection, &message, &line);
+    int error = exchange(connection, &message, given);
+    line = given[LINE_END];
     if (error == 0 && line >= MAX_DESCRIPTORS) {
         REAL(close)(line);
+        REAL(close)(given[LEVELS]);
         error = EMFILE;
     }
     if (error != 0)
@@ -195,8 +212,12 @@ static int chip_ioctl(int connection, unsigned code, void *argument) {
     if (message.bytes == bytes)
         memcpy(argument, message.payload, bytes);
     if (line >= 0) {
+        struct gpio_v2_line_request *request = argument;
+        levels[line].file = given[LEVELS];
+        levels[line].offset = request->offsets[0];
+        levels[line].active_low = (request->config.flags & GPIO_V2_LINE_FLAG_ACTIVE_LOW) != 0;
         atomic_store(&kinds[line], LINE);
-        ((struct gpio_v2_line_request *)argument)->fd = line;
+        request->fd = line;
     }
     return 0;
 }
@@ -213,6 +234,27 @@ static int set_values(int line, const struct gpio_v2_line_values *values) {
     return sent == (ssize_t)sizeof edge ? 0 : fail(ENODEV); /* as the kernel does when the chip is unplugged */
 }
 
+static int get_values(int line, struct gpio_v2_line_values *values) {
+    struct pollfd end = {.fd = line};
+    char high;
+    if (poll(&end, 1, 0) < 0 || (end.revents & (POLLHUP | POLLERR)) != 0 ||
+        pread(levels[line].file, &high, 1, levels[line].offset) != 1)
+        return fail(ENODEV);
+    values->bits = values->mask & (unsigned)(high != levels[line].active_low);
+    return 0;
+}
+
+static int line_ioctl(int line, unsigned code, void *argument) {
+    switch (code) {
+    case GPIO_V2_LINE_SET_VALUES_IOCTL:
+        return set_values(line, argument);
+    case GPIO_V2_LINE_GET_VALUES_IOCTL:
+        return get_values(line, argument);
+    default:
+        return fail(ENOTTY);
+    }
+}
+
 SHIM int ioctl(int descriptor, unsigned long code, ...) {
     va_list arguments;
     va_start(arguments, code);
@@ -222,7 +264,7 @@ SHIM int ioctl(int descriptor, unsigned long code, ...) {
     case CHIP:
         return chip_ioctl(descriptor, (unsigned)code, argument);
     case LINE:
-        return (unsigned)code == GPIO_V2_LINE_SET_VALUES_IOCTL ? set_values(descriptor, argument) : fail(ENOTTY);
+        return line_ioctl(descriptor, (unsigned)code, argument);
     default:
         return REAL(ioctl)(descriptor, code, argument);
     }

@@ -26,6 +26,7 @@ from service.status.measurements import measurements
 from simrig.gpio.build import environment
 from simrig.gpio.chip import GpioChip
 from tests.capture.rigs import write_rig
+from tests.service.serving import serving
 from tests.service.trigger.armed import armed
 from tests.support.loopback import Loopback
 from triggering.sources.gpio.pulser import LATEST
@@ -40,12 +41,19 @@ def chip() -> Iterator[GpioChip]:
         yield chip
 
 
+def _write_rig(
+    folder: Path, loopback: Loopback, chip: GpioChip, line: int, backend: str = "sim", more: str = "", **rig: Any
+) -> Path:
+    path = write_rig(folder, backend, loopback, source="gpio", rate_hz=RATE_HZ, **{"names": ["K1"], **rig})
+    keys = f'source = "gpio"\nchip = "{chip.path}"\nline = {line}\npulse_ms = 2.0\n{more}'
+    path.write_text(path.read_text().replace('source = "gpio"', keys))
+    return path
+
+
 def _record(
     folder: Path, loopback: Loopback, chip: GpioChip, line: int, seconds: float, backend: str = "sim", **rig: Any
 ) -> subprocess.Popen[str]:
-    path = write_rig(folder, backend, loopback, source="gpio", rate_hz=RATE_HZ, **{"names": ["K1"], **rig})
-    keys = f'source = "gpio"\nchip = "{chip.path}"\nline = {line}\npulse_ms = 2.0'
-    path.write_text(path.read_text().replace('source = "gpio"', keys))
+    path = _write_rig(folder, loopback, chip, line, backend, **rig)
     command = [sys.executable, "-m", "svev", "record", "--rig", str(path), "--seconds", str(seconds)]
     return subprocess.Popen(
         [*command, "--out", str(folder / "logs"), "--json"], env={**os.environ, **environment()},
@@ -126,3 +134,28 @@ def test_a_line_that_somebody_has_is_named(tmp_path: Path, loopback: Loopback, c
     with _record(tmp_path, loopback, chip, 3, 0.5) as program:
         _, complaints = program.communicate(timeout=90)
     assert "line 3 of gpiochip0 is taken by fan: end that, or name another line in the rig file" in complaints
+
+
+def test_while_a_gate_outside_is_closed_no_pulses_are_made_and_that_is_no_alarm(
+    tmp_path: Path, loopback: Loopback, chip: GpioChip
+) -> None:
+    path = _write_rig(tmp_path, loopback, chip, 1, more="gate = { line = 4, active_low = true }")
+    assert load_rig(path).trigger.pauses
+    chip.drive(4, high=True)
+    with serving(tmp_path, path, loopback, environment=environment()) as service:
+        service.arm()
+        service.await_statement("state_gate_closed")
+        pulses = service.get("/api/status")["pulses"]
+        assert (pulses["fired"], pulses["made"]["skipped"], pulses["made"]["gate_open"]) == (0, 0, False)
+        assert not any(edge.high for edge in chip.edges)
+        chip.drive(4, high=False)
+        service.await_statement("state_armed")
+        recording = service.post("/api/recordings")["id"]
+        service.await_pulses(5)
+        chip.drive(4, high=True)
+        service.post(f"/api/recordings/{recording}/stop", {"confirm": True})
+        service.await_statement("state_gate_closed")
+        status = service.get("/api/status")
+        assert status["pulses"]["fired"] == sum(edge.high for edge in chip.edges)
+        assert status["alarms"] == []
+    chip.wait_for_use(4, used=False)

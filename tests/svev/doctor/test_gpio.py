@@ -21,14 +21,16 @@ rig, chip = load_rig(Path(sys.argv[1])), sys.argv[2]
 def look(trigger):
     for found in look_at_gpio(rig.model_copy(update={"trigger": trigger})):
         print(found.level, found.code, found.what.replace(chip, "CHIP"), found.remedy, sep="|")
-def gpio(chip, line):
-    return GpioTrigger(source="gpio", chip=chip, line=line)
+def gpio(chip, line, gate=None):
+    return GpioTrigger(source="gpio", chip=chip, line=line, gate=gate)
 look(ExternalTrigger())
 look(gpio(chip, 0))
 with OutputLine(chip, 0, active_low=False):
     look(gpio(chip, 0))
 look(gpio(chip, "FAN"))
 look(gpio(chip, 9))
+look(gpio(chip, 0, {"line": 2}))
+look(gpio(chip, 0, {"line": "FAN"}))
 def watch(line, trigger=ExternalTrigger()):
     automatic = rig.automatic.model_copy(update={"barrier": BarrierSettings(chip=chip, line=line)})
     for found in look_at_barrier(rig.model_copy(update={"automatic": automatic, "trigger": trigger})):
@@ -37,6 +39,7 @@ watch(0)
 with EdgeLine(chip, 0, active_low=False, debounce_ms=5):
     watch(0)
 watch(0, gpio(chip, 0))
+watch(2, gpio(chip, 0, {"line": 2}))
 watch(1)
 watch(9)
 """
@@ -45,7 +48,7 @@ watch(9)
 def test_the_doctor_says_whether_the_lines_can_make_pulses_and_watch_a_barrier() -> None:
     with (
         tempfile.TemporaryDirectory() as folder,
-        GpioChip(Path(folder) / "gpiochip0", lines=("", "FAN"), taken={1: "fan"}) as chip,
+        GpioChip(Path(folder) / "gpiochip0", lines=("", "FAN", ""), taken={1: "fan"}) as chip,
     ):
         done = subprocess.run(
             [sys.executable, "-c", _PROGRAM, str(CONFIG / "rigs" / "sim.toml"), str(chip.path)],
@@ -54,22 +57,30 @@ def test_the_doctor_says_whether_the_lines_can_make_pulses_and_watch_a_barrier()
         assert (done.returncode, done.stderr) == (0, "")
         assert chip.edges == []
     assert done.stdout.splitlines() == [
-        "PASS|check_gpio|line 0 of CHIP is there for the trigger pulses|",
-        "PASS|check_gpio|line 0 of CHIP is there for the trigger pulses|",
+        "PASS|check_gpio|line 0 of CHIP is there (trigger.line)|",
+        "PASS|check_gpio|line 0 of CHIP is there (trigger.line)|",
         (
             "FAIL|check_gpio_taken|line FAN of CHIP is taken by fan|end that, or name another line as trigger.line in "
             "the rig file"
         ),
         (
-            "FAIL|check_gpio_chip|trigger line: GPIO chip CHIP has no line 9, but lines 0 to 1: name one that gpioinfo "
+            "FAIL|check_gpio_chip|trigger.line: GPIO chip CHIP has no line 9, but lines 0 to 2: name one that gpioinfo "
             "lists in the rig file|no pulses are made until then"
+        ),
+        "PASS|check_gpio|line 0 of CHIP is there (trigger.line)|",
+        "PASS|check_gpio|line 2 of CHIP is there (trigger.gate)|",
+        "PASS|check_gpio|line 0 of CHIP is there (trigger.line)|",
+        (
+            "FAIL|check_gpio_taken|line FAN of CHIP is taken by fan|end that, or name another line as trigger.gate in "
+            "the rig file"
         ),
         "PASS|check_barrier|line 0 of CHIP is there for the light barrier",
         "PASS|check_barrier|line 0 of CHIP is there for the light barrier",
-        "FAIL|check_barrier_twice|line 0 of CHIP is to make the pulses and to watch the light barrier",
+        "FAIL|check_barrier_twice|line 0 of CHIP is to serve both the pulses and the light barrier",
+        "FAIL|check_barrier_twice|line 2 of CHIP is to serve both the pulses and the light barrier",
         "FAIL|check_barrier_taken|line 1 of CHIP, of the light barrier, is taken by fan",
         (
-            "FAIL|check_barrier_chip|light barrier: GPIO chip CHIP has no line 9, but lines 0 to 1: name one that "
+            "FAIL|check_barrier_chip|light barrier: GPIO chip CHIP has no line 9, but lines 0 to 2: name one that "
             "gpioinfo lists in the rig file"
         ),
     ]

@@ -13,7 +13,7 @@ from gpiod.line import Direction, Edge, Value
 from rig.clocks import HostNs
 from rig.errors import TriggerError
 from rig.phrase import phrase
-from rig.settings.trigger import GpioLine
+from rig.settings.trigger import GateSettings, GpioLine
 
 _DEVICES: Final = Path("/dev")
 #: Who has a line, as `gpioinfo` shows it.
@@ -150,6 +150,32 @@ class OutputLine(RequestedLine):
                 self.set(False)
         finally:
             super().__exit__(kind, error, trace)
+
+
+class GateLine(RequestedLine):
+    """A line whose level is asked for.
+
+    Args:
+        chip: its chip, as the rig file names it.
+        gate: the line, and which level is active.
+
+    Raises:
+        TriggerError: as `RequestedLine`.
+    """
+
+    def __init__(self, chip: str, gate: GateSettings) -> None:
+        super().__init__(chip, gate.line, gpiod.LineSettings(direction=Direction.INPUT, active_low=gate.active_low))
+
+    def is_open(self) -> bool:
+        """Whether the line is active now.
+
+        Raises:
+            TriggerError: the chip is gone.
+        """
+        try:
+            return self.request.get_value(self.offset) is Value.ACTIVE
+        except OSError as error:
+            raise _gone(self.name, error) from None
 
 
 class EdgeLine(RequestedLine):

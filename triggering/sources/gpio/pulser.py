@@ -47,6 +47,7 @@ class Pulser:
         rate_hz: pulses per second.
         width_ns: length of a pulse, at most half of the period.
         gate: lets pulses through.
+        is_open: whether a gate outside lets pulses through now; asked when one is due. None: there is none.
 
     One thread makes the pulses, another may ask for `figures` and `fetch` them.
     """
@@ -59,8 +60,10 @@ class Pulser:
         rate_hz: float,
         width_ns: int,
         gate: Gate,
+        is_open: Callable[[], bool] | None = None,
     ) -> None:
-        self._set_line, self._waiting, self._gate = set_line, waiting, gate
+        self._set_line, self._waiting, self._gate, self._is_open = set_line, waiting, gate, is_open
+        self._opened: bool | None = None
         self._origin, self._rate_hz, self._width_ns = origin, rate_hz, width_ns
         self._latest_ns = round(LATEST * NS_PER_S / rate_hz)
         self._nearest_ns = round((1 - LATEST) * NS_PER_S / rate_hz)
@@ -74,12 +77,16 @@ class Pulser:
         """Make pulses until the waiting is ended; the line is inactive then.
 
         Raises:
-            TriggerError: the line cannot be set any more.
+            TriggerError: the line cannot be set any more, or the gate cannot be asked.
         """
         pulse = self._first_after(self._waiting.now())
         while self._waiting.wait(self._due(pulse), precisely=True):
+            if self._is_open is not None:
+                self._opened = self._is_open()
             now = self._waiting.now()
-            if now > self._due(pulse) + self._latest_ns or (self._free_from is not None and now < self._free_from):
+            if self._opened is False:
+                pass  # a pulse that is not wanted is not late either
+            elif now > self._due(pulse) + self._latest_ns or (self._free_from is not None and now < self._free_from):
                 self._skipped += not self._gate.still
             elif self._gate.passes() and not self._pulse(self._due(pulse)):
                 return
@@ -99,6 +106,7 @@ class Pulser:
             late_p99_us=_us(late[len(late) * _PERCENT // 100]) if late else None,
             late_max_us=_us(self._latest_made_ns) if late else None,
             realtime=realtime,
+            gate_open=self._opened,
         )
 
     def fetch(self) -> tuple[list[Fired], HostNs]:

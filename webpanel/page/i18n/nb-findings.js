@@ -37,13 +37,13 @@ export const findings = {
   check_fallback_not_writable: ["det kan ikke skrives i {folder} (recorder.fallback_directory): {why}", "rett tilgangen; under systemd tillates det med: sudo systemctl edit svev, [Service] ReadWritePaths="],
   check_fallback_same_disk: ["{folder} (recorder.fallback_directory) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
 
-  check_gpio: ["linje {line} på {chip} er klar for triggerpulsene"],
+  check_gpio: ["linje {line} på {chip} er på plass ({setting})"],
   check_barrier: ["linje {line} på {chip} er klar for lysporten"],
   check_barrier_chip: ["lysport: {why}", "rett barrier under [automatic] i riggfilen; til da starter den ingen opptak"],
-  check_barrier_twice: ["linje {line} på {chip} skal både lage pulsene og vokte lysporten", "sett en annen linje for en av dem i riggfilen"],
+  check_barrier_twice: ["linje {line} på {chip} skal tjene både pulsene og lysporten", "sett en annen linje for en av dem i riggfilen"],
   check_barrier_taken: ["linje {line} på {chip}, for lysporten, er opptatt av {consumer}", "avslutt det, eller sett en annen linje som barrier under [automatic] i riggfilen"],
-  check_gpio_chip: ["triggerlinje: {why}", "til det er rettet, lages ingen pulser"],
-  check_gpio_taken: ["linje {line} på {chip} er opptatt av {consumer}", "avslutt det, eller sett en annen linje som trigger.line i riggfilen"],
+  check_gpio_chip: ["{setting}: {why}", "til det er rettet, lages ingen pulser"],
+  check_gpio_taken: ["linje {line} på {chip} er opptatt av {consumer}", "avslutt det, eller sett en annen linje som {setting} i riggfilen"],
 
   check_webhook: ["{host} kan nås for varsler; svev doctor --send-test sender et"],
   check_webhook_file: ["varsler: {why}", "rett filen; varsler sendes ikke før det er gjort"],

@@ -53,6 +53,7 @@
  * @property {number|null} late_p99_us
  * @property {number|null} late_max_us
  * @property {boolean} realtime
+ * @property {boolean|null} gate_open
  *
  * @typedef {object} DiskStatus
  * @property {number} free_gb

@@ -6,7 +6,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +19,8 @@ _HEAD = """
 import sys
 from pathlib import Path
 from rig.errors import TriggerError
-from triggering.sources.gpio.lines import EdgeLine, OutputLine, chip_path
+from triggering.sources.gpio.lines import EdgeLine, GateLine, OutputLine, chip_path
+from rig.settings.trigger import GateSettings
 folder = Path(sys.argv[1])
 chip = str(folder / "gpiochip0")
 def said(action):
@@ -53,6 +56,35 @@ with OutputLine(chip, "PULSES", active_low=True) as line:
 """) == ["line PULSES of gpiochip0"]  # fmt: skip
         assert [(edge.line, edge.high) for edge in chip.wait_for_edges(3)] == [(1, True), (1, False), (1, True)]
         assert [request.consumer for request in chip.requests] == ["svev"]
+
+
+@pytest.mark.parametrize("active_low", [False, True])
+def test_a_gate_is_open_while_its_line_is_active(folder: Path, active_low: bool) -> None:
+    """Whoever asks is another process, so the level changes between two words from it."""
+    code = """
+with GateLine(chip, GateSettings(line="GATE", active_low=sys.argv[2] == "True")) as line:
+    for _ in sys.stdin:
+        said(lambda: print(line.is_open()))
+        sys.stdout.flush()
+"""
+    command = [sys.executable, "-c", _HEAD + code, str(folder), str(active_low)]
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with ExitStack() as powered:
+        chip = powered.enter_context(GpioChip(folder / "gpiochip0", lines=("", "GATE")))
+        with subprocess.Popen(command, env={**os.environ, **environment()}, **pipes) as program:
+
+            def answer() -> str:
+                assert program.stdout is not None
+                print("?", file=program.stdin, flush=True)
+                return str(program.stdout.readline().strip())
+
+            chip.wait_for_use(1, used=True)
+            for high in (False, True, False):
+                chip.drive(1, high=high)
+                assert answer() == str(high != active_low)
+            powered.close()
+            assert answer() == "line GATE of gpiochip0 fails (No such device): see that its GPIO chip is plugged in"
+            program.communicate(timeout=60)
 
 
 def test_chips_are_found_by_file_name_number_and_label(folder: Path) -> None:

@@ -48,8 +48,14 @@ class _Computer:
         return [time for time, active in self.edges if active]
 
 
-def _run(computer: _Computer, rate_hz: float, width_us: int = 1000, gate: Gate | None = None) -> Pulser:
-    pulser = Pulser(computer.set_line, computer, ORIGIN, rate_hz, width_us * US, gate or Gate())
+def _run(
+    computer: _Computer,
+    rate_hz: float,
+    width_us: int = 1000,
+    gate: Gate | None = None,
+    is_open: Callable[[], bool] | None = None,
+) -> Pulser:
+    pulser = Pulser(computer.set_line, computer, ORIGIN, rate_hz, width_us * US, gate or Gate(), is_open)
     pulser.run()
     return pulser
 
@@ -75,6 +81,27 @@ def test_what_the_gate_lets_through_is_at_the_times_of_the_train() -> None:
     assert after > first + 3
     assert pulses[3:] == [after + number for number in range(len(pulses) - 3)]
     assert pulser.figures(realtime=False).skipped == 0
+
+
+def test_a_gate_outside_lets_pulses_through_at_the_times_of_the_train_and_what_it_holds_back_is_not_late() -> None:
+    """The gate is open from 1.05 s to 2.05 s; one second before, and one while it is open, the computer stalls."""
+    stalls = {5: 300_000_000, 15: 300_000_000}
+    waits = iter(range(10_000))
+    computer = _Computer(lambda: stalls.get(next(waits), 0), lambda: 0, HostNs(ORIGIN + 4_000_000 * US))
+    pulser = _run(computer, 10.0, is_open=lambda: 1.05e9 < computer.time - ORIGIN < 2.05e9)
+    pulses = [(time - ORIGIN) / 1e8 for time in computer.rises]
+    assert pulses == [number for number in range(11, 21) if number in pulses]
+    made = pulser.figures(realtime=True)
+    assert (made.made, made.skipped, made.gate_open) == (len(pulses), 10 - len(pulses), False)
+    assert made.skipped > 0
+
+
+def test_pulses_on_request_wait_for_the_gate_outside() -> None:
+    gate = Gate(still=True)
+    gate.let(3)
+    computer = _Computer(lambda: 0, lambda: 0, HostNs(ORIGIN + 3_000_000 * US))
+    _run(computer, 10.0, gate=gate, is_open=lambda: computer.time - ORIGIN > 1.05e9)
+    assert [(time - ORIGIN) / 1e8 for time in computer.rises] == [11, 12, 13]
 
 
 @pytest.mark.parametrize("rate_hz", [0.1, 29.97, 30.0, 200.0])

@@ -1,5 +1,6 @@
 """Writes what was changed while the rig runs into the rig file, as it is by then: what else was edited in it stays."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +24,8 @@ def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phras
     """
     text = edit(read_text(path, "TOML", "the rig file in use"))
     try:
+        # Renewing a file asks for rights to its folder alone. Here those of the file decide, as its owner expects.
+        os.close(os.open(path, os.O_WRONLY | os.O_CLOEXEC))
         replace_file(path, text.encode())
     except OSError as error:
         raise StorageError(not_kept(error.strerror or str(error))) from error

@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -32,7 +33,7 @@ def free_bytes(place: Path | int) -> int | None:
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file, or renew it: whoever reads it, also after a power cut, finds the old content or the new one.
 
-    A file that was there keeps its permissions.
+    A file that was there keeps its permissions, and its owner and group as far as this user may give files to them.
 
     Args:
         path: of the file; what a link points to is renewed.
@@ -47,7 +48,7 @@ def replace_file(path: Path, content: bytes) -> None:
         new.unlink(missing_ok=True)
         with new.open("xb") as file:
             if path.exists():
-                os.fchmod(file.fileno(), path.stat().st_mode & 0o777)
+                _take_rights(file.fileno(), path.stat())
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -55,6 +56,14 @@ def replace_file(path: Path, content: bytes) -> None:
     except OSError:
         new.unlink(missing_ok=True)
         raise
+
+
+def _take_rights(descriptor: int, of: os.stat_result) -> None:
+    """Give an open file the rights of another; owner and group first, because a change of these takes rights away."""
+    for owner, group in ((of.st_uid, -1), (-1, of.st_gid)):
+        with suppress(PermissionError):  # root alone gives files away; others give them to their own groups
+            os.fchown(descriptor, owner, group)
+    os.fchmod(descriptor, of.st_mode & 0o777)
 
 
 def set_direct(descriptor: int, *, wanted: bool) -> bool:

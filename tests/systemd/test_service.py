@@ -86,6 +86,39 @@ def _second_disk(system: Booted) -> tuple[str, str]:
     return finding["level"], finding["what"]
 
 
+def _keep_exposure(system: Booted, exposure_us: int) -> tuple[int, str]:
+    """Ask the service to keep an exposure of K1 in the rig file; status and body of its answer."""
+    ask = (
+        "import sys, httpx; answer = httpx.patch('http://127.0.0.1:8000/api/cameras/K1', timeout=60, "
+        "json={'exposure_us': int(sys.argv[1]), 'save': True}); print(answer.status_code, answer.text)"
+    )
+    status, text = system.run("/opt/svev/.venv/bin/python", "-c", ask, str(exposure_us)).split(" ", 1)
+    return int(status), text
+
+
+def test_the_service_renews_its_rig_file_and_nothing_that_says_who_may_reach_it(systemd: Booted) -> None:
+    folder = "/opt/prefix/etc/svev"
+    rig = f"{folder}/rig.toml"
+    first = systemd.run("cat", rig)
+    assert _keep_exposure(systemd, 1234)[0] == 200
+    kept = systemd.run("cat", rig)
+    assert kept.count("exposure_us = 1234") == 1
+    assert [line for line in kept.splitlines() if "#" in line] == [line for line in first.splitlines() if "#" in line]
+    assert systemd.run("stat", "--format=%U:%G %a", rig) == "svev:svev 644\n"
+
+    inside = ("nsenter", f"--target={systemd.show('MainPID')}", "--mount", "setpriv", "--reuid=svev", "--regid=svev")
+    others = (
+        "cd $0; for way in 'mv -fT rig.toml options' 'rm -f options' 'ln -sfnT rig.toml options'; do $way || true; done"
+    )
+    systemd.run(*inside, "--clear-groups", "sh", "-euc", others, folder)
+    assert systemd.run("stat", "--format=%U:%G %F", f"{folder}/options") == "root:svev regular file\n"
+
+    systemd.run("chown", "root:svev", rig)  # the owner keeps the file from the page
+    status, said = _keep_exposure(systemd, 1500)
+    assert (status, "cannot be written (Permission denied); write exposure_us = 1500" in said) == (507, True)
+    assert systemd.run("cat", rig) == kept
+
+
 def test_a_second_disk_can_be_written_when_the_unit_is_told(prefix: Path) -> None:
     rig = prefix / "etc/svev/rig.toml"
     fallback = '[recorder]\nfallback_directory = "/opt/second"\n[service]\narm_at_start = true\n'

@@ -9,6 +9,7 @@ from recorder.reading.triplets import (
     ImageView,
     camera_images_of,
     event_of,
+    health_of,
     images_of,
     is_json,
     pixels,
@@ -18,17 +19,14 @@ from recorder.reading.triplets import (
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.frame import FrameStatus
-from rig.health import Health
 from rig.images.pixels import Stored
 from rig.jumper import JumperState
 from rig.tag import CameraTag, TripletTag
 from rig.topics import CAMERA_TOPIC, EVENTS, HEALTH, JUMPER, TAG, TRIPLET
-from rig.transport import wire
 from triggering.ledger.account import Ledger
 from triggering.ledger.recount import Recount
 
 _EVENTS_MAX = 1000
-_HEALTH = wire.decoder(Health)
 
 
 class _Said(msgspec.Struct):
@@ -150,14 +148,10 @@ class PulseCheck:
             self.events.append(event)
 
     def _health(self, message: Message) -> None:
-        data = message.data or b""
-        if not is_json(data):
+        if not is_json(message.data or b""):
             self._report(f"health record {message.sequence}: cannot be read")
-            return
-        try:
-            self.recount.told(_HEALTH.decode(data), UtcNs(message.log_time))
-        except msgspec.ValidationError:
-            return  # of another version of svev: what it says of the source is not used
+        elif (health := health_of(message)) is not None:
+            self.recount.told(health, message.log_time)
 
     def _jumper(self, message: Message) -> None:
         try:

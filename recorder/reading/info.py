@@ -1,4 +1,4 @@
-"""Says in a moment what a log holds: reads its tags and events, no pixels."""
+"""Says in a moment what a log holds: reads its tags and health records, no pixels."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -7,15 +7,24 @@ from typing import Any
 
 from recorder.log.extent import apply_extent, forgotten_s
 from recorder.log.session_changes import session_changes
-from recorder.reading.items import Chunk
+from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
-from recorder.reading.triplets import tag_of
+from recorder.reading.triplets import health_of, tag_of
 from rig.host.utc_clock import UtcState
 from rig.tag import TripletTag
-from rig.topics import MERGE_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TAG, TROUBLE_METADATA
+from rig.topics import (
+    HEALTH,
+    MERGE_METADATA,
+    RECOVERY_METADATA,
+    RIG_METADATA,
+    SESSION_METADATA,
+    TAG,
+    TROUBLE_METADATA,
+)
 from rig.transport import wire
 from triggering.ledger.account import Ledger, runs_from_text
+from triggering.ledger.source_recount import SourceAccount, SourceRecount
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +48,8 @@ class LogInfo:
         forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
         messages: number of messages per topic.
         library: the program that wrote the log.
+        source: what the source of the pulses told of them, beside the tags; None: it tells nothing, the log does not
+            hold it, or it was not asked for.
     """
 
     path: Path
@@ -57,6 +68,7 @@ class LogInfo:
     forgotten_s: float
     messages: dict[str, int]
     library: str
+    source: SourceAccount | None = None
 
     @property
     def recording(self) -> str:
@@ -100,6 +112,7 @@ class LogInfo:
             "start_ns": None if ledger.first_time is None else str(ledger.first_time),
             "duration_s": round(ledger.duration_s, 6),
             "rate_hz": None if ledger.rate_hz is None else round(ledger.rate_hz, 4),
+            "source": None if self.source is None else self.source.to_json(),
             "offset_us": ledger.spread.figures(),
             "shape": None if self.shape is None else list(self.shape),
             "cameras": list(self.cameras),
@@ -113,7 +126,7 @@ class LogInfo:
         }
 
 
-def info(path: Path, *, original: bool = False) -> LogInfo:
+def info(path: Path, *, original: bool = False, source: bool = False) -> LogInfo:
     """Read what a log says about itself, and count its pulses by their tags.
 
     The time this takes depends on the number of pulses, not on the size of the log. Nothing is checked: `verify` does
@@ -122,15 +135,17 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
     Args:
         path: the log.
         original: give the session as the log has it, without the changes in the file beside it.
+        source: compare the tags with what the source of the pulses told, too.
 
     Raises:
         BadInputError: no such file, no MCAP log, not one of ours, or the file of session changes is broken.
     """
     ledger, first = Ledger(), None
+    told = SourceRecount() if source else None
     messages: dict[str, int] = {}
     damaged = torn = 0
     with LogReader(path, skim=True) as reader:
-        for item in reader.items(only=(TAG.name,)):
+        for item in reader.items(only=(TAG.name, HEALTH.name) if source else (TAG.name,)):
             if isinstance(item, Damage):
                 damaged += item.length
                 torn += item.length if item.torn else 0
@@ -142,14 +157,26 @@ def info(path: Path, *, original: bool = False) -> LogInfo:
                     if tag is not None:
                         first = first or tag
                         ledger.add(tag)
+                    if told is not None:
+                        _tell(told, tag, message)
         apply_extent(reader.metadata, ledger)
+        if MERGE_METADATA in reader.metadata:
+            told = None  # the health records of two computers have two clocks
         session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
         return LogInfo(
             path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
             "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata), messages,
-            reader.library,
+            reader.library, None if told is None else told.finish(),
         )  # fmt: skip
+
+
+def _tell(source: SourceRecount, tag: TripletTag | None, message: Message) -> None:
+    """Hand a tag, or a message that may be a health record, to the account of the source."""
+    if tag is not None:
+        source.add(tag)
+    elif message.topic == HEALTH.name and (health := health_of(message)) is not None:
+        source.told(health, message.log_time)
 
 
 def known_lost(reader: LogReader) -> tuple[tuple[int, int], ...]:

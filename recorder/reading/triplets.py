@@ -15,14 +15,17 @@ from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from rig.clocks import UtcNs
 from rig.events import Event
+from rig.health import Health
 from rig.images.pixels import Pixels, Stored
 from rig.tag import TripletTag
 from rig.topics import CAMERA_TOPIC, TAG, TRIPLET
+from rig.transport import wire
 
 #: Pulse numbers are 32 bits in MCAP; times are below 2**63 ns (year 2262).
 _SEQUENCE_MAX, _TIME_MAX = (1 << 32) - 1, (1 << 63) - 1
 #: All fields of an image but its pixels take some 50 bytes.
 _OTHERS_MAX = 1 << 12
+_HEALTH = wire.decoder(Health)
 _DATA_KEY = RawImage.DATA_FIELD_NUMBER << 3 | 2
 
 
@@ -157,6 +160,15 @@ def event_of(message: Message) -> Event | None:
         return Event.from_protobuf(message.data or b"")
     except (DecodeError, ValueError, KeyError):
         return None
+
+
+def health_of(message: Message) -> Health | None:
+    """The health record in a message; None if it is damaged, or of another version of svev."""
+    try:
+        health: Health = _HEALTH.decode(message.data or b"")
+    except (msgspec.MsgspecError, RecursionError):
+        return None
+    return health
 
 
 def is_json(data: bytes | memoryview) -> bool:

@@ -100,6 +100,7 @@ def write_log(
     shape: tuple[int, int] = SHAPE,
     cameras: Sequence[tuple[str, tuple[int, int]]] = (),
     description: LogDescription = DESCRIPTION,
+    health: tuple[bytes, UtcNs] | None = None,
 ) -> list[Written]:
     """A closed log with these pulses, a start and a stop event and one health record; `cameras`: with own topics."""
     buffers = TripletBuffers(shape, 4, cameras)
@@ -109,7 +110,7 @@ def write_log(
         written = [
             write_pulse(log, buffers, make_tag(pulse, statuses, shape)) for pulse, statuses in enumerate(pulses, 1)
         ]
-        log.write_health(b'{"free_triplets":4}', now)
+        log.write_health(*(health or (b'{"free_triplets":4}', now)))
         log.write_event(Event(now, Level.INFO, "recorder", "recording stopped"))
     buffers.close()
     return written

@@ -4,7 +4,7 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,10 +13,13 @@ import zmq
 
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
+from rig.clocks import DecimalNs, UtcNs
 from rig.frame import FrameStatus
+from rig.health import DiskHealth, Health, Latency, PairingHealth, PrerollHealth, ToldPulses
 from rig.host.utc_clock import UtcState
+from rig.transport import wire
 from svev.cli import main
-from tests.recorder.logs import ALL_OK, DESCRIPTION, LOST, OK, write_log
+from tests.recorder.logs import ALL_OK, DESCRIPTION, LOST, OK, PERIOD_NS, START, write_log
 from tests.support.loopback import Loopback
 
 
@@ -69,6 +72,37 @@ def test_info_prints_the_ledger_of_each_camera(log: Path, svev: Svev) -> None:
     assert "ledger     K2 2 ok, 1 lost, 0 missed, 0 damaged, 0 absent" in svev("info", log).stdout
     found = json.loads(svev("info", log, "--json").stdout)
     assert found["ledger"]["K1"] == {"ok": 3, "lost": 0, "missed": 0, "damaged": 0, "absent": 0}
+
+
+@pytest.mark.parametrize(
+    ("fired", "counts", "verdict", "more"),
+    [
+        ((1, 2, 3, 4), (4, 1, 0, 0), "agrees", ""),
+        ((1, 2, 2.5, 3, 4), (5, 1, 1, 0), "does not agree", "; `svev verify --ledger` names each"),
+    ],
+)
+def test_info_puts_the_sources_own_count_beside_the_tags(
+    tmp_path: Path, svev: Svev, fired: Sequence[float], counts: tuple[int, int, int, int], verdict: str, more: str
+) -> None:
+    path, now = tmp_path / "log.mcap", UtcNs(START + 5 * PERIOD_NS)
+    told = ToldPulses(
+        first=1, times_ns=tuple(DecimalNs(round(pulse * PERIOD_NS)) for pulse in fired), uncertainty_us=20.0,
+        until_ns=DecimalNs(round(4.4 * PERIOD_NS)),
+    )  # fmt: skip
+    pairing = PairingHealth(4, 0, 0, 0, PERIOD_NS / 1e3, 1.0, 2.0, alarm=False, cameras=())
+    health = Health(
+        cameras=(), pairing=pairing, free_triplets=4, unpublished=0, preroll=PrerollHealth(0, 0, 0, 0),
+        recording=None, disk=DiskHealth(None), latency=Latency({}, 0, 0), host_time_ns=DecimalNs(5 * PERIOD_NS),
+        fired=(told,),
+    )  # fmt: skip
+    write_log(path, (ALL_OK, (FrameStatus.MISSED,) * 3, ALL_OK, ALL_OK), health=(wire.encode(health), now))
+    pulses, unseen, untagged, unfired = counts
+    said = f"{pulses} pulses fired, {unseen} of them seen by no camera, {untagged} without a tag"
+    line = f"source     own count {verdict}: {said}; {unfired} tagged that it did not fire{more}"
+    assert line in svev("info", path).stdout.splitlines()
+    found = json.loads(svev("info", path, "--json").stdout)["source"]
+    assert tuple(found[name] for name in ("fired", "unseen", "untagged", "unfired")) == counts
+    assert len(found["findings"]) == counts[2]
 
 
 def test_info_says_how_well_utc_is_known(tmp_path: Path, svev: Svev) -> None:

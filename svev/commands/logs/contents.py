@@ -26,15 +26,16 @@ AlsoJson = Annotated[bool, typer.Option("--json", help="end with one JSON object
 def info_command(log: LogPath, as_json: AsJson = False) -> None:
     """Say what a log holds: pulses, ledger of each camera, rate, spread of the triggers, session, rig.
 
-    Tells of the jumps too that were measured while it was recorded. Reads tags only and so takes a moment even for a
-    long log; `svev verify` checks every byte.
+    Where the source of the pulses tells of them (a trigger box, a line of the computer), its count stands beside that
+    of the tags. Tells of the jumps too that were measured while it was recorded. Reads no images and so takes a moment
+    even for a long log; `svev verify` checks every byte.
 
     Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed or is damaged. What can be
     read is printed in any case.
 
     Example: svev info recordings/jump.mcap
     """
-    found, jumps = info(log), live_results.summaries(log)
+    found, jumps = info(log, source=True), live_results.summaries(log)
     if as_json:
         console.print_json(found.to_json() | {"jumps": [jump.model_dump(mode="json") for jump in jumps]})
     else:
@@ -145,6 +146,9 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
     yield "pulses", ledger.summary_line()
     for camera, states in ledger.states(found.cameras).items():
         yield "ledger", f"{camera} " + ", ".join(f"{count} {state}" for state, count in states.items())
+    if found.source is not None:
+        more = "" if found.source.agrees else "; `svev verify --ledger` names each"
+        yield "source", found.source.summary_line().removeprefix("the source's ") + more
     if found.missing_pulses:
         yield "no tag", f"{found.missing_pulses} pulses"
     told = (

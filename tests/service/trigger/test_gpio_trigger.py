@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 from msgspec.structs import replace
 
 from recorder.checking.verify import verify
+from recorder.reading.info import info
 from rig.clocks import UtcAnchor
 from rig.health import Health, PulsesMade
 from rig.settings.file import load_rig
@@ -99,6 +100,7 @@ def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_cam
     assert recounted.agrees, list(recounted.in_words())
     assert recounted.source is not None
     assert 0 < recounted.source.unseen <= fates["missed", "missed"]
+    assert info(Path(json.loads(output)["log"]), source=True).source == recounted.source
     assert 0 < made.made <= len(rises)
     assert made.late_median_us is not None
     assert made.late_p99_us is not None

@@ -20,7 +20,8 @@ from rig.arrays import Floats, Integers
 from rig.images.picture import Grey
 
 _SAMPLES = 8_000  # pixels of the grid
-_ROUNDS, _CLIP = 4, 3.0  # of the robust adjustment; sigmas
+_ROUNDS, _CLIP = 3, 3.0  # of the robust adjustment, before one of all pixels; sigmas
+_FEW = 4  # of the pixels of the grid every so many are enough for those rounds
 _SHIFT_SIGMA = 0.07  # px by which a frame may still be off: lenses, rolling air, a turn about the axis
 _BINS, _THIN = 12, 17  # of the grey values; of the pixels every so many
 _ROUNDING = np.float32(1 / 12)  # variance of whole numbers
@@ -103,13 +104,15 @@ class Background:
         self._ratio = np.where(ratio > _RESTLESS, ratio**2, np.float32(1))
         step = max(1, int(np.sqrt(grey.size / _SAMPLES)))
         self._grid = slice(step // 2, None, step), slice(step // 2, None, step)
-        sampled = [layer[self._grid].ravel().astype(float) for layer in (grey, self._right, self._down)]
-        self._design = np.stack((sampled[0], np.ones(len(sampled[0])), *sampled[1:]))
-        self._weight = 1 / np.sqrt(noise**2 + self._shift)[self._grid].ravel().astype(float)
+        sampled = [layer[self._grid].ravel() for layer in (grey, self._right, self._down)]
+        calm, order = self._ratio[self._grid].ravel() == 1, np.argsort(sampled[0])
+        self._order = np.concatenate((order[calm[order]], order[~calm[order]]))  # calm ones first, bin by bin
+        self._in_bin: int = max(1, int(calm.sum()) // _BINS)
+        sampled = [layer[self._order] for layer in sampled]
+        self._design = np.stack((sampled[0], np.ones_like(sampled[0]), *sampled[1:]))
+        self._weight = 1 / np.sqrt(noise**2 + self._shift)[self._grid].ravel()[self._order]
         self._weighted = self._design * self._weight
-        calm = (self._ratio == 1)[self._grid].ravel()
-        bins = (part[calm[part]] for part in np.array_split(np.argsort(sampled[0]), _BINS))
-        self._bins = [part for part in bins if len(part) >= _FEWEST]
+        self._few = np.ascontiguousarray(self._weighted[:, ::_FEW])
         self._strip = max(1, _STRIP // grey.shape[1])
 
     @property
@@ -169,32 +172,43 @@ class Background:
 
     def _moment(self, image: Grey) -> "_Moment":
         """Light, shift and noise of an image (robust adjustment of the grid)."""
-        sample = image[self._grid].ravel().astype(float)
-        rows, values = self._weighted, sample * self._weight
-        keep = np.ones(len(values))
-        unknown = np.array([1.0, 0.0, 0.0, 0.0])
+        sample = image[self._grid].ravel()[self._order].astype(np.float32)
+        values = sample * self._weight
+        few = values[::_FEW]
+        unknown, limit = np.array([1.0, 0.0, 0.0, 0.0]), np.inf
+        keep = np.ones(len(few), np.float32)
         for _ in range(_ROUNDS):
-            kept = rows * keep
-            normal = kept @ rows.T
-            normal += np.diag(1e-9 * np.diag(normal) + 1e-12)
-            unknown = np.asarray(np.linalg.solve(normal, kept @ values), float)
-            v = np.abs(values - unknown @ rows)
-            keep = (v < _CLIP * max(1e-3, _MAD_TO_SIGMA * median(v))).astype(float)
+            unknown = _solved(self._few, few, keep)
+            v = np.abs(few - unknown @ self._few)
+            limit = _CLIP * max(1e-3, _MAD_TO_SIGMA * median(v))
+            keep = (v < limit).astype(np.float32)
+        near = np.abs(values - unknown @ self._weighted) < limit
+        unknown = _solved(self._weighted, values, near.astype(np.float32))
         grey = unknown @ self._design
         gain, offset, right, down = unknown.tolist()
         return _Moment(gain, offset, right, down, *self._noise(grey, np.abs(sample - grey)))
 
-    def _noise(self, grey: Floats, off: Floats) -> tuple[np.float32, np.float32]:
+    def _noise(self, grey: GreyImage, off: GreyImage) -> tuple[np.float32, np.float32]:
         """Variance of a grey value in this image: of reading, and per grey value (photons)."""
-        if not self._bins:
+        if self._in_bin < _FEWEST:
             return np.float32(np.median(self._weight) ** -2), np.float32(0)
-        at = np.array([grey[part].mean() for part in self._bins])
-        level = np.array([median(off[part]) for part in self._bins])
+        of_bins = slice(_BINS * self._in_bin)
+        at = grey[of_bins].reshape(_BINS, -1).mean(axis=1)
+        middle = self._in_bin // 2
+        level = np.partition(off[of_bins].reshape(_BINS, -1), middle, axis=1)[:, middle]
         level = (_MAD_TO_SIGMA * level) ** 2
         from_mean = at - at.mean()
         slope = max(0.0, float(from_mean @ level / (from_mean @ from_mean))) if np.ptp(at) > 1 else 0.0
         read = max(float(_ROUNDING), median(level - slope * at))
         return np.float32(read), np.float32(slope)
+
+
+def _solved(rows: GreyImage, values: GreyImage, keep: GreyImage) -> GreyImage:
+    """Unknowns (4,) of weighted equations, rows (4, n) and values (n,), of which some are kept."""
+    kept = rows * keep
+    normal = (kept @ rows.T).astype(float)
+    normal += np.diag(1e-9 * np.diag(normal) + 1e-12)
+    return np.linalg.solve(normal, kept @ values).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,6 @@ takes weaker evidence there. Pixels that are a signature of the camera
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from weakref import ref
 
@@ -33,7 +32,6 @@ from rig.tag import CameraTag, TripletTag
 
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
 
-_THINNEST = 4  # px; a smaller part of an image holds no spot
 _FITS_OF_OTHERS = (
     20  # places that are fitted in other regions than the largest one of an image: four markers, and what beats them
 )
@@ -63,13 +61,17 @@ class Finder:
         Raises:
             BadInputError: an image is not as large as the static image of its camera.
         """
-        found: dict[str, ImageCandidates] = {}
+        names: list[str] = []
+        images: list[list[Region]] = []
+        traces: list[WantedTraces] = []
         for camera, background, block in self._blocks(tag, image):
             regions = background.regions(block, _stamped(camera))
-            traces = WantedTraces.of(regions)
-            self._keep(tag.pulse, camera.name, regions, traces)
-            found[camera.name] = ImageCandidates(_spots(regions), traces)
-        return PulseCandidates(tag.pulse, tag.time, found)
+            names.append(camera.name)
+            images.append(regions)
+            traces.append(WantedTraces.of(regions))
+            self._keep(tag.pulse, camera.name, regions, traces[-1])
+        spots = find_spots(images, [[MOST, *[_FITS_OF_OTHERS] * (len(of) - 1)][: len(of)] for of in images])
+        return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
 
     def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:
         """The candidates of a pulse near where a jumper is expected: faster than all of them.
@@ -83,22 +85,21 @@ class Finder:
             BadInputError: see `find`.
         """
         names: list[str] = []
-        columns = [0]
-        parts: list[Region] = []
+        places: list[Expected | None] = []
+        images: list[list[Region]] = []
         traces: list[tuple[Trace, ...]] = []
         for camera, background, block in self._blocks(tag, image):
             place = expected.get(camera.name)
             box = None if place is None else _inside(place.box, background.shape)
             regions = [] if box is None else background.regions(block, _stamped(camera), box)
             self._keep(tag.pulse, camera.name, regions)
-            if place is not None:
-                parts += [_moved(part, columns[-1]) for part in _around(regions, place)]
             names.append(camera.name)
-            columns.append(columns[-1] + block.shape[1])
+            places.append(place)
+            images.append(regions)
             skis = () if place is None else place.skis
             known = tuple(trace for region in regions for trace in find_expected_traces(region, skis))
             traces.append(known or tuple(trace for region in regions for trace in find_traces(region)))
-        spots = find_expected(parts, columns) if parts else [Spots.none() for _ in names]
+        spots = find_expected(images, places)
         return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
 
     def _blocks(self, tag: TripletTag, image: Grey) -> Iterator[tuple[CameraTag, Background, Grey]]:
@@ -157,11 +158,13 @@ class Finder:
                     region.copy_into(grey[i], noise[i], first[i])
                     break
         there = np.isfinite(noise).any(axis=(1, 2))
-        discs = fit_known_discs(
-            Windows((xy - first)[there], grey[there], noise[there]), shape.of(np.flatnonzero(there))
-        )
         spots = Spots(
             np.full((len(xy), 2), np.nan), np.full((len(xy), 2, 2), np.nan), shape.radius, *np.zeros((2, len(xy)))
+        )
+        if not there.any():
+            return spots
+        discs = fit_known_discs(
+            Windows((xy - first)[there], grey[there], noise[there]), shape.of(np.flatnonzero(there))
         )
         spots.xy[there], spots.covariance[there] = discs.xy + first[there], discs.covariance
         spots.contrast[there] = discs.contrast
@@ -210,27 +213,11 @@ def find_candidates(
     return found
 
 
-def _spots(regions: list[Region]) -> Spots:
-    most = [MOST if i == 0 else _FITS_OF_OTHERS for i in range(len(regions))]
-    return find_spots(regions, most)
-
-
 def _inside(box: Floats, shape: tuple[int, int]) -> tuple[int, int, int, int] | None:
     """The part of a box (`Expected.box`) that lies in an image of so many rows and columns; None if none does."""
     left, top = np.maximum(np.floor(box[0]).astype(int), 0).tolist()
     right, bottom = np.minimum(np.ceil(box[1]).astype(int) + 1, shape[::-1]).tolist()
     return (left, top, right, bottom) if left < right and top < bottom else None
-
-
-def _around(regions: list[Region], place: Expected) -> list[Region]:
-    """The parts of regions around the expected markers."""
-    pairs = zip(place.markers, place.reach.tolist(), strict=True)
-    parts = [region.around(xy, reach) for xy, reach in pairs for region in regions]
-    return [part for part in parts if min(part.grey.shape) > _THINNEST]
-
-
-def _moved(part: Region, columns: int) -> Region:
-    return replace(part, x=part.x + columns)
 
 
 def _stamped(camera: CameraTag) -> tuple[int, int, int] | None:

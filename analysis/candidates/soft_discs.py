@@ -24,7 +24,8 @@ _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residua
 _COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
 _FARTHEST = 24.0  # px; no pixel farther away is fitted
-_GROUPS = 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together
+_GROUPS = 3.7, 4.3, 5.0, 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together
+_FEWEST = 12  # spots of a group; fewer go with the next larger ones: each call costs more than their pixels
 _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends on it
 _STRETCH_SPREAD, _SHAPE, _SHAPE_SPREAD = 0.25, 0.3, 0.5  # weak priors
 _SIZE_SPREAD = 0.4  # of log size
@@ -78,9 +79,7 @@ def fit_soft_discs(
     theta, covariance = np.zeros((n, UNKNOWNS)), np.full((n, UNKNOWNS, UNKNOWNS), np.nan)
     misfit, rms, good = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, bool)
     reach = np.minimum(radius + margin, _FARTHEST)
-    group = np.searchsorted(_GROUPS, reach)
-    for each in np.unique(group):
-        mine = np.flatnonzero(group == each)
+    for mine in _groups(reach):
         fitted = _Batch(grey, sigma, xy[mine], radius[mine], reach[mine], tight).solved()
         theta[mine], covariance[mine], misfit[mine], rms[mine], good[mine] = fitted
     spread = _second_moment(theta[:, 2], theta[:, 5])
@@ -96,6 +95,18 @@ def fit_soft_discs(
         rms,
         good,
     )
+
+
+def _groups(reach: Floats) -> list[Integers]:
+    """Spots that are fitted together, by how far (n,) each one's pixels reach: all windows of a group are as large."""
+    group = np.searchsorted(_GROUPS, reach)
+    groups, waiting = [], np.empty(0, np.intp)
+    for each in np.unique(group):
+        waiting = np.concatenate((waiting, np.flatnonzero(group == each)))
+        if len(waiting) >= _FEWEST:
+            groups.append(waiting)
+            waiting = waiting[:0]
+    return [*groups, waiting] if len(waiting) else groups
 
 
 def _second_moment(log_size: Floats, log_shape: Floats) -> Floats:

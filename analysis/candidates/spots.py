@@ -5,7 +5,7 @@ discs. What is no spot goes: too long, too large, not explained by the model, to
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.special import chdtri
 
 from analysis.candidates.background import Region
 from analysis.candidates.median import median
-from analysis.candidates.model import Spots
+from analysis.candidates.model import Expected, Spots
 from analysis.candidates.soft_discs import SoftDiscs, fit_soft_discs
 from analysis.scene.static_image import GreyImage
 from rig.arrays import Flags, Floats, Integers
@@ -29,6 +29,7 @@ _STRENGTH = 6.0  # contrast over its sigma
 _STRETCH = 0.75  # log of the ratio of the axes: a streak of 26 m/s and 2 ms is no longer
 _MISFIT = 0.25  # residuals over contrast
 _TIGHT, _TIGHT_MISFIT = 14, 0.15  # places that are fitted again in smaller windows, and what is asked of them there
+_THINNEST = 4  # px; a smaller part of a region holds no spot
 _GAP = 26  # px between regions on the sheet
 _WORST_SIGMA = 0.5  # px
 _SECOND_ANSWER, _SECOND_STRENGTH = 3.0, 4.0  # where a spot is expected, a few places compete, not a whole image
@@ -38,36 +39,38 @@ _GATE = float(chdtri(2, 0.001))
 _NEAR = 2  # px from what is in front
 
 
-def find_spots(regions: Sequence[Region], most: Sequence[int]) -> Spots:
-    """Spots of all regions of an image, in px of the image, the clearest first.
+def find_spots(images: Sequence[Sequence[Region]], most: Sequence[Sequence[int]]) -> list[Spots]:
+    """Spots of several images, fitted all at once.
 
     Args:
-        regions: parts of an image.
-        most: for each, how many places are fitted, those with the strongest answers.
-    """
-    blobs = [_blobs(region) for region in regions]
-    places = [of[0][:count] for of, count in zip(blobs, most, strict=True)]
-    radii = [of[1][:count] for of, count in zip(blobs, most, strict=True)]
-    return _fitted(regions, places, radii, _STRENGTH)
-
-
-def find_expected(parts: Sequence[Region], columns: Sequence[int]) -> list[Spots]:
-    """Spots around expected places in several images side by side, all at once: the clearest of each image first.
-
-    Args:
-        parts: of the images around each place; their columns count from the first column of the first image.
-        columns: first column of each image, and behind the last one.
+        images: parts of each image.
+        most: for each of them, how many places are fitted, those with the strongest answers.
 
     Returns:
-        By image, in px of the image.
+        By image, in px of the image, the clearest first.
     """
-    found = find_spots(parts, [_OF_PLACE] * len(parts))
-    image = np.searchsorted(columns, found.xy[:, 0] + 0.5, side="right") - 1
-    spots = []
-    for i in range(len(columns) - 1):
-        own = found.only(image == i)
-        spots.append(replace(own, xy=own.xy - (columns[i], 0.0)))
-    return spots
+    places = [
+        [_Places(region, *_blobs(region)).only(slice(count)) for region, count in zip(regions, counts, strict=True)]
+        for regions, counts in zip(images, most, strict=True)
+    ]
+    return _fitted(places, _STRENGTH)
+
+
+def find_expected(images: Sequence[Sequence[Region]], expected: Sequence[Expected | None]) -> list[Spots]:
+    """Spots around expected places in several images, fitted all at once.
+
+    Args:
+        images: parts of each image.
+        expected: in each image; None: nothing.
+
+    Returns:
+        By image, in px of the image, the clearest first.
+    """
+    places = [
+        [] if place is None else [found for region in regions if (found := _near(region, place)) is not None]
+        for regions, place in zip(images, expected, strict=True)
+    ]
+    return _fitted(places, _STRENGTH)
 
 
 def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float | None = None) -> Spots:
@@ -86,7 +89,7 @@ def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float
     tried = [radius] if radius is not None else list(_USUAL_RADII)
     places, radii = places[near][:MOST], radii[near][:MOST]
     places = np.concatenate((places, np.repeat(place[None], len(tried), axis=0)))
-    spots = _fitted([region], [places], [np.concatenate((radii, tried))], _SECOND_STRENGTH)
+    spots = _fitted([[_Places(region, places, np.concatenate((radii, tried)))]], _SECOND_STRENGTH)[0]
     squares = _squares(spots.xy - xy, covariance + spots.covariance)
     order = np.argsort(squares)
     return spots.only(order[squares[order] < _GATE])
@@ -98,23 +101,65 @@ def _squares(off: Floats, covariance: Floats) -> Floats:
     return np.asarray(np.einsum("ni,nij,nj->n", off, inverse, off))
 
 
-def _fitted(regions: Sequence[Region], places: Sequence[Floats], radii: Sequence[Floats], strength: float) -> Spots:
-    """The spots near some places (n, 2) of each region; what lies close around one counts less if it spoils the fit."""
-    if not sum(len(of) for of in places):
-        return Spots.none()
-    sheet = _Sheet(regions)
-    xy = np.concatenate([of + offset for of, offset in zip(places, sheet.offsets, strict=True)])
-    home = np.repeat(sheet.to_image, [len(of) for of in places], axis=0)
-    radius = np.concatenate(radii)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Places:
+    """Where spots of a region are fitted: places (n, 2) and radii (n,), px of the region, the likeliest first."""
+
+    region: Region
+    xy: Floats
+    radius: Floats
+
+    def only(self, chosen: slice | Integers) -> "_Places":
+        """Some of them."""
+        return _Places(self.region, self.xy[chosen], self.radius[chosen])
+
+
+def _near(region: Region, expected: Expected) -> _Places | None:
+    """The few likeliest places around each expected marker; None where the region holds nothing of them."""
+    low, high = expected.markers - expected.reach[:, None], expected.markers + expected.reach[:, None]
+    own = np.array((region.x, region.y)), np.array((region.x, region.y)) + region.grey.shape[::-1] - 1
+    sides = np.minimum(high, own[1]) - np.maximum(low, own[0])
+    there = sides.min(axis=1) >= _THINNEST
+    if not there.any():
+        return None
+    first = low[there].min(axis=0)
+    middle = (first + high[there].max(axis=0)) / 2
+    part = region.around(middle, middle - first)
+    xy, radius = _blobs(part, largest=float(sides[there].max()))
+    found = xy + np.array((part.x, part.y))
+    each = [
+        np.flatnonzero(np.abs(found - marker).max(axis=1) <= reach)[:_OF_PLACE]
+        for marker, reach in zip(expected.markers[there], expected.reach[there], strict=True)
+    ]
+    return _Places(part, xy, radius).only(np.unique(np.concatenate(each)))
+
+
+def _fitted(images: Sequence[Sequence[_Places]], strength: float) -> list[Spots]:
+    """The spots of each image near some places; what lies close around one counts less if it spoils the fit."""
+    places = [of_region for of_image in images for of_region in of_image]
+    counts = [len(of_region.xy) for of_region in places]
+    if not sum(counts):
+        return [Spots.none() for _ in images]
+    sheet = _Sheet([of_region.region for of_region in places])
+    region = np.repeat(np.arange(len(places)), counts)
+    image = np.repeat(np.arange(len(images)), [len(of_image) for of_image in images])[region]
+    xy = np.concatenate([of_region.xy for of_region in places]) + sheet.offsets[region]
+    radius, home = np.concatenate([of_region.radius for of_region in places]), sheet.to_image[region]
     wide = fit_soft_discs(sheet.grey, sheet.noise, xy, radius)
     sound = _sound(wide, strength)
     first = _spots(wide, sound, home)
-    first = _apart(first.only(np.argsort(-first.strength)))
-    again = _first_of_each(np.flatnonzero(~sound), home)
-    if not len(again):
-        return first
-    tight = fit_soft_discs(sheet.grey, sheet.noise, xy[again], radius[again], tight=True)
-    return _apart(Spots.joined([first, _spots(tight, _sound(tight, strength, _TIGHT_MISFIT), home[again])]))
+    order = np.argsort(-first.strength)
+    spots, image_of = first.only(order), image[sound][order]
+    apart = _apart(spots, image_of)
+    spots, image_of = spots.only(apart), image_of[apart]
+    if len(again := _first_of_each(np.flatnonzero(~sound), region)):
+        tight = fit_soft_discs(sheet.grey, sheet.noise, xy[again], radius[again], tight=True)
+        sound = _sound(tight, strength, _TIGHT_MISFIT)
+        spots = Spots.joined([spots, _spots(tight, sound, home[again])])
+        image_of = np.concatenate((image_of, image[again][sound]))
+        apart = _apart(spots, image_of)
+        spots, image_of = spots.only(apart), image_of[apart]
+    return [spots.only(image_of == i) for i in range(len(images))]
 
 
 class _Sheet:
@@ -138,10 +183,10 @@ class _Sheet:
         self.to_image = np.array([(region.x, region.y) for region in regions]) - self.offsets
 
 
-def _first_of_each(chosen: Integers, home: Floats) -> Integers:
+def _first_of_each(chosen: Integers, region: Integers) -> Integers:
     """Of the chosen places the first few of each region."""
-    kept = [chosen[(home[chosen] == of).all(axis=1)][:_TIGHT] for of in np.unique(home[chosen], axis=0)]
-    return np.sort(np.concatenate(kept)) if kept else chosen
+    of = region[chosen]
+    return chosen[np.arange(len(chosen)) - np.searchsorted(of, of) < _TIGHT]
 
 
 def _spots(discs: SoftDiscs, chosen: Flags, home: Floats) -> Spots:
@@ -155,14 +200,16 @@ def _spots(discs: SoftDiscs, chosen: Flags, home: Floats) -> Spots:
     )
 
 
-def _apart(spots: Spots) -> Spots:
-    """Without those that lie on an earlier one."""
-    kept: list[int] = []
+def _apart(spots: Spots, image: Integers) -> Flags:
+    """Which spots do not lie on an earlier one of the same image (n,)."""
+    least = np.maximum(np.maximum(spots.radius[:, None], spots.radius), 1.0)
+    x, y = spots.xy.T
+    on = (np.hypot(x[:, None] - x, y[:, None] - y) <= least) & (image[:, None] == image)
+    kept = np.ones(len(spots), bool)
     for i in range(len(spots)):
-        near = (max(spots.radius[i], spots.radius[k], 1.0) for k in kept)
-        if all(np.hypot(*(spots.xy[i] - spots.xy[k])) > least for k, least in zip(kept, near, strict=True)):
-            kept.append(i)
-    return spots.only(np.array(kept, int))
+        if kept[i]:
+            kept[i + 1 :] &= ~on[i, i + 1 :]
+    return kept
 
 
 def _sound(discs: SoftDiscs, strength: float, misfit: float = _MISFIT) -> Flags:
@@ -177,10 +224,16 @@ def _sound(discs: SoftDiscs, strength: float, misfit: float = _MISFIT) -> Flags:
         )
 
 
-def _blobs(region: Region, answer: float = _ANSWER) -> tuple[Floats, Floats]:
-    """Places (n, 2) in the region and radii (n,) of blobs, the strongest answers first."""
+def _blobs(region: Region, answer: float = _ANSWER, largest: float | None = None) -> tuple[Floats, Floats]:
+    """Places (n, 2) in the region and radii (n,) of blobs, the strongest answers first.
+
+    Args:
+        region: part of an image.
+        answer: times its noise, at least.
+        largest: px that a thing with such a blob measures; as large as the region if left out.
+    """
     rows, columns = region.grey.shape
-    largest = max(rows, columns) / _LARGEST
+    largest = (max(rows, columns) if largest is None else largest) / _LARGEST
     scales = [float(scale) for scale in _SCALES if scale <= max(_SCALES[2], largest / np.sqrt(2) * 1.4)]
     grey = region.grey
     noise = median(region.noise)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from analysis.candidates.known_discs import DiscShape
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 from tests.analysis.candidates.judge import Hill, judged, scenario
@@ -59,8 +60,10 @@ def test_a_predicted_place_finds_the_marker_again(hill: Hill) -> None:
             predicted = np.array(place) + np.array((0.8, -0.6))
             spots = hill.finder.look_for_spots(PulseNumber(pulse), camera, predicted, np.eye(2))
             assert np.hypot(*(spots.xy - place).T).min() < 0.15
-    nowhere = hill.finder.look_for_spots(PulseNumber(pulse), "K1", np.array((600.0, 20.0)), np.eye(2))
-    assert len(nowhere) == 0
+    place = np.array((600.0, 20.0))
+    assert len(hill.finder.look_for_spots(PulseNumber(pulse), "K1", place, np.eye(2))) == 0
+    shape = DiscShape(np.array((2.5,)), 0.2, np.zeros((1, 2)), 150.0, 40.0)
+    assert np.isnan(hill.finder.fit_discs([PulseNumber(pulse)], "K1", place[None], shape).xy).all()
 
 
 def test_a_hard_day_hides_few_markers() -> None:

@@ -79,7 +79,8 @@ class Service(Archive):
         lights: exposure and gain of the cameras.
         trains: the pulses, where svev makes them.
         balls: where the cameras should show the balls.
-        examine: the doctor; examines what disturbs nothing in the given state.
+        examine: the doctor; examines what disturbs nothing in the given state. It is told whether the beam of the light
+            barrier is interrupted; None: it is not known.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class Service(Archive):
         lights: Lights,
         trains: Trains,
         balls: BallPlaces,
-        examine: Callable[[Status], DoctorReport],
+        examine: Callable[[Status, bool | None], DoctorReport],
     ) -> None:
         super().__init__(catalogue, exports)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
@@ -355,7 +356,8 @@ class Service(Archive):
     def doctor(self) -> DoctorReport:
         """Run the doctor, except for probes that would disturb the present state."""
         with self._examining:
-            return self._examine(self.status())
+            beam = None if self._barrier is None else self._barrier.interrupted()
+            return self._examine(self.status(), beam)
 
     def metrics(self) -> Iterable[Metric]:
         """The metric families of what has been measured so far."""

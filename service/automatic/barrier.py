@@ -3,7 +3,8 @@
 import os
 import select
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from rig.api.status import State
@@ -34,12 +35,22 @@ class BarrierWatch:
         failed: Callable[[Phrase], None],
     ) -> None:
         self._barrier, self._state, self._crossed, self._failed = barrier, state, crossed, failed
+        self._line: EdgeLine | None = None
+        self._asking = threading.Lock()  # nobody asks a line that is given back
         self._closing = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
         self._thread = threading.Thread(target=self._run, name="light barrier")
 
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
+
+    def interrupted(self) -> bool | None:
+        """Whether the beam is interrupted now; None: the line is not had, or fails. Any thread may ask."""
+        with self._asking:
+            try:
+                return None if self._line is None else self._line.active()
+            except TriggerError:
+                return None  # the watching thread tells of it
 
     def close(self) -> None:
         """End the thread."""
@@ -57,7 +68,8 @@ class BarrierWatch:
                 with EdgeLine(
                     barrier.chip, barrier.line, active_low=barrier.active_low, debounce_ms=barrier.debounce_ms
                 ) as line:
-                    self._watch(line)
+                    with self._had(line):
+                        self._watch(line)
                     return
             except TriggerError as error:
                 if str(error) != said:
@@ -65,6 +77,16 @@ class BarrierWatch:
                     self._failed(error.said)
             if poll.poll(_RETRY_MS):
                 return
+
+    @contextmanager
+    def _had(self, line: EdgeLine) -> Iterator[None]:
+        """Let others ask for the level of the line meanwhile."""
+        self._line = line
+        try:
+            yield
+        finally:
+            with self._asking:
+                self._line = None
 
     def _watch(self, line: EdgeLine) -> None:
         """Tell of edges until the watch is closed.

@@ -28,8 +28,15 @@ class Probe:
     limit_s: float = 5.0
 
 
-def probes(rig: RigSettings, directory: Path) -> list[Probe]:
-    """All probes for a rig that records into `directory`, in the order in which findings are shown."""
+def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -> list[Probe]:
+    """All probes for a rig that records into `directory`, in the order in which findings are shown.
+
+    Args:
+        rig: the rig.
+        directory: of the recordings.
+        interrupted: whether the beam of the light barrier is, as this process sees that has its line; None: the line
+            is to be asked.
+    """
     return [
         Probe("Python", Topic.SOFTWARE, machine.look_at_python),
         Probe("packages", Topic.SOFTWARE, machine.look_at_packages, limit_s=30.0),
@@ -48,7 +55,7 @@ def probes(rig: RigSettings, directory: Path) -> list[Probe]:
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("trigger box", Topic.CAMERAS, lambda: trigger_box.look_at_trigger_box(rig)),
         Probe("trigger line", Topic.CAMERAS, lambda: gpio.look_at_gpio(rig)),
-        Probe("light barrier", Topic.CAMERAS, lambda: gpio.look_at_barrier(rig)),
+        Probe("light barrier", Topic.CAMERAS, lambda: gpio.look_at_barrier(rig, interrupted)),
         Probe("discovery", Topic.CAMERAS, lambda: gige.look_for_cameras(rig), limit_s=10.0),
         Probe("clock", Topic.TIME, machine.look_at_clock),
         Probe("processor", Topic.PROCESSOR, machine.look_at_processor),

@@ -32,25 +32,26 @@ class PanelDoctor:
         self._report: models.DoctorReport | None = None
         self._key: tuple[bool, float] = (False, 0.0)
 
-    def report(self, status: Status) -> models.DoctorReport:
+    def report(self, status: Status, interrupted: bool | None = None) -> models.DoctorReport:
         """Examine everything that may be examined in this state; give the last report while it is fresh.
 
         Args:
             status: present status of the service.
+            interrupted: whether the beam of the light barrier is, as the service sees it; None: it does not.
         """
         with self._lock:
             idle = status.state is State.IDLE and status.rehearsal is None
             kept_idle, until = self._key
             if self._report is not None and kept_idle == idle and time.monotonic() < until:
                 return self._report
-            findings = list(self._look(status, idle=idle))
+            findings = list(self._look(status, interrupted, idle=idle))
             worst = max((finding.level for finding in findings), key=_RANK.index)
             self._report = models.DoctorReport(worst=worst.value, findings=tuple(_shown(each) for each in findings))
             self._key = (idle, time.monotonic() + _KEPT_S)
             return self._report
 
-    def _look(self, status: Status, *, idle: bool) -> Iterator[Finding]:
-        for probe in probes(self._rig(), self._data):
+    def _look(self, status: Status, interrupted: bool | None, *, idle: bool) -> Iterator[Finding]:
+        for probe in probes(self._rig(), self._data, interrupted):
             if idle or probe.name not in _ONLY_IDLE:
                 yield from run_probe(probe)
             elif probe.name == "cameras" and status.rehearsal is None:

@@ -19,7 +19,7 @@ from rig.transport.recorder_commands import PulsesFired, TellPulses
 from rig.transport.trigger_messages import LetPulses, TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
 from triggering.sources.gate import Gate
-from triggering.sources.gpio.lines import GateLine, OutputLine
+from triggering.sources.gpio.lines import InputLine, OutputLine
 from triggering.sources.gpio.pulser import Pulser
 from triggering.sources.gpio.telling import LatenessTeller
 from triggering.sources.gpio.timer import Timer
@@ -80,8 +80,8 @@ def _outer_gate(trigger: GpioTrigger) -> Iterator[Callable[[], bool] | None]:
     if trigger.gate is None:
         yield None
         return
-    with GateLine(trigger.chip, trigger.gate) as line:
-        yield line.is_open
+    with InputLine(trigger.chip, trigger.gate.line, active_low=trigger.gate.active_low) as line:
+        yield line.active
 
 
 class _Maker:

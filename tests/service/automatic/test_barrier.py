@@ -41,4 +41,6 @@ def test_an_interrupted_light_barrier_is_one_recording_however_it_bounces(tmp_pa
             ]
             assert len(said) == 1
             assert "a jump is marked by light barrier" in said[0]
+            seen = [each for each in service.get("/api/doctor")["findings"] if each["code"].startswith("check_b")]
+            assert [each["code"] for each in seen] == ["check_beam_interrupted"]
         chip.wait_for_use(2, used=False)

@@ -125,6 +125,25 @@ with Chip(path) as chip, chip.request_lines({1: settings}) as line:
     assert chip.requests[0].flags == LineFlag.INPUT | LineFlag.RISING
 
 
+@pytest.mark.parametrize("active_low", [False, True])
+def test_a_program_asks_for_the_level_of_its_lines_while_edges_wait(folder: Path, active_low: bool) -> None:
+    with GpioChip(folder / "gpiochip0") as chip, _start(chip, f"""
+settings = LineSettings(active_low={active_low}, edge_detection=Edge.BOTH)
+out = LineSettings(direction=Direction.OUTPUT, output_value=Value.ACTIVE)
+with Chip(path) as chip, chip.request_lines({{1: settings}}) as line, chip.request_lines({{2: out}}) as output:
+    print(line.get_value(1).name, output.get_value(2).name, flush=True)
+    sys.stdin.readline()
+    print(line.get_value(1).name, line.read_edge_events()[0].event_type.name)
+""") as program:  # fmt: skip
+        assert program.stdout is not None
+        before = program.stdout.readline()
+        chip.drive(1, high=True)
+        chip.wait_until_settled(1)
+        seen, _ = program.communicate("go\n", timeout=30)
+    low, high = ("ACTIVE", "INACTIVE") if active_low else ("INACTIVE", "ACTIVE")
+    assert before + seen == f"{low} ACTIVE\n{high} {'FALLING' if active_low else 'RISING'}_EDGE\n"
+
+
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
 def test_a_line_is_free_again_when_its_program_dies_and_keeps_its_level(folder: Path, how: signal.Signals) -> None:
     with GpioChip(folder / "gpiochip0") as chip, _start(chip, """

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from rig.settings.file import CONFIG
+from simrig.gpio.abi import LineFlag
 from simrig.gpio.build import environment
 from simrig.gpio.chip import GpioChip
 
@@ -31,13 +32,19 @@ look(gpio(chip, "FAN"))
 look(gpio(chip, 9))
 look(gpio(chip, 0, {"line": 2}))
 look(gpio(chip, 0, {"line": "FAN"}))
-def watch(line, trigger=ExternalTrigger()):
-    automatic = rig.automatic.model_copy(update={"barrier": BarrierSettings(chip=chip, line=line)})
-    for found in look_at_barrier(rig.model_copy(update={"automatic": automatic, "trigger": trigger})):
+def watch(line, trigger=ExternalTrigger(), low=False, interrupted=None):
+    barrier = BarrierSettings(chip=chip, line=line, active_low=low)
+    automatic = rig.automatic.model_copy(update={"barrier": barrier})
+    for found in look_at_barrier(rig.model_copy(update={"automatic": automatic, "trigger": trigger}), interrupted):
         print(found.level, found.code, found.what.replace(chip, "CHIP"), sep="|")
 watch(0)
+watch(2)
+watch(2, low=True)
+watch(0, low=True)
 with EdgeLine(chip, 0, active_low=False, debounce_ms=5):
     watch(0)
+    watch(0, interrupted=False)
+    watch(0, low=True, interrupted=True)
 watch(0, gpio(chip, 0))
 watch(2, gpio(chip, 0, {"line": 2}))
 watch(1)
@@ -48,14 +55,16 @@ watch(9)
 def test_the_doctor_says_whether_the_lines_can_make_pulses_and_watch_a_barrier() -> None:
     with (
         tempfile.TemporaryDirectory() as folder,
-        GpioChip(Path(folder) / "gpiochip0", lines=("", "FAN", ""), taken={1: "fan"}) as chip,
+        GpioChip(Path(folder) / "gpiochip0", lines=("", "FAN", "BEAM"), taken={1: "fan"}) as chip,
     ):
+        chip.drive(2, high=True)
         done = subprocess.run(
             [sys.executable, "-c", _PROGRAM, str(CONFIG / "rigs" / "sim.toml"), str(chip.path)],
             env={**os.environ, **environment()}, capture_output=True, text=True, timeout=60, check=False,
         )  # fmt: skip
         assert (done.returncode, done.stderr) == (0, "")
         assert chip.edges == []
+        assert all(LineFlag.INPUT in request.flags for request in chip.requests[1:])
     assert done.stdout.splitlines() == [
         "PASS|check_gpio|line 0 of CHIP is there (trigger.line)|",
         "PASS|check_gpio|line 0 of CHIP is there (trigger.line)|",
@@ -74,8 +83,13 @@ def test_the_doctor_says_whether_the_lines_can_make_pulses_and_watch_a_barrier()
             "FAIL|check_gpio_taken|line FAN of CHIP is taken by fan|end that, or name another line as trigger.gate in "
             "the rig file"
         ),
-        "PASS|check_barrier|line 0 of CHIP is there for the light barrier",
-        "PASS|check_barrier|line 0 of CHIP is there for the light barrier",
+        "PASS|check_beam_whole|line 0 of CHIP is low: the beam of the light barrier is whole",
+        "WARN|check_beam_interrupted|line 2 of CHIP is high: the beam of the light barrier is interrupted",
+        "PASS|check_beam_whole|line 2 of CHIP is high: the beam of the light barrier is whole",
+        "WARN|check_beam_interrupted|line 0 of CHIP is low: the beam of the light barrier is interrupted",
+        "PASS|check_barrier|line 0 of CHIP is there for the light barrier: Check on the page tells its level",
+        "PASS|check_beam_whole|line 0 of CHIP is low: the beam of the light barrier is whole",
+        "WARN|check_beam_interrupted|line 0 of CHIP is low: the beam of the light barrier is interrupted",
         "FAIL|check_barrier_twice|line 0 of CHIP is to serve both the pulses and the light barrier",
         "FAIL|check_barrier_twice|line 2 of CHIP is to serve both the pulses and the light barrier",
         "FAIL|check_barrier_taken|line 1 of CHIP, of the light barrier, is taken by fan",

@@ -13,7 +13,7 @@ from gpiod.line import Direction, Edge, Value
 from rig.clocks import HostNs
 from rig.errors import TriggerError
 from rig.phrase import phrase
-from rig.settings.trigger import GateSettings, GpioLine
+from rig.settings.trigger import GpioLine
 
 _DEVICES: Final = Path("/dev")
 #: Who has a line, as `gpioinfo` shows it.
@@ -83,7 +83,7 @@ def consumer_of(chip: str, line: GpioLine) -> str:
 
 
 class RequestedLine:
-    """A line that this process has; a context manager that gives it back.
+    """A line that this process has; a context manager that gives it back. Levels may be asked for in any thread.
 
     Args:
         chip: its chip, as the rig file names it.
@@ -106,6 +106,17 @@ class RequestedLine:
 
     def __enter__(self) -> Self:
         return self
+
+    def active(self) -> bool:
+        """Whether the line is active now; an input, after its debounce period.
+
+        Raises:
+            TriggerError: the chip is gone.
+        """
+        try:
+            return self.request.get_value(self.offset) is Value.ACTIVE
+        except OSError as error:
+            raise _gone(self.name, error) from None
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -152,30 +163,20 @@ class OutputLine(RequestedLine):
             super().__exit__(kind, error, trace)
 
 
-class GateLine(RequestedLine):
+class InputLine(RequestedLine):
     """A line whose level is asked for.
 
     Args:
         chip: its chip, as the rig file names it.
-        gate: the line, and which level is active.
+        line: number or name.
+        active_low: low is active.
 
     Raises:
         TriggerError: as `RequestedLine`.
     """
 
-    def __init__(self, chip: str, gate: GateSettings) -> None:
-        super().__init__(chip, gate.line, gpiod.LineSettings(direction=Direction.INPUT, active_low=gate.active_low))
-
-    def is_open(self) -> bool:
-        """Whether the line is active now.
-
-        Raises:
-            TriggerError: the chip is gone.
-        """
-        try:
-            return self.request.get_value(self.offset) is Value.ACTIVE
-        except OSError as error:
-            raise _gone(self.name, error) from None
+    def __init__(self, chip: str, line: GpioLine, *, active_low: bool) -> None:
+        super().__init__(chip, line, gpiod.LineSettings(direction=Direction.INPUT, active_low=active_low))
 
 
 class EdgeLine(RequestedLine):

@@ -38,7 +38,11 @@ export const findings = {
   check_fallback_same_disk: ["{folder} (recorder.fallback_directory) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
 
   check_gpio: ["linje {line} på {chip} er på plass ({setting})"],
-  check_barrier: ["linje {line} på {chip} er klar for lysporten"],
+  check_barrier: ["linje {line} på {chip} er klar for lysporten: Sjekk på siden viser nivået"],
+  check_beam_whole: ["linje {line} på {chip} er {level}: strålen i lysporten er hel"],
+  check_beam_interrupted: ["linje {line} på {chip} er {level}: strålen i lysporten er brutt", "hvis ingenting er i strålen, rett inn lysporten og se på kabelen; er den hel, må active_low for barrier under [automatic] i riggfilen være {other}"],
+  line_high: ["høy"],
+  line_low: ["lav"],
   check_barrier_chip: ["lysport: {why}", "rett barrier under [automatic] i riggfilen; til da starter den ingen opptak"],
   check_barrier_twice: ["linje {line} på {chip} skal tjene både pulsene og lysporten", "sett en annen linje for en av dem i riggfilen"],
   check_barrier_taken: ["linje {line} på {chip}, for lysporten, er opptatt av {consumer}", "avslutt det, eller sett en annen linje som barrier under [automatic] i riggfilen"],

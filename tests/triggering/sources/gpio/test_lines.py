@@ -19,8 +19,7 @@ _HEAD = """
 import sys
 from pathlib import Path
 from rig.errors import TriggerError
-from triggering.sources.gpio.lines import EdgeLine, GateLine, OutputLine, chip_path
-from rig.settings.trigger import GateSettings
+from triggering.sources.gpio.lines import EdgeLine, InputLine, OutputLine, chip_path
 folder = Path(sys.argv[1])
 chip = str(folder / "gpiochip0")
 def said(action):
@@ -59,12 +58,12 @@ with OutputLine(chip, "PULSES", active_low=True) as line:
 
 
 @pytest.mark.parametrize("active_low", [False, True])
-def test_a_gate_is_open_while_its_line_is_active(folder: Path, active_low: bool) -> None:
+def test_the_level_of_an_input_is_told_while_its_chip_is_there(folder: Path, active_low: bool) -> None:
     """Whoever asks is another process, so the level changes between two words from it."""
     code = """
-with GateLine(chip, GateSettings(line="GATE", active_low=sys.argv[2] == "True")) as line:
+with InputLine(chip, "GATE", active_low=sys.argv[2] == "True") as line:
     for _ in sys.stdin:
-        said(lambda: print(line.is_open()))
+        said(lambda: print(line.active()))
         sys.stdout.flush()
 """
     command = [sys.executable, "-c", _HEAD + code, str(folder), str(active_low)]

@@ -1,18 +1,15 @@
-"""Finds the back end that a rig file names for a camera; imports a camera library only if a camera needs it."""
+"""Finds the back end that a rig file names for a camera; imports what drives a camera only if a camera needs it."""
 
 from collections.abc import Callable
 from functools import cache
 from typing import Final
 
-from capture.iidc.bandwidth import check_bandwidth
-from capture.iidc.library import load as load_libdc1394
 from capture.seam import OpenCamera
 from rig.clocks import HostNs
 from rig.errors import BadInputError, CameraNotFoundError
 from rig.settings.model import Backend, RigSettings
 from rig.settings.trigger import SoftwareTrigger
 from rig.transport.ring import CameraRing
-from service.processes.replayed_log import ReplayedLog, check_replay
 
 _Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
 
@@ -42,6 +39,7 @@ def _sim(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenC
 def _replay(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:
     from capture.replay.camera import ReplayCamera  # noqa: PLC0415
     from capture.replay.timeline import Timeline  # noqa: PLC0415
+    from service.processes.replayed_log import ReplayedLog  # noqa: PLC0415
 
     camera = rig.cameras[index]
 
@@ -66,10 +64,17 @@ def check_backends(rig: RigSettings) -> None:
         BadInputError: libdc1394 is missing, a FireWire bus has no room for its cameras, or a log that is to be replayed
             is missing or does not fit the rig file.
     """
-    if any(camera.backend == "iidc" for camera in rig.cameras):
+    backends = {camera.backend for camera in rig.cameras}
+    if "iidc" in backends:
+        from capture.iidc.bandwidth import check_bandwidth  # noqa: PLC0415
+        from capture.iidc.library import load as load_libdc1394  # noqa: PLC0415
+
         load_libdc1394()
         check_bandwidth(rig)
-    check_replay(rig)
+    if "replay" in backends:
+        from service.processes.replayed_log import check_replay  # noqa: PLC0415
+
+        check_replay(rig)
 
 
 def camera_opener(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:

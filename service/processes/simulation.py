@@ -1,10 +1,14 @@
-"""Starts the simulated cameras of a rig file with a `[simulation]` table; no other module here imports `simrig`."""
+"""Starts the simulated cameras of a rig file with a `[simulation]` table; no other module here imports `simrig`.
+
+A rig of real cameras loads nothing of the simulated hill.
+"""
 
 import ipaddress
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from capture.sim.camera import Scene
 from rig.clocks import HostNs
@@ -13,14 +17,9 @@ from rig.pulse import PulseNumber
 from rig.settings.model import CameraSettings, RigSettings
 from rig.settings.trigger import ActionTrigger, SoftwareTrigger, TriggerBoxTrigger
 from service.processes.rig_processes import TRIGGER_PORT
-from simrig.programs.recording_truth import RecordingTruth, gige_sensor
-from simrig.programs.scene import SimScene
-from simrig.programs.simulated_hill import SimulatedHill
-from simrig.triggerbox.box import EmulatedBox
-from simrig.triggerbox.timer import HillTimer
-from simrig.world.cable import cable_end
-from simrig.world.pulses import PulseTrain
-from simrig.world.scenario import load_scenario
+
+if TYPE_CHECKING:
+    from simrig.programs.simulated_hill import SimulatedHill
 
 #: Writes the truth of a recording into a file; called with its path, and number and host time of each pulse.
 WriteTruth = Callable[[Path, Iterable[tuple[PulseNumber, HostNs]]], None]
@@ -28,7 +27,7 @@ WriteTruth = Callable[[Path, Iterable[tuple[PulseNumber, HostNs]]], None]
 
 def simulated_hill(
     rig: RigSettings, epoch: HostNs, *, prerendered: int = 0, link_mbit_s: float = 1000.0
-) -> AbstractContextManager[SimulatedHill | None]:
+) -> AbstractContextManager["SimulatedHill | None"]:
     """The simulated GigE Vision and FireWire cameras of a rig with a `[simulation]` table; nothing for other rigs.
 
     Args:
@@ -42,6 +41,11 @@ def simulated_hill(
     """
     if rig.simulation is None:
         return nullcontext()
+    from simrig.programs.recording_truth import gige_sensor  # noqa: PLC0415
+    from simrig.programs.simulated_hill import SimulatedHill  # noqa: PLC0415
+    from simrig.world.cable import cable_end  # noqa: PLC0415
+    from simrig.world.scenario import load_scenario  # noqa: PLC0415
+
     scenario = load_scenario(rig.simulation.scenario)
     for camera in rig.cameras:
         scenario.camera_index(camera.name)
@@ -82,6 +86,10 @@ def hill_environment(rig: RigSettings, epoch: HostNs) -> Iterator[Mapping[str, s
         hill = stack.enter_context(simulated_hill(rig, epoch))
         variables = {} if hill is None else hill.environment
         if rig.simulation is not None and isinstance(rig.trigger, TriggerBoxTrigger):
+            from simrig.triggerbox.box import EmulatedBox  # noqa: PLC0415
+            from simrig.triggerbox.timer import HillTimer  # noqa: PLC0415
+            from simrig.world.pulses import PulseTrain  # noqa: PLC0415
+
             port = Path(stack.enter_context(TemporaryDirectory(prefix="svev-trigger-"))) / "box"
             stack.enter_context(EmulatedBox(port, HillTimer(PulseTrain(epoch, rig.trigger.rate_hz))))
             variables[TRIGGER_PORT] = str(port)
@@ -90,6 +98,8 @@ def hill_environment(rig: RigSettings, epoch: HostNs) -> Iterator[Mapping[str, s
 
 def sim_scene(rig: RigSettings, index: int, epoch: HostNs) -> Scene:
     """The simulated hill as one camera inside its grabber process sees it (back end "sim")."""
+    from simrig.programs.scene import SimScene  # noqa: PLC0415
+
     return SimScene(rig, index, epoch)
 
 
@@ -105,6 +115,8 @@ def simulated_truth(rig: RigSettings, epoch: HostNs) -> WriteTruth | None:
     """
     if rig.simulation is None or any(camera.backend == "replay" for camera in rig.cameras):
         return None
+    from simrig.programs.recording_truth import RecordingTruth  # noqa: PLC0415
+
     return RecordingTruth(rig, rig.simulation.scenario, epoch).write
 
 

@@ -4,12 +4,12 @@ import errno
 import os
 import socket
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from rig.clocks import HostNs, host_now
 from rig.errors import BadInputError
 from rig.pulse import HillPulse
+from simrig.firewire.bus_state import BusState
 from simrig.firewire.camera.config_rom import HOST_VENDOR, host_rom
 from simrig.firewire.camera.marlin import Camera
 from simrig.firewire.host import abi, wire
@@ -22,23 +22,6 @@ from simrig.world.pulses import PulseTrain
 _HOST_NODE: Final = "fw0"
 _HOST_GUID: Final = HOST_VENDOR << 40 | 1
 _READ_WRITE: Final = 0o660
-
-
-@dataclass(frozen=True, slots=True)
-class BusState:
-    """The state of the bus as a whole.
-
-    Attributes:
-        generation: number of its configuration; every reset makes a new one.
-        bandwidth: free units in each cycle.
-        channels: allocated isochronous channels.
-        nodes: names of the nodes, e.g. fw0 (the computer), fw1.
-    """
-
-    generation: int
-    bandwidth: int
-    channels: tuple[int, ...]
-    nodes: tuple[str, ...]
 
 
 class Bus:

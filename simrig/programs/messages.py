@@ -10,10 +10,10 @@ from pydantic import AfterValidator, Field
 
 from rig.settings.strict_toml import StrictModel
 from rig.transport.message import Message, Quit
+from simrig.firewire.bus_state import BusState
 from simrig.firewire.camera.advanced import Signature
 from simrig.firewire.camera.geometry import MARLIN, Deep
-from simrig.firewire.firewire_bus import BusState
-from simrig.gige.camera import CameraConfig
+from simrig.gige.configuration import CameraConfig
 from simrig.world.faults import Fault
 from simrig.world.statistics import CameraStatistics
 

@@ -14,12 +14,12 @@ from rig.errors import BadInputError
 from rig.settings.strict_toml import validate
 from rig.transport.message import Message
 from rig.transport.process_table import Child, ProcessSpec
+from simrig.firewire.bus_state import BusState
 from simrig.firewire.camera.advanced import Signature
 from simrig.firewire.camera.geometry import MARLIN, Deep
-from simrig.firewire.firewire_bus import BusState
 from simrig.firewire.host import wire
 from simrig.firewire.host.build import shim
-from simrig.gige.camera import CameraConfig
+from simrig.gige.configuration import CameraConfig
 from simrig.gige.registers.makers import Maker
 from simrig.programs.cameras import START_S, CameraProcess, HillCamera
 from simrig.programs.messages import AskBusState, BusConfig, Done, FireWireBus, GigeCamera, ResetBus, State

@@ -11,7 +11,8 @@ from rig.clocks import host_now
 from rig.settings.model import RigSettings
 from rig.transport.ring import CameraRing
 from service.processes.simulation import simulated_hill
-from simrig.gige.camera import Camera, CameraConfig
+from simrig.gige.camera import Camera
+from simrig.gige.configuration import CameraConfig
 from simrig.images import stamp
 from tests.capture.rigs import SCENARIO, make_rig
 from tests.support.loopback import Loopback

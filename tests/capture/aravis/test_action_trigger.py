@@ -15,7 +15,8 @@ from rig.frame import RecordKind
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger
 from rig.transport.ring import CameraRing
-from simrig.gige.camera import Camera, CameraConfig
+from simrig.gige.camera import Camera
+from simrig.gige.configuration import CameraConfig
 from simrig.gige.registers.makers import Maker
 from tests.capture.rigs import SCENARIO, make_rig
 from tests.capture.station import Station

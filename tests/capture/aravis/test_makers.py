@@ -12,7 +12,8 @@ from rig.clocks import NS_PER_S, host_now
 from rig.errors import CameraError
 from rig.settings.model import RigSettings
 from rig.transport.ring import CameraRing
-from simrig.gige.camera import Camera, CameraConfig
+from simrig.gige.camera import Camera
+from simrig.gige.configuration import CameraConfig
 from simrig.gige.registers.makers import DIALECTS, Maker
 from simrig.gige.registers.register_map import RegisterMap
 from simrig.images import stamp

@@ -8,7 +8,8 @@ import pytest
 
 from rig.clocks import HostNs, host_now
 from rig.settings.file import CONFIG
-from simrig.gige.camera import Camera, CameraConfig
+from simrig.gige.camera import Camera
+from simrig.gige.configuration import CameraConfig
 from simrig.world.pulses import DeviceClock, PulseTrain
 from simrig.world.scenario import load_scenario
 from tests.support.loopback import Loopback

@@ -67,6 +67,26 @@ _USAGE_ERROR: Final[type[Exception]] = typer.BadParameter.__mro__[1]
 
 def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
     """Make the command line with the commands `names`."""
+    app = _without_commands()
+    for name in names:
+        module, attribute, short_help = _COMMANDS[name]
+        command = getattr(import_module(f"svev.commands.{module}"), attribute)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name, short_help=short_help)
+        else:
+            app.command(name, short_help=short_help)(command)
+    return app
+
+
+def _overview() -> typer.Typer:
+    """The command line with the names of all commands, none of which it can run: enough for `svev --help`."""
+    app = _without_commands()
+    for name, (_, _, short_help) in _COMMANDS.items():
+        app.command(name, short_help=short_help)(_every_command)
+    return app
+
+
+def _without_commands() -> typer.Typer:
     app = typer.Typer(
         name="svev",
         help="Live capture and photogrammetry for three synchronized cameras at a ski jump.",
@@ -77,13 +97,6 @@ def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
         rich_markup_mode=None,
     )
     app.callback()(_every_command)
-    for name in names:
-        module, attribute, short_help = _COMMANDS[name]
-        command = getattr(import_module(f"svev.commands.{module}"), attribute)
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name, short_help=short_help)
-        else:
-            app.command(name, short_help=short_help)(command)
     return app
 
 
@@ -116,8 +129,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _allow_open_files()
         if COMPLETE_VARIABLE in os.environ:
             command = _completed(os.environ)
+        elif argv and argv[0] in _COMMANDS:
+            command = command_line(argv[:1])
         else:
-            command = command_line(argv[:1] if argv and argv[0] in _COMMANDS else _COMMANDS)
+            command = command_line() if any(word in _COMMANDS for word in argv) else _overview()
         code = command(argv, prog_name="svev", standalone_mode=False)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 1
@@ -148,10 +163,7 @@ def _completed(environment: Mapping[str, str]) -> typer.Typer:
     words = re.split(r"[ \n]", environment.get("COMP_WORDS") or environment.get("_TYPER_COMPLETE_ARGS", ""))
     if len(words) > 2 and words[1] in _COMMANDS:
         return command_line(words[1:2])
-    app = typer.Typer(name="svev", add_completion=False)
-    for name, (_, _, short_help) in _COMMANDS.items():
-        app.command(name, short_help=short_help)(_every_command)
-    return app
+    return _overview()
 
 
 def _allow_open_files() -> None:

@@ -37,6 +37,13 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(f"\n  {command} " in listed for command in _commands())
 
 
+def test_the_help_loads_no_command() -> None:
+    check = (
+        "import sys; from svev.cli import main; main(['--help']); assert not {'numpy', 'pydantic'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", check], capture_output=True, timeout=60, check=True)
+
+
 def test_the_version_says_where_it_is_installed(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"svev {version('svev')}, in {sys.prefix}\n"

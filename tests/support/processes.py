@@ -15,6 +15,8 @@ TOKEN_VARIABLE = "SVEV_TEST_TOKEN"  # noqa: S105 - marks processes, guards nothi
 #: Lives as long as the interpreter once anything of multiprocessing was used, and ends with it.
 _RESOURCE_TRACKER = "multiprocessing.resource_tracker"
 
+_STAT_BYTES = 4096
+
 
 @dataclass(frozen=True, slots=True)
 class Process:
@@ -64,7 +66,7 @@ def end(process: Process) -> None:
 def _read(pid: int, since: int = 0) -> Process | None:
     """The process of this number; None if it has just gone, or was started before `since` (clock ticks)."""
     try:
-        stat = Path(f"/proc/{pid}/stat").read_text()
+        stat = _stat(pid)
         # The name stands in parentheses and may hold anything, a closing parenthesis included.
         name, fields = stat[stat.index("(") + 1 : stat.rindex(")")], stat[stat.rindex(")") + 2 :].split()
         if int(fields[19]) < since:
@@ -73,6 +75,15 @@ def _read(pid: int, since: int = 0) -> Process | None:
     except OSError:
         return None
     return Process(pid, int(fields[1]), int(fields[19]), fields[0], command or f"[{name}]")
+
+
+def _stat(pid: int) -> str:
+    """The line of /proc/PID/stat, without a file object: every process is looked at twice in each test."""
+    descriptor = os.open(f"/proc/{pid}/stat", os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        return os.read(descriptor, _STAT_BYTES).decode(errors="replace")
+    finally:
+        os.close(descriptor)
 
 
 def _descends(process: Process, ancestor: int, everyone: dict[int, Process]) -> bool:

@@ -7,6 +7,10 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help demo run bench test check style wheel bundle install rollback uninstall lock clean setup system
 
+# Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
+# call of pytest, would compile the program anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 ARGS ?=
 PREFIX ?= /usr/local
 BIN := .venv/bin

@@ -83,6 +83,8 @@ class Grabber:
         self._last_failure = ""
         asked = self._ring.reconnect_requests()
         self._put(RecordKind.CONNECTED, text=camera.description)
+        if (limits := camera.limits) is not None:
+            self._put(RecordKind.LIMITS, text=limits.model_dump_json(exclude_defaults=True))
         for _ in range(_LATCHES_AT_START):
             self._put_latch(camera.latch())
         camera.start()

@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 
 from rig.clocks import ClockLatch, DeviceNs, HostNs
 from rig.frame import NO_SLOT, StampedPixels
+from rig.settings.region import RegionLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,11 @@ class Camera(Protocol):
     @property
     def description(self) -> str:
         """Vendor, model, serial number and settings, in one line for people."""
+        ...
+
+    @property
+    def limits(self) -> RegionLimits | None:
+        """Which regions the camera takes; None: it does not say, or its frames are no part of a sensor."""
         ...
 
     def start(self) -> None:

@@ -30,6 +30,7 @@ class RecordKind(IntEnum):
     CONNECTED = 4  #: the camera is set up and streams; a new epoch begins; `text` describes the camera
     DISCONNECTED = 5  #: the camera is gone, the epoch is over; `text` says why
     NOTICE = 6  #: a message for the event log, in `text`
+    LIMITS = 7  #: which regions the camera takes: `text` is JSON (`rig.settings.region.RegionLimits`)
 
 
 NO_SLOT = 0xFFFFFFFF

@@ -26,7 +26,7 @@ def aids_of(image: PreviewImage, rig: RigSettings, camera: int) -> CameraAids:
     name, status = rig.cameras[camera].name, image.statuses[camera]
     if status is not FrameStatus.OK:
         return CameraAids(camera=name, pulse=image.pulse, status=status)
-    pixels = _block(image, rig, camera)
+    pixels = frame_of(image.pixels, rig, camera)
     light = exposure(pixels, BINS)
     return CameraAids(
         camera=name,
@@ -49,11 +49,12 @@ def close_up_of(image: PreviewImage, rig: RigSettings, camera: int, *, peaking: 
         camera: index of the camera.
         peaking: whether to look where it is in focus.
     """
-    pixels, status = _block(image, rig, camera), image.statuses[camera]
+    pixels, status = frame_of(image.pixels, rig, camera), image.statuses[camera]
     marked = sharp(pixels, mosaic=rig.pixels.is_mosaic) if peaking and status is FrameStatus.OK else None
     return CloseUp(image.pulse, status, shown(pixels, shown_as(rig), coloured=True), marked)
 
 
-def _block(image: PreviewImage, rig: RigSettings, camera: int) -> Image:
+def frame_of(triplet: Image, rig: RigSettings, camera: int) -> Image:
+    """The frame of a camera in a triplet."""
     left, right = rig.columns()[camera]
-    return image.pixels[: rig.cameras[camera].region.height, left:right]
+    return triplet[: rig.cameras[camera].region.height, left:right]

@@ -1,4 +1,4 @@
-"""Exposure and gain of the cameras, changed while the rig runs and kept in the rig file when somebody wishes that."""
+"""Exposure, gain and region of the cameras, changed while the rig runs and kept in the rig file on request."""
 
 from functools import partial
 from pathlib import Path
@@ -9,8 +9,10 @@ from rig.events import Event, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.light import camera_of, with_light, written
 from rig.settings.model import CameraSettings
+from service.regions import Regions, unfit
 from service.rig_file import keep
 from service.supervision.commands import at_once
+from service.supervision.settings_control import RigInUse
 from service.supervision.supervisor import Supervisor
 
 _SOON_S: Final = 10.0
@@ -22,39 +24,52 @@ class Lights:
     Args:
         supervisor: owns the rig.
         rig_file: where exposure and gain are kept.
+        regions: of the cameras.
     """
 
-    def __init__(self, supervisor: Supervisor, rig_file: Path) -> None:
-        self._supervisor, self._file = supervisor, rig_file
+    def __init__(self, supervisor: Supervisor, rig_file: Path, regions: Regions) -> None:
+        self._supervisor, self._file, self._regions = supervisor, rig_file, regions
         self._kept = {camera.name: _light(camera) for camera in supervisor.rig.cameras}
 
     def view(self, name: str) -> CameraLight:
-        """Exposure and gain of a camera.
+        """Exposure, gain and region of a camera.
 
         Raises:
             UnknownCameraError: the rig has no such camera.
         """
         camera = camera_of(self._supervisor.rig, name)
         exposure_us, gain_db = _light(camera)
-        saved = self._kept[name] == (exposure_us, gain_db)
-        return CameraLight(camera=name, exposure_us=exposure_us, gain_db=gain_db, saved=saved)
+        return CameraLight(
+            camera=name,
+            exposure_us=exposure_us,
+            gain_db=gain_db,
+            region=camera.region,
+            limits=self._regions.limits(name),
+            calibration=unfit(camera),
+            saved=self._kept[name] == (exposure_us, gain_db) and self._regions.saved(camera),
+        )
 
     def change(self, name: str, change: LightChange) -> CameraLight:
-        """Change exposure or gain of a camera, and write both into the rig file if that is wished.
+        """Change exposure, gain or region of a camera, and write them into the rig file if that is wished.
 
         Raises:
             UnknownCameraError: the rig has no such camera.
-            BadInputError: a value is out of range, or the rig file has become unreadable.
+            BadInputError: a value is out of range, the camera or a check of arming refuses the region, or the rig file
+                has become unreadable.
             StateForbidsError: a recording runs.
-            StorageError: the rig file cannot be written; the camera has its other exposure or gain all the same.
+            StorageError: the rig file cannot be written; the camera has what was changed all the same.
         """
         with self._supervisor.changing:
             supervisor, before = self._supervisor, self.view(name)
             rig = with_light(supervisor.rig, name, change.values())
             exposure_us, gain_db = _light(camera_of(rig, name))
-            if (exposure_us, gain_db) != (before.exposure_us, before.gain_db):
-                text = written(supervisor.rig_toml, name, change.values())
-                supervisor.commands.ask(at_once(partial(supervisor.change_camera, rig, text, name)), _SOON_S)
+            new = RigInUse(rig, written(supervisor.rig_toml, name, change.values()))
+            lit = (exposure_us, gain_db) != (before.exposure_us, before.gain_db)
+            if change.region is not None and change.region.region() != before.region:
+                self._regions.change(name, change.region.region(), new)
+            elif lit:
+                supervisor.commands.ask(at_once(partial(supervisor.settings.change_camera, new, name)), _SOON_S)
+            if lit:
                 said = phrase(
                     "event_light", "exposes for {exposure_us:g} us now, with a gain of {gain_db:g} dB",
                     exposure_us=exposure_us, gain_db=gain_db,
@@ -62,6 +77,7 @@ class Lights:
                 supervisor.hub.tell(Event.now(Level.INFO, name, said))
             if change.save:
                 self._keep(name, exposure_us, gain_db)
+                self._regions.keep(name)
             return self.view(name)
 
     def _keep(self, name: str, exposure_us: float, gain_db: float) -> None:

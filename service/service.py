@@ -76,7 +76,7 @@ class Service(Archive):
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
         rehearser: makes rehearsals of the rig.
-        lights: exposure and gain of the cameras.
+        lights: exposure, gain and region of the cameras.
         trains: the pulses, where svev makes them.
         balls: where the cameras should show the balls.
         examine: the doctor; examines what disturbs nothing in the given state. It is told whether the beam of the light
@@ -106,7 +106,9 @@ class Service(Archive):
         self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
         self._watch = None
         if motion is not None:
-            self._watch = MotionWatch(supervisor.rig, motion, slot, lambda: supervisor.status.state, self._moved)
+            self._watch = MotionWatch(
+                lambda: supervisor.rig, motion, slot, lambda: supervisor.status.state, self._moved
+            )
         self._barrier, barrier = None, supervisor.rig.automatic.barrier
         if barrier is not None:
             told = partial(self.tell, "warning", "mark")
@@ -295,13 +297,13 @@ class Service(Archive):
         return self._balls.of(camera)
 
     def camera_light(self, camera: str) -> CameraLight:
-        """Exposure and gain of a camera."""
+        """Exposure, gain and region of a camera."""
         return self._lights.view(camera)
 
     def change_light(self, camera: str, change: LightChange) -> CameraLight:
-        """Change exposure or gain of a camera; it is away for a moment if the rig is armed."""
+        """Change exposure, gain or region of a camera; it is away for a moment if the rig is armed."""
         if self._rehearser.progress is not None:
-            raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change exposure or gain")
+            raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change their settings")
         return self._lights.change(camera, change)
 
     def trigger(self) -> TriggerView:
@@ -331,7 +333,9 @@ class Service(Archive):
             self._slot.want(_LEASE_S)
             if self.status().state is not State.IDLE and self._slot.newest() not in {0, newer_than}:
                 image = self._slot.read()
-                if image is not None and image.pulse != newer_than:
+                # One of before another region has columns that mean something else.
+                sized = image is not None and image.pixels.shape == self._supervisor.rig.triplet_shape
+                if image is not None and sized and image.pulse != newer_than:
                     return image
             if time.monotonic() > deadline or self._closing.wait(_POLL_S):
                 return None

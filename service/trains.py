@@ -17,6 +17,7 @@ from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.rig_file import keep
 from service.supervision.commands import at_once
+from service.supervision.settings_control import RigInUse
 from service.supervision.supervisor import Supervisor
 from triggering.sources.choice import trigger_source
 
@@ -104,7 +105,7 @@ class Trains:
         _check_dead_time(rig)
         check_memory(rig, self._preroll_s)
         text = written_rate(supervisor.rig_toml, rate_hz)
-        self._ask(partial(supervisor.change_rate, rig, text))
+        self._ask(partial(supervisor.settings.change_rate, RigInUse(rig, text)))
         said = phrase("event_rate", "is to make {rate_hz:g} pulses per second from now on", rate_hz=rate_hz)
         supervisor.hub.tell(Event.now(Level.INFO, TRIGGER, said))
 

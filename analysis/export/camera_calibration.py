@@ -45,7 +45,8 @@ def calibration_for_log(path: Path, cameras: Sequence[CameraSettings]) -> Calibr
 
     Args:
         path: a result file (`svev-adjustment/1`) of a network in pixels.
-        cameras: the rig's cameras; the file may have others beside them.
+        cameras: the rig's cameras; the file may have others beside them. Those that were calibrated with another
+            region than they have now are left out.
 
     Raises:
         BadInputError: the file is missing, unreadable or without a result, lacks one of the cameras, or does not fit
@@ -56,6 +57,8 @@ def calibration_for_log(path: Path, cameras: Sequence[CameraSettings]) -> Calibr
     calibrated = read_calibration(path)
     encoded = {}
     for camera in cameras:
+        if camera.calibrated_region is not None:
+            continue  # calibrated with another region, of which this is not true any more
         if camera.name not in calibrated:
             raise BadInputError(
                 f"{path}: lacks camera {camera.name} of the rig (it has {', '.join(calibrated) or 'none'}); calibrate "

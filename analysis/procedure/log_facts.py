@@ -10,7 +10,10 @@ from analysis.measurements.model import MeasuredCamera
 from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import LogReader
 from rig.errors import BadInputError
+from rig.phrase import Phrase
 from rig.settings.model import CameraSettings
+from rig.settings.region import calibration_unfit
+from rig.settings.strict_toml import examine
 from rig.topics import RIG_ATTACHMENT
 
 _EXPOSURE_US = float(CameraSettings.model_fields["exposure_us"].default)
@@ -48,10 +51,12 @@ def log_facts(path: Path) -> LogFacts:
     about = info(path)
     if about.first is None:
         raise BadInputError(f"{path}: holds no pulse, so there is nothing to analyze; choose another recording")
-    exposures = _exposures_us(path)
+    settings = _cameras(path)
+    exposures = {str(camera.get("name")): _exposure_us(camera) for camera in settings}
     tags = about.first.cameras
     unknown = [tag.name for tag in tags if tag.name not in exposures]
     messages = [f"exposure time of {', '.join(unknown)} is unknown: taken as {_EXPOSURE_US:g} us"] if unknown else []
+    messages += [str(unfit) for camera in settings if (unfit := _unfit(camera)) is not None]
     if about.truncated or not about.closed:
         messages.append(
             "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"
@@ -79,8 +84,8 @@ def _rate_hz(about: LogInfo) -> float:
         ) from None
 
 
-def _exposures_us(path: Path) -> dict[str, float]:
-    """Exposure times as the rig file in the log gives them; those it leaves out are the default of rig files."""
+def _cameras(path: Path) -> list[dict[str, Any]]:
+    """The cameras as the rig file in the log gives them."""
     with LogReader(path) as reader:
         for _ in reader.items():
             if RIG_ATTACHMENT in reader.attachments:
@@ -89,10 +94,17 @@ def _exposures_us(path: Path) -> dict[str, float]:
     try:
         cameras = tomllib.loads(text.decode("utf-8")).get("cameras", [])
     except (tomllib.TOMLDecodeError, UnicodeDecodeError):
-        return {}
-    return {str(camera.get("name")): _exposure_us(camera) for camera in cameras if isinstance(camera, dict)}
+        return []
+    return [camera for camera in cameras if isinstance(camera, dict)]
+
+
+def _unfit(camera: dict[str, Any]) -> Phrase | None:
+    """Why interior orientations of a camera do not hold for this log, if its rig file says so."""
+    settings, _ = examine(CameraSettings, camera)
+    return None if settings is None else calibration_unfit(settings)
 
 
 def _exposure_us(camera: dict[str, Any]) -> float:
+    """Exposure time of a camera; if the rig file leaves it out, the default of rig files."""
     given = camera.get("exposure_us", _EXPOSURE_US)
     return float(given) if isinstance(given, (int, float)) and given >= 0 else _EXPOSURE_US

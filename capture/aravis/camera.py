@@ -14,7 +14,7 @@ import gi
 
 from capture.aravis.action import lock_clock
 from capture.aravis.clock import CameraClock
-from capture.aravis.configuration import SOFTWARE_TRIGGER, configure
+from capture.aravis.configuration import SOFTWARE_TRIGGER, configure, region_limits
 from capture.aravis.features import Features
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
@@ -24,6 +24,7 @@ from rig.action import ActionKeys
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.settings.model import CameraSettings, NetworkSettings
+from rig.settings.region import RegionLimits
 from rig.settings.trigger import ActionTrigger, ExternalTrigger, SoftwareTrigger, Trigger
 from rig.transport.ring import CameraRing
 
@@ -121,6 +122,11 @@ class AravisCamera:
             f"{camera.get_vendor_name()} {camera.get_model_name()} serial {camera.get_device_serial_number()} "
             f"at {self._address}, {camera.gv_get_packet_size()}-byte packets"
         )
+
+    @property
+    def limits(self) -> RegionLimits | None:
+        """See `capture.seam.Camera.limits`."""
+        return region_limits(self._features)
 
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""

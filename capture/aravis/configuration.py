@@ -13,6 +13,7 @@ from capture.aravis.features import Features
 from rig.action import ActionKeys
 from rig.errors import CameraError
 from rig.settings.model import CameraSettings
+from rig.settings.region import RegionLimits
 
 #: Triggers that take one frame per pulse, the best first, and the feature that has to be 1 for that.
 _ONE_FRAME: Final = {"FrameStart": "", "FrameBurstStart": "AcquisitionBurstFrameCount", "ExposureStart": "",
@@ -73,6 +74,24 @@ def configure(
     notices += _set_exposure(features, settings.exposure_us)
     notices += _set_gain(features, settings.gain_db)
     return [f"camera {settings.name}: {notice}" for notice in notices]
+
+
+def region_limits(features: Features) -> RegionLimits | None:
+    """Which regions the camera takes; None if it does not say.
+
+    What is left beside the present region counts too: many cameras limit the size by the offset.
+    """
+    width, height = features.bounds("Width"), features.bounds("Height")
+    x, y = features.bounds("OffsetX") or (0, 0, 1), features.bounds("OffsetY") or (0, 0, 1)
+    if width is None or height is None:
+        return None
+    left, top = features.number("OffsetX") or 0.0, features.number("OffsetY") or 0.0
+    return RegionLimits(
+        width=round(features.number("WidthMax") or features.number("SensorWidth") or width[1] + left),
+        height=round(features.number("HeightMax") or features.number("SensorHeight") or height[1] + top),
+        step_x=x[2], step_y=y[2], step_width=width[2], step_height=height[2],
+        least_width=max(1, width[0]), least_height=max(1, height[0]),
+    )  # fmt: skip
 
 
 def _set_image(features: Features, settings: CameraSettings) -> None:

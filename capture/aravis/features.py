@@ -102,6 +102,16 @@ class Features:
         except GLib.Error:
             return None
 
+    def bounds(self, name: str) -> tuple[int, int, int] | None:
+        """Least value, largest value and step of an integer at present; None if it cannot be read."""
+        try:
+            if not isinstance(self._device.get_feature(name), Aravis.GcInteger) or not self.has(name):
+                return None
+            low, high = self._device.get_integer_feature_bounds(name)
+            return int(low), int(high), max(1, int(self._device.get_integer_feature_increment(name)))
+        except GLib.Error:
+            return None
+
     def write(self, name: str, value: int) -> bool:
         """Write an integer as it is, without reading it back: keys can only be written with some makers.
 

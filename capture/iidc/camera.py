@@ -16,6 +16,7 @@ from capture.iidc.clock import BusClock, CycleTimer, PacketTimes, first_packet
 from capture.iidc.configuration import (
     READOUT_NS,
     longest_delay_ns,
+    region_limits,
     set_exposure,
     set_gain,
     set_trigger,
@@ -31,6 +32,7 @@ from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_n
 from rig.errors import CameraError, CameraNotFoundError, SvevError
 from rig.frame import StampedPixels
 from rig.settings.model import CameraSettings
+from rig.settings.region import RegionLimits
 from rig.transport.ring import CameraRing
 
 _CLOCK_STEP_NS: Final = 5_000_000  # far more than a crystal drifts between two latches
@@ -98,6 +100,11 @@ class IidcCamera:
         signed = "signs its frames" if self._signatures is not None else "no signature, times from packets"
         need = self._format.need
         return f"{self._device.name}, {self._format.name}, {need.units} bandwidth units, {signed}"
+
+    @property
+    def limits(self) -> RegionLimits | None:
+        """See `capture.seam.Camera.limits`."""
+        return region_limits(self._device)
 
     @property
     def byte_order(self) -> ByteOrder | None:

@@ -17,9 +17,10 @@ from capture.iidc.structures import (
     VideoMode,
 )
 from rig.clocks import NS_PER_US
-from rig.errors import CameraError
+from rig.errors import BadInputError, CameraError
 from rig.images.pixels import FORMATS
 from rig.settings.model import CameraSettings
+from rig.settings.region import RegionLimits
 
 #: Time from the end of the exposure to the first packet (Marlin manual: 500 us +- 62.5 us).
 READOUT_NS = 500_000
@@ -129,19 +130,28 @@ def _set_region(device: Device, camera: CameraSettings, packet_bytes: int) -> No
     )  # fmt: skip
 
 
+def region_limits(device: Device) -> RegionLimits | None:
+    """Which regions the camera takes; None if it has fixed formats only."""
+    mode = VideoMode.FORMAT7_0
+    if mode not in device.modes():
+        return None
+    width, height = device.pair("format7_get_max_image_size", mode)
+    step_width, step_height = (max(1, step) for step in device.pair("format7_get_unit_size", mode))
+    step_x, step_y = (max(1, step) for step in device.pair("format7_get_unit_position", mode))
+    return RegionLimits(
+        width=width, height=height, step_x=step_x, step_y=step_y, step_width=step_width, step_height=step_height,
+        least_width=step_width, least_height=step_height,
+    )  # fmt: skip
+
+
 def _check_region(device: Device, camera: CameraSettings) -> None:
     """Check the region: cameras round it silently, or refuse it without saying which steps it must have."""
-    mode, region = VideoMode.FORMAT7_0, camera.region
-    width, height = device.pair("format7_get_max_image_size", mode)
-    step_width, step_height = device.pair("format7_get_unit_size", mode)
-    step_x, step_y = device.pair("format7_get_unit_position", mode)
-    fits = region.x + region.width <= width and region.y + region.height <= height
-    steps = ((region.width, step_width), (region.height, step_height), (region.x, step_x), (region.y, step_y))
-    if not fits or any(step and value % step for value, step in steps):
-        raise CameraError(
-            f"camera {camera.name} has {width} x {height} pixels; width and height go in steps of {step_width} and "
-            f"{step_height}, x and y of {step_x} and {step_y}: correct its region"
-        )
+    if (limits := region_limits(device)) is None:
+        return
+    try:
+        limits.check(camera.name, camera.region)
+    except BadInputError as error:
+        raise CameraError(f"{error}; correct its region") from None
 
 
 def set_trigger(device: Device, camera: CameraSettings, *, software: bool) -> None:

@@ -48,6 +48,11 @@ class ReplayCamera:
         source, (rows, columns) = self._timeline.source, self._shape
         return f"replayed camera {self._name}, {columns} x {rows}, {len(source.times)} pulses of {source.name}"
 
+    @property
+    def limits(self) -> None:
+        """See `capture.seam.Camera.limits`."""
+        return
+
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""
         self._pulse = self._timeline.next_pulse(host_now())

@@ -67,6 +67,11 @@ class SimCamera:
         """Name and size."""
         return f"simulated camera {self._settings.name}, {self._shape[1]} x {self._shape[0]}"
 
+    @property
+    def limits(self) -> None:
+        """See `capture.seam.Camera.limits`."""
+        return
+
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""
         self._scene.start(host_now())

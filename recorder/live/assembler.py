@@ -18,8 +18,9 @@ from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
 from rig.images.pixels import Stored
 from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import RigSettings
+from rig.settings.region import RegionLimits
 from rig.tag import CameraTag
-from rig.transport.recorder_reports import CameraChanged, CameraNews
+from rig.transport.recorder_reports import CameraChanged, CameraLimits, CameraNews
 from rig.transport.ring import CameraRing
 from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
 from triggering.sources.choice import trigger_source
@@ -113,6 +114,7 @@ class Assembler:
         self._waiting: list[_Composition] = []
         self._decided: deque[ClosedPulse] = deque()
         self._changes: list[CameraChanged] = []
+        self._limits: list[CameraLimits] = []
         self._asked = [False] * len(rings)
         self._slow_told = [HostNs(-_TELL_SLOW_NS)] * len(rings)
         self._slow_since: dict[int, HostNs] = {}
@@ -199,6 +201,11 @@ class Assembler:
         changes, self._changes = self._changes, []
         return changes
 
+    def limits(self) -> list[CameraLimits]:
+        """Which regions cameras take that were connected since the last call."""
+        limits, self._limits = self._limits, []
+        return limits
+
     def disconnected(self, camera: int, reason: Phrase, time: HostNs) -> None:
         """Note that a camera is gone: its grabber says so, or the grabber process died without a record of it."""
         self.pairer.disconnected(camera, time)
@@ -280,6 +287,9 @@ class Assembler:
                 self._join(camera, record, plain(record.text))
             case RecordKind.DISCONNECTED:
                 self.disconnected(camera, plain(record.text), record.host_time)
+            case RecordKind.LIMITS:
+                limits = RegionLimits.model_validate_json(record.text)
+                self._limits.append(CameraLimits(camera=camera, limits=limits))
             case RecordKind.NOTICE:
                 self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, said=plain(record.text)))
 

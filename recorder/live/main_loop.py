@@ -108,7 +108,7 @@ class RecorderLoop:
             terminated: whether the process got SIGTERM.
         """
         if self._preview is not None:
-            self._preview.take_over()
+            self._preview.take_over(self._rig.triplet_shape)
         self._tell(RecorderReady())
         if exposed := check_publication(self._rig.network):
             self._warn("publisher", exposed)
@@ -140,6 +140,8 @@ class RecorderLoop:
             self._take_in(triplet, now)
         for change in self._assembler.changes():
             self._camera_changed(change)
+        for limits in self._assembler.limits():
+            self._tell(limits)
         self._recordings.work(now)
         if now >= self._next_report:
             self._next_report = HostNs(now + _REPORT_EVERY_NS)

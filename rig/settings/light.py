@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import tomlkit
 
 from rig.errors import BadInputError, UnknownCameraError
-from rig.settings.editing import as_toml, editable
+from rig.settings.editing import as_toml, camera_table, editable
 from rig.settings.model import CameraSettings, RigSettings
 from rig.settings.strict_toml import validate
 
@@ -58,10 +58,7 @@ def written(text: str, name: str, light: Mapping[str, float]) -> str:
         BadInputError: the text is not TOML, or has no such camera.
     """
     document = editable(text)
-    cameras = document.get("cameras", [])
-    camera = next((each for each in cameras if each.get("name") == name), None) if isinstance(cameras, list) else None
-    if camera is None:
-        raise BadInputError(f"the rig file has no camera {name} any more: start the service again")
+    camera = camera_table(document, name)
     for key, value in light.items():
         camera[key] = as_toml(value)
     return tomlkit.dumps(document)

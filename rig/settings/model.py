@@ -70,6 +70,11 @@ class CameraSettings(StrictModel):
         "relative to the working directory, the same for all cameras; name says which camera of it",
     )
     region: Region = Region()
+    calibrated_region: Region | None = Field(
+        None,
+        description="the region with which the camera was calibrated, if it is another one; written when the region is "
+        "changed while the service runs. Remove it when interior orientations of the present region are in use",
+    )
     pixel_format: PixelFormatName = Field(
         "Mono8",
         description="what the camera sends. Logs hold 8 bits per pixel as mono8, 10 and 12 as mono16, whether packed "

@@ -28,7 +28,8 @@ from rig.images.pixels import Stored
 from rig.pulse import RigPulse
 
 _MAGIC: Final = 0x3156_4552_5056_5653  # "SVVPREV1" read as a little-endian word
-_HEADER: Final = struct.Struct("<QQQQ")  # magic, rows, columns, cameras
+_HEADER: Final = struct.Struct("<QIIQ")  # magic, columns, rows, cameras
+_SHAPE = 1  # number of the word that holds rows and columns, which change at once
 _SEQUENCE, _WANTED_UNTIL, _PULSE, _TIME = 16, 24, 32, 40  # word numbers, a cache line each
 _STATUSES: Final = 1024
 _KINDS: Final = tuple(FrameStatus)
@@ -63,7 +64,6 @@ class PreviewSlot:
 
     Attributes:
         fd: as given; the recorder inherits it.
-        shape: rows and columns of the triplet.
         cameras: number of cameras.
 
     Raises:
@@ -72,14 +72,13 @@ class PreviewSlot:
 
     def __init__(self, fd: int) -> None:
         self.fd = fd
-        magic, rows, columns, self.cameras = _HEADER.unpack(os.pread(fd, _HEADER.size, 0))
+        magic, *_, self.cameras = _HEADER.unpack(os.pread(fd, _HEADER.size, 0))
         if magic != _MAGIC:
             raise BadInputError(f"file descriptor {fd} is no preview slot: start the process through svev")
-        self.shape = (rows, columns)
-        self._map = mmap.mmap(fd, mmap.PAGESIZE + rows * columns)
+        self._map = mmap.mmap(fd, mmap.PAGESIZE)
         self._view = memoryview(self._map)
-        self._words = self._view[: mmap.PAGESIZE].cast("Q")
-        self._pixels = np.frombuffer(self._map, np.uint8, offset=mmap.PAGESIZE).reshape(self.shape)
+        self._words = self._view.cast("Q")
+        self._pixels = self._mapped()
         self._next = HostNs(0)
 
     @classmethod
@@ -87,8 +86,13 @@ class PreviewSlot:
         """Make the shared memory for triplets of this shape."""
         fd = os.memfd_create("svev-preview", os.MFD_CLOEXEC)
         os.ftruncate(fd, mmap.PAGESIZE + shape[0] * shape[1])
-        os.pwrite(fd, _HEADER.pack(_MAGIC, *shape, cameras), 0)
+        os.pwrite(fd, _HEADER.pack(_MAGIC, shape[1], shape[0], cameras), 0)
         return cls(fd)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the triplet."""
+        return divmod(self._words[_SHAPE], 1 << 32)
 
     def close(self) -> None:
         """Unmap the memory and close the descriptor."""
@@ -125,10 +129,20 @@ class PreviewSlot:
 
     # The recorder's side
 
-    def take_over(self) -> None:
-        """Become the writer, also after one that died while it wrote; removes the old image."""
+    def take_over(self, shape: tuple[int, int]) -> None:
+        """Become the writer, also after one that died while it wrote; removes the old image.
+
+        Args:
+            shape: rows and columns of the triplets from now on. The memory grows with them and never shrinks: another
+                process may be copying the old image.
+        """
         self._words[_SEQUENCE] += 1 + self._words[_SEQUENCE] % 2  # odd: being written
         self._words[_PULSE] = 0
+        size = mmap.PAGESIZE + shape[0] * shape[1]
+        if size > os.fstat(self.fd).st_size:
+            os.ftruncate(self.fd, size)
+        self._pixels = self._mapped()
+        self._words[_SHAPE] = shape[0] << 32 | shape[1]
         self._words[_SEQUENCE] += 1
 
     def due(self, now: HostNs) -> bool:
@@ -159,11 +173,11 @@ class PreviewSlot:
         self._words[_PULSE], self._words[_TIME] = pulse, time_
         self._view[_STATUSES : _STATUSES + self.cameras] = bytes(_KINDS.index(status) for status in statuses)
         if pixels is None:
-            self._pixels.fill(0)
+            self._image().fill(0)
         elif bits > 8:
-            np.right_shift(pixels, bits - 8, out=self._pixels, casting="unsafe")
+            np.right_shift(pixels, bits - 8, out=self._image(), casting="unsafe")
         else:
-            np.copyto(self._pixels, pixels)
+            np.copyto(self._image(), pixels)
         self._words[_SEQUENCE] += 1
 
     def _copy(self) -> PreviewImage:
@@ -172,5 +186,16 @@ class PreviewSlot:
             self.newest(),
             HostNs(self._words[_TIME]),
             tuple(_KINDS[status] for status in statuses),
-            self._pixels.copy(),
+            self._image().copy(),
         )
+
+    def _mapped(self) -> NDArray[np.uint8]:
+        """All pixels that the memory has room for. It stays mapped as long as somebody holds them."""
+        return np.frombuffer(mmap.mmap(self.fd, os.fstat(self.fd).st_size), np.uint8, offset=mmap.PAGESIZE)
+
+    def _image(self) -> NDArray[np.uint8]:
+        """The triplet in the slot."""
+        rows, columns = self.shape
+        if (pixels := self._pixels).size < rows * columns:
+            pixels = self._pixels = self._mapped()
+        return pixels[: rows * columns].reshape(rows, columns)

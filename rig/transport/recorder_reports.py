@@ -15,6 +15,7 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import Phrase, phrase
 from rig.pulse import Pause
+from rig.settings.region import RegionLimits
 from rig.transport.message import Message
 
 
@@ -83,6 +84,18 @@ class CameraChanged(Message):
             name: of the camera.
         """
         return Event.now(self.news.level, name, _NEWS[self.news](self.said))
+
+
+class CameraLimits(Message):
+    """A camera that was connected has said which regions it takes.
+
+    Attributes:
+        camera: index of the camera.
+        limits: of its regions.
+    """
+
+    camera: int
+    limits: RegionLimits
 
 
 class RecordingStarted(Message):
@@ -195,6 +208,7 @@ RecorderReport = (
     RecorderReady
     | RecorderWarm
     | CameraChanged
+    | CameraLimits
     | RecordingStarted
     | RecordingProgress
     | RecordingContinued

@@ -1,12 +1,13 @@
 """Tells where the cameras should show the balls; reads the files again when they have changed."""
 
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from rig.api.cameras.balls import CameraBalls
 from rig.settings.light import camera_of
-from rig.settings.model import RigSettings
+from rig.settings.model import CameraSettings, RigSettings
 
 #: In the folder of the recordings: where the cameras showed the balls when they were oriented last.
 ORIENTATION: Final = ".svev-orientation.json"
@@ -16,16 +17,17 @@ class BallPlaces:
     """Any thread may call any method.
 
     Args:
-        rig: the rig.
+        rig: gives the rig in use, of which only exposures, gains, regions and the rate change.
         folder: of the recordings.
     """
 
-    def __init__(self, rig: RigSettings, folder: Path) -> None:
+    def __init__(self, rig: Callable[[], RigSettings], folder: Path) -> None:
         self._rig, self._folder = rig, folder
-        given = [] if rig.analysis is None else [rig.analysis.survey, rig.analysis.calibration]
-        self._files = [file for file in (folder / ORIENTATION, rig.plan, *given) if file is not None]
+        analysis = rig().analysis
+        given = [] if analysis is None else [analysis.survey, analysis.calibration]
+        self._files = [file for file in (folder / ORIENTATION, rig().plan, *given) if file is not None]
         self._lock = threading.Lock()
-        self._known: dict[str, CameraBalls] = {}
+        self._known: dict[CameraSettings, CameraBalls] = {}
         self._read: list[tuple[int, int] | None] = []
 
     def of(self, name: str) -> CameraBalls:
@@ -34,16 +36,17 @@ class BallPlaces:
         Raises:
             UnknownCameraError: the rig has no such camera.
         """
-        camera = camera_of(self._rig, name)
+        rig = self._rig()
+        camera = camera_of(rig, name)
         # Imported here because photogrammetry and its libraries take memory and half a second to load.
         from service.aiming.sources import known_balls  # noqa: PLC0415
 
         with self._lock:
             if (now := [_state(file) for file in self._files]) != self._read:
                 self._known, self._read = {}, now
-            if name not in self._known:
-                self._known[name] = known_balls(self._rig, camera, self._folder)
-            return self._known[name]
+            if camera not in self._known:
+                self._known[camera] = known_balls(rig, camera, self._folder)
+            return self._known[camera]
 
 
 def _state(file: Path) -> tuple[int, int] | None:

@@ -23,6 +23,7 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.phrase import phrase
 from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.region import calibration_unfit
 from service.aiming.kept import kept_in
 from service.aiming.places import Balls, of_system, places, standing
 
@@ -70,6 +71,8 @@ def known_balls(rig: RigSettings, camera: CameraSettings, folder: Path) -> Camer
 def _found(rig: RigSettings, camera: CameraSettings, folder: Path, nothing: CameraBalls) -> CameraBalls | None:
     """The places by the best of what there is; None: there is nothing that says it."""
     given = rig.analysis
+    if (unfit := calibration_unfit(camera)) is not None:
+        raise BadInputError(unfit)
     if given is not None and given.calibration is not None:
         balls = _of_calibration(read_poses(given.calibration), camera)
         return _told(nothing, BallSource.CALIBRATION, balls, given.calibration)

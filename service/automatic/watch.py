@@ -9,6 +9,7 @@ from rig.clocks import NS_PER_S, HostNs
 from rig.frame import FrameStatus
 from rig.settings.model import MotionSettings, RigSettings
 from rig.transport.preview import PreviewImage, PreviewSlot
+from service.aids import frame_of
 from service.automatic.motion import MotionDetector
 
 _POLL_S: Final = 0.03
@@ -22,7 +23,7 @@ class MotionWatch:
     """Looks at the newest triplet again and again while armed; begun by `start`, ended by `close`.
 
     Args:
-        rig: the rig.
+        rig: gives the rig in use.
         motion: which part of which camera's images.
         slot: shared memory with the newest triplet.
         state: the state of the service.
@@ -31,20 +32,15 @@ class MotionWatch:
 
     def __init__(
         self,
-        rig: RigSettings,
+        rig: Callable[[], RigSettings],
         motion: MotionSettings,
         slot: PreviewSlot,
         state: Callable[[], State],
         seen: Callable[[HostNs], None],
     ) -> None:
         self._slot, self._state, self._seen = slot, state, seen
-        self._camera = [camera.name for camera in rig.cameras].index(motion.camera)
-        first, last = rig.columns()[self._camera]
-        part = motion.region
-        self._rows = (
-            slice(rig.cameras[self._camera].region.height) if part is None else slice(part.y, part.y + part.height)
-        )
-        self._columns = slice(first, last) if part is None else slice(first + part.x, first + part.x + part.width)
+        self._rig, self._part = rig, motion.region
+        self._camera = [camera.name for camera in rig().cameras].index(motion.camera)
         self._detector = MotionDetector(motion.least_share)
         self._looked_at, self._pulse = HostNs(0), 0
         self._closing = threading.Event()
@@ -73,9 +69,13 @@ class MotionWatch:
                     self._seen(image.time)
 
     def _moves(self, image: PreviewImage) -> bool:
-        if image.statuses[self._camera] is not FrameStatus.OK:
+        rig = self._rig()
+        if image.statuses[self._camera] is not FrameStatus.OK or image.pixels.shape != rig.triplet_shape:
             return False
         if image.time - self._looked_at > _MISSED_S * NS_PER_S:
             self._detector.forget()
         self._looked_at = image.time
-        return self._detector.look(image.pixels[self._rows, self._columns], image.time / NS_PER_S)
+        frame = frame_of(image.pixels, rig, self._camera)
+        if (part := self._part) is not None:
+            frame = frame[part.y : part.y + part.height, part.x : part.x + part.width]
+        return self._detector.look(frame, image.time / NS_PER_S)

@@ -154,11 +154,19 @@ class RecordingControl:
             StateForbidsError: not armed, or a recording is being opened.
         """
         processes = self._armed_processes()
-        order = msgspec.structs.replace(start, rig_toml=self._rig_toml, calibration=self._calibration)
+        order = msgspec.structs.replace(start, rig_toml=self._rig_toml, calibration=self._fitting())
         self.current, self.notice = RecordingInProgress(order, session, opened), None
         if ended is not None:
             self.current.waiting.append(ended)
         processes.tell(order)
+
+    def _fitting(self) -> Calibration | None:
+        """The calibration without cameras that were calibrated with another region."""
+        if (known := self._calibration) is None:
+            return None
+        unfit = {camera.name for camera in self._rig.cameras if camera.calibrated_region is not None}
+        cameras = {name: data for name, data in known.cameras.items() if name not in unfit}
+        return msgspec.structs.replace(known, cameras=cameras)
 
     def _armed_processes(self) -> RigProcesses:
         state, processes = self._machine.state, self._session.processes

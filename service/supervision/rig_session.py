@@ -135,7 +135,8 @@ class RigSession:
                 start = self._given_hill or partial(hill_environment, self.rig)
                 self._environment = stack.enter_context(start(epoch))
                 self._epoch = epoch
-                self.truth = simulated_truth(self.rig, epoch) if self._given_hill is None else None
+            if self._given_hill is None and self._epoch is not None:
+                self.truth = simulated_truth(self.rig, self._epoch)
             processes = RigProcesses(
                 self.rig, self._on_event, epoch=self._epoch, recorder=self.recorder,
                 environment=self._environment,

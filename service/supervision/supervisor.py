@@ -19,9 +19,10 @@ from rig.health import Health
 from rig.host.disk import free_bytes
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
+from rig.settings.region import RegionLimits
 from rig.transport.analysis_messages import JumpMeasured
 from rig.transport.recorder_commands import RecorderOptions
-from rig.transport.recorder_reports import RecorderFailed, RecorderHealth, RecorderReport
+from rig.transport.recorder_reports import CameraLimits, RecorderFailed, RecorderHealth, RecorderReport
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RECORDER
 from service.recordings import live_results
@@ -35,6 +36,7 @@ from service.status.statements import measured, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.rig_session import RigSession, StartHill
+from service.supervision.settings_control import RigInUse, SettingsControl
 from service.supervision.state_machine import StateMachine
 from service.supervision.train_control import TrainControl
 from service.supervision.warm_up import WarmUp
@@ -71,7 +73,8 @@ class Supervisor:
         commands: through which other threads give commands.
         changing: held by the thread that changes settings of the rig in use.
         recordings: starts and ends recordings; only for commands in the supervisor's thread.
-        train: stops and starts the pulses; only for commands in the supervisor's thread.
+        train, settings: stops and starts the pulses; takes other settings. Likewise.
+        limits: which regions cameras take, by name, as those that were connected have said.
         truths: writes the truth beside the logs of simulated cameras; any thread may wait for it.
     """
 
@@ -104,6 +107,8 @@ class Supervisor:
         self._least = rig.least_cameras
         self._settling, self._watch = Settling(rig), RecorderWatch(rig, self._session.tell)
         self.train = TrainControl(self._machine, self._session, self.recordings, self._refresh)
+        self.settings = SettingsControl(self._machine, self._session, self.recordings, self._use, self._begin_again)
+        self.limits: dict[str, RegionLimits] = {}
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
@@ -168,31 +173,19 @@ class Supervisor:
             self._reconcile()
         return self._refresh()
 
-    def change_camera(self, rig: RigSettings, rig_toml: str, name: str) -> None:
-        """Command: use a rig with another exposure or gain of a camera, which is away for a moment while armed."""
-        if self.recordings.current is not None or self._session.busy:
-            raise StateForbidsError(FORBIDDEN["expose", self._machine.state])
-        self._use(rig, rig_toml)
-        self._session.change_camera(name)
+    def _use(self, new: RigInUse) -> None:
+        self.rig, self.rig_toml = new.rig, new.toml
+        self._session.rig, self._settling = new.rig, Settling(new.rig)
+        self.recordings.use(new.rig, new.toml)
+        self._watch.use(new.rig)
 
-    def change_rate(self, rig: RigSettings, rig_toml: str) -> None:
-        """Command: use a rig with another rate of its pulses; if it is armed, or has a fault, it is armed anew."""
-        state = self._machine.state
-        if self.recordings.current is not None or self._session.busy or state is State.ARMING:
-            raise StateForbidsError(FORBIDDEN["rate", state])
-        self._use(rig, rig_toml)
-        self._settling = Settling(rig)
-        if self._session.processes is not None:
-            self._fault.hurry()
+    def _begin_again(self, keep_hill: bool) -> None:
+        """End all processes; the next turn arms anew."""
+        self._fault.hurry()
+        if self._machine.state is not State.ARMING:
             self._machine.move(State.ARMING)
-            self._session.begin_take_down(keep_hill=False)
+        self._session.begin_take_down(keep_hill=keep_hill)
         self._refresh()
-
-    def _use(self, rig: RigSettings, rig_toml: str) -> None:
-        self.rig, self.rig_toml = rig, rig_toml
-        self._session.rig = rig
-        self.recordings.use(rig, rig_toml)
-        self._watch.use(rig)
 
     def note(self, event: Event) -> None:
         """Command: tell an event, also to the log of a recording that runs or begins soon."""
@@ -209,6 +202,7 @@ class Supervisor:
         """Command: begin to disarm."""
         if self._machine.state is State.RECORDING or self.recordings.current is not None:
             raise StateForbidsError(FORBIDDEN["disarm", State.RECORDING])
+        self.settings.drop(phrase("why_region_disarmed", "the rig was disarmed before it was tried"))
         self._wanted, self._least = False, self.rig.least_cameras
         self._reconcile()
         return self._refresh()
@@ -224,6 +218,7 @@ class Supervisor:
             self.failure = error
             raise
         finally:
+            self.settings.drop(phrase("why_region_ending", "the service ends"))
             self._session.close()
             self.recordings.abandon()
             self.truths.end(_FINISH_S)
@@ -283,7 +278,7 @@ class Supervisor:
     def _begin_arming(self) -> None:
         if self._machine.state is not State.ARMING:
             self._machine.move(State.ARMING)
-        self._settling.begin(time.monotonic())
+        self._settling.begin(time.monotonic(), self.settings.patience_s)
         self._fault.clear()
 
     def _listen(self) -> None:
@@ -309,14 +304,15 @@ class Supervisor:
     def _hear(self, report: RecorderReport) -> None:
         self._dirty = True
         self._watch.hear(report)
+        if isinstance(report, CameraLimits):
+            self.limits[self.rig.cameras[report.camera].name] = report.limits
         if isinstance(report, RecorderFailed) and self.recordings.current is None:
             self._fault.complain(report.error())
         self.recordings.hear(report)
 
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
-        level = Level.INFO if jump.ok else Level.WARNING
-        self._session.tell(Event.now(level, "analysis", measured(jump)))
+        self._session.tell(Event.now(Level.INFO if jump.ok else Level.WARNING, "analysis", measured(jump)))
 
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""
@@ -324,8 +320,9 @@ class Supervisor:
         if processes is None or not self._wanted or self.recordings.current is not None:
             return
         fault = self._why_not()
+        settled = self.settings.lacks_cameras(processes) or self._settling.settled(processes)
         match state:
-            case State.ARMING if self._settling.settled(processes):
+            case State.ARMING if settled and self.settings.stands(processes, fault):
                 self.recordings.armed_at = self.recordings.emptied_at = time.monotonic()
                 self._machine.move(State.ARMED) if fault is None else self._refuse(fault)
             case State.ARMED if fault is not None and not any(camera.present for camera in processes.cameras):
@@ -344,6 +341,8 @@ class Supervisor:
 
     def _rig_failed(self, error: SvevError) -> None:
         """Handle that setting up failed or that the recorder died: try again later, or end if not `enduring`."""
+        if self.settings.go_back(error.said):
+            return
         final = self.recordings.interrupt(error) if self._enduring and self._wanted else error
         said = self._fault.fail(error, time.monotonic() - self._settling.began, hurry=final is None)
         if final is not None:

@@ -142,12 +142,18 @@ class Settling:
 
     def __init__(self, rig: RigSettings) -> None:
         self._rig = rig
-        self.began = 0.0
+        self.began, self._patience_s = 0.0, _WARM_S
         self._tried_at: float | None = None
 
-    def begin(self, now: float) -> None:
-        """Note that arming begins now."""
+    def begin(self, now: float, patience_s: float | None = None) -> None:
+        """Note that arming begins now.
+
+        Args:
+            now: on the monotonic clock, s.
+            patience_s: longest wait for the first complete triplets, s; None: as always.
+        """
         self.began, self._tried_at = now, None
+        self._patience_s = _WARM_S if patience_s is None else patience_s
 
     def settled(self, processes: RigProcesses) -> bool:
         """Whether every camera has answered or failed, and the connected ones have had time for their first frames.
@@ -162,7 +168,7 @@ class Settling:
             self._tried_at = now
         lacking = not any(camera.present for camera in processes.cameras)
         sure = _contradicts(self._rig, processes.rate) is not None  # else the rate is told again soon
-        return lacking or (processes.warm and sure) or now > self._tried_at + _WARM_S
+        return lacking or (processes.warm and sure) or now > self._tried_at + self._patience_s
 
 
 #: Pulses whose rate differs from the rig file's by more than this share are those of another generator or another file.

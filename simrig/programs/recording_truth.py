@@ -96,6 +96,11 @@ def _window(camera: CameraSettings, gige: tuple[int, int]) -> Window:
 
 
 def gige_sensor(rig: RigSettings) -> tuple[int, int]:
-    """Width and height of the sensor of all simulated GigE Vision cameras of a rig: each region fits into it."""
-    regions = [camera.region for camera in rig.cameras if camera.backend == "aravis"] or [_VGA_REGION]
-    return max(region.width for region in regions), max(region.height for region in regions)
+    """Width and height of the sensor of all simulated GigE Vision cameras of a rig: each region fits into it.
+
+    So does the one before it was changed: a sensor does not change with the part of it that is read out.
+    """
+    cameras = [camera for camera in rig.cameras if camera.backend == "aravis"]
+    regions = [region for camera in cameras for region in (camera.region, camera.calibrated_region) if region]
+    regions = regions or [_VGA_REGION]
+    return max(each.x + each.width for each in regions), max(each.y + each.height for each in regions)

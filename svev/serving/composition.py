@@ -32,6 +32,7 @@ from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.storage import usable_bytes
 from service.recordings.trash_keeper import TrashKeeper
+from service.regions import Regions
 from service.rehearsals import Rehearser
 from service.service import Service
 from service.status.event_hub import EventHub
@@ -104,12 +105,13 @@ def serve(settings: ServiceSettings) -> None:
             return supervisor.rig, supervisor.rig_toml
 
         rehearser = stack.enter_context(closing(Rehearser(REHEARSE, in_use, data, hub.tell, hub.wake)))
-        lights, examine = Lights(supervisor, settings.rig), PanelDoctor(lambda: supervisor.rig, data).report
+        lights = Lights(supervisor, settings.rig, Regions(supervisor, settings.rig, preroll_s))
         trains = Trains(supervisor, settings.rig, preroll_s)
-        balls = BallPlaces(rig, data)
+        balls = BallPlaces(lambda: supervisor.rig, data)
         service = Service(
-            supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, trains, balls, examine
-        )
+            supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, trains, balls,
+            PanelDoctor(lambda: supervisor.rig, data).report,
+        )  # fmt: skip
         server = make_server(create_app(service, settings.access), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report

@@ -156,7 +156,7 @@ def show_hill(service: MemoryService, folder: Path) -> NDArray[np.uint8]:
         The picture.
     """
     rig = surveyed(survey_file(folder / "hill.json", training(), true_pose))
-    service.balls = BallPlaces(rig, folder).of
+    service.balls = BallPlaces(lambda: rig, folder).of
     picture = np.empty(SIZE[::-1], np.uint8)
     CameraView(training(), 0, *SIZE, 30.0).render_into(picture, HillPulse(1))
     service.through_the_lens = lambda _: picture

@@ -50,6 +50,8 @@ from rig.errors import StateForbidsError, UnknownCameraError, UnknownRecordingEr
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
+from rig.settings.model import Region
+from rig.settings.region import RegionLimits
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.recordings.archive import Archive, as_recording
@@ -83,7 +85,7 @@ class MemoryService(Archive):
         automatic: whether recordings begin by themselves, set by tests.
         rehearsal: how far a rehearsal is, and `rehearsed`, what the last one showed; set by tests.
         through_the_lens: what the lens makes of the picture of a camera, set by tests.
-        lights: exposure and gain of each camera.
+        lights: exposure, gain and region of each camera.
         pulses_made: who makes the pulses.
         bursts: pulses that were asked for.
         balls: where each camera should show the balls, set by tests.
@@ -108,7 +110,14 @@ class MemoryService(Archive):
             source="gpio", rate_hz=30, controls=tuple(TriggerControl), running=True, saved=True
         )
         self.bursts: list[int] = []
-        self.lights = {name: CameraLight(camera=name, exposure_us=2000, gain_db=0, saved=True) for name in CAMERAS}
+        limits = RegionLimits(
+            width=320, height=240, step_x=4, step_y=2, least_width=16, least_height=2, step_width=8, step_height=2
+        )
+        whole = Region(width=160, height=120)
+        self.lights = {
+            name: CameraLight(camera=name, exposure_us=2000, gain_db=0, region=whole, limits=limits, saved=True)
+            for name in CAMERAS
+        }
         self.balls: Callable[[str], CameraBalls] = lambda name: CameraBalls(camera=name, width=160, height=120)
         self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
         self._phase = Phase.now(State.IDLE, 1)
@@ -302,7 +311,9 @@ class MemoryService(Archive):
         before = self.camera_light(camera)
         if self._recording is not None:
             raise StateForbidsError("a recording is running: stop it, then change exposure or gain")
-        changed = before.model_copy(update={"saved": before.saved and not change.values(), **change.values()})
+        region = before.region if change.region is None else change.region.region()
+        changed = before.model_copy(update=change.values() | {"region": region})
+        changed = changed.model_copy(update={"saved": before.saved and changed == before})
         self.lights[camera] = changed.model_copy(update={"saved": changed.saved or change.save})
         return self.lights[camera]
 

@@ -38,7 +38,7 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     (r"POST /api/mark", lambda: phrase("act_marked", "marked a jump")),
     (
         r"PATCH /api/cameras/([^/]+)",
-        lambda camera: phrase("act_light", "changed exposure or gain of {camera}", camera=camera),
+        lambda camera: phrase("act_light", "changed exposure, gain or region of {camera}", camera=camera),
     ),
     (r"PATCH /api/trigger", lambda: phrase("act_trigger", "changed the pulses")),
     (r"POST /api/trigger/burst", lambda: phrase("act_burst", "asked for pulses")),

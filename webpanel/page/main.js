@@ -26,6 +26,7 @@ import * as doctor from "./system/doctor.js";
 import { drawEarlier, enterEarlier, startEarlier } from "./system/earlier.js";
 import { startLog } from "./system/log.js";
 import { drawPulses, enterPulses, startPulses } from "./system/pulses.js";
+import { drawRegion, enterRegion, startRegion } from "./system/region.js";
 import * as rehearsal from "./system/rehearsal.js";
 import * as rig from "./system/rig.js";
 import { drawChoices, startComparing } from "./viewing/comparing.js";
@@ -45,6 +46,7 @@ function redraw() {
   drawEarlier();
   drawKeys();
   drawPulses();
+  drawRegion();
 }
 
 /** @param {import("./shared/router.js").Place} place */
@@ -56,6 +58,7 @@ function entered({ view, id }) {
     doctor.draw();
     rehearsal.enterRehearsal();
     void enterPulses();
+    void enterRegion();
   }
   if (view === "aim") void enterEarlier();
   if (view === "rig") void rig.enterRig();
@@ -64,7 +67,7 @@ function entered({ view, id }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

@@ -220,12 +220,16 @@ def cameras_router(service: RigService, streams: OpenStreams) -> APIRouter:
 
     @router.get("/cameras/{camera}", responses=refusals(404))
     def get_camera(camera: _Camera) -> CameraLight:
-        """Exposure and gain of a camera."""
+        """Exposure, gain and region of a camera, and which regions it takes."""
         return service.camera_light(camera)
 
     @router.patch("/cameras/{camera}", responses=CHANGING | refusals(404))
     def change_camera(camera: _Camera, change: LightChange) -> CameraLight:
         """Change exposure or gain of a camera; while armed it is connected anew with them, which takes a second or two.
+
+        Another `region` makes an armed rig be armed anew, which takes some seconds; the answer comes when it is. If the
+        camera or a check of arming refuses the region, the rig goes back to the one before, and the answer says why.
+        Calibrations belong to a region: `calibration` says if they no longer fit.
 
         Not while a recording runs: all its frames are to be alike. The logs from then on hold the rig file with what
         was changed. `save` writes it into the rig file too; else it holds until the service ends.

@@ -21,6 +21,7 @@ from rig.jumper import JumperState
 from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 from rig.settings.model import AnalysisSettings, NetworkSettings, RigSettings
+from rig.settings.region import calibration_unfit
 from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
 from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
 from rig.transport.channel import ControlChannel
@@ -90,6 +91,9 @@ def main() -> None:
     if rig.analysis is None:
         raise SystemExit("analysis: the rig file has no [analysis] table")
     reports = _Reports(child.control, rig, child.config.directory)
+    for camera in rig.cameras:
+        if (unfit := calibration_unfit(camera)) is not None:
+            reports.message(Level.WARNING, unfit)
     if (analysis := _opened(child, rig, rig.analysis, reports)) is not None:
         with analysis, connected(_source(rig.network)) as stream:
             _measure(child, stream, analysis)

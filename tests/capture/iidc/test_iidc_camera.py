@@ -286,7 +286,7 @@ def test_a_region_of_the_sensor() -> None:
     [
         (
             {"region": {"x": 900, "width": 400, "height": 300}},
-            "camera K1 has 1032 x 778 pixels; width and height go in",
+            "camera K1 has 1032 x 778 px, and no region of",
         ),
         ({"trigger_input": "Line3"}, 'camera K1 has no trigger_input Line3, but "Line0": correct it'),
         ({"gain_db": 60.0}, "camera K1 has 24.1 dB of gain at most: lower gain_db"),

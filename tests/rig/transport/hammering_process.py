@@ -22,7 +22,7 @@ _PAUSE_S = 2e-4
 
 def _main(fd: int) -> None:
     slot = PreviewSlot(fd)
-    slot.take_over()
+    slot.take_over(slot.shape)
     pixels = np.zeros(slot.shape, np.uint8)
     number = 0
     while not select.select([sys.stdin], [], [], number % 4 * _PAUSE_S)[0]:

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +76,7 @@ def test_a_writer_that_dies_while_writing_blocks_nobody(slot: PreviewSlot) -> No
         process.send_signal(signal.SIGKILL)
         process.wait()
     new = PreviewSlot(os.dup(slot.fd))
-    new.take_over()
+    new.take_over(SHAPE)
     assert slot.read() is None
     assert slot.newest() == 0
     new.write(RigPulse(1), HostNs(5), (OK, LOST, OK), np.full(SHAPE, 9, np.uint8), host_now())
@@ -118,3 +118,15 @@ def test_another_descriptor_is_refused() -> None:
     with pytest.raises(BadInputError, match="is no preview slot"):
         PreviewSlot(fd)
     os.close(fd)
+
+
+def test_triplets_of_another_size_come_from_another_recorder(slot: PreviewSlot) -> None:
+    with closing(PreviewSlot(os.dup(slot.fd))) as writer:
+        for shape in ((483, 4000), (479, 1921)):
+            writer.take_over(shape)
+            assert slot.read() is None
+            writer.write(RigPulse(1), host_now(), (OK,) * 3, np.full(shape, 7, np.uint8), host_now())
+            image = slot.read()
+            assert image is not None
+            assert slot.shape == image.pixels.shape == shape
+            assert (image.pixels == 7).all()

@@ -74,9 +74,9 @@ function enter(found) {
   drawLight();
 }
 
-/** @returns {CameraLight} */
+/** @returns {Pick<CameraLight, "exposure_us"|"gain_db">} */
 function at() {
-  return light ?? { camera, exposure_us: 0, gain_db: 0, saved: true };
+  return light ?? { exposure_us: 0, gain_db: 0 };
 }
 
 /** @param {number} value three digits */

@@ -11,10 +11,29 @@
  * @property {number|null} black
  * @property {number[]} histogram
  *
+ * @typedef {object} Region
+ * @property {number} x
+ * @property {number} y
+ * @property {number} width
+ * @property {number} height
+ *
+ * @typedef {object} RegionLimits
+ * @property {number} width
+ * @property {number} height
+ * @property {number} step_x
+ * @property {number} step_y
+ * @property {number} step_width
+ * @property {number} step_height
+ * @property {number} least_width
+ * @property {number} least_height
+ *
  * @typedef {object} CameraLight
  * @property {string} camera
  * @property {number} exposure_us
  * @property {number} gain_db
+ * @property {Region} region
+ * @property {RegionLimits|null} limits
+ * @property {import("../shared/types.js").Statement|null} calibration
  * @property {boolean} saved
  *
  * @typedef {object} BallPlace

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from analysis.scene.disc import Disc, fit_disc
+from analysis.scene.disc import MARGIN, Disc, fit_discs
 from analysis.scene.static_image import GreyImage, StaticImage
 from rig.arrays import Floats, Integers
 
@@ -69,12 +69,8 @@ def detect_balls(image: StaticImage, most: int = MOST) -> Detections:
     """
     sigma = np.asarray(image.sigma, float)
     grey = np.asarray(image.grey, float)
-    discs = []
-    for x, y, radius in _blobs(image.grey, float(np.median(sigma))):
-        disc = _fitted(grey, sigma, np.array([x, y]), radius)
-        if disc is not None:
-            discs.append(disc)
-    return collected(_apart(discs)[:most])
+    blobs = np.array(_blobs(image.grey, float(np.median(sigma)))).reshape(-1, 3)
+    return collected(_apart(_fitted(grey, sigma, blobs[:, :2], blobs[:, 2]))[:most])
 
 
 def collected(discs: Sequence[Disc]) -> Detections:
@@ -88,14 +84,18 @@ def collected(discs: Sequence[Disc]) -> Detections:
     )
 
 
-def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: float) -> Disc | None:
-    """The ball at a place; None if there is none. What lies close around it is left out if it spoils the fit."""
-    wide = fit_disc(grey, sigma, xy, radius, poor_start=_MISFIT_AT_START, steps=_STEPS)
-    if wide is not None and wide.factor < _SPOILT:
-        return wide if _is_ball(wide) else None
-    tight = fit_disc(grey, sigma, xy, radius, margin=_TIGHT, poor_start=_MISFIT_AT_START, steps=_STEPS)
-    balls = [disc for disc in (wide, tight) if disc is not None and _is_ball(disc)]
-    return min(balls, key=lambda disc: disc.factor, default=None)
+def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Disc]:
+    """The balls at places (n, 2), where there are some. What lies close around one is left out if it spoils the fit."""
+
+    def fitted(chosen: Integers, margin: float) -> list[Disc | None]:
+        return fit_discs(grey, sigma, xy[chosen], radius[chosen], margin, _MISFIT_AT_START, _STEPS)
+
+    found = [[disc] for disc in fitted(np.arange(len(xy)), MARGIN)]
+    spoilt = [i for i, (disc,) in enumerate(found) if disc is None or disc.factor >= _SPOILT]
+    for i, disc in zip(spoilt, fitted(np.array(spoilt, int), _TIGHT), strict=True):
+        found[i].append(disc)
+    balls = [[disc for disc in of_place if disc is not None and _is_ball(disc)] for of_place in found]
+    return [min(of_place, key=lambda disc: disc.factor) for of_place in balls if of_place]
 
 
 def _quality(disc: Disc) -> float:

@@ -1,4 +1,4 @@
-"""Fits a blurred disc to grey values: centre with covariance, radius, contrast. For balls and for the jumper's markers.
+"""Fits blurred discs to grey values, many at once: centre with covariance, radius, contrast. For balls.
 
 The image of a uniform disc of radius R through a lens (a Gaussian of standard deviation s, which integration over a
 pixel widens by 1/12 px^2) is the noncentral chi-squared distribution with two degrees of freedom:
@@ -9,23 +9,29 @@ A small ellipse is the same in stretched coordinates. The fit is weighted least 
 log s, two of stretch, contrast, and a plane as background. Signalised features should be spherical so that their centre
 of gravity can be found (paper, section 3); the model is symmetric, so the errors of its shape do not move the centre.
 
+Each disc has an adjustment and a damping of its own (Levenberg-Marquardt); those with windows of similar size are
+computed together, and leave when they are settled or given up.
+
 The sigma of the centre is that of the adjustment a posteriori: the residuals around this very disc tell how large the
 noise is there, whatever made it (sensor, texture, compression).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import exp, isfinite, log
+from math import log
 from typing import Final
 
 import numpy as np
 from scipy.special import chndtr, erfc, i0e, i1e
 
-from rig.arrays import Floats
+from rig.arrays import Flags, Floats, Integers
 
 _UNKNOWNS = 10
 MARGIN: Final = 3.6  #: px beyond the disc that are fitted
 _WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one that is approximate more is needed
 _NODES = 0.3  # blurs between the nodes of a profile
+_TAIL = 6.0  # blurs from the border: there a profile is 1 or 0
+_SIMILAR, _TOGETHER = 1.4, 16_000  # ratio of the reaches of windows that are computed together, and their pixels
 _SHARP = 8.0  # R / s: from there on the border is that of a half plane, with the curvature's first term
 _BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and blur of a small disc go together
 _LOG_BLUR = log(_BLUR)
@@ -37,8 +43,13 @@ _SETTLED = 2e-5  # relative decrease of the square sum: a twentieth of a sigma o
 _TRIAL_STEPS, _POOR = 4, 0.25  # steps after which the residuals over the contrast must be smaller than that
 POOR_START: Final = 0.4  #: residuals over contrast, before the first step
 _RADII = (0.75, 1.0, 1.33)  # times the approximate radius, to start from
+_WINDOW_FITS = 0.15  # of log R, by which a disc may be larger or smaller than its window was made for
+_MOST_DAMPED = 1e8  # no step helps
 _LARGEST_STEP = 0.5  # of log R, log s and stretch
 _SMALLEST_SIGMA = 5e-4  # px
+#: Mean and inverse variance of the unknowns that have a prior.
+_PRIOR = np.zeros((2, _UNKNOWNS))
+_PRIOR[:, 3], _PRIOR[1, 4:6] = (_LOG_BLUR, _BLUR_SPREAD**-2), _STRETCH_SPREAD**-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,227 +82,291 @@ class Disc:
         return np.sqrt(np.diagonal(self.covariance))
 
 
-def fit_disc(
+def fit_discs(
     grey: Floats,
     sigma: Floats,
     xy: Floats,
-    radius: float,
-    mask: Floats | None = None,
+    radius: Floats,
     margin: float = MARGIN,
     poor_start: float = POOR_START,
     steps: int = STEPS,
-) -> Disc | None:
-    """Fit a disc near a place.
+) -> list[Disc | None]:
+    """Fit a disc near each of some places.
 
     Args:
         grey: (rows, columns) image.
-        sigma: (rows, columns) standard deviations of its grey values; their scale does not matter.
-        xy: (2,) approximate centre, px.
-        radius: approximate radius, px.
-        mask: (rows, columns) where the image may be used; everywhere if left out.
-        margin: so far beyond the disc its surroundings are one plane, px.
+        sigma: (rows, columns) standard deviations of its grey values; their scale does not matter, and where they are
+            infinite the image is not used.
+        xy: (n, 2) approximate centres, px.
+        radius: (n,) approximate radii, px.
+        margin: so far beyond a disc its surroundings are one plane, px.
         poor_start: residuals over contrast from which on a disc of the approximate place and radius is given up.
         steps: iterations at most; few are enough for a clear disc.
 
     Returns:
-        The disc; None if nothing there is one: no convergence, it leaves the place, or the image ends.
+        n discs; None if nothing there is one: no convergence, it leaves the place, or the image ends.
     """
-    theta = np.array([xy[0], xy[1], np.log(max(radius, 0.7)), np.log(_BLUR), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    window = None
-    for again in range(2):  # the second time with a window of the radius that was found
-        window = _window(grey, sigma, theta[:2], float(np.exp(theta[2])), mask, margin)
-        if window is None:
-            return None
-        start = _started(theta, window, _RADII if not again else (1.0,), poor_start)
-        fitted = None if start is None else _fitted(start, *window, steps)
-        if fitted is None or np.hypot(*(fitted[:2] - xy)) > max(1.5, radius):
-            return None
-        wider = abs(fitted[2] - theta[2]) > 0.15
-        theta = fitted
-        if not wider or again:
-            break
-    return None if window is None else _result(theta, *window)
+    theta = np.zeros((len(xy), _UNKNOWNS))
+    theta[:, :2], theta[:, 2], theta[:, 3] = xy, np.log(np.maximum(radius, 0.7)), _LOG_BLUR
+    discs: list[Disc | None] = [None] * len(xy)
+    waiting = np.arange(len(xy))
+    for factors in (_RADII, (1.0,)):  # the second time with windows of the radii that were found
+        size = theta[:, 2].copy()
+        wider: list[Integers] = [waiting[:0]]
+        for tried, around in _windows(grey, sigma, theta, _inside(grey, theta, waiting), margin):
+            start, promising = _started(theta[tried], around, factors, poor_start)
+            fitted, found = _fitted(start, promising, around, steps)
+            found &= np.hypot(*(fitted[:, :2] - xy[tried]).T) <= np.maximum(1.5, radius[tried])
+            theta[tried[found]] = fitted[found]
+            done = np.abs(theta[tried, 2] - size[tried]) <= (_WINDOW_FITS if len(factors) > 1 else np.inf)
+            last = found & done
+            wider.append(tried[found & ~done])
+            for i, disc in zip(tried[last].tolist(), _results(theta[tried[last]], around.only(last)), strict=True):
+                discs[i] = disc
+        waiting = np.concatenate(wider)
+    return discs
 
 
-def cover(r: Floats, radius: float, blur: float) -> tuple[Floats, Floats, Floats]:
-    """Blurred disc at distances r (n,): value, derivative by r, derivative by the radius."""
-    if radius / blur > _SHARP:
-        u = (r - radius + blur**2 / (2 * radius)) / blur
-        edge = np.exp(-0.5 * u**2) / (np.sqrt(2 * np.pi) * blur)
-        return np.asarray(0.5 * erfc(u / np.sqrt(2))), -edge, edge
+def cover(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floats]:
+    """Blurred discs (n,) at distances r (n, k): value, derivative by r, derivative by the radius."""
+    value, by_r, by_radius = np.empty((3, *r.shape))
+    sharp = radius / blur > _SHARP
+    for chosen, of in ((sharp, _cover_sharp), (~sharp, _cover_soft)):
+        if chosen.any():
+            parts = of(r[chosen], radius[chosen, None], blur[chosen, None])
+            value[chosen], by_r[chosen], by_radius[chosen] = parts
+    return value, by_r, by_radius
+
+
+def _cover_sharp(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floats]:
+    u = (r - radius + blur**2 / (2 * radius)) / blur
+    edge = np.exp(-0.5 * u**2) / (np.sqrt(2 * np.pi) * blur)
+    return np.asarray(0.5 * erfc(u / np.sqrt(2))), -edge, edge
+
+
+def _cover_soft(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floats]:
     a, b = r / blur, radius / blur
     common = (b / blur) * np.exp(-0.5 * (a - b) ** 2)
-    slope = -common * i1e(a * b)
-    return _share(r, radius, blur), np.asarray(slope), np.asarray(common * i0e(a * b))
+    return _share(a, b), np.asarray(-common * i1e(a * b)), np.asarray(common * i0e(a * b))
 
 
-def _share(r: Floats, radius: float, blur: float) -> Floats:
-    """The distribution function itself, which is slow: cubic between nodes that are dense enough for 1e-5."""
-    b = radius / blur
-    last = float(r.max(initial=0.0))
-    count = int(last / (_NODES * blur)) + 2
-    if 2 * count > len(r):
-        return np.asarray(chndtr(b * b, 2.0, (r / blur) ** 2))
-    width = last / (count - 1)
-    a = np.arange(count) * (width / blur)
-    value = chndtr(b * b, 2.0, a * a)
-    by_r = -(b / blur) * np.exp(-0.5 * (a - b) ** 2) * i1e(a * b) * width
-    place = r / width
+def _share(a: Floats, b: Floats) -> Floats:
+    """The distribution function itself, which is slow: cubic between nodes that are dense enough for 1e-5.
+
+    Args:
+        a: (n, k) distances, in blurs.
+        b: (n, 1) radii, in blurs.
+    """
+    first = np.maximum(0.0, np.floor((b - _TAIL) / _NODES))  # from there on it is not 1
+    last = min(float(a.max()), float(b.max()) + _TAIL) / _NODES - float(first.min())
+    count = min(int(last), int(2 * _TAIL / _NODES) + 1) + 2
+    node = (first + np.arange(count)) * _NODES
+    value = chndtr(b * b, 2.0, node * node)
+    by_a = -b * np.exp(-0.5 * (node - b) ** 2) * i1e(node * b) * _NODES
+    place = np.clip(a / _NODES - first, 0.0, count - 1)
     left = np.minimum(place.astype(np.intp), count - 2)
     t = place - left
+    left += (np.arange(len(a)) * (count - 1))[:, None]
     # the cubic of each step as a polynomial: value, slope, and what makes it end as the next one begins
-    rise, slope, next_slope = np.diff(value), by_r[:-1], by_r[1:]
-    square, cube = (3 * rise - 2 * slope - next_slope)[left], (slope + next_slope - 2 * rise)[left]
-    return np.asarray(value[left] + t * (slope[left] + t * (square + t * cube)))
+    rise, slope, next_slope = np.diff(value), by_a[:, :-1], by_a[:, 1:]
+    terms = value[:, :-1], slope, 3 * rise - 2 * slope - next_slope, slope + next_slope - 2 * rise
+    constant, linear, square, cube = (np.take(term.ravel(), left) for term in terms)
+    return np.asarray(constant + t * (linear + t * (square + t * cube)))
 
 
-_Window = tuple[Floats, Floats, Floats]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """The pixels around n discs.
+
+    Attributes:
+        x, y: (n, k) places.
+        grey: (n, k) grey values.
+        weight: (n, k) one over the sigmas; 0: the pixel is not used.
+        middle: (n,) of the sigmas.
+    """
+
+    x: Floats
+    y: Floats
+    grey: Floats
+    weight: Floats
+    middle: Floats
+
+    def only(self, chosen: Integers | Flags) -> "_Windows":
+        """Those of some discs."""
+        return _Windows(self.x[chosen], self.y[chosen], self.grey[chosen], self.weight[chosen], self.middle[chosen])
+
+    @property
+    def count(self) -> Integers:
+        """(n,) of the pixels that are used."""
+        return np.asarray(np.count_nonzero(self.weight, axis=1))
 
 
-def _window(
-    grey: Floats, sigma: Floats, xy: Floats, radius: float, mask: Floats | None, margin: float
-) -> _Window | None:
-    """Places (n, 2), grey values (n,) and sigmas (n,) around a disc; None if too much of it is outside."""
-    reach = max(radius + margin, _WIDER * radius + min(margin, _MARGIN_OF_WIDER))
+def _inside(grey: Floats, theta: Floats, chosen: Integers) -> Integers:
+    """Those of the chosen discs that lie in the image, the smallest first."""
+    room = np.minimum(theta[chosen, :2], np.array(grey.shape[::-1]) - 1 - theta[chosen, :2]).min(axis=1)
+    chosen = chosen[room > np.exp(theta[chosen, 2])]
+    return np.asarray(chosen[np.argsort(theta[chosen, 2], kind="stable")])
+
+
+def _windows(
+    grey: Floats, sigma: Floats, theta: Floats, order: Integers, margin: float
+) -> Iterator[tuple[Integers, _Windows]]:
+    """Discs of similar size, in their order from small to large, and their windows; without those of few pixels."""
+    radius = np.exp(theta[:, 2])
+    reach = np.maximum(radius + margin, _WIDER * radius + min(margin, _MARGIN_OF_WIDER))
+    while len(order):
+        most = min(_SIMILAR * reach[order[0]], reach[order[-1]])
+        together = max(1, int(_TOGETHER / (np.pi * most**2)))
+        chosen = order[: min(together, int(np.searchsorted(reach[order], most, side="right")))]
+        order = order[len(chosen) :]
+        windows = _window(grey, sigma, theta[chosen, :2], reach[chosen])
+        enough = windows.count >= 2 * _UNKNOWNS
+        yield chosen[enough], windows.only(enough)
+
+
+def _window(grey: Floats, sigma: Floats, xy: Floats, reach: Floats) -> _Windows:
+    """The pixels within reach (n,) of places (n, 2)."""
     rows, columns = grey.shape
-    left, right = int(np.ceil(xy[0] - reach)), int(np.floor(xy[0] + reach))
-    top, bottom = int(np.ceil(xy[1] - reach)), int(np.floor(xy[1] + reach))
-    if not (radius < xy[0] < columns - 1 - radius and radius < xy[1] < rows - 1 - radius):
-        return None
-    part = slice(max(0, top), min(rows, bottom + 1)), slice(max(0, left), min(columns, right + 1))
-    x, y = np.arange(part[1].start, part[1].stop), np.arange(part[0].start, part[0].stop)
-    inside = (x - xy[0]) ** 2 + ((y - xy[1]) ** 2)[:, None] <= reach**2
-    if mask is not None:
-        inside &= mask[part] > 0
-    row, column = np.nonzero(inside)
-    if len(row) < 2 * _UNKNOWNS:
-        return None
-    places = np.empty((len(row), 2))
-    places[:, 0], places[:, 1] = x[column], y[row]
-    return places, grey[part][inside].astype(float), sigma[part][inside].astype(float)
+    centre = np.rint(xy).astype(int)
+    half = int(reach.max() + 0.5)
+    y, x = (part.ravel() for part in np.mgrid[-half : half + 1, -half : half + 1])
+    within = x * x + y * y <= (float(reach.max()) + np.sqrt(0.5)) ** 2
+    x, y = x[within] + centre[:, :1], y[within] + centre[:, 1:]
+    near = (x - xy[:, :1]) ** 2 + (y - xy[:, 1:]) ** 2 <= reach[:, None] ** 2
+    near &= (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    place = np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)
+    spread = np.where(near, sigma[place], np.inf)
+    middle = np.sort(spread)[np.arange(len(xy)), np.isfinite(spread).sum(axis=1) // 2]
+    return _Windows(x.astype(float), y.astype(float), grey[place].astype(float), 1 / spread, middle)
 
 
-def _started(theta: Floats, window: _Window, factors: tuple[float, ...], poor: float) -> Floats | None:
-    """Start values with the best of some radii; None if no disc is near: no fit would mend such residuals."""
-    places, grey, sigma = window
-    dx, dy = places[:, 0] - theta[0], places[:, 1] - theta[1]
+def _started(theta: Floats, windows: _Windows, factors: tuple[float, ...], poor: float) -> tuple[Floats, Flags]:
+    """Start values with the best of some radii; and whether a disc is near: no fit would mend such residuals."""
+    dx, dy = windows.x - theta[:, :1], windows.y - theta[:, 1:2]
     r = np.hypot(dx, dy)
-    radii = np.array(factors) * float(np.exp(theta[2]))
-    n = len(radii)
-    columns = np.empty((n + 4, len(r)))  # of the design, one cover for each radius, and the grey values
+    radii = np.exp(theta[:, 2:3]) * np.array(factors)
+    n = len(factors)
+    columns = np.empty((len(theta), n + 4, r.shape[1]))  # of the design, a cover for each radius, and the grey values
     # the border as that of a half plane is near enough for a start
-    columns[:n] = 0.5 * erfc((r - radii[:, None]) / (np.sqrt(2) * np.exp(theta[3])))
-    columns[n], columns[n + 1], columns[n + 2], columns[n + 3] = 1.0, dx, dy, grey
-    columns /= sigma
-    products = columns @ columns.T
+    columns[:, :n] = 0.5 * erfc((r[:, None] - radii[..., None]) / (np.sqrt(2) * np.exp(theta[:, 3, None, None])))
+    columns[:, n], columns[:, n + 1], columns[:, n + 2], columns[:, n + 3] = 1.0, dx, dy, windows.grey
+    columns *= windows.weight[:, None]
+    products = columns @ columns.transpose(0, 2, 1)
     own = np.column_stack((np.arange(n), np.tile(np.arange(n, n + 3), (n, 1))))
-    normal = products[own[:, :, None], own[:, None]] + 1e-12 * np.eye(4)
-    right = products[own, -1]
+    normal = products[:, own[:, :, None], own[:, None]] + 1e-12 * np.eye(4)
+    right = products[:, own, -1]
     linear = np.linalg.solve(normal, right[..., None])[..., 0]
-    squares = (products[-1, -1] - (linear * right).sum(axis=1)) / len(r)
-    best = int(squares.argmin())
-    if not np.sqrt(max(0.0, squares[best])) * _middle(sigma) < poor * abs(float(linear[best, 0])):
-        return None
-    return np.concatenate((theta[:2], [np.log(radii[best])], theta[3:6], linear[best]))
+    squares = (products[:, -1:, -1] - (linear * right).sum(axis=2)) / windows.count[:, None]
+    best = np.arange(len(theta)), squares.argmin(axis=1)
+    misfit = np.sqrt(np.maximum(0.0, squares[best])) * windows.middle
+    start = np.column_stack((theta[:, :2], np.log(radii[best]), theta[:, 3:6], linear[best]))
+    return start, np.asarray(misfit < poor * np.abs(start[:, 6]))
 
 
-def _middle(values: Floats) -> float:
-    """The median, or its upper neighbour."""
-    return float(np.partition(values, len(values) // 2)[len(values) // 2])
-
-
-def _fitted(theta: Floats, places: Floats, grey: Floats, sigma: Floats, steps: int) -> Floats | None:
-    """Levenberg-Marquardt; None if it does not converge."""
-    damping, cost = 1e-3, np.inf
-    middle = _middle(sigma)
-    normal, gradient = np.eye(_UNKNOWNS), np.zeros(_UNKNOWNS)
-    best = theta
-    for step_number in range(steps):
-        new_cost, new_normal, new_gradient = _normal_equations(theta, places, grey, sigma)
-        if new_cost <= cost:
-            gain = cost - new_cost
-            best, cost, normal, gradient, damping = theta, new_cost, new_normal, new_gradient, damping / 8
-            if gain < _SETTLED * cost:
-                break
-            if step_number >= _TRIAL_STEPS and cost > len(grey) * (_POOR * theta[6] / middle) ** 2:
-                return None
-        else:
-            damping *= 10
-            if damping > 1e8:
-                break
-        damped = normal.copy()
-        diagonal = damped.reshape(-1)[:: _UNKNOWNS + 1]
-        diagonal += damping * (diagonal + 1e-12)
-        step = np.linalg.solve(damped, gradient)
-        np.minimum(np.maximum(step[2:6], -_LARGEST_STEP, out=step[2:6]), _LARGEST_STEP, out=step[2:6])
-        if not isfinite(step.sum()):
-            return None
-        theta = best + step
-        off = np.abs(step[:6]).tolist()
-        if max(off[:2]) < _ENOUGH and max(off[2:]) < _ENOUGH_OF_SHAPE:
-            best = theta
+def _fitted(theta: Floats, promising: Flags, windows: _Windows, steps: int) -> tuple[Floats, Flags]:
+    """Unknowns by Levenberg-Marquardt, and whether each converged; those that promise nothing are left as they are."""
+    n, poor = len(theta), windows.count * (_POOR / windows.middle) ** 2
+    best, trial, converged = theta.copy(), theta.copy(), np.zeros(n, bool)
+    damping, cost = np.full(n, 1e-3), np.full(n, np.inf)
+    normal, gradient = np.tile(np.eye(_UNKNOWNS), (n, 1, 1)), np.zeros((n, _UNKNOWNS))
+    active, windows = np.flatnonzero(promising), windows.only(promising)
+    for number in range(steps):
+        if not len(active):
             break
-        if not (_LOG_RADII[0] < theta[2] < _LOG_RADII[1] and _LOG_BLURS[0] < theta[3] < _LOG_BLURS[1]):
-            return None
-    else:
-        return None
-    return best
+        new_cost, new_normal, new_gradient = _normal_equations(trial[active], windows)
+        better = new_cost <= cost[active]
+        settled = better & (cost[active] - new_cost < _SETTLED * new_cost)
+        won = active[better]
+        best[won], cost[won] = trial[won], new_cost[better]
+        normal[won], gradient[won] = new_normal[better], new_gradient[better]
+        damping[active] *= np.where(better, 1 / 8, 10.0)
+        settled |= damping[active] > _MOST_DAMPED
+        given_up = better & (number >= _TRIAL_STEPS) & (cost[active] > poor[active] * best[active, 6] ** 2)
+        step = _step(normal[active], gradient[active], damping[active])
+        size = np.abs(step[:, :6])
+        small = ~settled & (size[:, :2].max(axis=1) < _ENOUGH) & (size[:, 2:].max(axis=1) < _ENOUGH_OF_SHAPE)
+        trial[active] = best[active] + step
+        best[active[small & ~given_up]] = trial[active[small & ~given_up]]
+        settled |= small & ~given_up
+        converged[active[settled]] = True
+        goes_on = ~(settled | given_up) & _possible(trial[active])
+        active, windows = active[goes_on], windows.only(goes_on)
+    return best, converged
 
 
-def _normal_equations(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> tuple[float, Floats, Floats]:
-    """Cost, normal matrix and right-hand side, priors included."""
-    value, design = _model(theta, places)
-    v = (grey - value) / sigma
-    design /= sigma
-    normal, gradient, cost = design @ design.T, design @ v, float(v @ v)
-    for i, mean, spread in ((3, _LOG_BLUR, _BLUR_SPREAD), (4, 0.0, _STRETCH_SPREAD), (5, 0.0, _STRETCH_SPREAD)):
-        off = mean - float(theta[i])
-        normal[i, i] += spread**-2
-        gradient[i] += off / spread**2
-        cost += (off / spread) ** 2
-    return cost, normal, gradient
+def _step(normal: Floats, gradient: Floats, damping: Floats) -> Floats:
+    """Steps (n, 10) of the unknowns."""
+    damped = normal.copy()
+    diagonal = np.einsum("nii->ni", damped)  # a view
+    diagonal += damping[:, None] * (diagonal + 1e-12)
+    step = np.asarray(np.linalg.solve(damped, gradient[..., None])[..., 0], float)
+    np.clip(step[:, 2:6], -_LARGEST_STEP, _LARGEST_STEP, out=step[:, 2:6])
+    return step
 
 
-def _model(theta: Floats, places: Floats) -> tuple[Floats, Floats]:
-    """Grey values (n,) and their derivatives (10, n)."""
-    x, y, log_r, log_s, p, q, contrast, *plane = theta.tolist()
-    radius, blur = exp(log_r), exp(log_s)
-    dx, dy = places[:, 0] - x, places[:, 1] - y
+def _possible(theta: Floats) -> Flags:
+    """Whether a fit may go through such unknowns."""
+    possible = np.isfinite(theta).all(axis=1)
+    for unknown, (low, high) in ((2, _LOG_RADII), (3, _LOG_BLURS)):
+        possible &= (low < theta[:, unknown]) & (theta[:, unknown] < high)
+    return np.asarray(possible)
+
+
+def _normal_equations(theta: Floats, windows: _Windows) -> tuple[Floats, Floats, Floats]:
+    """Costs, normal matrices and right-hand sides, priors included."""
+    value, design = _model(theta, windows)
+    v = (windows.grey - value) * windows.weight
+    design *= windows.weight[:, None]
+    off = _PRIOR[0] - theta
+    normal = design @ design.transpose(0, 2, 1) + np.diag(_PRIOR[1])
+    gradient = (design @ v[..., None])[..., 0] + _PRIOR[1] * off
+    return np.einsum("nk,nk->n", v, v) + off**2 @ _PRIOR[1], normal, gradient
+
+
+def _model(theta: Floats, windows: _Windows) -> tuple[Floats, Floats]:
+    """Grey values (n, k) and their derivatives (n, 10, k)."""
+    x, y, log_r, log_s, p, q, contrast, level, right, down = theta.T[..., None]
+    radius, blur = np.exp(log_r), np.exp(log_s)
+    dx, dy = windows.x - x, windows.y - y
     # stretched coordinates (I + [[p, q], [q, -p]]) d
     u, w = (1 + p) * dx + q * dy, q * dx + (1 - p) * dy
     r = np.sqrt(u * u + w * w) + 1e-9
-    value, by_r, by_radius = cover(r, radius, blur)
-    nu, nw = u / r, w / r
-    design = np.empty((_UNKNOWNS, len(r)))
-    design[0] = -by_r * (nu * (1 + p) + nw * q)
-    design[1] = -by_r * (nu * q + nw * (1 - p))
-    design[2] = by_radius * radius
-    design[3] = -(r * by_r + radius * by_radius)  # the cover depends on the ratios of r, R and s alone
-    design[4] = by_r * (nu * dx - nw * dy)
-    design[5] = by_r * (nu * dy + nw * dx)
-    design[:6] *= contrast
-    design[6] = value
-    design[7] = 1.0
-    design[8], design[9] = dx, dy
+    value, by_r, by_radius = cover(r, radius[:, 0], blur[:, 0])
+    along = by_r / r
+    along_u, along_w = along * u, along * w
+    design = np.empty((len(theta), _UNKNOWNS, r.shape[1]))
+    design[:, 0] = -(along_u * (1 + p) + along_w * q)
+    design[:, 1] = -(along_u * q + along_w * (1 - p))
+    design[:, 2] = by_radius * radius
+    design[:, 3] = -(r * by_r + radius * by_radius)  # the cover depends on the ratios of r, R and s alone
+    design[:, 4] = along_u * dx - along_w * dy
+    design[:, 5] = along_u * dy + along_w * dx
+    design[:, :6] *= contrast[:, None]
+    design[:, 6], design[:, 7] = value, 1.0
+    design[:, 8], design[:, 9] = dx, dy
     # the plane hangs on the centre, whose derivative it therefore has too
-    design[0] -= plane[1]
-    design[1] -= plane[2]
-    return contrast * value + plane[0] + plane[1] * dx + plane[2] * dy, design
+    design[:, 0] -= right
+    design[:, 1] -= down
+    return contrast * value + level + right * dx + down * dy, design
 
 
-def _result(theta: Floats, places: Floats, grey: Floats, sigma: Floats) -> Disc | None:
-    _, normal, _ = _normal_equations(theta, places, grey, sigma)
-    value, _ = _model(theta, places)
-    v = (grey - value) / sigma
-    factor = float(np.sqrt(v @ v / (len(v) - _UNKNOWNS)))
-    try:
-        covariance = np.linalg.inv(normal)[:2, :2] * factor**2
-    except np.linalg.LinAlgError:
-        return None
-    if not (np.isfinite(covariance).all() and (np.diagonal(covariance) > 0).all()):
-        return None
-    covariance = covariance + _SMALLEST_SIGMA**2 * np.eye(2)
-    stretch = 2 * float(np.arctanh(min(0.99, float(np.hypot(theta[4], theta[5])))))
-    rms = float(np.sqrt(np.mean((grey - value) ** 2)))
-    shape = float(np.exp(theta[2])), float(np.exp(theta[3])), stretch
-    return Disc(theta[:2].copy(), covariance, *shape, float(theta[6]), rms, factor)
+def _results(theta: Floats, windows: _Windows) -> list[Disc | None]:
+    """The discs of unknowns (n, 10); None where they are not determined."""
+    if not len(theta):
+        return []
+    _, normal, _ = _normal_equations(theta, windows)
+    value, _ = _model(theta, windows)
+    off = (windows.grey - value) * (windows.weight > 0)
+    factor = np.sqrt(((off * windows.weight) ** 2).sum(axis=1) / (windows.count - _UNKNOWNS))
+    sound = np.isfinite(np.linalg.slogdet(normal)[1])
+    normal[~sound] = np.eye(_UNKNOWNS)
+    covariance = np.linalg.inv(normal)[:, :2, :2] * factor[:, None, None] ** 2
+    sound &= np.isfinite(covariance).all(axis=(1, 2)) & (np.einsum("nii->ni", covariance) > 0).all(axis=1)
+    covariance += _SMALLEST_SIGMA**2 * np.eye(2)
+    radius, blur = np.exp(theta[:, 2:4].T)
+    stretch = 2 * np.arctanh(np.minimum(0.99, np.hypot(theta[:, 4], theta[:, 5])))
+    rms = np.sqrt((off**2).sum(axis=1) / windows.count)
+    shapes = zip(*(part.tolist() for part in (radius, blur, stretch, theta[:, 6], rms, factor)), strict=True)
+    return [
+        Disc(theta[i, :2].copy(), covariance[i].copy(), *shape) if sound[i] else None for i, shape in enumerate(shapes)
+    ]

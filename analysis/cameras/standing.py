@@ -70,10 +70,25 @@ class Standing:
     system: CameraSystem
     shake: Mapping[str, Mapping[PulseNumber, FrameShake]]
 
-    def candidates(self, seen: PulseCandidates) -> PulseCandidates:
-        """Candidates where the cameras of `system` would show them."""
-        images = {name: self._image_candidates(name, seen.pulse, image) for name, image in seen.images.items()}
-        return replace(seen, images=images)
+    def candidates(self, seen: Sequence[PulseCandidates]) -> list[PulseCandidates]:
+        """Candidates of some pulses where the cameras of `system` would show them."""
+        images = [dict(pulse.images) for pulse in seen]
+        for name, shakes in self.shake.items():
+            if name not in self.system.cameras:
+                continue
+            shaken = [i for i, pulse in enumerate(seen) if name in pulse.images and pulse.pulse in shakes]
+            spots = [images[i][name].spots for i in shaken]
+            of_spot = [shakes[seen[i].pulse] for i, own in zip(shaken, spots, strict=True) for _ in range(len(own))]
+            joined = Spots.joined(spots)
+            xy, added = steadied_each(self.system[name], of_spot, joined.xy)
+            joined = replace(joined, xy=xy, covariance=joined.covariance + added)
+            ends = np.cumsum([0, *map(len, spots)])
+            for i, first, last in zip(shaken, ends[:-1], ends[1:], strict=True):
+                steady = partial(_steadied_traces, self.system[name], shakes[seen[i].pulse])
+                wanted = images[i][name].traces
+                traces = wanted.changed(steady) if isinstance(wanted, WantedTraces) else steady(tuple(wanted))
+                images[i][name] = ImageCandidates(joined.only(np.arange(first, last)), traces)
+        return [replace(pulse, images=own) for pulse, own in zip(seen, images, strict=True)]
 
     def measurements(self, seen: PulseMeasurements) -> PulseMeasurements:
         """Measurements in the frames as the cameras of `system` would have made them."""
@@ -104,18 +119,6 @@ class Standing:
             else:
                 images[name] = _image_measurements(self.system[name], shake.reversed() if back else shake, image)
         return replace(seen, images=images)
-
-    def _image_candidates(self, name: str, pulse: PulseNumber, image: ImageCandidates) -> ImageCandidates:
-        shake = self.shake.get(name, {}).get(pulse)
-        if shake is None or name not in self.system.cameras:
-            return image
-        placed = self.system[name]
-        xy, added = steadied(placed, shake, image.spots.xy)
-        spots: Spots = replace(image.spots, xy=xy, covariance=image.spots.covariance + added)
-        steady = partial(_steadied_traces, placed, shake)
-        wanted = image.traces
-        traces = wanted.changed(steady) if isinstance(wanted, WantedTraces) else steady(tuple(wanted))
-        return ImageCandidates(spots, traces)
 
 
 class _SteadyLook:

@@ -59,7 +59,7 @@ def find_jumps(
             if measured := sighting.measured(look):
                 found.append(JumpMeasurements(len(found) + 1, measured))
             continue
-        steady = [standing.candidates(seen) for seen in window]
+        steady = standing.candidates(window)
         again = identify(steady, standing.system, facts.rate_hz, exposures, standing.look(look))
         best = max(again, key=lambda one: len(one.pulses), default=None)
         if best is not None:

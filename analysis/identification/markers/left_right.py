@@ -76,7 +76,7 @@ def _followed(
     h = _Hypotheses(np.zeros(1), np.zeros((1, 0), int), mean[None], np.diag(sigma**2)[None], none)
     for t in range(len(time_s)):
         if t:
-            state, variance = bindings.moved(h.state, h.variance, float(time_s[t] - time_s[t - 1]), h.begun)
+            state, variance = bindings.moved(h.state, h.variance, np.diff(time_s[t - 1 : t + 1]), h.begun)
             h = replace(h, state=state, variance=variance)
         h = _continued(h, there[t], xyz[t], covariance[t], strange[t], bindings)
     return h

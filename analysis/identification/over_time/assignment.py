@@ -94,6 +94,8 @@ def assign(
     for t in np.flatnonzero(known.any(axis=1)).tolist():
         points = window.points[t]
         of_markers = [[nothing(m), *_worthy(options.get((t, i), ()))] for i in range(n)]
+        if all(len(of_marker) == 1 for of_marker in of_markers):
+            continue
         strange = _strangeness(of_markers, points, axes)
         for i, (option, doubtful) in enumerate(jointly_best(of_markers, strange)):
             result.rays[t, i] = np.where(doubtful, -1, option.rays)
@@ -230,10 +232,12 @@ def _numbered(counts: Sequence[int]) -> tuple[Integers, Integers]:
 def _worthy(options: Sequence[Option]) -> list[Option]:
     """The best options: those that chance does not explain, and no single ray of a spot that a better one has."""
     kept: list[Option] = []
+    shown: set[tuple[int, int]] = set()
     for option in sorted((o for o in options if o.cost < -DECISIVE), key=lambda o: o.cost):
-        seen = option.rays >= 0
-        if option.point >= 0 or not any((o.rays == option.rays)[seen].all() for o in kept):
+        spots = {(k, s) for k, s in enumerate(option.rays.tolist()) if s >= 0}
+        if option.point >= 0 or not spots <= shown:
             kept.append(option)
+            shown |= spots
         if len(kept) == MOST_OPTIONS:
             break
     return kept

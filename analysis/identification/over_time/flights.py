@@ -243,16 +243,20 @@ def _following(
 ) -> tuple[Integers, Integers, Floats]:
     """Which steps may follow which: index of a step from point i to point j, that of an arrival, and their misfit."""
     step, came = arrivals.of(i)
-    i, j, back = i[step], j[step], arrivals.back_s[came]
-    ratio = (dt / back)[:, None]
-    off = there.xyz[j] - here.xyz[i] - ratio * (here.xyz[i] - arrivals.xyz[came])
-    bend = ACCELERATION_M_S2 * dt * (dt + back) / 2
-    ratio = ratio[:, None]
+    ratio = dt / arrivals.back_s[came]
+    bend = (ACCELERATION_M_S2 * dt * (dt + arrivals.back_s[came]) / 2) ** 2
+    off = there.xyz[j[step]] - here.xyz[i[step]]
+    off -= ratio[:, None] * (here.xyz[i[step]] - arrivals.xyz[came])
+    traces = [np.trace(of, axis1=1, axis2=2) for of in (there.covariance, here.covariance, arrivals.covariance)]
+    most = traces[0][j[step]] + (1 + ratio) ** 2 * traces[1][i[step]] + ratio**2 * traces[2][came] + 3 * bend
+    # no variance is larger than the trace: for most pairs that is enough to tell that they do not fit
+    near = np.flatnonzero((off**2).sum(axis=1) < _FITS * most)
+    step, came, off, ratio, bend = step[near], came[near], off[near], ratio[near, None, None], bend[near, None, None]
     covariance = (
-        there.covariance[j]
-        + (1 + ratio) ** 2 * here.covariance[i]
+        there.covariance[j[step]]
+        + (1 + ratio) ** 2 * here.covariance[i[step]]
         + ratio**2 * arrivals.covariance[came]
-        + (bend**2)[:, None, None] * np.eye(3)
+        + bend * np.eye(3)
     )
     misfit = np.einsum("ni,ni->n", off, np.linalg.solve(covariance, off[..., None])[..., 0])
     fits = misfit < _FITS

@@ -8,11 +8,14 @@ that the one that is hidden is where the other one tells.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from rig.arrays import Flags, Floats
+
+_States: TypeAlias = tuple[Floats, Floats]  # with their covariances
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,15 +57,14 @@ def predict(time_s: Floats, xyz: Floats, covariance: Floats, parts: Sequence[Par
         mixing: (n, p) the things as sums of parts.
     """
     filters = PathFilter(xyz.shape[2], parts, mixing)
-    ahead = filters.run(time_s, xyz, covariance)
-    back = tuple(part[::-1] for part in filters.run(time_s[::-1], xyz[::-1], covariance[::-1]))
-    one, other = np.linalg.inv(ahead[1]), np.linalg.inv(back[1])
-    total = np.linalg.inv(one + other)
-    state = (total @ (one @ ahead[0][..., None] + other @ back[0][..., None]))[..., 0]
+    ahead, back = filters.run(time_s, xyz, covariance)
     steps, n, d = xyz.shape
-    values = (state @ filters.all_of.T).reshape(steps, n, d)
-    spread = (filters.all_of @ total @ filters.all_of.T).reshape(steps, n, d, n, d)
-    return Prediction(values, np.stack([spread[:, i, :, i] for i in range(n)], axis=1))
+    # both filters together, of what is asked for alone: ahead gives way to back by its share of both variances
+    asked = filters.all_of @ ahead[1]
+    share = np.linalg.solve(ahead[1] + back[1], asked.swapaxes(-1, -2)).swapaxes(-1, -2)
+    values = ahead[0] @ filters.all_of.T + (share @ (back[0] - ahead[0])[..., None])[..., 0]
+    spread = (share @ back[1] @ filters.all_of.T).reshape(steps, n, d, n, d)
+    return Prediction(values.reshape(steps, n, d), np.stack([spread[:, i, :, i] for i in range(n)], axis=1))
 
 
 class PathFilter:
@@ -104,40 +106,48 @@ class PathFilter:
             self._movements[dt] = np.asarray(move, float), np.asarray(noise, float)
         return self._movements[dt]
 
-    def run(self, time_s: Floats, xyz: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-        """States (t, 3 d p) and their covariances before each pulse's own measurement."""
+    def run(self, time_s: Floats, xyz: Floats, covariance: Floats) -> tuple[_States, _States]:
+        """States (t, 3 d p) and their covariances before each pulse's own measurement, ahead and back in time."""
+        steps, n, d = xyz.shape
         measured: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
-        state, variance = self.begin[0], np.diag(self.begin[1] ** 2)
-        begun = np.zeros(len(self._jerk), bool)
-        states, variances = np.empty((len(time_s), len(state))), np.empty((len(time_s), len(state), len(state)))
-        for i in range(len(time_s)):
+        values, spread = np.nan_to_num(xyz.reshape(steps, n * d)), np.zeros((steps, n * d, n * d))
+        for i in range(n):
+            block = slice(i * d, (i + 1) * d)
+            spread[:, block, block] = np.where(measured[:, i, None, None], covariance[:, i], np.eye(d))
+        by_state = np.where(np.repeat(measured, d, axis=1)[..., None], self.all_of, 0.0)
+        begins = measured @ (self.mixing != 0)
+        size = len(self.begin[0])
+        state, variance = np.tile(self.begin[0], (2, 1)), np.tile(np.diag(self.begin[1] ** 2), (2, 1, 1))
+        begun = np.zeros((2, len(self._jerk)), bool)
+        states, variances = np.empty((2, steps, size)), np.empty((2, steps, size, size))
+        both = np.arange(2)
+        for i in range(steps):
+            at = np.array((i, steps - 1 - i))
             if i:
-                state, variance = self.moved(state, variance, float(time_s[i] - time_s[i - 1]), begun)
-            states[i], variances[i] = state, variance
-            if measured[i].any():
-                state, variance = self._updated(state, variance, measured[i], xyz[i], covariance[i])
-                begun |= (self.mixing[measured[i]] != 0).any(axis=0)
-        return states, variances
+                state, variance = self.moved(state, variance, time_s[at] - time_s[at - (1, -1)], begun)
+            states[both, at], variances[both, at] = state, variance
+            if measured[at].any():
+                state, variance = _updated(state, variance, by_state[at], values[at], spread[at])
+                begun |= begins[at]
+        return (states[0], variances[0]), (states[1], variances[1])
 
-    def _updated(
-        self, state: Floats, variance: Floats, measured: Flags, xyz: Floats, covariance: Floats
-    ) -> tuple[Floats, Floats]:
-        by_state = self.all_of[np.repeat(measured, self._d)]
-        total = by_state @ variance @ by_state.T
-        for i, own in enumerate(covariance[measured]):
-            block = slice(i * self._d, (i + 1) * self._d)
-            total[block, block] += own
-        gain = np.linalg.solve(total, by_state @ variance).T
-        variance = variance - gain @ by_state @ variance
-        return state + gain @ (xyz[measured].ravel() - by_state @ state), (variance + variance.T) / 2
+    def moved(self, state: Floats, variance: Floats, dt: Floats, begun: Flags) -> _States:
+        """States (h, 3 d p) and covariances dt (h,) later (earlier where negative), or all the same dt (1,) later.
 
-    def moved(self, state: Floats, variance: Floats, dt: float, begun: Flags) -> tuple[Floats, Floats]:
-        """States (..., 3 d p) and covariances dt later (earlier where negative).
-
-        Parts that were not measured yet, begun (..., p), stay as uncertain as they are.
+        Parts that were not measured yet, begun (h, p), stay as uncertain as they are.
         """
-        move, noise = self._movement(round(dt, 6))
-        grown = move @ variance @ move.T + noise
+        movements = [self._movement(round(each, 6)) for each in dt.tolist()]
+        move, noise = (np.stack(parts) for parts in zip(*movements, strict=True))
+        grown = move @ variance @ move.swapaxes(-1, -2) + noise
         known = np.repeat(begun, 3 * self._d, axis=-1)
         grown = np.where(known[..., :, None] & known[..., None, :], grown, variance)
-        return state @ move.T, (grown + grown.swapaxes(-1, -2)) / 2
+        return (move @ state[..., None])[..., 0], (grown + grown.swapaxes(-1, -2)) / 2
+
+
+def _updated(state: Floats, variance: Floats, by_state: Floats, values: Floats, spread: Floats) -> _States:
+    """States (h, s) and covariances after a measurement: values (h, k) with their derivatives and covariances."""
+    total = by_state @ variance @ by_state.swapaxes(-1, -2) + spread
+    gain = np.linalg.solve(total, by_state @ variance).swapaxes(-1, -2)
+    variance = variance - gain @ by_state @ variance
+    off = values[..., None] - by_state @ state[..., None]
+    return state + (gain @ off)[..., 0], (variance + variance.swapaxes(-1, -2)) / 2

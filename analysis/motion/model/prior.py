@@ -1,9 +1,10 @@
 """The prior of the motion: white noise on the jerk of each channel, of three regimes, with a break at the take-off.
 
 On the table, around the edge and in flight the channels move differently, so each regime has its own density q of the
-jerk's noise, and at the take-off the acceleration may break. The densities are not given: they are variance components,
-estimated from the jump itself together with everything else. Their start values are sizes of human movement; as a few
-pseudo-observations they keep a density in bounds that a short regime does not determine.
+jerk's noise, and at the take-off the acceleration may break. A push does not end at a known moment: what the edge adds
+to the flight fades. The densities are not given: they are variance components, estimated from the jump itself together
+with everything else. Their start values are sizes of human movement, known by their order of magnitude: the square root
+of each density has a half-Cauchy prior, with the start value as its median.
 
 A state is (value, h velocity, h^2/2 acceleration) of all channels, with the pulse interval h as unit of time.
 """
@@ -29,10 +30,11 @@ _GAIN: Final = np.array(
     ((0.5, 0.5, 0.5, 10, 5, 2, 0.5, 0.5), (20, 5, 20, 20, 10, 10, 20, 20), (1, 1, 1, 5, 3, 3, 5, 5)), float
 )
 _WITHIN_S: Final = 0.1
-_PSEUDO: Final = 1.0  #: observations that the start values count as
+_FADE_S: Final = EDGE_S / 2  #: in so long a time the density of the edge falls to 1 / e: at the end of the phase, 14 %
 _BREAK: Final = np.array((20, 10, 40, 20, 10, 10, 20, 20), float)[SHARE]  # m/s^2, rad/s^2: at the take-off
 _BODY_S: Final = 1.0
 _ALL: Final = np.arange(CHANNELS)
+_NODES: Final = np.polynomial.legendre.leggauss(12)  # of an integral from -1 to 1: places and weights
 _SMALLEST: Final = 1e-4  # of the start value: below, a density is as good as none
 
 
@@ -48,7 +50,7 @@ class Prior:
     Attributes:
         unit: h, s.
         transition: (n - 1, 3, 3) of a channel's state.
-        by_density: (..., n - 1, 3, 3, 3) covariance that a density 1 of each regime adds.
+        by_density: (..., n - 1, 3, 3, 3) covariance that density 1 of each regime adds (of the edge, at the take-off).
         by_break: (..., n - 1, 3, 3) covariance that a break of variance 1 adds.
         density: (3, 8) by regime and share.
     """
@@ -89,16 +91,18 @@ def prior(
 ) -> Prior:
     """The prior between pulses at `times` (n,), s, with the take-off at `takeoff`; (g,) for g possible times of it.
 
-    Without one everything from `airborne` on is flight; before, he may have passed the edge at any time.
+    From the take-off on there is the density of the flight, and on top of it that of the edge, which fades. Without a
+    take-off everything from `airborne` on is flight; before, he may have passed the edge at any time.
     """
     start, end = times[:-1], times[1:]
     first = np.asarray(-np.inf if takeoff is None else takeoff)[..., None]
-    last = np.full_like(first, airborne) if takeoff is None else first + EDGE_S
+    last = np.full_like(first, airborne) if takeoff is None else first
     bounds = np.stack(np.broadcast_arrays(start, np.clip(first, start, end), np.clip(last, start, end), end))
     after = (end - bounds[1:]) / unit  # time left at the end of each regime's part
     by_density = np.moveaxis(_carried(white_jerk(np.diff(bounds, axis=0), unit), after), 0, -3)
     by_break = np.zeros(by_density[..., 0, :, :].shape)
     if takeoff is not None:
+        by_density[..., 1, :, :] = _fading(start - first, end - first, unit)
         inside = (start < first) & (first <= end)
         gain = np.zeros((3, 3))
         gain[2, 2] = (unit**2 / 2) ** 2
@@ -122,6 +126,19 @@ def white_jerk(seconds: Floats, unit: float) -> Floats:
     return np.asarray(seconds[..., None, None] ** exponents / powers * np.outer(scale, scale))
 
 
+def _fading(start: Floats, end: Floats, unit: float) -> Floats:
+    """(..., 3, 3) what noise on the jerk adds between two times (...), s, if its density is exp(-t / T) from 0 on."""
+    start = np.maximum(start, 0.0)
+    # In long gaps the nodes stand where there is something to add.
+    half = np.maximum(np.minimum(end, start + 20 * _FADE_S) - start, 0.0)[..., None] / 2
+    places, weights = _NODES
+    at = start[..., None] + half * (1 + places)
+    left = (end[..., None] - at)[..., None]
+    gain = np.concatenate((left**2 / 2, left, np.ones_like(left)), axis=-1) * (1.0, unit, unit**2 / 2)
+    weighted = gain * (half * weights * np.exp(-at / _FADE_S))[..., None]
+    return np.asarray(weighted.swapaxes(-1, -2) @ gain)
+
+
 def _carried(covariance: Floats, steps: Floats) -> Floats:
     move = transitions(steps)
     return np.asarray(move @ covariance @ move.swapaxes(-1, -2))
@@ -131,7 +148,8 @@ def re_estimated(given: Prior, states: Floats, covariance: Floats, following: Fl
     """Better densities (3, 8): variance components of the motion's own residuals.
 
     The residuals of an interval are w = x(k+1) - F x(k) with Q = sum q K and, as estimated, the covariance C_w. Each
-    component gets its square sum over its redundancy: q <- q (w' Q^-1 K Q^-1 w) / (tr Q^-1 K - tr Q^-1 K Q^-1 C_w).
+    component gets its square sum over its redundancy: q <- q (w' Q^-1 K Q^-1 w) / (tr Q^-1 K - tr Q^-1 K Q^-1 C_w),
+    as far as its prior lets it (`_shared`).
 
     Args:
         given: the prior that the solution was computed with.
@@ -156,11 +174,19 @@ def re_estimated(given: Prior, states: Floats, covariance: Floats, following: Fl
 
 
 def _shared(density: Floats, squares: Floats, redundancy: Floats, start: Floats) -> Floats:
-    """New densities (3, 8) from square sums and redundancies (3, 16) per unit of density."""
+    """New densities (3, 8) from square sums and redundancies (3, 16) per unit of density.
+
+    With the square sum S and the redundancy r of a density q, the derivative of the likelihood's logarithm by that of
+    sqrt(q) is S / q - r; that of a half-Cauchy prior with median sqrt(q0) is 1 - 2 q / (q + q0). The densities, most
+    likely on a logarithmic scale, are where both together are 0. A few pseudo-observations of q0 instead (an inverse
+    gamma prior) would keep q from being much smaller than q0 however still the jumper is (Gelman 2006, Bayesian
+    Analysis 1, section 4).
+    """
     groups = np.eye(_SHARES)[SHARE]
     square = (squares @ groups) * density**2
     count = np.maximum(redundancy @ groups, 0.0) * density
-    return np.asarray(np.maximum((square + _PSEUDO * start) / (count + _PSEUDO), _SMALLEST * start))
+    better = (square + density) / (count + 2 * density / (density + start))
+    return np.asarray(np.maximum(better, _SMALLEST * start))
 
 
 def _by_channel(covariance: Floats) -> Floats:

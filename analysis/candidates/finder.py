@@ -17,6 +17,7 @@ from msgspec import UNSET
 from analysis.candidates.background import Background, Region
 from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs, half_size
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
+from analysis.candidates.pace import Pace
 from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
 from analysis.candidates.traces import find_expected_traces, find_traces
 from analysis.candidates.wanted_traces import WantedTraces
@@ -35,6 +36,7 @@ _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the old
 _FITS_OF_OTHERS = (
     20  # places that are fitted in other regions than the largest one of an image: four markers, and what beats them
 )
+_FITS_OF_STILL = 8  # places in a region that hardly moves: a jumper who passes it shows four markers
 
 
 class Finder:
@@ -49,28 +51,35 @@ class Finder:
         self._backgrounds = {name: Background(image) for name, image in static.items()}
         self._regions: OrderedDict[tuple[PulseNumber, str], list[Region]] = OrderedDict()
         self._wanted: dict[tuple[PulseNumber, str], ref[WantedTraces]] = {}
+        self._paces: dict[str, Pace] = {}
         self._kept, self._memory = 0, memory
 
-    def find(self, tag: TripletTag, image: Grey) -> PulseCandidates:
+    def find(self, tag: TripletTag, image: Grey, *, sparing: bool = False) -> PulseCandidates:
         """The candidates of a pulse; keeps what a second look needs.
 
         Args:
             tag: of the pulse.
             image: (rows, columns) all cameras side by side.
+            sparing: fit few places in what hardly moves, as people who stand and walk do; pulses come in order.
 
         Raises:
             BadInputError: an image is not as large as the static image of its camera.
         """
         names: list[str] = []
         images: list[list[Region]] = []
+        most: list[list[int]] = []
         traces: list[WantedTraces] = []
         for camera, background, block in self._blocks(tag, image):
             regions = background.regions(block, _stamped(camera))
+            still = self._paces.setdefault(camera.name, Pace()).still(tag.time, regions) if sparing else ()
+            most.append([MOST, *[_FITS_OF_OTHERS] * (len(regions) - 1)][: len(regions)])
+            for i in np.flatnonzero(still):
+                most[-1][i] = _FITS_OF_STILL
             names.append(camera.name)
             images.append(regions)
             traces.append(WantedTraces.of(regions))
             self._keep(tag.pulse, camera.name, regions, traces[-1])
-        spots = find_spots(images, [[MOST, *[_FITS_OF_OTHERS] * (len(of) - 1)][: len(of)] for of in images])
+        spots = find_spots(images, most)
         return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
 
     def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:

@@ -24,14 +24,15 @@ _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residua
 _COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
 _FARTHEST = 24.0  # px; no pixel farther away is fitted
-_GROUPS = 3.7, 4.3, 5.0, 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together
-_FEWEST = 12  # spots of a group; fewer go with the next larger ones: each call costs more than their pixels
+_GROUPS = 5.0, 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together
+_FEWEST = 20  # spots of a group; fewer go with the next larger ones: each call costs more than their pixels
 _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends on it
 _STRETCH_SPREAD, _SHAPE, _SHAPE_SPREAD = 0.25, 0.3, 0.5  # weak priors
 _SIZE_SPREAD = 0.4  # of log size
 _PENALTY = 3.0  # power of the misfit by which the covariance grows: 2 for noise, more for residuals that lie together
 _STEPS, _ENOUGH = 7, 5e-3  # iterations; px
 _POOR_START = 0.4  # residuals over contrast, before the first step
+_HOPELESS = 3, 0.35  # after so many steps no more will make residuals smaller that are so large, over contrast
 _LARGEST_STEP = 0.4  # of the logarithms
 
 
@@ -160,7 +161,12 @@ class _Batch:
         windows = self._windows.only(active)
         if len(active):
             cost[active], normal[active], gradient[active] = self._equations(theta[active], active, windows)
-        for _ in range(_STEPS):
+        for taken in range(_STEPS):
+            if taken == _HOPELESS[0]:
+                most = (_HOPELESS[1] * theta[active, 6]) ** 2
+                hopeless = cost[active] > most * _sums(windows.weight, windows.weight)
+                cost[active[hopeless]] = np.inf
+                active, windows = active[~hopeless], windows.only(~hopeless)
             if not len(active):
                 break
             step = np.linalg.solve(_damped(normal[active], damping[active]), gradient[active][..., None])[..., 0]

@@ -42,8 +42,6 @@ def identify(
     rate_hz: float,
     exposures_s: Mapping[str, float] | None = None,
     look: SecondLook | None = None,
-    *,
-    on_time: bool = False,
 ) -> list[JumpMeasurements]:
     """Find the jumps of a recording and name what is to be measured.
 
@@ -53,13 +51,12 @@ def identify(
         rate_hz: pulses per second.
         exposures_s: exposure time of each camera; all alike if left out.
         look: looks again where a marker is expected (`Finder`); it finds more of them, and centres of covered ones.
-        on_time: take all cameras to obey the trigger, without looking whether one shows the jumper late; faster.
 
     Returns:
         The jumps in order, each from the first to the last pulse in which the jumper was found. None: nobody jumped.
     """
     jumps: list[JumpMeasurements] = []
-    for sighting in find_sightings(candidates, system, rate_hz, exposures_s, on_time=on_time):
+    for sighting in find_sightings(candidates, system, rate_hz, exposures_s):
         if pulses := sighting.measured(look):
             jumps.append(JumpMeasurements(len(jumps) + 1, pulses))
     return jumps
@@ -70,27 +67,48 @@ def find_sightings(
     system: CameraSystem,
     rate_hz: float,
     exposures_s: Mapping[str, float] | None = None,
-    *,
-    on_time: bool = False,
 ) -> "list[Sighting]":
     """What moves like a jumper, with its markers as far as the first look tells them; arguments as of `identify`."""
     views = Views(system, exposures_s)
-    stride = max(1, round(rate_hz / _SEARCH_HZ))
-    sought = candidates[::stride]
+    sought = candidates[:: stride(rate_hz)]
     search = Window(views, sought, rate_hz)
-    sightings = []
-    for flight in find_flights(find_tracks(search.points, search.time_s)):
-        begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
-        near = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
-        appearance = _appearance(views, sought, flight)
-        window = Window(views, near, rate_hz, flight, appearance)
+    flights = find_flights(find_tracks(search.points, search.time_s))
+    return [sighted(views, candidates, rate_hz, flight, appearance_of(views, sought, flight)) for flight in flights]
+
+
+def stride(rate_hz: float) -> int:
+    """Of the pulses every so many are enough to find tracks."""
+    return max(1, round(rate_hz / _SEARCH_HZ))
+
+
+def sighted(
+    views: Views,
+    candidates: Sequence[PulseCandidates],
+    rate_hz: float,
+    flight: Flight,
+    appearance: Appearance,
+    *,
+    on_time: bool = False,
+) -> "Sighting":
+    """What moves along a path, with its markers as far as the first look tells them.
+
+    Args:
+        views: the cameras.
+        candidates: of the pulses, in order.
+        rate_hz: pulses per second.
+        flight: the path.
+        appearance: of the markers.
+        on_time: take all cameras to obey the trigger, without looking whether one shows the jumper late; faster.
+    """
+    begin, end = flight.begin_s - _BEYOND_S, flight.end_s + _BEYOND_S
+    near = [c for c in candidates if begin <= c.pulse / rate_hz <= end]
+    window = Window(views, near, rate_hz, flight, appearance)
+    markers = follow_markers(views, window, flight)
+    late_s = np.zeros(len(views)) if on_time else lateness(views, window, markers, flight)
+    if late_s.any():
+        window = Window(views, near, rate_hz, flight, appearance, late_s)
         markers = follow_markers(views, window, flight)
-        late_s = np.zeros(len(views)) if on_time else lateness(views, window, markers, flight)
-        if late_s.any():
-            window = Window(views, near, rate_hz, flight, appearance, late_s)
-            markers = follow_markers(views, window, flight)
-        sightings.append(Sighting(views, window, flight, appearance, markers))
-    return sightings
+    return Sighting(views, window, flight, appearance, markers)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,11 +138,12 @@ class Sighting:
         first, last = (self.window.candidates[int(t)].pulse for t in there[[0, -1]])
         return range(first, last + 1)
 
-    def measured(self, look: SecondLook | None) -> tuple[PulseMeasurements, ...]:
+    def measured(self, look: SecondLook | None, *, briefly: bool = False) -> tuple[PulseMeasurements, ...]:
         """What was measured of him, from his first to his last appearance; empty if he is no jumper.
 
         Args:
             look: as of `identify`; what it finds is added to the window.
+            briefly: seek no skis before the first and after the last pulse with a named marker; faster.
         """
         views, window, flight, markers = self.views, self.window, self.flight, self.markers
         if look is not None:
@@ -132,7 +151,9 @@ class Sighting:
             markers = refined(views, window, flight, markers, self.appearance, look)
         if not _is_jumper(np.asarray(np.any(markers.assigned.rays >= 0, axis=2))):
             return ()
-        _look_for_traces(views, window, markers.places(BINDINGS))
+        first, last = (self.pulses()[0], self.pulses()[-1]) if briefly else (0, np.inf)
+        steps = [first <= c.pulse <= last for c in window.candidates]
+        _look_for_traces(views, window, markers.places(BINDINGS), np.array(steps))
         _tell_skis_apart(views, window, flight)
         traces = straight_traces(views, window)
         skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
@@ -144,7 +165,7 @@ class Sighting:
         return tuple(pulses[found[0] : found[-1] + 1])
 
 
-def _appearance(views: Views, candidates: Sequence[PulseCandidates], flight: Flight) -> Appearance:
+def appearance_of(views: Views, candidates: Sequence[PulseCandidates], flight: Flight) -> Appearance:
     """What the spots of a flight look like: most points of its tracks are markers."""
     seen = [
         (spots.contrast[i], spots.radius[i] / views.scale[k])
@@ -162,14 +183,15 @@ def _is_jumper(named: Flags) -> bool:
     return bool(np.count_nonzero(named.sum(axis=1) >= _LEAST_NAMES) >= _LEAST_PULSES)
 
 
-def _look_for_traces(views: Views, window: Window, bindings: Places) -> None:
-    """Find the traces of what may be skis: nothing else is as near to the bindings."""
+def _look_for_traces(views: Views, window: Window, bindings: Places, steps: Flags) -> None:
+    """Find the traces of what may be skis in some pulses (t,): nothing else is as near to the bindings."""
     spread = np.sqrt(np.linalg.eigvalsh(bindings.covariance)[..., -1])
     reach_m = np.minimum(LONGEST_M + _SIGMAS * spread, REACH_M)
     for k in range(len(views)):
         sight = views.see(k, bindings.xyz.reshape(-1, 3))
         scale = np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2))
         places = sight.xy.reshape(-1, 2, 2) - window.shift[:, k, None]
+        places[~steps] = np.nan
         window.look_for_traces(k, places, reach_m * scale.reshape(-1, 2))
 
 

@@ -23,7 +23,7 @@ from analysis.cameras.source import orient_from, read_source
 from analysis.cameras.steadiness import standing_in
 from analysis.candidates.finder import Finder
 from analysis.export.scene_update import camera_frames, scene_update
-from analysis.identification.identify import identify
+from analysis.identification.seeking import Seeker
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.following import Followed, Follower
 from analysis.worker.stream import Received
@@ -151,6 +151,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             self._findings.message(Level.ERROR, phrase("event_not_oriented", text, why=error.said))
             return
         self._scene, moved = standing_in(scene)
+        recording.seeker = None
         self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
         self._findings.oriented(recording.id, (recording.last or recording.first).time, self._scene)
         said = (*scene.messages, *(move.message for move in moved))
@@ -165,12 +166,12 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         """Follow the jumper, or look whether one comes."""
         follower = recording.follower
         if follower is None:
-            recording.keep(finder.find(tag, image))
+            recording.keep(finder.find(tag, image, sparing=True))
             self._seek(recording)
             self._look_at_balls(recording, tag, image)
         elif follower.lost(tag.pulse, tag.time):
             recording.follower = None
-            recording.keep(finder.find(tag, image))
+            recording.keep(finder.find(tag, image, sparing=True))
         else:
             recording.keep(finder.find_expected(tag, image, follower.expected(tag.time)))
             self._tell(recording, follower.follow(recording.candidates[-1]))
@@ -203,12 +204,14 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recording.sought = newest.pulse
         recent = recording.between(max(newest.pulse - _SOUGHT_S * rate, recording.told + 1), newest.pulse)
         cameras = recording.cameras(self._exposures)
-        exposures = {name: camera.exposure_s for name, camera in cameras.items()}
-        found = identify(recent, self._scene.system, rate, exposures, on_time=True)  # as he is followed
-        if not found or len(found[-1].pulses) < _BEGIN:
+        if recording.seeker is None:
+            exposures = {name: camera.exposure_s for name, camera in cameras.items()}
+            recording.seeker = Seeker(self._scene.system, exposures)
+        found = recording.seeker.seek(recent, rate)
+        if found is None or len(found.pulses) < _BEGIN:
             return
         follower = Follower(self._scene.system, cameras, rate)
-        begun = follower.begin(found[-1], recent)
+        begun = follower.begin(found, recent)
         if not begun:
             return
         recording.follow(follower)

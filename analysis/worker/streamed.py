@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates
+from analysis.identification.seeking import Seeker
 from analysis.measurements.model import MeasuredCamera
 from analysis.scene.static_image import StaticImage, static_image
 from analysis.worker.following import Follower
@@ -38,6 +39,7 @@ class Streamed:
         last: of its latest.
         waiting: triplets that wait until the cameras are oriented.
         candidates: of the last seconds.
+        seeker: seeks one in the candidates; None until the first time.
         follower: follows the jumper; None while nobody is in sight.
         seen: first and last pulse of the jumper who was followed and whose jump is not computed yet; None: nobody.
         told: last pulse whose state was told.
@@ -53,6 +55,7 @@ class Streamed:
         self.last: TripletTag | None = None
         self.waiting: deque[tuple[TripletTag, Grey]] = deque()
         self.candidates: deque[PulseCandidates] = deque()
+        self.seeker: Seeker | None = None
         self.follower: Follower | None = None
         self.seen: tuple[PulseNumber, PulseNumber] | None = None
         self.told, self.done = PulseNumber(0), PulseNumber(0)

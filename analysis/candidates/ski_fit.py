@@ -122,7 +122,8 @@ def fit_bars(region: Region, starts: Sequence[Sequence[Bar]], brighter: bool, po
 class _Fit:
     """The adjustment; unknowns as in `modelled`."""
 
-    def __init__(self, pixels: Pixels, bars: Sequence[Bar]) -> None:
+    def __init__(self, pixels: Pixels, bars: Sequence[Bar], begin: Floats | None = None) -> None:
+        """Prepare the adjustment of bars to pixels, from these bars or from unknowns that are known better."""
         self._pixels, self._bars, self.count = pixels, bars, len(bars)
         width = median(np.array([bar.width for bar in bars]))
         lines = [bar.line(pixels.origin) for bar in bars]
@@ -143,7 +144,7 @@ class _Fit:
         self._good = np.ones(len(pixels), bool)
         self._robust = True
         self.misfit = self.cost = np.inf
-        self._at = self._modelled(start)
+        self._at = self._modelled(start if begin is None else begin)
 
     @property
     def theta(self) -> Floats:
@@ -154,9 +155,8 @@ class _Fit:
         """The same explanation with other pixels, from where this one has come to."""
         if pixels is self._pixels:
             return self
-        other = _Fit(pixels, self._bars)
+        other = _Fit(pixels, self._bars, self.theta)
         other._robust = False
-        other._at = other._modelled(self.theta)
         other._choose()
         return other
 

@@ -96,10 +96,9 @@ class Follower:
         places = np.concatenate((xyz, state.origin.value[None], self._skis.places(state)))
         radius = 0.0 if self._appearance is None else self._appearance.radius
         found = {}
-        for k, name in enumerate(self._views.names):
-            scale = float(self._views.scale[k])
-            moved = state.velocity.value * self._views.late_s[k]
-            whole = self._views.see(k, places + moved)
+        moved = state.velocity.value * self._views.late_s[:, None, None]
+        for k, whole in enumerate(self._views.see_all(places + moved)):
+            name, scale = self._views.names[k], float(self._views.scale[k])
             sight, of_skis = whole.only(slice(len(xyz))), whole.only(slice(len(xyz) + 1, None))
             spread = sight.by_point @ covariance @ sight.by_point.swapaxes(-1, -2) + sight.noise
             sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(spread, nan=1e6))[:, -1])

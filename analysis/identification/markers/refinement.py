@@ -53,7 +53,7 @@ def refined(
 
     The spots of the window are replaced: covered ones move to where their whole disc is.
     """
-    sights = [views.see(k, markers.predicted.xyz.reshape(-1, 3)) for k in range(len(views))]
+    sights = views.see_all(markers.predicted.xyz.reshape(-1, 3))
     changed: set[int] = set()
     for k, radius in enumerate(_radii(views, window, flight, markers, sights)):
         places = _places(views, window, flight, markers, k, sights[k], radius)

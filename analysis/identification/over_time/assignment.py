@@ -133,7 +133,7 @@ def _options(views: Views, window: Window, predicted: Prediction, known: Flags) 
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
     rate = 2 * np.log(2 * np.pi / DETECTED * (1 + counts.T) / sizes)
     xyz, covariance, known = predicted.xyz[steps], predicted.covariance[steps], known[steps]
-    sights = [views.see(k, xyz.reshape(-1, 3)) for k in range(len(views))]
+    sights = views.see_all(xyz.reshape(-1, 3))
     inside = np.stack([sight.inside.reshape(known.shape) for sight in sights], axis=2)
     expected = known[..., None] & window.delivered[steps][:, None] & inside
     # (t, n, m) cost of a ray by chance and by not being missed

@@ -56,8 +56,7 @@ class Window:
         self.shift = np.zeros((len(candidates), len(views), 2))
         self._path = np.full(self.shift.shape, np.nan)
         if flight is not None:
-            for k in range(len(views)):
-                sight = views.see(k, flight.place(self.time_s))
+            for k, sight in enumerate(views.see_all(flight.place(self.time_s))):
                 moved = np.einsum("tij,tj->ti", sight.by_point, flight.velocity(self.time_s)) * late[k]
                 self.shift[:, k] = -np.nan_to_num(moved)
                 self._path[:, k] = sight.xy

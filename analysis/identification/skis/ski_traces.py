@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.candidates.model import Trace
-from analysis.identification.space.views import Views, gate
+from analysis.identification.space.views import Sight, gate
 from rig.arrays import Flags, Floats, Integers
 
 _PERSPECTIVE = 0.05  #: share of a distance across the ski that neglects the perspective of 3 m
@@ -190,13 +190,20 @@ class SeenSkis:
         inside: (s,) whether the ski's middle lies in the image.
     """
 
-    def __init__(self, views: Views, k: int, values: Floats) -> None:
-        place, direction = values[:, :3], values[:, 3:]
-        ends = views.see(k, np.concatenate((place - _HALF_M * direction, place + _HALF_M * direction)))
+    def __init__(self, sight: Sight) -> None:
+        """Skis by how the camera sees their `places`."""
+        s = len(sight.xy) // 3
+        ends = sight.only(slice(2 * s))
         self._xy = ends.xy.reshape(2, -1, 2).swapaxes(0, 1)
         self._by_point = ends.by_point.reshape(2, -1, 2, 3).swapaxes(0, 1)
         self._pose = ends.pose.reshape(2, -1, 2, 2).mean(axis=0)
-        self.inside: Flags = views.inside(k, place)
+        self.inside: Flags = sight.inside[2 * s :]
+
+    @staticmethod
+    def places(values: Floats) -> Floats:
+        """Object points (3 s, 3) that a camera must be asked for: both ends and the middles of skis (s, 6)."""
+        place, half = values[:, :3], _HALF_M * values[:, 3:]
+        return np.concatenate((place - half, place + half, place))
 
     def equations(self, skis: Integers, lines: Lines) -> Equations:
         """What n traces say about a ski (n,) each."""

@@ -201,8 +201,8 @@ class _Search:
         """Traces (t, 2, m) of the skis."""
         values, spread = belief[0].reshape(-1, 6), belief[1].reshape(-1, 6, 6)
         beams = _Beams.begun(np.flatnonzero(self._known.ravel()), spread, len(self._views))
-        for k in range(len(self._views)):
-            beams = self._continued(beams, k, values, spread)
+        for k, sight in enumerate(self._views.see_all(SeenSkis.places(values))):
+            beams = self._continued(beams, k, SeenSkis(sight), spread)
         found = np.full((*self._known.shape, len(self._views)), -1)
         for t in np.flatnonzero(self._known.any(axis=1)).tolist():
             options = [beams.options(2 * t + side) for side in range(len(SIDES))]
@@ -210,9 +210,9 @@ class _Search:
                 found[t, side] = np.where(doubtful, -1, option.rays)
         return found
 
-    def _continued(self, beams: "_Beams", k: int, values: Floats, spread: Floats) -> "_Beams":
+    def _continued(self, beams: "_Beams", k: int, seen: SeenSkis, spread: Floats) -> "_Beams":
         """Hypotheses with the traces of one more camera."""
-        seen, lines = SeenSkis(self._views, k, values), self._lines[k]
+        lines = self._lines[k]
         usable = self._known & self._delivered[:, k, None] & seen.inside.reshape(self._known.shape)
         line, side = np.nonzero(usable[lines.step])
         skis = 2 * lines.step[line] + side
@@ -258,7 +258,8 @@ class _Search:
     def _equations(self, k: int, values: Floats, found: Integers, t: Integers, side: Integers) -> Equations:
         """What the traces of some skis that were found in a camera say about them."""
         lines = self._lines[k].at(t, found[t, side, k])
-        return SeenSkis(self._views, k, values.reshape(-1, 6)).equations(2 * t + side, lines)
+        sight = self._views.see(k, SeenSkis.places(values.reshape(-1, 6)))
+        return SeenSkis(sight).equations(2 * t + side, lines)
 
     def angles(self, lines: tuple[Floats, Floats, Flags]) -> tuple[Floats, Floats]:
         """Slope and heading (t, 2, 2) of measured skis with covariance; NaN where not measured."""

@@ -242,8 +242,7 @@ def _solve(views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, r
 def _extended(views: Views, pulses: Sequence[Sequence[Rays]], of_pulse: Integers, pairs: SpacePoints) -> Integers:
     """Rays (n, m) of points seen by pairs, with the nearest spot in the gate of every other camera."""
     full = pairs.rays.copy()
-    for k in range(len(views)):
-        sight = views.see(k, pairs.xyz)
+    for k, sight in enumerate(views.see_all(pairs.xyz)):
         spread = sight.by_point @ pairs.covariance @ sight.by_point.transpose(0, 2, 1) + sight.noise
         other = np.asarray((pairs.rays[:, k] < 0) & sight.inside)
         for p in np.unique(of_pulse[other]):

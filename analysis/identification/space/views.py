@@ -12,13 +12,16 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from photogrammetry.geometry.camera_model import INTERIOR, Lens, camera_coordinates, image_point, linearise
 from photogrammetry.geometry.ideal_camera import IdealCamera
-from rig.arrays import Flags, Floats
+from rig.arrays import Flags, Floats, Integers
 
 #: Standard deviation of the point of a marker that a camera sees as its centre, m: a fraction of a marker's radius.
 MARKER_SIGMA_M = 0.01
 #: Share of true correspondences that a gate lets pass.
 GATE = 0.999
+_MIRROR = np.array([1.0, -1.0])  # metric frame to pixel frame
+_POSE = 6
 _AXES_PULL = 1e-6  #: keeps the scene's centre finite where all cameras look in one direction
 
 
@@ -75,8 +78,15 @@ class Views:
         self.ideal: Sequence[IdealCamera] = [placed.ideal() for placed in self.placed]
         self.exposure_s = np.array([(exposures_s or {}).get(name, 0.0) for name in self.names])
         self.late_s = (self.exposure_s - self.exposure_s.mean()) / 2
+        self._position = np.array([placed.position for placed in self.placed])
+        self._rotation = np.array([placed.rotation for placed in self.placed])
+        self._size = np.array([placed.size for placed in self.placed])
+        lenses = [placed.camera.lens() for placed in self.placed]
+        interior = np.array([lens.interior for lens in lenses])
+        self._lens = Lens(interior, np.array([x.balance for x in lenses]), np.array([x.measured for x in lenses]))
+        self._poses = np.array([_of_pose(system, placed) for placed in self.placed])
         self.centre = _looked_at(self.ideal)
-        sights = [self.see(k, self.centre[None]) for k in range(len(self.names))]
+        sights = self.see_all(self.centre[None])
         self.noise = np.array([np.trace(sight.noise[0]) / 2 for sight in sights])
         self.scale = np.array([np.linalg.norm(sight.by_point[0], ord=2) for sight in sights])
 
@@ -85,16 +95,33 @@ class Views:
 
     def see(self, k: int, xyz: Floats) -> Sight:
         """Project object points (n, 3) into camera k."""
-        placed = self.placed[k]
-        xy = placed.project(xyz)
-        there = np.asarray(np.isfinite(xy).all(axis=1))
-        by_point, noise = np.full((len(xyz), 2, 3), np.nan), np.full((len(xyz), 2, 2), np.nan)
-        if there.any():
-            _, by_there, by_parameters = placed.linearised(xyz[there], xy[there])
-            pose = self.system.covariance[np.ix_(placed.columns, placed.columns)]
-            by_point[there] = by_there
-            noise[there] = by_parameters @ pose @ by_parameters.transpose(0, 2, 1)
-        return Sight(xy, by_point, noise, _inside(placed, xy))
+        return self._seen(np.array([k]), xyz[None])[0]
+
+    def see_all(self, xyz: Floats) -> list[Sight]:
+        """Project object points into all cameras: what `see` says, in little more time than for one.
+
+        Args:
+            xyz: (n, 3), or (m, n, 3) where they are others for each camera.
+        """
+        return self._seen(np.arange(len(self.names)), xyz if xyz.ndim == 3 else xyz[None])
+
+    def _seen(self, cameras: Integers, xyz: Floats) -> list[Sight]:
+        """Sights of some cameras (c,); the object points are (c, n, 3), or (1, n, 3)."""
+        c, n = len(cameras), xyz.shape[1]
+        each = np.repeat(cameras, n)
+        points = np.broadcast_to(xyz, (c, n, 3)).reshape(-1, 3)
+        lens = Lens(self._lens.interior[each], self._lens.balance[each], self._lens.measured[each])
+        rotation, position, size = self._rotation[each], self._position[each], self._size[each]
+        before = camera_coordinates(rotation, position, points)[:, 2:] < 0
+        with np.errstate(all="ignore"):
+            metric = np.where(before, image_point(lens, rotation, position, points), np.nan)
+            equations = linearise(lens, rotation, position, points, metric)
+        by_own = np.concatenate((equations.by_pose, equations.by_interior), axis=2) * _MIRROR[:, None]
+        by_own = by_own.reshape(c, n, 2, -1)
+        pose = by_own @ self._poses[cameras, None] @ by_own.swapaxes(2, 3)
+        by_point = (equations.by_point * _MIRROR[:, None]).reshape(c, n, 2, 3)
+        xy = (metric * _MIRROR + (size - 1) / 2).reshape(c, n, 2)
+        return [Sight(xy[i], by_point[i], pose[i], _inside(self.placed[k], xy[i])) for i, k in enumerate(cameras)]
 
     def inside(self, k: int, xyz: Floats) -> Flags:
         """Whether object points (n, 3) lie in the image of camera k: what `see` says, faster."""
@@ -105,6 +132,14 @@ def _inside(placed: PlacedCamera, xy: Floats) -> Flags:
     """Whether image points (n, 2), px, lie in the image; NaN does not."""
     with np.errstate(invalid="ignore"):
         return np.asarray(((xy > -0.5) & (xy < placed.size - 0.5)).all(axis=1))
+
+
+def _of_pose(system: CameraSystem, placed: PlacedCamera) -> Floats:
+    """Covariance (16, 16) of pose and interior orientation of a camera; zero where it is certain."""
+    uncertain = np.concatenate((np.arange(_POSE), _POSE + placed.interior))
+    covariance = np.zeros((_POSE + len(INTERIOR),) * 2)
+    covariance[np.ix_(uncertain, uncertain)] = system.covariance[np.ix_(placed.columns, placed.columns)]
+    return covariance
 
 
 def _looked_at(cameras: Sequence[IdealCamera]) -> Floats:

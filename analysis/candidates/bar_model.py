@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.candidates.background import Region
+from analysis.candidates.median import quantile
 from rig.arrays import Floats, Integers
 
 SHARED: Final = 3  #: unknowns that all bars share: brightness, log of the half width, log of the blur
@@ -123,7 +124,7 @@ def pixels_around(region: Region, bars: Sequence[Bar], brighter: bool) -> Pixels
     near &= cv2.dilate(opposite.astype(np.uint8), square) == 0
     grey, behind = region.grey[part][near], region.behind[part][near]
     inside = grey[region.front[part][near]]
-    brightness = float(np.percentile(inside, 75 if brighter else 25)) if len(inside) else 0.0
+    brightness = quantile(inside, 0.75 if brighter else 0.25) if len(inside) else 0.0
     sigma = np.hypot(region.sigma[part][near], np.float32(_MODEL) * np.abs(np.float32(brightness) - behind))
     row, column = np.nonzero(near)
     return Pixels(origin, x[column], y[row, 0], grey, behind, sigma, brightness)

@@ -1,4 +1,4 @@
-"""The median of one array: what NumPy's gives, without its overhead, which is most of the time for few values."""
+"""Median and quantiles of one array: what NumPy's gives, without its overhead, which is most of the time for few."""
 
 import numpy as np
 
@@ -14,3 +14,11 @@ def median(values: Floats | GreyImage) -> float:
         return float(np.partition(flat, middle)[middle])
     parted = np.partition(flat, (middle - 1, middle))
     return float((parted[middle - 1] + parted[middle]) / 2)
+
+
+def quantile(values: Floats | GreyImage, share: float) -> float:
+    """The value below which such a share of all values lies, interpolated as `np.quantile` does."""
+    flat = np.sort(values, axis=None)
+    place = share * (len(flat) - 1)
+    below = int(place)
+    return float(flat[below] + (place - below) * (flat[min(below + 1, len(flat) - 1)] - flat[below]))

@@ -25,7 +25,7 @@ from analysis.candidates.bar_model import (
     modelled,
     pixels_around,
 )
-from analysis.candidates.median import median
+from analysis.candidates.median import median, quantile
 from rig.arrays import Flags, Floats, Integers
 
 _BLUR, _BLUR_SPREAD = 0.65, 0.4  # px; weak prior of log s: of lens and pixels
@@ -212,7 +212,7 @@ class _Fit:
         square = self._at.residuals**2
         mean = np.bincount(self._section, square) / np.maximum(self._in_section, 1)
         there = self._in_section > 0
-        typical = max(1.0, _quantile(mean[there], _TYPICAL))
+        typical = max(1.0, quantile(mean[there], _TYPICAL))
         self._good = ~(mean > _POOR * typical)[self._section]
         self.misfit = float(np.sqrt(square[self._good].mean())) if self._good.any() else np.inf
         self.cost = float(np.minimum(square, _CAP).sum())
@@ -332,11 +332,6 @@ class _Fit:
         parts = whole, whole - np.outer(by_width, by_width) / inverse[1, 1]
         common, given_width = (max(0.0, scale * float(row @ part @ row) - own) for part in parts)
         return float(np.sqrt(given_width)), float(np.sqrt(common - given_width))
-
-
-def _quantile(values: Floats, share: float) -> float:
-    """What `np.quantile` gives, which takes longer than all the rest for a few values."""
-    return float(np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.candidates.median import median
 from analysis.candidates.model import Trace
 from analysis.candidates.traces import bent
 from rig.arrays import Floats
@@ -48,8 +49,8 @@ class SkiWidth:
         if len(widths) < _FEWEST:
             return None
         logarithm = np.log(np.array(widths))
-        middle = float(np.median(logarithm))
-        spread = _MAD_TO_SIGMA * float(np.median(np.abs(logarithm - middle)))
+        middle = median(logarithm)
+        spread = _MAD_TO_SIGMA * median(np.abs(logarithm - middle))
         return cls(float(np.exp(middle)), max(spread, _LEAST_SPREAD))
 
 
@@ -65,7 +66,7 @@ def clear_widths(traces: Sequence[Trace]) -> list[float]:
     one, two = order
     lengths, widths = sorted((_length(one), _length(two))), sorted((one.width, two.width))
     alike = one.contrast * two.contrast > 0 and lengths[0] > _ALIKE * lengths[1] and widths[0] > _ALIKE * widths[1]
-    hidden = max(float(np.median(np.abs(trace.one_sided))) for trace in order)
+    hidden = max(median(np.abs(trace.one_sided)) for trace in order)
     return [one.width, two.width] if alike and hidden < _FREE else []
 
 
@@ -86,7 +87,7 @@ def told_apart(traces: Sequence[Trace], px: float, spread: float) -> tuple[Trace
         excess, sigma = (trace.width - px) / 2, spread * px / 2
         hidden = np.abs(trace.one_sided)
         wide = _SIGNIFICANT * spread < np.log(trace.width / px) < np.log(_TWO)
-        if wide and np.median(hidden) < _FREE and np.count_nonzero(np.isfinite(trace.widening)) >= _FEWEST_POINTS:
+        if wide and median(hidden) < _FREE and np.count_nonzero(np.isfinite(trace.widening)) >= _FEWEST_POINTS:
             found += [_off(_one_of_two(trace, px, side), sigma) for side in (-1, 1)]
         else:
             foreign = abs(excess) * (1 - float(hidden.max()))

@@ -32,7 +32,7 @@ _SIZE_SPREAD = 0.4  # of log size
 _PENALTY = 3.0  # power of the misfit by which the covariance grows: 2 for noise, more for residuals that lie together
 _STEPS, _ENOUGH = 7, 5e-3  # iterations; px
 _POOR_START = 0.4  # residuals over contrast, before the first step
-_HOPELESS = 3, 0.35  # after so many steps no more will make residuals smaller that are so large, over contrast
+_HOPELESS = {1: 0.5, 2: 0.35}  # by steps done: residuals over contrast that are larger will not get small enough
 _LARGEST_STEP = 0.4  # of the logarithms
 
 
@@ -107,7 +107,11 @@ def _groups(reach: Floats) -> list[Integers]:
         if len(waiting) >= _FEWEST:
             groups.append(waiting)
             waiting = waiting[:0]
-    return [*groups, waiting] if len(waiting) else groups
+    if groups and len(waiting) and len(groups[-1]) < 2 * _FEWEST and group[waiting].max() < len(_GROUPS):
+        groups[-1] = np.concatenate((groups[-1], waiting))
+    elif len(waiting):
+        groups.append(waiting)
+    return groups
 
 
 def _second_moment(log_size: Floats, log_shape: Floats) -> Floats:
@@ -162,8 +166,8 @@ class _Batch:
         if len(active):
             cost[active], normal[active], gradient[active] = self._equations(theta[active], active, windows)
         for taken in range(_STEPS):
-            if taken == _HOPELESS[0]:
-                most = (_HOPELESS[1] * theta[active, 6]) ** 2
+            if taken in _HOPELESS:
+                most = (_HOPELESS[taken] * theta[active, 6]) ** 2
                 hopeless = cost[active] > most * _sums(windows.weight, windows.weight)
                 cost[active[hopeless]] = np.inf
                 active, windows = active[~hopeless], windows.only(~hopeless)

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from analysis.candidates.median import median
 from analysis.candidates.model import ExpectedSki, Trace
 from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
 from analysis.identification.space.views import Sight
@@ -80,7 +81,7 @@ class SkiImages:
         known.scale = float(np.linalg.norm(np.nan_to_num(sight.by_point.mean(axis=0)), ord=2))
         if not known.widths or not np.isfinite(known.xy).all():
             return ()
-        px = float(np.median(known.widths)) * known.scale
+        px = median(np.array(known.widths)) * known.scale
         either = np.nanmean(known.ends, axis=0)
         found = []
         for i, (label, side) in enumerate(zip(BINDINGS, SIDES, strict=True)):

@@ -346,6 +346,8 @@ class Assembler:
             if camera in silent and not self._asked[camera]:
                 ring.request_reconnect()
                 said = phrase("camera_behind", "three pulses behind the other cameras; looking after it")
+                if self.connected.count(True) <= len(silent):
+                    said = phrase("camera_mute", "the source fires, and it does not answer; looking after it")
                 self._changes.append(CameraChanged(camera=camera, news=CameraNews.SILENT, said=said))
             self._asked[camera] = camera in silent
 

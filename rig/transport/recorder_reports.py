@@ -23,7 +23,9 @@ class CameraNews(StrEnum):
     """What happened to a camera."""
 
     CONNECTED = "connected"
-    SILENT = "silent"  #: connected, but three pulses behind the other cameras; its grabber connects it again
+    SILENT = (
+        "silent"  #: connected, but delivers nothing while others do, or the source fires; its grabber connects it again
+    )
     GONE = "gone"
     NOTICE = "notice"  #: no change of state, but people should know
 

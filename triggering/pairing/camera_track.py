@@ -48,7 +48,7 @@ class CameraTrack:
         counters: totals since the start.
         epoch: number of the present connection, 0 before the first.
         connected: whether the camera is there.
-        silent: the camera is connected, but delivers nothing while others do.
+        silent: the camera is connected, but delivers nothing while others do, or while the source fires.
         unanswered: pulses decided without this camera since its last sign of life.
         alive: host time of the last sign of life: a trigger time or the connection.
         heard: host time at which the last whole frame came.
@@ -73,6 +73,7 @@ class CameraTrack:
         self._first: HostNs | None = None  # trigger time of the epoch's first whole frame
         self._seen = HostNs(0)  # until then the camera was there in this epoch: frames triggered before would be here
         self._left = HostNs(0)  # the same of the last epoch
+        self._readings = 0  # of its clock in this epoch
         self._known_until = HostNs(0)
         self._last: tuple[Record, HostNs] | None = None  # the epoch's last whole frame and its trigger time
         # The running gap: it began with the last frame, and its end is not known yet.
@@ -108,6 +109,7 @@ class CameraTrack:
         self.epoch, self.connected, self.silent = epoch, True, False
         self._since = self._seen = self.alive = host
         self._last = self._first = None
+        self._readings = 0
         self._begin_running_gap()
 
     def disconnect(self, host: HostNs) -> None:
@@ -129,6 +131,7 @@ class CameraTrack:
         """
         steps = self.clock.steps
         agrees = self.clock.latch(latch)
+        self._readings += 1
         self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
         if stepped := self.clock.steps != steps:
             self.counters.clock_steps += 1
@@ -282,6 +285,10 @@ class CameraTrack:
         ready = self._since + FIRST_NS if self._first is None else self._since
         return self.connected and time >= ready
 
+    def is_awaited(self, time: HostNs) -> bool:
+        """Whether the camera was there before `time`, has answered until now, and not since: it may have gone."""
+        return self.was_there(time) and not self.silent and self._readings > 1 and time > self._seen
+
     def was_away(self, time: HostNs) -> bool:
         """Whether the camera was not there at `time`: it was disconnected, or not set up yet."""
         if time <= self._left or not self.connected:
@@ -291,25 +298,16 @@ class CameraTrack:
         return time < (self._since + FIRST_NS if self._first is None else self._first - self._train.tolerance_ns)
 
     def settle_unwatched(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
-        """Decide what became of a pulse at which the camera was away: absent, unless a damaged arrival is left of it.
-
-        Args:
-            time: time of the pulse.
-            rivals: as for `settle`.
-        """
+        """As `settle`, for a pulse at which the camera was away: absent, unless a damaged arrival is left of it."""
         gap = self.gap_after(time)
         outcome = NO_FRAME[FrameStatus.ABSENT] if gap is None else gap.settle(time, rivals, self._matcher)
         return NO_FRAME[FrameStatus.ABSENT] if outcome.status is FrameStatus.MISSED else outcome
 
     def settle_fired(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
-        """Decide what became of a pulse that the source fired, and of which no camera delivered a frame.
+        """As `settle`, for a pulse that the source fired, and of which no camera delivered a frame.
 
         A camera whose clock was read after the pulse was there. If its ids cannot tell, the pulse did not reach it:
         what keeps a pulse from all cameras is the cable, and what keeps a frame back is mostly one camera's own.
-
-        Args:
-            time: time of the pulse.
-            rivals: as for `settle`.
         """
         ids_tell = self.gap_after(time) is not None or self._damaged
         if not ids_tell and self.was_there(time) and time <= self._seen:

@@ -13,6 +13,12 @@ from triggering.timeline.pulse_train import PulseTrain
 SILENT_PERIODS: Final = 3
 
 
+def fall_silent(track: CameraTrack) -> None:
+    """Note that a camera is silent."""
+    track.silent = True
+    track.counters.silences += 1
+
+
 class Silence:
     """Judges the cameras by the pulses that lack their frames.
 
@@ -61,5 +67,4 @@ class Silence:
                     periods += 1 + self._train.room(other.time - before)
                     before = other.time
             if periods >= SILENT_PERIODS:
-                track.silent = True
-                track.counters.silences += 1
+                fall_silent(track)

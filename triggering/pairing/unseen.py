@@ -1,24 +1,27 @@
 """Finds the pulses of which no camera delivered a frame, and puts them among the open ones.
 
 The source of the pulses may say that it fired them (`triggering.timeline.fired`), the frame ids may prove it
-(`undelivered`), and those that were due while no camera was there follow from the rhythm: the train goes on in the
-rhythm that it had. That holds only from its last pulse to the next one that a camera sees, and only if it was running
-when the last camera left: a camera that answered, but took no frame, shows that it had paused.
+(`undelivered`), and those that were due while no camera was there, and no source tells, follow from the rhythm: the
+train goes on in the rhythm that it had. That holds only from its last pulse to the next one that a camera sees, and
+only if it was running when the last camera left: a camera that answered, but took no frame, shows that it had paused.
 """
 
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from rig.clocks import HostNs
+from rig.clocks import NS_PER_S, HostNs
 from triggering.pairing.camera_track import CameraTrack
 from triggering.pairing.held import HeldFrames
 from triggering.pairing.outcomes import OpenPulse
+from triggering.pairing.silence import fall_silent
 from triggering.pairing.undelivered import undelivered_times
 from triggering.timeline.fired import FiredPulses
 from triggering.timeline.pulse_train import PulseTrain
 
 #: A pulse that nobody saw waits so long for readings of the cameras' clocks, four times a second, after it.
 _ANSWER_NS: Final = 600_000_000
+#: So long for a reading of each of them: a computer may be busy. A camera that does not answer then was not there.
+_PATIENCE_NS: Final = 3 * NS_PER_S
 
 
 class UnseenPulses:
@@ -62,7 +65,7 @@ class UnseenPulses:
             due = self._heed_source(now, due=due)
         if due and not self._fired.covers(self._open[0].time):
             self._insert_undelivered()
-        if not (due and (self._open[0].proven_by_ids or self._open[0].fired)):
+        if not (due and (self._open[0].proven_by_ids or self._open[0].fired)) and not self._fired.tells(now):
             self._insert_unwatched(now, due=due)
         return due or (bool(self._open) and self._open[0].unwatched)
 
@@ -76,12 +79,23 @@ class UnseenPulses:
         if due and head is not None and now < self._deadline() and self._fired.waits(head.time, now):
             return False
         time = self._fired.next_unseen(None if head is None else head.time)
-        if time is None or not (due or (not self._held.count and now >= time + max(self._hold_ns(), _ANSWER_NS))):
+        if time is None or not (due or (not self._held.count and self._are_heard(time, now))):
             return due
         if self._train.last is None and not any(track.was_there(time) for track in self._tracks):
             self._fired.skip()  # the rig is being set up
             return due
         self._open.insert(0, OpenPulse(len(self._tracks), time, fired=True))
+        return True
+
+    def _are_heard(self, time: HostNs, now: HostNs) -> bool:
+        """Whether a pulse that nobody saw has waited long enough, and each camera has shown if it was there."""
+        if now < time + max(self._hold_ns(), _ANSWER_NS):
+            return False
+        mute = [track for track in self._tracks if track.is_awaited(time)]
+        if mute and now < time + _PATIENCE_NS:
+            return False
+        for track in mute:
+            fall_silent(track)
         return True
 
     def _insert_undelivered(self) -> None:

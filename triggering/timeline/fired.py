@@ -120,6 +120,10 @@ class FiredPulses:
         """Whether the source has told of all pulses up to a time: there were no others."""
         return self._trusted and self._until is not None and self._on_line(self._until) >= time
 
+    def tells(self, now: HostNs) -> bool:
+        """Whether the source tells of its pulses at present: what it does not tell of has not fired."""
+        return self._trusted and self._until is not None and now < self._until + _SILENT_NS
+
     def waits(self, before: HostNs, now: HostNs) -> bool:
         """Whether a pulse behind a gap is to wait, since the source has not told of all pulses before it.
 

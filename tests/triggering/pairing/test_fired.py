@@ -180,6 +180,51 @@ def test_while_the_cable_is_off_pulses_are_missed_in_all_cameras_and_none_is_tho
     assert _codes(feed) == ["pairing_unseen"]
 
 
+@pytest.mark.parametrize("told_gone", [110, 400])
+def test_while_no_camera_has_power_the_pulses_of_the_source_and_no_others_are_absent(told_gone: int) -> None:
+    """The source pauses in between, which the rhythm tells nothing of; the cameras are found to be gone late."""
+    feed = _trained()
+    fired = [pulse for pulse in range(20, 300) if not 150 <= pulse < 200]
+    for pulse in range(20, 420):
+        if pulse in fired:
+            feed.pairer.fired(20 + fired.index(pulse), feed.time_of(pulse), 100_000)
+        feed.pairer.fired_until(feed.time_of(pulse))
+        if pulse == told_gone:
+            for camera in range(3):
+                feed.pairer.disconnected(camera, feed.time_of(pulse))
+        feed.advance(feed.time_of(pulse) + MS)
+    assert feed.pairer.counters[0].silences == (told_gone > 300)
+    for camera in range(3):
+        feed.pairer.connected(camera, 2, feed.time_of(420))
+        feed.latch(camera, feed.time_of(421), clock=10**12)
+    for pulse in range(440, 460):
+        feed.pairer.fired(pulse - 170, feed.time_of(pulse), 100_000)
+        feed.pairer.fired_until(feed.time_of(pulse))
+        for camera in range(3):
+            feed.frame(camera, pulse, pulse - 439, epoch=2, clock=10**12)
+        feed.advance(feed.time_of(pulse) + 6 * MS)
+    times = [feed.time_of(pulse) for pulse in (*range(20), *fired, *range(440, 460))]
+    assert len(feed.closed) == len(times)
+    assert all(abs(closed.time - time) < MS for closed, time in zip(feed.closed, times, strict=True))
+    fates = [{outcome.status for outcome in closed.outcomes} for closed in feed.closed]
+    assert fates == [{OK}] * 20 + [{ABSENT}] * len(fired) + [{OK}] * 20
+    source = feed.pairer.health().source
+    assert source is not None
+    assert (source.unseen, source.untagged, source.unfired) == (0, 0, 0)
+    assert feed.pairer.health().unwatched == 0
+
+
+def test_a_source_that_falls_silent_too_leaves_the_rhythm() -> None:
+    feed = _trained()
+    for camera in range(3):
+        feed.pairer.disconnected(camera, feed.time_of(20.5))
+    feed.advance(feed.time_of(45))
+    assert len(feed.closed) == 20, "the source may still tell"
+    feed.advance(feed.time_of(80))
+    assert {outcome.status for closed in feed.closed[20:] for outcome in closed.outcomes} == {ABSENT}
+    assert len(feed.closed) > 60
+
+
 def test_a_pulse_that_the_source_did_not_fire_is_kept_and_told() -> None:
     feed = _trained()
     assert _codes(feed) == []

@@ -18,6 +18,7 @@ export const events = {
   event_camera_gone: ["borte: {said}"],
   event_camera_notice: ["merknad: {said}"],
   camera_streaming_before: ["sendte bilder allerede før opptaksprosessen ble startet"],
+  camera_mute: ["kilden sender pulser, og det svarer ikke; det sees etter det"],
   camera_behind: ["tre pulser bak de andre kameraene; det sees etter det"],
   camera_late: ["bildene kommer for sent, {late_ms} ms etter vanlig tid: forbindelsen er for langsom for dem"],
   camera_late_together: ["bildene kommer for sent, {late_ms} ms etter vanlig tid, som de fra {others}: denne datamaskinen eller forbindelsen de deler, er for langsom"],

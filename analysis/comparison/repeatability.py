@@ -30,8 +30,9 @@ _RATES_AND_PATH: Final = np.append(RATES, True)
 #: Rates that change when the table ends: vertical velocity and slope of the path.
 _VERTICAL: Final = np.append(np.arange(len(RATES)) == VELOCITY.stop - 1, True)
 #: Mean square of what the model over time makes of repeated measurements / that by this approximation: the model
-#: estimates how smooth a jump is from the jump itself, so that no two jumps are smoothed quite alike.
-_APPROXIMATE: Final = 1.1
+#: estimates how smooth a jump is from the jump itself, so that no two jumps are smoothed quite alike. That is
+#: its size for sideways velocity, which tells least of its smoothness; for others it is 0.6 to 1.1, with long tails.
+_APPROXIMATE: Final = 1.3
 _LEAST_PATH: Final = 0.01  # of the variance of the angle of attack
 _STIFFNESSES: Final = np.logspace(-4, 9, 131)
 

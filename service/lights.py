@@ -7,8 +7,8 @@ from typing import Final
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.events import Event, Level
 from rig.phrase import Phrase, phrase
+from rig.settings.camera import CameraSettings
 from rig.settings.light import camera_of, with_light, written
-from rig.settings.model import CameraSettings
 from service.regions import Regions, unfit
 from service.rig_file import keep
 from service.supervision.commands import at_once

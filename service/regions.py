@@ -9,8 +9,8 @@ from rig.api.statement import Level as StatementLevel
 from rig.api.statement import Statement
 from rig.events import Event, Level
 from rig.phrase import Phrase, phrase
+from rig.settings.camera import CameraSettings, Region
 from rig.settings.light import camera_of
-from rig.settings.model import CameraSettings, Region
 from rig.settings.region import RegionLimits, calibration_unfit, named, with_region, written_region
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory

@@ -30,7 +30,7 @@ from scipy.optimize import least_squares
 from photogrammetry.geometry.camera_model import INTERIOR, Lens, undistort
 from photogrammetry.procedures.calibrated_cameras import CalibratedCamera, read_calibration
 from rig.errors import BadInputError
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.transport.recorder_commands import Calibration
 
 Floats = NDArray[np.float64]

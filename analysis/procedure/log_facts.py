@@ -11,7 +11,7 @@ from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import LogReader
 from rig.errors import BadInputError
 from rig.phrase import Phrase
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.settings.region import calibration_unfit
 from rig.settings.strict_toml import examine
 from rig.topics import RIG_ATTACHMENT

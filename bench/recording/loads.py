@@ -4,15 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from rig.settings.camera import CameraSettings, Region
 from rig.settings.file import CONFIG
-from rig.settings.model import (
-    CameraSettings,
-    NetworkSettings,
-    RecorderSettings,
-    Region,
-    RigSettings,
-    SimulationSettings,
-)
+from rig.settings.model import NetworkSettings, RecorderSettings, RigSettings, SimulationSettings
 from rig.settings.trigger import ExternalTrigger
 
 #: Frames that the simulated cameras draw once and only stamp anew: drawing is not what is measured.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from recorder.live.unpacking import Unpack, unpacker
 from rig.images.pixels import Stored
-from rig.settings.model import CameraSettings, Region
+from rig.settings.camera import CameraSettings, Region
 
 _SHAPE = (1216, 1936)
 _FRAMES = 24  # more than fits into the cache: memory is read cold, as in a ring

@@ -23,7 +23,8 @@ from capture.seam import Arrival
 from rig.action import ActionKeys
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
-from rig.settings.model import CameraSettings, NetworkSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import NetworkSettings
 from rig.settings.region import RegionLimits
 from rig.settings.trigger import ActionTrigger, ExternalTrigger, SoftwareTrigger, Trigger
 from rig.transport.ring import CameraRing

@@ -12,7 +12,7 @@ from capture.aravis.action import set_action_trigger
 from capture.aravis.features import Features
 from rig.action import ActionKeys
 from rig.errors import CameraError
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.settings.region import RegionLimits
 
 #: Triggers that take one frame per pulse, the best first, and the feature that has to be 1 for that.

@@ -13,7 +13,8 @@ from typing import Final
 from capture.iidc.clock import CYCLE_NS
 from capture.iidc.structures import VideoMode
 from rig.errors import BadInputError
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 
 UNITS_PER_BUS: Final = 4915
 _OVERHEAD_QUADLETS: Final = 3

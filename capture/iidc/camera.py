@@ -31,7 +31,7 @@ from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError, SvevError
 from rig.frame import StampedPixels
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.settings.region import RegionLimits
 from rig.transport.ring import CameraRing
 

@@ -19,7 +19,7 @@ from capture.iidc.structures import (
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, CameraError
 from rig.images.pixels import FORMATS
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.settings.region import RegionLimits
 
 #: Time from the end of the exposure to the first packet (Marlin manual: 500 us +- 62.5 us).

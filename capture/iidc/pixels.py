@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 
 #: Called with the address of a frame and the slot that it goes to, shape (bytes,).
 CopyFrame: TypeAlias = Callable[[int, NDArray[np.uint8]], None]

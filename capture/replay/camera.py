@@ -15,7 +15,7 @@ from capture.seam import Arrival
 from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now, sleep_until
 from rig.errors import CameraError, CameraNotFoundError
 from rig.frame import FrameStatus, StampedPixels
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.tag import CameraTag
 from rig.transport.ring import CameraRing
 

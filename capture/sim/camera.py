@@ -14,7 +14,7 @@ from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now, sleep_until
 from rig.errors import CameraError
 from rig.frame import FrameStatus
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
 
 #: From the end of the exposure to the frame in memory: about what a camera's link needs.

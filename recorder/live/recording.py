@@ -1,10 +1,7 @@
 """One recording: which pulses belong to it, their numbers and tags, and its log. Nothing here waits for the disk."""
 
-import threading
 from collections import deque
-from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -12,17 +9,15 @@ from typing import Final
 import msgspec
 
 from recorder.live.assembler import Assembler
+from recorder.live.opening import discard, in_background, open_log
 from recorder.live.preroll import Held
 from recorder.log.extent import CONTINUES, CONTINUES_AFTER, FORGOTTEN, extent
 from recorder.log.tag_room import check_tag_fits
-from recorder.log.triplet_buffers import TripletBuffers
-from recorder.writing.append_file import storage_error
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
 from rig.errors import FileVanishedError, StorageError
 from rig.events import Event
 from rig.health import WritingHealth
-from rig.host.utc_clock import utc_fields
 from rig.phrase import phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
@@ -95,7 +90,7 @@ class Recording:
             calibrations={} if order.calibration is None else order.calibration.cameras,
         )
         self.log: LogWriter | None = None
-        self._opening = _in_background(partial(_open, order.path, description, assembler.buffers))
+        self._opening = in_background(partial(open_log, order.path, description, assembler.buffers))
         self._opening_since = host_now()
 
     def _begin(self, order: StartRecording) -> None:
@@ -166,7 +161,7 @@ class Recording:
     def give_up(self, error: StorageError) -> None:
         """Do not wait for the disk any longer; a log that is opened only now is removed again."""
         if self.log is None:
-            self._opening.add_done_callback(partial(_discard, error))
+            self._opening.add_done_callback(partial(discard, error))
         else:
             self.log.give_up(error)
 
@@ -371,32 +366,3 @@ class Recording:
         if self.log is None:
             raise RuntimeError("the log is not open yet")
         return self.log
-
-
-def _open(path: Path, description: LogDescription, buffers: TripletBuffers) -> LogWriter:
-    """Make a log, with what is known of UTC; its folder too, which may have been deleted meanwhile."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise storage_error(path, error) from error
-    return LogWriter(path, replace(description, rig={**description.rig, **utc_fields()}), buffers)
-
-
-def _in_background(make: Callable[[], LogWriter]) -> "Future[LogWriter]":
-    """Call a function in a thread that never keeps the process alive: the disk may hang for ever."""
-    future: Future[LogWriter] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(make())
-        except BaseException as error:  # noqa: BLE001 - raised where the result is asked for
-            future.set_exception(error)
-
-    threading.Thread(target=run, name="opens a log", daemon=True).start()
-    return future
-
-
-def _discard(error: StorageError, opening: "Future[LogWriter]") -> None:
-    if opening.exception() is None:
-        opening.result().give_up(error)
-        opening.result().path.unlink(missing_ok=True)

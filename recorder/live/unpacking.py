@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.images.pixels import Stored
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 
 #: Called with the bytes of a frame as the camera sent it, and its place in the triplet, (rows, columns).
 Unpack: TypeAlias = Callable[[NDArray[np.uint8], Stored], None]

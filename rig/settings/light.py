@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import tomlkit
 
 from rig.errors import BadInputError, UnknownCameraError
+from rig.settings.camera import CameraSettings
 from rig.settings.editing import as_toml, camera_table, editable
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.model import RigSettings
 from rig.settings.strict_toml import validate
 
 

@@ -3,13 +3,13 @@
 `rig.settings.file` reads them from a rig file. The field descriptions stand in the JSON schema (`svev schema`).
 """
 
-import re
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
-from rig.images.pixels import FORMATS, PixelFormat, PixelFormatName, Pixels
+from rig.images.pixels import Pixels
+from rig.settings.camera import COMMANDED, CameraSettings, Region
 from rig.settings.strict_toml import StrictModel
 from rig.settings.trigger import (
     ActionTrigger,
@@ -22,116 +22,10 @@ from rig.settings.trigger import (
 from rig.settings.webhook import WebhookSettings
 from rig.topics import DEFAULT_PUBLISH
 
-Backend = Literal["aravis", "iidc", "sim", "replay"]
-#: The back ends whose cameras can be told to expose.
-COMMANDED: Final[frozenset[Backend]] = frozenset({"aravis", "iidc"})
-
-#: Grey pixels of 8 bits, or of 16 of which so many are significant.
-_FIREWIRE_FORMATS: Final[tuple[PixelFormatName, ...]] = ("Mono8", "Mono10", "Mono12", "Mono16")
-#: Less than a chunk of a log holds (`recorder.log.mcap_layout.CHUNK_MAX`), with room for the tag.
-_TRIPLET_BYTES_MAX: Final = 255 << 20
-
-
-class Region(StrictModel):
-    """The part of the sensor that is read out, in px."""
-
-    x: int = Field(0, ge=0, description="first column")
-    y: int = Field(0, ge=0, description="first row")
-    width: int = Field(640, gt=0, le=16384)
-    height: int = Field(480, gt=0, le=16384)
-
-
-class IidcSettings(StrictModel):
-    """Settings that only FireWire cameras have."""
-
-    bus: int = Field(0, ge=0, le=15, description="which FireWire bus: cameras on one card share its bandwidth")
-    iso_speed: Literal[100, 200, 400, 800] = Field(400, description="Mbit/s; 800 needs IEEE 1394b throughout")
-    trigger_mode: Literal[0, 1] = Field(0, description="0: the edge triggers, exposure_us long; 1: the level exposes")
-    signature: bool = Field(True, description="let AVT cameras sign their frames: times, lost and torn frames")
-    dma_frames: int = Field(64, ge=64, le=512, description="frames that the kernel holds while the grabber is busy")
-    gain_step_db: float = Field(0.0354, gt=0, le=10, description="gain_db of one step of the gain register (Marlin)")
-    shutter_offset_us: float = Field(
-        30.0, ge=0, le=10_000, description="added to every exposure by the camera (Marlin F-080B: 30, F-080-30fps: 17)"
-    )
-
-
 #: Processes and events that are not of one camera go by these names, beside those that go by a camera's.
 _TAKEN: Final = frozenset({"recorder", "analysis", "trigger", "pairing", "service"})
-
-
-class CameraSettings(StrictModel):
-    """One camera. The order of the cameras in the file is their order in the triplet, from left to right."""
-
-    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$", description="short name, e.g. K1")
-    backend: Backend
-    address: str = Field(
-        "",
-        description="aravis: IP address; iidc: GUID (hexadecimal); replay: path of a log, "
-        "relative to the working directory, the same for all cameras; name says which camera of it",
-    )
-    region: Region = Region()
-    calibrated_region: Region | None = Field(
-        None,
-        description="the region with which the camera was calibrated, if it is another one; written when the region is "
-        "changed while the service runs. Remove it when interior orientations of the present region are in use",
-    )
-    pixel_format: PixelFormatName = Field(
-        "Mono8",
-        description="what the camera sends. Logs hold 8 bits per pixel as mono8, 10 and 12 as mono16, whether packed "
-        "or not. iidc: Mono8, or 16 bits of which so many are significant: Mono10, Mono12, Mono16",
-    )
-    exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
-    gain_db: float = Field(0.0, ge=0, le=60)
-    trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
-    trigger_edge: Literal["rising", "falling"] = "rising"
-    iidc: IidcSettings = IidcSettings()
-
-    @property
-    def frame_bytes(self) -> int:
-        """Bytes of one frame as the camera sends it."""
-        return self.format.frame_bytes(self.region.width, self.region.height)
-
-    @property
-    def format(self) -> PixelFormat:
-        """How the camera sends its pixels."""
-        return FORMATS[self.pixel_format]
-
-    @model_validator(mode="after")
-    def _address_where_needed(self) -> "CameraSettings":
-        if self.backend != "sim" and not self.address:
-            raise ValueError(f'backend "{self.backend}" needs an address: add address = "..."')
-        return self
-
-    @model_validator(mode="after")
-    def _lines_hold_whole_groups(self) -> "CameraSettings":
-        if self.region.width % (group := self.format.group):
-            raise ValueError(
-                f"region.width of {self.name} is {self.region.width}: in {self.pixel_format} {group} pixels stand "
-                f"together, so make it a multiple of {group}"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _firewire_keys_make_sense(self) -> "CameraSettings":
-        if self.backend != "iidc":
-            if "iidc" in self.model_fields_set:
-                raise ValueError(f'iidc = ... is for backend "iidc" only, this one is "{self.backend}": remove it')
-            return self
-        if self.pixel_format not in _FIREWIRE_FORMATS:
-            raise ValueError(
-                f'pixel_format "{self.pixel_format}" is not for backend "iidc": FireWire cameras send '
-                f"{', '.join(_FIREWIRE_FORMATS)} here"
-            )
-        if not re.fullmatch(r"(0x)?[0-9A-Fa-f]{16}", self.address):
-            raise ValueError(
-                f'address "{self.address}" is no GUID: give the 16 hexadecimal digits of the camera\'s label, '
-                "or of svev doctor --bus firewire"
-            )
-        if not re.fullmatch(r"Line[0-3]", self.trigger_input):
-            raise ValueError(
-                f'trigger_input "{self.trigger_input}" is no input of a FireWire camera: use "Line0" to "Line3"'
-            )
-        return self
+#: Less than a chunk of a log holds (`recorder.log.mcap_layout.CHUNK_MAX`), with room for the tag.
+_TRIPLET_BYTES_MAX: Final = 255 << 20
 
 
 class RecorderSettings(StrictModel):

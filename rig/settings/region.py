@@ -12,9 +12,10 @@ from pydantic import Field
 
 from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
+from rig.settings.camera import CameraSettings, Region
 from rig.settings.editing import camera_table, editable
 from rig.settings.light import camera_of
-from rig.settings.model import CameraSettings, Region, RigSettings
+from rig.settings.model import RigSettings
 from rig.settings.strict_toml import StrictModel, validate
 
 _CALIBRATED = "calibrated_region"

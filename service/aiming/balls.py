@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Final
 
 from rig.api.cameras.balls import CameraBalls
+from rig.settings.camera import CameraSettings
 from rig.settings.light import camera_of
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.model import RigSettings
 
 #: In the folder of the recordings: where the cameras showed the balls when they were oriented last.
 ORIENTATION: Final = ".svev-orientation.json"

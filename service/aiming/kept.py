@@ -18,7 +18,8 @@ from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StorageError
 from rig.host.disk import replace_file
 from rig.phrase import phrase
-from rig.settings.model import Region, RigSettings
+from rig.settings.camera import Region
+from rig.settings.model import RigSettings
 from service.aiming.balls import ORIENTATION
 from service.aiming.places import Balls, of_system
 

@@ -22,7 +22,8 @@ from rig.api.statement import Level, Statement
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.phrase import phrase
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 from rig.settings.region import calibration_unfit
 from service.aiming.kept import kept_in
 from service.aiming.places import Balls, of_system, places, standing

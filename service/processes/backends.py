@@ -7,7 +7,8 @@ from typing import Final
 from capture.seam import OpenCamera
 from rig.clocks import HostNs
 from rig.errors import BadInputError, CameraNotFoundError
-from rig.settings.model import Backend, RigSettings
+from rig.settings.camera import Backend
+from rig.settings.model import RigSettings
 from rig.settings.trigger import SoftwareTrigger
 from rig.transport.ring import CameraRing
 

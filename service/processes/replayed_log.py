@@ -16,7 +16,8 @@ from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, CameraError
 from rig.images.pixels import FORMATS, Stored
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 from rig.tag import CameraTag, TripletTag
 from rig.topics import TAG
 

@@ -14,7 +14,8 @@ from capture.sim.camera import Scene
 from rig.clocks import HostNs
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, SoftwareTrigger, TriggerBoxTrigger
 from service.processes.rig_processes import TRIGGER_PORT
 

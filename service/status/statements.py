@@ -13,7 +13,7 @@ from rig.api.status import CameraState, State
 from rig.errors import SvevError
 from rig.phrase import Phrase, Value, phrase
 from rig.pulse import Pause
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.transport.recorder_reports import CameraNews
 from service.processes.rig_processes import CameraPresence
 

@@ -8,7 +8,8 @@ import msgspec
 
 from rig.clocks import HostNs
 from rig.pulse import HillPulse, PulseNumber
-from rig.settings.model import CameraSettings, Region, RigSettings
+from rig.settings.camera import CameraSettings, Region
+from rig.settings.model import RigSettings
 from simrig.firewire.camera.geometry import SENSOR, VGA
 from simrig.world.projection import Window
 from simrig.world.pulses import PulseTrain

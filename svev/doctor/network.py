@@ -12,7 +12,8 @@ from recorder.publishing.keys import exposure, load_keys
 from recorder.publishing.publisher import bind
 from rig.errors import BadInputError
 from rig.phrase import phrase
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.interfaces import Interface, interface_to
 

@@ -17,7 +17,7 @@ from analysis.export.camera_calibration import calibration_for_log
 from photogrammetry.geometry.camera_model import INTERIOR, Lens, image_point, undistort
 from photogrammetry.geometry.rotation import rotation_from_vector
 from rig.errors import BadInputError
-from rig.settings.model import CameraSettings, Region
+from rig.settings.camera import CameraSettings, Region
 
 WIDTH, HEIGHT = 640, 480
 CENTRE = np.array([WIDTH - 1, HEIGHT - 1]) / 2.0

@@ -12,7 +12,7 @@ from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals, RehearsalVe
 from rig.api.statement import Level, Statement
 from rig.api.status import Finding, RehearsalProgress, RehearsalStage
 from rig.phrase import Phrase
-from rig.settings.model import CameraSettings, Region
+from rig.settings.camera import CameraSettings, Region
 from service.regions import unfit
 from svev.doctor.finding import Topic, failure, passed
 from tests.browser.conftest import Open

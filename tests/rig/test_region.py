@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from rig.errors import BadInputError
+from rig.settings.camera import Region
 from rig.settings.file import load_rig
-from rig.settings.model import Region
 from rig.settings.region import RegionLimits, calibration_unfit, with_region, written_region
 
 TEXT = """name = "hill"

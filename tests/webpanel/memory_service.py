@@ -50,7 +50,7 @@ from rig.errors import StateForbidsError, UnknownCameraError, UnknownRecordingEr
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
-from rig.settings.model import Region
+from rig.settings.camera import Region
 from rig.settings.region import RegionLimits
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook

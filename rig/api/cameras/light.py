@@ -6,7 +6,7 @@ from pydantic import Field, StrictBool
 
 from rig.api.fields import WHOLE, Model
 from rig.api.statement import Statement
-from rig.settings.model import Region
+from rig.settings.camera import Region
 from rig.settings.region import RegionLimits
 
 _Place = Annotated[int, Field(ge=0, le=16384), WHOLE]

@@ -10,7 +10,8 @@ from capture.iidc.device import Device
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, CameraError
 from rig.phrase import phrase
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 
 

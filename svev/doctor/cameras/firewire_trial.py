@@ -15,7 +15,7 @@ from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, host_now
 from rig.errors import BadInputError, CameraError
 from rig.phrase import phrase
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
 from svev.doctor.cameras.firewire_cameras import told
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from rig.errors import BadInputError
 from rig.phrase import phrase
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 from service.processes.replayed_log import check_replay
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras

@@ -17,7 +17,7 @@ from typing import Any
 
 from capture.iidc import dma
 from capture.iidc.library import SONAME
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
 from simrig.firewire.host.build import shim
 from simrig.programs.simulated_hill import SimulatedHill

@@ -4,7 +4,8 @@ import pytest
 
 from capture.iidc.bandwidth import UNITS_PER_BUS, check_bandwidth, need
 from rig.errors import BadInputError
-from rig.settings.model import CameraSettings, RigSettings
+from rig.settings.camera import CameraSettings
+from rig.settings.model import RigSettings
 
 GUID = "000a4701011b000"
 

@@ -20,7 +20,7 @@ from capture.seam import Arrival
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.pulse import HillPulse
-from rig.settings.model import CameraSettings
+from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
 from simrig.images import stamp
 from simrig.world.faults import Fault, FaultKind

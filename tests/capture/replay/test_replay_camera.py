@@ -14,7 +14,7 @@ from capture.seam import Arrival
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
 from rig.frame import FrameStatus, StampedPixels
-from rig.settings.model import CameraSettings, Region
+from rig.settings.camera import CameraSettings, Region
 from rig.transport.ring import CameraRing
 from tests.capture.replay.test_timeline import ABSENT, DAMAGED, LOST, MISSED, OK, Log, make_log
 

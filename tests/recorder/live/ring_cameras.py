@@ -5,7 +5,8 @@ from contextlib import ExitStack, contextmanager
 
 from rig.clocks import DeviceNs, HostNs
 from rig.frame import Record, RecordKind
-from rig.settings.model import CameraSettings, RecorderSettings, Region, RigSettings
+from rig.settings.camera import CameraSettings, Region
+from rig.settings.model import RecorderSettings, RigSettings
 from rig.settings.trigger import ExternalTrigger
 from rig.transport.ring import CameraRing
 

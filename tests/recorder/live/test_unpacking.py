@@ -5,7 +5,7 @@ import pytest
 
 from recorder.live.unpacking import unpacker
 from rig.images.pixels import FORMATS
-from rig.settings.model import CameraSettings, Region
+from rig.settings.camera import CameraSettings, Region
 from simrig.images.packing import Packing
 
 #: Pixels and their bytes, by the layouts in PFNC 2.4 (p: section 6.2) and GigE Vision 2.0 (Packed: section 27).

@@ -15,8 +15,9 @@ from recorder.reading.triplets import triplets
 from rig.api.status import State
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.settings.camera import Region
 from rig.settings.file import load_rig
-from rig.settings.model import Region, RigSettings
+from rig.settings.model import RigSettings
 from rig.topics import RIG_ATTACHMENT
 from rig.transport.recorder_commands import RecorderOptions
 from service.regions import Regions

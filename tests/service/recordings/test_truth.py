@@ -11,8 +11,9 @@ import numpy as np
 from rig.clocks import HostNs, UtcAnchor
 from rig.events import Event
 from rig.pulse import PulseNumber
+from rig.settings.camera import Region
 from rig.settings.file import CONFIG
-from rig.settings.model import Region, RigSettings
+from rig.settings.model import RigSettings
 from service.processes.simulation import simulated_truth
 from service.recordings.truth import TruthWriter
 from tests.recorder.logs import START, write_log

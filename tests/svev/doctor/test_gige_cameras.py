@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from rig.settings.camera import Region
 from rig.settings.file import CONFIG, load_rig
-from rig.settings.model import Region
 from simrig.programs.simulated_hill import SimulatedHill
 from svev.doctor.cameras import gige
 from svev.doctor.finding import Level

@@ -16,7 +16,7 @@ from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measur
 from analysis.motion.adjustment.bundle import Model, begun, near, root_of, settled
 from analysis.motion.adjustment.gross_errors import without_gross_errors
 from analysis.motion.model.camera_arrays import CameraArrays, own_root
-from analysis.motion.model.channels import CHANNELS, SLOPE, MotionFrame
+from analysis.motion.model.channels import CHANNELS, ORIGIN, SLOPE, VECTORS, MotionFrame
 from analysis.motion.model.equations import linearised
 from analysis.motion.model.observations import GROUPS, Observations, by_hand, observations, used_cameras
 from analysis.motion.model.prior import SHARE, STATE, prior, start_densities, transitions, white_jerk
@@ -34,6 +34,11 @@ _STEPS, _REMOVALS = 8, 4
 #: How far a jumper's skis turn at all: standard deviations of slope, its difference, heading and opening (rows), of
 #: value, speed and acceleration (columns), rad, rad/s, rad/s^2. Nothing may be less certain: so much is known unseen.
 _SKI_LIMITS: Final = np.array(((0.45, 2.0, 30.0), (0.3, 1.0, 15.0), (0.25, 1.0, 15.0), (0.5, 2.0, 30.0)))
+#: The vectors of a jumper's body, from the crouch to the flight: means and standard deviations, m, in the order of the
+#: channels. So much is known of what nobody has seen (`analysis.identification.space.body`); aside, the hip stays above
+#: the skis.
+_BODY: Final = np.array((0.25, 0, 0.6, 0.6, 0, 0.25, 0, 0.45, 0), float)
+_BODY_SIGMA: Final = np.array((0.30, 0.12, 0.17, 0.20, 0.12, 0.25, 0.12, 0.14, 0.10))
 _BOUNDED: Final = (np.arange(3)[:, None] * CHANNELS + np.arange(SLOPE, CHANNELS)).ravel()  # places of their transpose
 _REGIMES: Final = (2, 1)  #: of `prior`: the models are calm as in flight, lively as at the edge
 _CALM, _LIVELY = range(len(_REGIMES))
@@ -97,13 +102,17 @@ class CausalFilter:
         self._advance(pulse.time)
         used = self._measure(self._frame, observed)
         self._known |= known_groups(used)
-        return self._result(self._frame, used_cameras(observed, used), by_hand(observed, used), self._known)
+        belief = self._beliefs.mixed(self._chances[None])
+        return self._result(self._frame, belief, used_cameras(observed, used), by_hand(observed, used), self._known)
 
-    def predicted(self, time: UtcNs) -> SmoothedState | None:
+    def predicted(self, time: UtcNs, *, body: bool = False) -> SmoothedState | None:
         """Where to look for the jumper at a pulse that is measured next; None before enough pulses are measured.
 
         Args:
             time: of the pulse.
+            body: whether what was not seen for long is taken to be where people have it. That tells where to look, but
+                not what is there: a binding could be the other one. The filter itself never knows it: told at each
+                pulse anew, it would count as often.
 
         Returns:
             A state with all points, also those that were never measured: their covariance tells.
@@ -111,7 +120,9 @@ class CausalFilter:
         if self._frame is None:
             return None
         self._advance(time)
-        return self._result(self._frame, [_UNSEEN], [_BY_NOBODY], np.ones(len(GROUPS), bool))
+        belief = self._beliefs.mixed(self._chances[None])
+        belief = _with_body(belief) if body else belief
+        return self._result(self._frame, belief, [_UNSEEN], [_BY_NOBODY], np.ones(len(GROUPS), bool))
 
     def _observed(self, pulses: tuple[PulseMeasurements, ...]) -> Observations:
         return observations(JumpMeasurements(0, pulses), self._header, self._cameras)
@@ -249,12 +260,12 @@ class CausalFilter:
     def _result(
         self,
         frame: MotionFrame,
+        belief: _Beliefs,
         cameras: Sequence[Mapping[str, tuple[str, ...]]],
         hands: Sequence[Mapping[str, bool]],
         known: Flags,
     ) -> SmoothedState:
-        """What both models believe at the pulse of which `cameras` and `hands` tell who measured."""
-        belief = self._beliefs.mixed(self._chances[None])
+        """The state of a belief (k = 1) at the pulse of which `cameras` and `hands` tell who measured."""
         return smoothed_states(
             frame,
             self._unit,
@@ -266,6 +277,14 @@ class CausalFilter:
             known,
             vague=np.inf,  # the filter itself bounds what it does not know, and whoever follows needs all parts
         )[0]
+
+
+def _with_body(belief: _Beliefs) -> _Beliefs:
+    """A belief (k = 1) of a jumper whose body is one of people."""
+    vectors = slice(ORIGIN.stop, VECTORS)
+    mean, rows = belief.mean[0], belief.covariance[0, vectors]
+    gain = np.linalg.solve(rows[:, vectors] + np.diag(_BODY_SIGMA**2), rows).T
+    return _Beliefs((mean + gain @ (_BODY - mean[vectors]))[None], (belief.covariance[0] - gain @ rows)[None])
 
 
 def _moved(move: Floats, rows: Floats) -> Floats:

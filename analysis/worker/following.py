@@ -14,10 +14,11 @@ import numpy as np
 from analysis.candidates.model import Expected, PulseCandidates
 from analysis.identification.identify import named_pulse, straight_traces
 from analysis.identification.markers.markers import BINDINGS, Markers
-from analysis.identification.over_time.assignment import assign
+from analysis.identification.over_time.assignment import MOST_VAGUE_M, assign, well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Prediction
 from analysis.identification.over_time.window import Window
+from analysis.identification.seeking import Seeker
 from analysis.identification.skis.skis import assign_skis
 from analysis.identification.space.body import REACH_M
 from analysis.identification.space.space_points import Appearance
@@ -27,6 +28,7 @@ from analysis.motion.causal import CausalFilter
 from analysis.result.model import SmoothedState, Status
 from analysis.scene.camera_system import CameraSystem
 from analysis.worker.ski_images import SkiImages
+from rig.arrays import Flags, Floats
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
 
@@ -36,6 +38,9 @@ _LOST_S: Final = 0.25
 _SIGMAS, _RADII = 4.0, 8.0
 _ANYHOW_DEG: Final = np.array((25.0, 15.0))  #: slope and heading of skis against the flight, standard deviations
 _FEWEST_CAMERAS: Final = 2  #: that must be able to see any of his markers
+_BEGIN: Final = 4  #: pulses that show somebody before he is followed
+#: Markers whose place is not known are sought after so long a time, then after twice that, and so on.
+_HIDDEN_S: Final = 0.2
 
 _Part = TypeVar("_Part")
 
@@ -70,7 +75,23 @@ class Follower:
         self._rate_hz = rate_hz
         self._appearance: Appearance | None = None
         self._next: tuple[UtcNs, SmoothedState | None] = UtcNs(0), None
+        self._pulse, self._time = PulseNumber(0), UtcNs(0)
+        self._looks, self._look_at = 0, 0.0
         self.first = self.last = PulseNumber(0)
+
+    def find(self, seeker: Seeker, candidates: Sequence[PulseCandidates]) -> list[Followed]:
+        """Begin with who is found in the candidates of the last moments.
+
+        Returns:
+            His states up to the last candidates; none if nobody is found.
+        """
+        found = seeker.seek(candidates, self._rate_hz)
+        if found is None or len(found.pulses) < _BEGIN:
+            return []
+        states = self.begin(found, candidates)
+        if states:
+            states += [self.follow(later) for later in candidates if later.pulse > found.pulses[-1].pulse]
+        return states
 
     def begin(self, found: JumpMeasurements, candidates: Sequence[PulseCandidates]) -> list[Followed]:
         """Begin with the pulses in which a jumper was found.
@@ -85,12 +106,14 @@ class Follower:
         states = self._filter.begin(found.pulses)
         self._appearance = _appearance(self._views, found.pulses, candidates)
         pulses = found.pulses[len(found.pulses) - len(states) :]
-        self.first, self.last = found.pulses[0].pulse, found.pulses[-1].pulse
+        self.first, self._pulse = found.pulses[0].pulse, found.pulses[-1].pulse
+        self.last, self._time = self._pulse, found.pulses[-1].time
+        self._look_at = self._pulse + _HIDDEN_S * self._rate_hz
         return [Followed(pulse.pulse, pulse.time, state) for pulse, state in zip(pulses, states, strict=True)]
 
     def expected(self, time: UtcNs) -> dict[str, Expected]:
         """Where each camera is expected to show him at a pulse; cameras that do not see him are left out."""
-        state = self._predicted(time)
+        state = _known(self._filter.predicted(time, body=True))
         xyz = np.array([_known(point).xyz for point in state.points.values()])
         covariance = np.array([_known(point).covariance for point in state.points.values()])
         places = np.concatenate((xyz, state.origin.value[None], self._skis.places(state)))
@@ -134,7 +157,33 @@ class Follower:
             self._skis.learn(k, {i: [traces[part] for part in parts] for i, parts in own.items()})
         if any(part is not None and part.status is not Status.PREDICTED for part in found.points.values()):
             self.last = candidates.pulse
+        self._pulse, self._time = candidates.pulse, candidates.time
         return Followed(candidates.pulse, candidates.time, found)
+
+    def hidden(self) -> int:
+        """How many markers are somewhere unknown after the latest pulse."""
+        return int(np.count_nonzero(~self._places()[1]))
+
+    def look_is_due(self) -> bool:
+        """Whether hidden markers should be sought at the latest pulse; if so, the next time is later."""
+        if self._pulse < self._look_at or not self.hidden():
+            return False
+        self._looks += 1
+        self._look_at = self._pulse + _HIDDEN_S * 2**self._looks * self._rate_hz
+        return True
+
+    def knows_more_than(self, other: "Follower") -> bool:
+        """Whether this is the jumper whom another one follows, after the same pulse, with more of his markers."""
+        (mine, known), (theirs, also) = self._places(), other._places()
+        both = known & also
+        apart = np.linalg.norm(mine - theirs, axis=1)[both]
+        return bool(both.any() and (apart < MOST_VAGUE_M).all() and np.count_nonzero(known) > np.count_nonzero(also))
+
+    def _places(self) -> tuple[Floats, Flags]:
+        """Places (4, 3) of the markers after the latest pulse, and which are known (4,)."""
+        points = [_known(point) for point in _known(self._filter.predicted(self._time)).points.values()]
+        known = well_known(np.array([point.covariance for point in points]))
+        return np.array([point.xyz for point in points]), known
 
     def lost(self, pulse: PulseNumber, time: UtcNs) -> bool:
         """Whether he is followed no more at a pulse: nothing was measured for too long, or he has left the images."""

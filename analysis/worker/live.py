@@ -24,6 +24,7 @@ from analysis.cameras.steadiness import standing_in
 from analysis.candidates.finder import Finder
 from analysis.export.scene_update import camera_frames, scene_update
 from analysis.identification.seeking import Seeker
+from analysis.scene.camera_system import CameraSystem
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.following import Followed, Follower
 from analysis.worker.stream import Received
@@ -37,12 +38,12 @@ from rig.events import Level
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable
 from rig.phrase import phrase, plain
+from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
-#: A jumper is sought so often, in the candidates of so long a time, and followed once so many pulses show him.
+#: A jumper is sought so often, in the candidates of so long a time.
 _SEEK_S: Final = 0.1
 _SOUGHT_S: Final = 0.5
-_BEGIN: Final = 4
 _WATCH_S: Final = 1.0  #: from one look at the balls to the next
 _FEWEST_CAMERAS: Final = 2  # that show something
 #: A jump is over after so long a time without its jumper; what may belong to it is searched as far before and after.
@@ -176,6 +177,8 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.keep(finder.find_expected(tag, image, follower.expected(tag.time)))
             self._tell(recording, follower.follow(recording.candidates[-1]))
             recording.saw(follower)
+            if follower.look_is_due():
+                self._seek_hidden(recording, follower)
         if recording.follower is None and recording.unseen_s() > _OVER_S:
             self._end_jump(recording)
 
@@ -202,23 +205,33 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         if self._scene is None or showing < _FEWEST_CAMERAS or newest.pulse < recording.sought + _SEEK_S * rate:
             return
         recording.sought = newest.pulse
-        recent = recording.between(max(newest.pulse - _SOUGHT_S * rate, recording.told + 1), newest.pulse)
+        follower, states = self._found_since(recording, PulseNumber(recording.told + 1), self._scene.system)
+        if states:
+            recording.follow(follower)
+            for followed in states:
+                self._tell(recording, followed)
+
+    def _seek_hidden(self, recording: Streamed, follower: Follower) -> None:
+        """Seek the jumper who is followed anew, as if he came into sight: markers may be known by now that were not."""
+        if self._scene is None:
+            return
+        again, states = self._found_since(recording, follower.first, self._scene.system)
+        if states and again.knows_more_than(follower):
+            again.first = follower.first
+            recording.follow(again)
+
+    def _found_since(
+        self, recording: Streamed, first: PulseNumber, system: CameraSystem
+    ) -> tuple[Follower, list[Followed]]:
+        """A follower of who is found in the candidates of the last moments, and his states; none if nobody is."""
+        rate, newest = recording.rate_hz, recording.candidates[-1].pulse
         cameras = recording.cameras(self._exposures)
         if recording.seeker is None:
             exposures = {name: camera.exposure_s for name, camera in cameras.items()}
-            recording.seeker = Seeker(self._scene.system, exposures)
-        found = recording.seeker.seek(recent, rate)
-        if found is None or len(found.pulses) < _BEGIN:
-            return
-        follower = Follower(self._scene.system, cameras, rate)
-        begun = follower.begin(found, recent)
-        if not begun:
-            return
-        recording.follow(follower)
-        for followed in begun:
-            self._tell(recording, followed)
-        for candidates in recording.between(follower.last + 1, newest.pulse):
-            self._tell(recording, follower.follow(candidates))
+            recording.seeker = Seeker(system, exposures)
+        follower = Follower(system, cameras, rate)
+        recent = recording.between(max(newest - _SOUGHT_S * rate, first), newest)
+        return follower, follower.find(recording.seeker, recent)
 
     def _tell(self, recording: Streamed, followed: Followed) -> None:
         """Tell a state."""

@@ -1,0 +1,114 @@
+"""Live and whole: a jump in pictures that no part of Svev has made."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.result.model import Status
+from analysis.worker.findings import MeasuredJump
+from analysis.worker.live import LiveAnalysis
+from analysis.worker.stream import Received
+from rig.jumper import JumperState
+from tests.analysis.candidates.judge import scenario
+from tests.analysis.drawn_hill import DrawnHill
+
+PULSES = range(75)
+LARGEST_M = 0.02  # in each coordinate
+CLEAR = 0.75  # share of a marker that is in sight; less is not drawn
+
+
+@dataclass
+class _Found:
+    """See `analysis.worker.findings.Findings`."""
+
+    states: list[JumperState] = field(default_factory=list)
+    jumps: list[MeasuredJump] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+
+    def state(self, state: JumperState) -> None:
+        self.states.append(state)
+
+    def jump(self, jump: MeasuredJump) -> None:
+        self.jumps.append(jump)
+
+    def message(self, level: Any, said: Any) -> None:
+        self.said.append(f"{level}: {said}")
+
+    def scene(self, *args: Any) -> None: ...
+
+    def cameras(self, *args: Any) -> None: ...
+
+    def oriented(self, *args: Any) -> None: ...
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[DrawnHill, _Found]:
+    """The hill, and what was found in its pictures."""
+    hill, found = DrawnHill(scenario(), PULSES, seed=1), _Found()
+    survey = tmp_path_factory.mktemp("drawn") / Path("survey.json")
+    survey.write_text(json.dumps(hill.survey()))
+    with LiveAnalysis(survey, None, found) as worker:
+        for tag, image in hill.triplets():
+            worker.take(Received(tag, image))
+    return hill, found
+
+
+def _in_clear_sight(state: dict[str, Any]) -> set[str]:
+    """The markers that two cameras or more show."""
+    shown = [
+        label
+        for of_camera, inside in zip(state["visible"].values(), state["in_sight"].values(), strict=True)
+        for label, share in of_camera.items()
+        if share > CLEAR and inside[label]
+    ]
+    return {label for label in shown if shown.count(label) > 1}
+
+
+def test_he_is_followed_with_all_markers_that_are_in_sight(drawn: tuple[DrawnHill, _Found]) -> None:
+    hill, found = drawn
+    assert not [said for said in found.said if said.startswith(("error", "warning"))]
+    known = dict(enumerate(hill.known.values(), start=1))
+    squares, measured, clear = [], 0, sum(len(_in_clear_sight(state)) for state in known.values() if "points" in state)
+    for state in found.states:
+        truth = known[state.pulse]
+        for label, point in state.points.items():
+            if "points" not in truth or point is None or point.status == Status.PREDICTED:
+                continue
+            off = np.array(point.X) - truth["points"][label]
+            assert np.abs(off).max() < LARGEST_M
+            squares.append(off @ np.linalg.solve(np.array(point.covariance), off) / 3)
+            measured += label in _in_clear_sight(truth)
+    assert measured > 0.9 * clear
+    assert np.mean(squares) < 1.2
+
+
+def test_the_whole_jump_is_measured_as_its_sigmas_say(drawn: tuple[DrawnHill, _Found]) -> None:
+    hill, found = drawn
+    (measured,) = found.jumps
+    (jump,) = measured.result.jumps
+    assert jump.verdict.ok, jump.verdict.message
+    known = dict(enumerate(hill.known.values(), start=1))
+    squares, near, slopes, seen = list[float](), list[bool](), list[float](), 0
+    for pulse in jump.pulses:
+        truth = known[pulse.pulse]
+        for label, point in pulse.raw.points.items():
+            if "points" not in truth or point is None:
+                continue
+            off = point.xyz - truth["points"][label]
+            squares.append(float(off @ np.linalg.solve(point.covariance, off) / 3))
+            near.append(bool(np.abs(off).max() < LARGEST_M))
+            seen += label in _in_clear_sight(truth)
+        for side, ski in pulse.raw.skis.items():
+            if "skis" in truth and ski is not None:
+                rise = np.degrees(np.arcsin(truth["skis"][side]["direction"][2]))
+                slopes.append(abs(float(ski.slope.value - rise)))
+    clear = sum(len(_in_clear_sight(state)) for state in known.values() if "points" in state)
+    assert seen >= 0.98 * clear
+    assert np.mean(near) > 0.95
+    assert np.mean(squares) < 1.2
+    assert len(slopes) > 40
+    assert np.quantile(slopes, 0.9) < 0.5

@@ -200,7 +200,9 @@ class Health(msgspec.Struct, frozen=True):
     recording: Annotated[WritingHealth | None, Meta(description="null without a recording")]
     disk: DiskHealth
     latency: Latency
-    made: Annotated[PulsesMade | None, Meta(description='null: trigger.source is not "gpio"')] = None
+    made: Annotated[PulsesMade | None, Meta(description='null: trigger.source is not "gpio" or "iidc-broadcast"')] = (
+        None
+    )
     host_time_ns: Annotated[
         DecimalNs | None, Meta(description="this computer's monotonic clock when the record was made")
     ] = None

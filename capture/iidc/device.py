@@ -218,6 +218,10 @@ class Device:
         """Let the camera expose by its software trigger register (IIDC 1.31, Software_Trigger)."""
         self.call("software_trigger_set_power", 1)
 
+    def set_broadcast(self) -> None:
+        """Have every later write go to all cameras of the bus; reads are still this one's."""
+        self.call("camera_set_broadcast", 1)
+
     def is_triggered(self) -> bool:
         """Whether pulses trigger the camera."""
         return bool(self._int("external_trigger_get_power"))

@@ -68,6 +68,7 @@ _ARGUMENTS: Final[dict[str, tuple[Any, ...]]] = {
     "external_trigger_set_source": (CameraPointer, c_int),
     "external_trigger_set_polarity": (CameraPointer, c_int),
     "software_trigger_set_power": (CameraPointer, c_int),
+    "camera_set_broadcast": (CameraPointer, c_int),
     "capture_setup": (CameraPointer, c_uint32, c_uint32),
     "capture_stop": (CameraPointer,),
     "capture_dequeue": (CameraPointer, c_int, POINTER(FramePointer)),

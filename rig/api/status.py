@@ -94,7 +94,7 @@ class PulseStatus(Model):
     fired: int | None = Field(
         None, description="pulses that the source says it made since arming; null: it does not tell of its pulses"
     )
-    made: MadePulses | None = Field(None, description='null: trigger.source is not "gpio"')
+    made: MadePulses | None = Field(None, description='null: trigger.source is not "gpio" or "iidc-broadcast"')
 
 
 class DiskStatus(Model):

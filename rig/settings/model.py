@@ -15,6 +15,7 @@ from rig.settings.trigger import (
     ActionTrigger,
     BarrierSettings,
     ExternalTrigger,
+    IidcBroadcastTrigger,
     SoftwareTrigger,
     Trigger,
     check_takes_actions,
@@ -202,7 +203,13 @@ class RigSettings(StrictModel):
         if isinstance(self.trigger, ActionTrigger):
             for camera in self.cameras:
                 check_takes_actions(camera.name, camera.backend, camera.address)
-        for camera in self.cameras if isinstance(self.trigger, SoftwareTrigger) else ():
+        told = isinstance(self.trigger, SoftwareTrigger | IidcBroadcastTrigger)
+        for camera in self.cameras if told else ():
+            if isinstance(self.trigger, IidcBroadcastTrigger) and camera.backend != "iidc":
+                raise ValueError(
+                    f'trigger.source "iidc-broadcast" is a command to FireWire cameras, and {camera.name} has backend '
+                    f'"{camera.backend}": use source = "external"'
+                )
             if camera.backend not in COMMANDED:
                 raise ValueError(
                     f'trigger.source "software" is a command to each camera, and {camera.name} with backend '

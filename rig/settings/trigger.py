@@ -154,6 +154,17 @@ class GpioTrigger(TriggerSettings):
         return self
 
 
+class IidcBroadcastTrigger(TriggerSettings):
+    """Commands to all FireWire cameras of a bus at once: one write to their software trigger registers (IIDC 1.31)."""
+
+    source: Literal["iidc-broadcast"] = Field(description="one command to all FireWire cameras of a bus")
+
+    @property
+    def width_ns(self) -> int:
+        """A command has no length, ns."""
+        return 0
+
+
 class BarrierSettings(StrictModel):
     """A light barrier on an input line of this computer; each edge to active is a mark."""
 
@@ -207,7 +218,7 @@ def _external_unless_said(table: Any) -> Any:
 #: The `[trigger]` table: one of the sources, told by `source`.
 Trigger = Annotated[
     Annotated[
-        ExternalTrigger | SoftwareTrigger | ActionTrigger | TriggerBoxTrigger | GpioTrigger,
+        ExternalTrigger | SoftwareTrigger | ActionTrigger | IidcBroadcastTrigger | TriggerBoxTrigger | GpioTrigger,
         Field(discriminator="source"),
     ],
     BeforeValidator(_external_unless_said),

@@ -9,7 +9,7 @@ from rig.clocks import HostNs
 from rig.errors import BadInputError, CameraNotFoundError
 from rig.settings.camera import Backend
 from rig.settings.model import RigSettings
-from rig.settings.trigger import SoftwareTrigger
+from rig.settings.trigger import IidcBroadcastTrigger, SoftwareTrigger
 from rig.transport.ring import CameraRing
 
 _Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
@@ -25,7 +25,7 @@ def _aravis(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> Op
 def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:
     from capture.iidc.camera import IidcCamera  # noqa: PLC0415
 
-    software = isinstance(rig.trigger, SoftwareTrigger)
+    software = isinstance(rig.trigger, SoftwareTrigger | IidcBroadcastTrigger)
     return lambda: IidcCamera(rig.cameras[index], ring, rig.trigger.rate_hz, software=software)
 
 

@@ -21,7 +21,7 @@ from rig.events import Event, Level
 from rig.health import Health
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.settings.trigger import ActionTrigger, GpioTrigger, TriggerBoxTrigger
+from rig.settings.trigger import ActionTrigger, GpioTrigger, IidcBroadcastTrigger, TriggerBoxTrigger
 from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
 from rig.transport.grabber_messages import GrabberConfig
 from rig.transport.message import Quit
@@ -64,6 +64,8 @@ ANALYSIS: Final = "analysis"
 TRIGGER: Final = "trigger"
 #: Variable in which the simulated hill names the port of its trigger box.
 TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
+#: Sources whose pulses a process of its own makes.
+_MADE_BY_A_PROCESS: Final = ActionTrigger | IidcBroadcastTrigger | TriggerBoxTrigger | GpioTrigger
 #: Reports that are dealt with here.
 _FORWARDED: Final = TellResult | AnalysisTold | TellActions | TellPulses | PulsesFired | TriggerTold
 
@@ -101,7 +103,7 @@ class RigProcesses:
         on_event: called for each camera that comes or goes and each process that is started again.
         epoch: host time of pulse 0 of the simulated hill, the replayed log or the commands; now if left out.
         recorder: what the recorder does beside recording.
-        environment: what simulated devices are found by: variables for grabbers of FireWire cameras, `TRIGGER_PORT`.
+        environment: what simulated devices are found by: variables for who uses FireWire cameras, `TRIGGER_PORT`.
 
     Attributes:
         cameras: presence of each camera.
@@ -135,7 +137,7 @@ class RigProcesses:
         self._doorbell = -1
         self._epoch = host_now() if epoch is None else epoch
         self._names = [camera.name for camera in rig.cameras]
-        making = [TRIGGER] if isinstance(rig.trigger, ActionTrigger | TriggerBoxTrigger | GpioTrigger) else []
+        making = [TRIGGER] if isinstance(rig.trigger, _MADE_BY_A_PROCESS) else []
         self._helpers = [*self._names, *making, *([] if rig.analysis is None else [ANALYSIS])]
         self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
@@ -335,10 +337,12 @@ class RigProcesses:
             box = ProcessSpec(TRIGGER, "service.processes.programs.triggerbox", config, reports=TriggerReport)
             self._processes.start(box)
         else:
-            by_line = isinstance(trigger, GpioTrigger)
-            program = "service.processes.programs.gpio" if by_line else "service.processes.programs.actions"
+            at_times = isinstance(trigger, GpioTrigger | IidcBroadcastTrigger)
+            program = "service.processes.programs.even_pulses" if at_times else "service.processes.programs.actions"
             even = TriggerConfig(rig=self._rig, epoch=self._epoch, still=self.still)
-            self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport))
+            # As for grabbers: libdc1394 needs them to see the emulated bus.
+            more = self._environment if isinstance(trigger, IidcBroadcastTrigger) else {}
+            self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport, environment=more))
 
     def _start_recorder(self) -> None:
         fds, options = tuple(ring.fd for ring in self._rings), self._options

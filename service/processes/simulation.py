@@ -16,7 +16,7 @@ from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
-from rig.settings.trigger import ActionTrigger, SoftwareTrigger, TriggerBoxTrigger
+from rig.settings.trigger import ActionTrigger, IidcBroadcastTrigger, SoftwareTrigger, TriggerBoxTrigger
 from service.processes.rig_processes import TRIGGER_PORT
 
 if TYPE_CHECKING:
@@ -62,7 +62,9 @@ def simulated_hill(
         {camera.name: camera.address for camera in gige},
         rig.trigger.rate_hz,
         firewire={camera.name: camera.address for camera in firewire},
-        cable=not isinstance(rig.trigger, SoftwareTrigger),  # GigE Vision cameras are told which source to heed
+        cable=not isinstance(
+            rig.trigger, SoftwareTrigger | IidcBroadcastTrigger
+        ),  # GigE Vision cameras are told what to heed
         epoch=epoch,
         width=width,
         height=height,

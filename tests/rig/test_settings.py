@@ -179,8 +179,8 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'hand'\n",
-            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\", \"triggerbox\", "
-            '"gpio"; correct it',
+            "key \"trigger.source\" = 'hand': there is \"external\", \"software\", \"action\", \"iidc-broadcast\", "
+            '"triggerbox", "gpio"; correct it',
             id="unknown source",
         ),
         pytest.param(
@@ -210,6 +210,11 @@ def test_the_schema_is_a_schema() -> None:
             HEAD + CAMERA + "[trigger]\nsource = 'action'\nscheduled = true\nrate_hz = 500\nlead_ms = 20\n",
             '"trigger": trigger.lead_ms = 20 has cameras hold 10 commands at 500 Hz, and some hold only 4: make it ',
             id="too many scheduled commands",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "[trigger]\nsource = 'iidc-broadcast'\n",
+            'trigger.source "iidc-broadcast" is a command to FireWire cameras, and K1 has backend "aravis": use source',
+            id="a broadcast to a GigE Vision camera",
         ),
         pytest.param(
             HEAD + CAMERA + "[trigger]\nsource = 'gpio'\nline = 18\ngate = { line = 18 }\n",

@@ -1,9 +1,17 @@
 """Makes the source of pulses that a rig file names."""
 
-from rig.settings.trigger import ActionTrigger, GpioTrigger, SoftwareTrigger, Trigger, TriggerBoxTrigger
+from rig.settings.trigger import (
+    ActionTrigger,
+    GpioTrigger,
+    IidcBroadcastTrigger,
+    SoftwareTrigger,
+    Trigger,
+    TriggerBoxTrigger,
+)
 from triggering.sources.action import ActionPulses
 from triggering.sources.external import ExternalPulses
 from triggering.sources.gpio.source import GpioPulses
+from triggering.sources.iidc_broadcast import IidcBroadcastPulses
 from triggering.sources.seam import TriggerSource
 from triggering.sources.software import SoftwarePulses
 from triggering.sources.triggerbox.source import TriggerBoxPulses
@@ -20,6 +28,8 @@ def trigger_source(settings: Trigger) -> TriggerSource:
             return SoftwarePulses(settings)
         case ActionTrigger():
             return ActionPulses(settings)
+        case IidcBroadcastTrigger():
+            return IidcBroadcastPulses()
         case TriggerBoxTrigger():
             return TriggerBoxPulses(settings)
         case GpioTrigger():

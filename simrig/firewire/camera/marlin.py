@@ -82,6 +82,7 @@ class Camera:
         self.rom = camera_rom(guid, VENDOR, MODEL)
         self.counters = Counters()
         self.plugged, self.frozen = True, False
+        self._asked = HostNs(0)
         self._faults = faults
         self._command = CommandRegisters(self._written, deep.depth)
         self._advanced = AdvancedRegisters(signature, deep.signed_bytes)
@@ -129,7 +130,7 @@ class Camera:
             raise BadInputError(f"fault {fault.kind} is none of a frame on FireWire: inject it into the SimulatedHill")
         self._faults.inject(fault)
 
-    def request(self, tcode: int, offset: int, length: int, data: bytes) -> tuple[Rcode, bytes]:
+    def request(self, tcode: int, offset: int, length: int, data: bytes, time: HostNs) -> tuple[Rcode, bytes]:
         """Carry out a read or write of consecutive quadlets.
 
         Args:
@@ -137,12 +138,14 @@ class Camera:
             offset: address.
             length: bytes to read.
             data: bytes to write.
+            time: when it came over the bus; all cameras get a broadcast at once.
 
         Returns:
             How it ended, and the data read.
         """
         if self.frozen:
             return Rcode.NO_ACK, b""
+        self._asked = time
         place = offset - REGISTER_SPACE
         match tcode:
             case Tcode.READ_QUADLET | Tcode.READ_BLOCK:
@@ -191,6 +194,6 @@ class Camera:
             case Register.ISO_EN | Register.TRIGGER_MODE:
                 self._sensor.settings_changed()
             case Register.SOFTWARE_TRIGGER if value & bit(0):
-                self._sensor.software_trigger()
+                self._sensor.software_trigger(self._asked)
             case _:
                 return

@@ -114,11 +114,10 @@ class Sensor:
         session = self._session
         self._loop.at(edge, lambda: self._trigger(session, edge, pulse, faults))
 
-    def software_trigger(self) -> None:
+    def software_trigger(self, time: HostNs) -> None:
         """Expose at a trigger by register, which the camera does not count."""
         if self._command.transmitting and self._command.triggered:
-            now = host_now()
-            self._expose(now, self._line.train.next_index(HostNs(now - 1)), ())
+            self._expose(time, self._line.train.next_index(HostNs(time - 1)), ())
 
     def _trigger(self, session: int, time: HostNs, pulse: HillPulse, faults: tuple[Fault, ...]) -> None:
         if session != self._session:

@@ -206,7 +206,7 @@ class OpenFile:
         elif self._camera is None:
             self._tell(abi.response(closure, Rcode.ADDRESS_ERROR, b""))
         else:
-            self._tell(abi.response(closure, *self._camera.request(tcode, offset, length, data)))
+            self._tell(abi.response(closure, *self._camera.request(tcode, offset, length, data, host_now())))
 
     def _send_broadcast(self, argument: bytes, data: bytes) -> None:
         tcode, length, offset, closure, _, generation = abi.REQUEST.unpack(argument)
@@ -218,8 +218,9 @@ class OpenFile:
         if generation != self._bus.generation:
             self._tell(abi.response(closure, Rcode.GENERATION, b""))
             return
+        now = host_now()
         for camera in self._bus.plugged_cameras():
-            camera.request(tcode, offset, length, data)
+            camera.request(tcode, offset, length, data, now)
         self._tell(abi.response(closure, Rcode.COMPLETE, b""))  # no node acknowledges a broadcast
 
     def _cycle_time(self) -> tuple[int, int]:

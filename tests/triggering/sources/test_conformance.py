@@ -24,6 +24,7 @@ TABLES: dict[str, dict[str, Any]] = {
     "action by PTP": {"source": "action", "scheduled": True, "lead_ms": 5.0},
     "triggerbox": {"source": "triggerbox"},
     "gpio": {"source": "gpio", "line": 18},
+    "iidc-broadcast": {"source": "iidc-broadcast"},
 }
 SOURCES = list(TABLES)
 #: Those whose pulses are commands at times that the host chooses; of them, those that grabbers give.

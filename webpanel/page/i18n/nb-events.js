@@ -212,6 +212,7 @@ export const events = {
   action_not_sent: ["aksjonskommandoer kan ikke sendes til {address} ({why})", "sjekk nettverksporten og trigger.broadcast"],
   action_other_time: ["PTP-klokken i {camera} går {seconds} s feil i forhold til de andre", "koble alle kameraene til én PTP-master og ett PTP-domene"],
   gpio_two_chips: ["GPIO-brikke {chip}: {chips} har dette merket", "sett en av dem som trigger.chip i riggfilen"],
+  broadcast_fails: ["kommandoer til FireWire-kameraene lar seg ikke gi: {why}"],
   gpio_chip_missing: ["GPIO-brikke {chip} finnes ikke", "sett en som gpiodetect viser, som trigger.chip i riggfilen"],
   gpio_not_permitted: ["GPIO-brikke {chip} kan ikke åpnes av denne brukeren", "sudo usermod -aG gpio $USER, og logg inn på nytt; uten gruppen gpio, se docs/hill-pc.md"],
   gpio_no_chip: ["GPIO-brikke {chip} kan ikke åpnes ({why})", "sett en som gpiodetect viser, som trigger.chip i riggfilen"],

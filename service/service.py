@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from contextlib import suppress
-from datetime import UTC, datetime
 from functools import partial
 from typing import Final, Literal
 
@@ -19,14 +18,11 @@ from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
-from rig.api.status import ArmOrder, AutomaticStatus, DoctorReport, Event, RigView, State, Status
+from rig.api.status import ArmOrder, DoctorReport, Event, RigView, State, Status
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
-from rig.clocks import NS_PER_S, HostNs, UtcAnchor
 from rig.errors import (
-    BadInputError,
     RehearsingError,
     StateForbidsError,
-    SvevError,
     UnknownCameraError,
     UnknownRecordingError,
 )
@@ -36,8 +32,7 @@ from rig.pulse import RigPulse
 from rig.transport.preview import PreviewImage, PreviewSlot
 from service.aids import aids_of, close_up_of, shown_as
 from service.aiming.balls import BallPlaces
-from service.automatic.barrier import BarrierWatch
-from service.automatic.watch import MotionWatch
+from service.automatic.marks import Marks
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.lights import Lights
@@ -60,9 +55,6 @@ _CLOSE_S: Final = 60.0
 #: After each request for a preview the recorder goes on copying images for this time.
 _LEASE_S: Final = 3.0
 _POLL_S: Final = 0.02
-#: A mark may be so old, and so far in the future, because clocks differ.
-_MARK_S: Final = 60.0
-_CLOCKS_S: Final = 1.0
 
 
 class Service(Archive):
@@ -103,16 +95,7 @@ class Service(Archive):
         self._lights, self._trains, self._balls = lights, trains, balls
         #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
         self._idle, self._examining = threading.Lock(), threading.Lock()
-        self._automatic, motion = supervisor.rig.automatic, supervisor.rig.automatic.motion
-        self._watch = None
-        if motion is not None:
-            self._watch = MotionWatch(
-                lambda: supervisor.rig, motion, slot, lambda: supervisor.status.state, self._moved
-            )
-        self._barrier, barrier = None, supervisor.rig.automatic.barrier
-        if barrier is not None:
-            told = partial(self.tell, "warning", "mark")
-            self._barrier = BarrierWatch(barrier, lambda: supervisor.status.state, self._crossed, told)
+        self._marks = Marks(supervisor, slot, self.status, self.start_recording)
         self._closing = threading.Event()
 
     def status(self) -> Status:
@@ -120,9 +103,7 @@ class Service(Archive):
         status, shown = self._supervisor.status, self._jumpers.shown
         if shown.version > status.next_jumper.version:  # somebody has just edited him
             status = status.model_copy(update={"next_jumper": shown})
-        motion = self._automatic.motion
-        if self._watch is not None and motion is not None:
-            automatic = AutomaticStatus(on=self._watch.on, camera=motion.camera)
+        if (automatic := self._marks.automatic) is not None:
             status = status.model_copy(update={"automatic": automatic})
         if (progress := self._rehearser.progress) is not None:
             said = rehearsing() if status.state is State.IDLE else status.statement
@@ -189,55 +170,17 @@ class Service(Archive):
 
     def mark(self, mark: Mark) -> Marked:
         """Begin a recording at the mark, with the seconds before; one that runs already only gets the mark."""
-        age_s = _age_s(mark)
-        source, age = mark.source or "?", f"{age_s:.1f}"
-        said = phrase("event_marked", "a jump is marked by {source}, {age} s ago", source=source, age=age)
-        note = partial(self._supervisor.note, events.Event.now(events.Level.INFO, "mark", said))
-        self._supervisor.commands.ask(at_once(note), _SOON_S)
-        if (running := self.status().recording) is not None:
-            return Marked(started=False, recording=running)
-        settings = self._automatic
-        order = RecordingOrder(preroll_s=settings.before_s + age_s, duration_s=max(0.0, settings.after_s - age_s))
-        try:
-            return Marked(started=True, recording=self.start_recording(order))
-        except StateForbidsError:  # another mark came at the same time
-            if (running := self.status().recording) is None:
-                raise
-            return Marked(started=False, recording=running)
+        return self._marks.mark(mark)
 
     def change_automatic(self, change: AutomaticChange) -> Status:
         """Let motion begin recordings, or not."""
-        if self._watch is None:
-            raise StateForbidsError("nothing is watched for motion: add [automatic.motion] to the rig file")
-        if self._watch.on != change.on:
-            self._watch.on = change.on
-            on = phrase("event_motion_on", "recordings begin by themselves when something moves")
-            off = phrase("event_motion_off", "recordings do not begin by themselves any more")
-            self.tell("info", "motion", on if change.on else off)
+        self._marks.change(change)
         self._supervisor.hub.wake()
         return self.status()
 
     def watch(self) -> None:
         """Begin to watch for motion and at the light barrier, if the rig file says so; `close` ends it."""
-        for watch in (self._watch, self._barrier):
-            if watch is not None:
-                watch.start()
-
-    def _moved(self, time_: HostNs) -> None:
-        """Begin a recording, because something moves in an image; the thread that watches goes on whatever happens."""
-        try:
-            self.mark(_mark("motion", time_))
-        except SvevError as error:
-            text = "something moved, but no recording could begin: {why}"
-            self.tell("warning", "motion", phrase("event_motion_unrecorded", text, why=str(error)))
-
-    def _crossed(self, time_: HostNs) -> None:
-        """Begin a recording, because the light barrier is interrupted; its thread goes on whatever happens."""
-        try:
-            self.mark(_mark("light barrier", time_))
-        except SvevError as error:
-            text = "the light barrier was interrupted, but no recording could begin: {why}"
-            self.tell("warning", "mark", phrase("event_barrier_unrecorded", text, why=str(error)))
+        self._marks.watch()
 
     def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:
         """Stop, and return when the log is closed."""
@@ -360,8 +303,7 @@ class Service(Archive):
     def doctor(self) -> DoctorReport:
         """Run the doctor, except for probes that would disturb the present state."""
         with self._examining:
-            beam = None if self._barrier is None else self._barrier.interrupted()
-            return self._examine(self.status(), beam)
+            return self._examine(self.status(), self._marks.beam_interrupted())
 
     def metrics(self) -> Iterable[Metric]:
         """The metric families of what has been measured so far."""
@@ -374,27 +316,4 @@ class Service(Archive):
     def close(self) -> None:
         """End the waiting of all threads that wait for a preview, and the watching."""
         self._closing.set()
-        for watch in (self._watch, self._barrier):
-            if watch is not None:
-                watch.close()
-
-
-def _mark(source: str, time_: HostNs) -> Mark:
-    return Mark(source=source, time=datetime.fromtimestamp(UtcAnchor.take().utc(time_) / NS_PER_S, UTC))
-
-
-def _age_s(mark: Mark) -> float:
-    """How long ago it happened, s.
-
-    Raises:
-        BadInputError: in the future, or too long ago.
-    """
-    if mark.time is None:
-        return 0.0
-    age_s = (datetime.now(UTC) - mark.time).total_seconds()
-    if not -_CLOCKS_S < age_s < _MARK_S:
-        raise BadInputError(
-            f"the mark is {age_s:.1f} s old: give a time of the last {_MARK_S:g} s, by a clock that agrees with this "
-            "computer's to a second, or none"
-        )
-    return max(0.0, age_s)
+        self._marks.close()

@@ -3,15 +3,12 @@
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
 
 from rig.api.cameras.balls import CameraBalls
 from rig.settings.camera import CameraSettings
 from rig.settings.light import camera_of
 from rig.settings.model import RigSettings
-
-#: In the folder of the recordings: where the cameras showed the balls when they were oriented last.
-ORIENTATION: Final = ".svev-orientation.json"
+from service.aiming.files import ball_files
 
 
 class BallPlaces:
@@ -24,9 +21,7 @@ class BallPlaces:
 
     def __init__(self, rig: Callable[[], RigSettings], folder: Path) -> None:
         self._rig, self._folder = rig, folder
-        analysis = rig().analysis
-        given = [] if analysis is None else [analysis.survey, analysis.calibration]
-        self._files = [file for file in (folder / ORIENTATION, rig().plan, *given) if file is not None]
+        self._files = ball_files(rig(), folder)
         self._lock = threading.Lock()
         self._known: dict[CameraSettings, CameraBalls] = {}
         self._read: list[tuple[int, int] | None] = []

@@ -20,7 +20,7 @@ from rig.host.disk import replace_file
 from rig.phrase import phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
-from service.aiming.balls import ORIENTATION
+from service.aiming.files import ORIENTATION
 from service.aiming.places import Balls, of_system
 
 

@@ -56,14 +56,13 @@ from rig.transport.trigger_messages import (
 )
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
+from service.processes.simulation import TRIGGER_PORT
 from triggering.timeline.pulse_train import RHYTHM, RHYTHM_LEAST
 from triggering.timeline.steady_rate import SteadyRate, rhythm
 
 RECORDER: Final = "recorder"
 ANALYSIS: Final = "analysis"
 TRIGGER: Final = "trigger"
-#: Variable in which the simulated hill names the port of its trigger box.
-TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
 #: Sources whose pulses a process of its own makes.
 _MADE_BY_A_PROCESS: Final = ActionTrigger | IidcBroadcastTrigger | TriggerBoxTrigger | GpioTrigger
 #: Reports that are dealt with here.

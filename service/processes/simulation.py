@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from capture.sim.camera import Scene
 from rig.clocks import HostNs
@@ -17,11 +17,12 @@ from rig.pulse import PulseNumber
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, IidcBroadcastTrigger, SoftwareTrigger, TriggerBoxTrigger
-from service.processes.rig_processes import TRIGGER_PORT
 
 if TYPE_CHECKING:
     from simrig.programs.simulated_hill import SimulatedHill
 
+#: Variable in which the simulated hill names the port of its trigger box.
+TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
 #: Writes the truth of a recording into a file; called with its path, and number and host time of each pulse.
 WriteTruth = Callable[[Path, Iterable[tuple[PulseNumber, HostNs]]], None]
 

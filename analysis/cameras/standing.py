@@ -5,7 +5,7 @@ for a projective map of the image that does not depend on the distance. Measurem
 one pose of the jump, and everything after them need not know of the shake.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -127,32 +127,42 @@ class _SteadyLook:
     def __init__(self, standing: Standing, look: SecondLook) -> None:
         self._standing, self._look = standing, look
 
-    def look_for_spots(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+    def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
         """See `SecondLook`."""
-        return self._steadied(
-            [pulse], camera, xy[None], lambda places: self._look.look_for_spots(pulse, camera, places[0], covariance)
-        )
+        found = self._look.look_for_spots(pulses, camera, self._in_frames(pulses, camera, xy), covariance)
+        owner = np.repeat(np.arange(len(pulses)), [len(spots) for spots in found])
+        steady = self._steadied([pulses[i] for i in owner.tolist()], camera, Spots.joined(found))
+        return [steady.only(owner == i) for i in range(len(pulses))]
 
     def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
         """See `SecondLook`."""
-        return self._steadied(pulses, camera, xy, lambda places: self._look.fit_discs(pulses, camera, places, shape))
+        found = self._look.fit_discs(pulses, camera, self._in_frames(pulses, camera, xy), shape)
+        return self._steadied(pulses, camera, found)
 
-    def _steadied(
-        self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, look: Callable[[Floats], Spots]
-    ) -> Spots:
-        """What `look` finds at places in the frames; all spots belong to one pulse, or each to its own."""
-        shakes, placed, places = self._standing.shake.get(camera, {}), self._standing.system[camera], xy.copy()
-        there = [i for i, pulse in enumerate(pulses) if pulse in shakes]
+    def _in_frames(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats) -> Floats:
+        """Where the frames of n pulses show places (n, 2)."""
+        there, shakes = self._shaken(pulses, camera)
+        places = xy.copy()
+        if there:
+            reversed_ = [shake.reversed() for shake in shakes]
+            places[there] = steadied_each(self._standing.system[camera], reversed_, xy[there])[0]
+        return places
+
+    def _steadied(self, pulses: Sequence[PulseNumber], camera: str, spots: Spots) -> Spots:
+        """Spots (n) in the frames of n pulses where the camera of the jump would show them."""
+        there, shakes = self._shaken(pulses, camera)
         if not there:
-            return look(xy)
-        places[there] = steadied_each(placed, [shakes[pulses[i]].reversed() for i in there], xy[there])[0]
-        spots = look(places)
+            return spots
         found, covariance = spots.xy.copy(), spots.covariance.copy()
-        own = there if len(pulses) > 1 else [0] * len(spots)
-        rows = there if len(pulses) > 1 else list(range(len(spots)))
-        found[rows], added = steadied_each(placed, [shakes[pulses[i]] for i in own], spots.xy[rows])
-        covariance[rows] += added
+        found[there], added = steadied_each(self._standing.system[camera], shakes, spots.xy[there])
+        covariance[there] += added
         return replace(spots, xy=found, covariance=covariance)
+
+    def _shaken(self, pulses: Sequence[PulseNumber], camera: str) -> tuple[list[int], list[FrameShake]]:
+        """Which of n pulses have a shaken frame of a camera, and how it is shaken."""
+        shakes = self._standing.shake.get(camera, {})
+        there = [i for i, pulse in enumerate(pulses) if pulse in shakes]
+        return there, [shakes[pulses[i]] for i in there]
 
 
 def steadied(placed: PlacedCamera, shake: FrameShake, xy: Floats) -> tuple[Floats, Floats]:

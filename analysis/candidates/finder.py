@@ -19,7 +19,7 @@ from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs,
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
 from analysis.candidates.pace import Pace
 from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
-from analysis.candidates.traces import find_expected_traces, find_traces
+from analysis.candidates.traces import find_expected_traces
 from analysis.candidates.wanted_traces import WantedTraces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
@@ -85,6 +85,8 @@ class Finder:
     def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:
         """The candidates of a pulse near where a jumper is expected: faster than all of them.
 
+        Where the expected skis are not seen, or are not known so nearly, traces are sought when they are asked for.
+
         Args:
             tag: of the pulse.
             image: (rows, columns) all cameras side by side.
@@ -96,18 +98,19 @@ class Finder:
         names: list[str] = []
         places: list[Expected | None] = []
         images: list[list[Region]] = []
-        traces: list[tuple[Trace, ...]] = []
+        traces: list[Sequence[Trace]] = []
         for camera, background, block in self._blocks(tag, image):
             place = expected.get(camera.name)
             box = None if place is None else _inside(place.box, background.shape)
             regions = [] if box is None else background.regions(block, _stamped(camera), box)
-            self._keep(tag.pulse, camera.name, regions)
             names.append(camera.name)
             places.append(place)
             images.append(regions)
             skis = () if place is None else place.skis
             known = tuple(trace for region in regions for trace in find_expected_traces(region, skis))
-            traces.append(known or tuple(trace for region in regions for trace in find_traces(region)))
+            wanted = None if known else WantedTraces.of(regions)
+            traces.append(known if wanted is None else wanted)
+            self._keep(tag.pulse, camera.name, regions, wanted)
         spots = find_expected(images, places)
         return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
 
@@ -125,25 +128,28 @@ class Finder:
                 )
             yield camera, background, block
 
-    def look_for_spots(
-        self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats, radius: float | None = None
-    ) -> Spots:
-        """Spots near a predicted place, on weaker evidence than at first sight; the nearest by chi-squared first.
+    def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
+        """Spots near predicted places, on weaker evidence than at first sight; the nearest by chi-squared first.
 
         Args:
-            pulse: one that was searched before, not longer ago than the memory reaches.
+            pulses: (n) of the images, searched before, not longer ago than the memory reaches.
             camera: its name.
-            xy: (2,) predicted place, px.
-            covariance: (2, 2) of the prediction, px^2.
-            radius: expected, px, where it is known.
+            xy: (n, 2) predicted places, px.
+            covariance: (n, 2, 2) of the predictions, px^2.
 
         Returns:
-            None at all, also where nothing was in front of the static scene.
+            Those of each place; none at all also where nothing was in front of the static scene.
         """
-        for region in self._regions.get((pulse, camera), ()):
-            if region.holds(xy):
-                return look_for_spots(region, xy, covariance, radius)
-        return Spots.none()
+        found = [Spots.none() for _ in pulses]
+        regions = {
+            i: region
+            for i, (pulse, place) in enumerate(zip(pulses, xy, strict=True))
+            if (region := next((own for own in self._regions.get((pulse, camera), ()) if own.holds(place)), None))
+        }
+        there = list(regions)
+        for i, spots in zip(there, look_for_spots([*regions.values()], xy[there], covariance[there]), strict=True):
+            found[i] = spots
+        return found
 
     def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
         """Discs of known size near some places, each in an image of its own or with others in one.

@@ -154,8 +154,8 @@ class Expected:
 class SecondLook(Protocol):
     """Looks again at places of images where markers are expected (`finder.Finder`)."""
 
-    def look_for_spots(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
-        """Spots near the predicted place xy (2,) with covariance (2, 2), px, on weaker evidence; the nearest first."""
+    def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
+        """Spots near each predicted place xy (n, 2) with covariance (n, 2, 2), px, on weaker evidence."""
         ...
 
     def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:

@@ -23,7 +23,7 @@ UNKNOWNS: Final = 10
 _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residuals that count half
 _COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
-_FARTHEST = 24.0  # px; no pixel farther away is fitted
+FARTHEST: Final = 24.0  #: px; no pixel farther away is fitted
 _GROUPS = 5.0, 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together
 _FEWEST = 20  # spots of a group; fewer go with the next larger ones: each call costs more than their pixels
 _BLUR = 0.62  # px; of lens and pixel, typical: only the reported radius depends on it
@@ -79,7 +79,7 @@ def fit_soft_discs(
     n = len(xy)
     theta, covariance = np.zeros((n, UNKNOWNS)), np.full((n, UNKNOWNS, UNKNOWNS), np.nan)
     misfit, rms, good = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, bool)
-    reach = np.minimum(radius + margin, _FARTHEST)
+    reach = np.minimum(radius + margin, FARTHEST)
     for mine in _groups(reach):
         fitted = _Batch(grey, sigma, xy[mine], radius[mine], reach[mine], tight).solved()
         theta[mine], covariance[mine], misfit[mine], rms[mine], good[mine] = fitted

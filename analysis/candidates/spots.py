@@ -14,7 +14,7 @@ from scipy.special import chdtri
 from analysis.candidates.background import Region
 from analysis.candidates.median import median
 from analysis.candidates.model import Expected, Spots
-from analysis.candidates.soft_discs import SoftDiscs, fit_soft_discs
+from analysis.candidates.soft_discs import FARTHEST, SoftDiscs, fit_soft_discs
 from analysis.scene.static_image import GreyImage
 from rig.arrays import Flags, Floats, Integers
 
@@ -34,6 +34,7 @@ _GAP = 26  # px between regions on the sheet
 _WORST_SIGMA = 0.5  # px
 _SECOND_ANSWER, _SECOND_STRENGTH = 3.0, 4.0  # where a spot is expected, a few places compete, not a whole image
 _USUAL_RADII = (1.0, 1.6, 2.6)  # px; to start from
+_LOOKS = 100  # places that are looked at again together: the time grows slowly with them, their memory as the square
 _START_SIGMA = 1.0  # px; of a blob's place before the fit
 _GATE = float(chdtri(2, 0.001))
 _NEAR = 2  # px from what is in front
@@ -73,26 +74,40 @@ def find_expected(images: Sequence[Sequence[Region]], expected: Sequence[Expecte
     return _fitted(places, _STRENGTH)
 
 
-def look_for_spots(region: Region, xy: Floats, covariance: Floats, radius: float | None = None) -> Spots:
-    """Spots near a predicted place, on weaker evidence; the nearest by chi-squared first.
+def look_for_spots(regions: Sequence[Region], xy: Floats, covariance: Floats) -> list[Spots]:
+    """Spots near predicted places, on weaker evidence; of each place the nearest by chi-squared first.
 
     Args:
-        region: part of the image that holds the place.
-        xy: (2,) predicted place, px of the image.
-        covariance: (2, 2) of the prediction, px^2.
-        radius: expected, px, where it is known.
+        regions: n parts of images, each holds its place; the same one again for another place in it.
+        xy: (n, 2) predicted places, px of the image.
+        covariance: (n, 2, 2) of the predictions, px^2.
     """
-    place = xy - (region.x, region.y)
-    places, radii = _blobs(region, _SECOND_ANSWER)
-    gate = covariance + _START_SIGMA**2 * np.eye(2)
-    near = _squares(places - place, gate) < _GATE
-    tried = [radius] if radius is not None else list(_USUAL_RADII)
-    places, radii = places[near][:MOST], radii[near][:MOST]
-    places = np.concatenate((places, np.repeat(place[None], len(tried), axis=0)))
-    spots = _fitted([[_Places(region, places, np.concatenate((radii, tried)))]], _SECOND_STRENGTH)[0]
-    squares = _squares(spots.xy - xy, covariance + spots.covariance)
-    order = np.argsort(squares)
-    return spots.only(order[squares[order] < _GATE])
+    found: list[Spots] = []
+    for first in range(0, len(regions), _LOOKS):
+        part = slice(first, first + _LOOKS)
+        found += _looked_for(regions[part], xy[part], covariance[part])
+    return found
+
+
+def _looked_for(regions: Sequence[Region], xy: Floats, covariance: Floats) -> list[Spots]:
+    """As `look_for_spots`, all fitted at once."""
+    answers = {key: _blobs(region, _SECOND_ANSWER) for key, region in {id(of): of for of in regions}.items()}
+    starts: list[list[_Places]] = []
+    for region, place, gate in zip(regions, xy, covariance + _START_SIGMA**2 * np.eye(2), strict=True):
+        places, radii = answers[id(region)]
+        places = places + np.array((region.x, region.y))
+        near = _squares(places - place, gate) < _GATE
+        places = np.concatenate((places[near][:MOST], np.repeat(place[None], len(_USUAL_RADII), axis=0)))
+        low, high = places.min(axis=0), places.max(axis=0)
+        part = region.around((low + high) / 2, float((high - low).max()) / 2 + FARTHEST + 1)
+        of_part = places - np.array((part.x, part.y)), np.concatenate((radii[near][:MOST], _USUAL_RADII))
+        starts.append([_Places(part, *of_part)])
+    found = []
+    for spots, place, spread in zip(_fitted(starts, _SECOND_STRENGTH), xy, covariance, strict=True):
+        squares = _squares(spots.xy - place, spread + spots.covariance)
+        order = np.argsort(squares)
+        found.append(spots.only(order[squares[order] < _GATE]))
+    return found
 
 
 def _squares(off: Floats, covariance: Floats) -> Floats:

@@ -10,6 +10,7 @@ from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
 from analysis.identification.markers.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.markers.refinement import refined
 from analysis.identification.markers.synchrony import lateness
+from analysis.identification.over_time.assignment import well_known
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
 from analysis.identification.over_time.window import Window
 from analysis.identification.skis.ski_traces import StraightTrace, straightened
@@ -153,7 +154,7 @@ class Sighting:
             return ()
         first, last = (self.pulses()[0], self.pulses()[-1]) if briefly else (0, np.inf)
         steps = [first <= c.pulse <= last for c in window.candidates]
-        _look_for_traces(views, window, markers.places(BINDINGS), np.array(steps))
+        look_for_traces(views, window, markers.places(BINDINGS), np.array(steps))
         _tell_skis_apart(views, window, flight)
         traces = straight_traces(views, window)
         skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
@@ -183,15 +184,19 @@ def _is_jumper(named: Flags) -> bool:
     return bool(np.count_nonzero(named.sum(axis=1) >= _LEAST_NAMES) >= _LEAST_PULSES)
 
 
-def _look_for_traces(views: Views, window: Window, bindings: Places, steps: Flags) -> None:
-    """Find the traces of what may be skis in some pulses (t,): nothing else is as near to the bindings."""
+def look_for_traces(views: Views, window: Window, bindings: Places, steps: Flags) -> None:
+    """Find the traces of what may be skis in some pulses (t,): nothing else is as near to the bindings.
+
+    Where a binding could be anywhere, none is sought: no trace would be named as its ski.
+    """
+    wanted = steps[:, None] & well_known(bindings.covariance)
     spread = np.sqrt(np.linalg.eigvalsh(bindings.covariance)[..., -1])
     reach_m = np.minimum(LONGEST_M + _SIGMAS * spread, REACH_M)
     for k in range(len(views)):
         sight = views.see(k, bindings.xyz.reshape(-1, 3))
         scale = np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2))
         places = sight.xy.reshape(-1, 2, 2) - window.shift[:, k, None]
-        places[~steps] = np.nan
+        places[~wanted] = np.nan
         window.look_for_traces(k, places, reach_m * scale.reshape(-1, 2))
 
 

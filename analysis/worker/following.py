@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from analysis.candidates.model import Expected, PulseCandidates
-from analysis.identification.identify import named_pulse, straight_traces
+from analysis.identification.identify import look_for_traces, named_pulse, straight_traces
 from analysis.identification.markers.markers import BINDINGS, Markers
 from analysis.identification.over_time.assignment import MOST_VAGUE_M, assign, well_known
 from analysis.identification.over_time.flights import Flight
@@ -141,11 +141,12 @@ class Follower:
         points = [_known(point) for point in state.points.values()]
         places = Prediction(np.array([[p.xyz for p in points]]), np.array([[p.covariance for p in points]]))
         assigned = assign(views, window, places, flight.axes)
+        bindings = Markers(assigned, places).places(BINDINGS)
+        look_for_traces(views, window, bindings, np.ones(1, bool))
         for k in range(len(views)):
             if traces := window.traces(0, k):
                 window.put_traces(0, k, self._skis.told_apart(k, tuple(traces)))
         lines = straight_traces(views, window)
-        bindings = Markers(assigned, places).places(BINDINGS)
         skis = assign_skis(views, lines, window.delivered, flight, bindings, _angles(state, flight))
         measured = named_pulse(views, window.candidates[0], assigned.rays[0], skis[0], lines[0])
         found = self._filter.update(measured)

@@ -184,10 +184,13 @@ def _looked(views: Views, window: Window, markers: Markers, look: SecondLook) ->
         sight = views.see(k, markers.predicted.xyz.reshape(-1, 3))
         spread = sight.by_point @ markers.predicted.covariance.reshape(-1, 3, 3) @ sight.by_point.swapaxes(-1, -2)
         wanted = known & window.delivered[:, k, None] & (markers.assigned.rays[..., k] < 0)
-        for t, i in np.argwhere(wanted & sight.inside.reshape(-1, n)).tolist():
-            at = t * n + i
-            place = sight.xy[at] - window.shift[t, k]
-            spots = look.look_for_spots(window.candidates[t].pulse, camera, place, spread[at] + sight.noise[at])
+        steps, which = np.nonzero(wanted & sight.inside.reshape(-1, n))
+        at = steps * n + which
+        pulses = [window.candidates[t].pulse for t in steps.tolist()]
+        places = sight.xy[at] - window.shift[steps, k]
+        for t, spots in zip(
+            steps.tolist(), look.look_for_spots(pulses, camera, places, spread[at] + sight.noise[at]), strict=True
+        ):
             found.setdefault((t, k), []).append(spots)
     return found
 

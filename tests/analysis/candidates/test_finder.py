@@ -56,12 +56,16 @@ def test_a_predicted_place_finds_the_marker_again(hill: Hill) -> None:
     hill.find(pulse)
     state = hill.truth([pulse])[0]
     for camera, places in state["images"].items():
-        for place in places.values():
-            predicted = np.array(place) + np.array((0.8, -0.6))
-            spots = hill.finder.look_for_spots(PulseNumber(pulse), camera, predicted, np.eye(2))
+        truth, off = np.array([*places.values()]), np.array((0.8, -0.6))
+        predicted, sure = truth + off, np.tile(np.eye(2), (len(truth), 1, 1))
+        found = hill.finder.look_for_spots([PulseNumber(pulse)] * len(truth), camera, predicted, sure)
+        for place, at, spots in zip(truth, predicted, found, strict=True):
             assert np.hypot(*(spots.xy - place).T).min() < 0.15
+            alone = hill.finder.look_for_spots([PulseNumber(pulse)], camera, at[None], sure[:1])[0]
+            assert spots.xy == pytest.approx(alone.xy, abs=1e-3)
+            assert spots.covariance == pytest.approx(alone.covariance, rel=1e-2)
     place = np.array((600.0, 20.0))
-    assert len(hill.finder.look_for_spots(PulseNumber(pulse), "K1", place, np.eye(2))) == 0
+    assert len(hill.finder.look_for_spots([PulseNumber(pulse)], "K1", place[None], np.eye(2)[None])[0]) == 0
     shape = DiscShape(np.array((2.5,)), 0.2, np.zeros((1, 2)), 150.0, 40.0)
     assert np.isnan(hill.finder.fit_discs([PulseNumber(pulse)], "K1", place[None], shape).xy).all()
 

@@ -112,8 +112,11 @@ def test_a_marker_that_is_not_worn_is_not_found(missing: str) -> None:
 class _SecondLook:
     """Finds every marker that lies within 4 sigma of the expected place, and no disc in any image."""
 
-    def look_for_spots(self, pulse: PulseNumber, camera: str, xy: Floats, covariance: Floats) -> Spots:
+    def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
         """See `SecondLook`."""
+        return [self._near(*of, camera) for of in zip(pulses, xy, covariance, strict=True)]
+
+    def _near(self, pulse: PulseNumber, xy: Floats, covariance: Floats, camera: str) -> Spots:
         placed = true_cameras()[camera]
         places = [
             placed.project(marker)

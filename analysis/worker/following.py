@@ -75,6 +75,7 @@ class Follower:
         self._rate_hz = rate_hz
         self._appearance: Appearance | None = None
         self._next: tuple[UtcNs, SmoothedState | None] = UtcNs(0), None
+        self._latest: SmoothedState | None = None
         self._pulse, self._time = PulseNumber(0), UtcNs(0)
         self._looks, self._look_at = 0, 0.0
         self.first = self.last = PulseNumber(0)
@@ -158,7 +159,7 @@ class Follower:
             self._skis.learn(k, {i: [traces[part] for part in parts] for i, parts in own.items()})
         if any(part is not None and part.status is not Status.PREDICTED for part in found.points.values()):
             self.last = candidates.pulse
-        self._pulse, self._time = candidates.pulse, candidates.time
+        self._pulse, self._time, self._latest = candidates.pulse, candidates.time, found
         return Followed(candidates.pulse, candidates.time, found)
 
     def hidden(self) -> int:
@@ -182,7 +183,10 @@ class Follower:
 
     def _places(self) -> tuple[Floats, Flags]:
         """Places (4, 3) of the markers after the latest pulse, and which are known (4,)."""
-        points = [_known(point) for point in _known(self._filter.predicted(self._time)).points.values()]
+        state = self._latest
+        if state is None or None in state.points.values():
+            state = _known(self._filter.predicted(self._time))
+        points = [_known(point) for point in state.points.values()]
         known = well_known(np.array([point.covariance for point in points]))
         return np.array([point.xyz for point in points]), known
 

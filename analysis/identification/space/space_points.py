@@ -121,13 +121,17 @@ def rays_of(
     rays: list[list[Rays]] = [[] for _ in pulses]
     if not rays:
         return rays
+    counts: list[list[int]] = []
+    found: list[Spots] = []
+    places: list[Floats] = []
     for k, name in enumerate(views.names):
         images = [candidates.images.get(name) for candidates in pulses]
         of_pulse = [Spots.none() if image is None else image.spots for image in images]
-        count = [len(spots) for spots in of_pulse]
-        spots = Spots.joined(of_pulse)
-        xy = spots.xy if shift is None else spots.xy + np.repeat(shift[:, k], count, axis=0)
-        reduced = views.placed[k].reduced(xy)
+        counts.append([len(spots) for spots in of_pulse])
+        found.append(Spots.joined(of_pulse))
+        places.append(found[k].xy if shift is None else found[k].xy + np.repeat(shift[:, k], counts[k], axis=0))
+    for k, reduced in enumerate(views.reduced(places)):
+        spots, xy = found[k], places[k]
         usable = np.asarray(np.isfinite(reduced).all(axis=1))
         variance = np.trace(spots.covariance, axis1=1, axis2=2) / 2 + views.noise[k]
         parts = (
@@ -137,7 +141,7 @@ def rays_of(
             np.where(usable, variance, np.inf),
             np.zeros(len(spots)) if appearance is None else appearance.odd(spots, float(views.scale[k])),
         )
-        ends = np.cumsum(count)[:-1]
+        ends = np.cumsum(counts[k])[:-1]
         for own, split in zip(rays, zip(*(np.split(part, ends) for part in parts), strict=True), strict=True):
             own.append(Rays(*split))
     return rays

@@ -12,8 +12,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
-from photogrammetry.geometry.camera_model import INTERIOR, Lens, camera_coordinates, image_point, linearise
+from photogrammetry.geometry.camera_model import INTERIOR, Lens, camera_coordinates, image_point, linearise, undistort
 from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.network.file import pixel_to_metric
 from rig.arrays import Flags, Floats, Integers
 
 #: Standard deviation of the point of a marker that a camera sees as its centre, m: a fraction of a marker's radius.
@@ -122,6 +123,14 @@ class Views:
         by_point = (equations.by_point * _MIRROR[:, None]).reshape(c, n, 2, 3)
         xy = (metric * _MIRROR + (size - 1) / 2).reshape(c, n, 2)
         return [Sight(xy[i], by_point[i], pose[i], _inside(self.placed[k], xy[i])) for i, k in enumerate(cameras)]
+
+    def reduced(self, xy: Sequence[Floats]) -> list[Floats]:
+        """`PlacedCamera.reduced` for image points (n, 2) of every camera, in little more time than for one."""
+        counts = [len(of_camera) for of_camera in xy]
+        each = np.repeat(np.arange(len(xy)), counts)
+        lens = Lens(self._lens.interior[each], self._lens.balance[each], self._lens.measured[each])
+        ideal = undistort(lens, pixel_to_metric(np.concatenate(xy), self._size[each]))
+        return np.split(np.asarray(ideal, float), np.cumsum(counts)[:-1])
 
     def inside(self, k: int, xyz: Floats) -> Flags:
         """Whether object points (n, 3) lie in the image of camera k: what `see` says, faster."""

@@ -22,8 +22,10 @@ _SPARE_EVENTS_SESSION = 8
 _failed = pytest.StashKey[bool]()
 
 # The same examples at every run: a change is judged by what it changes. For new ones: --hypothesis-profile=explore
-hypothesis.settings.register_profile("repeatable", derandomize=True)
-hypothesis.settings.register_profile("explore", derandomize=False)
+# No example has a deadline, and none is too slow: on a crowded machine that says nothing about the code.
+_UNTIMED = hypothesis.settings(deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
+hypothesis.settings.register_profile("repeatable", _UNTIMED, derandomize=True)
+hypothesis.settings.register_profile("explore", _UNTIMED, derandomize=False)
 hypothesis.settings.load_profile("repeatable")
 
 

@@ -16,7 +16,7 @@ def _random(rng: np.random.Generator) -> Similarity:
     return Similarity(float(10 ** rng.uniform(-3, 3)), rotation_from_vector(rng.normal(0, 2, 3)), rng.normal(0, 1e3, 3))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.integers(3, 12), st.booleans())
 def test_exact(seed: int, n: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)

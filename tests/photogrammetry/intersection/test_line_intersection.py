@@ -42,7 +42,7 @@ def _nearby(lines: SpaceLines, skis: list[Ski]) -> Floats:
     return np.hstack((lines.parameters[:, :2] - _parameters(skis)[:, :2], (lines.at(x) - truth)[:, 1:]))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds)
 def test_exact_without_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -61,7 +61,7 @@ def test_exact_without_noise(seed: int) -> None:
     assert np.abs(difference[~start.coincident]).max() < 1e-7
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds)
 def test_two_steps_and_one_step_agree(seed: int) -> None:
     """Step A neglects second-order terms of the noise only: both agree within a few hundredths of a sigma."""

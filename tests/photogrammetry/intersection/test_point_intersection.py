@@ -35,7 +35,7 @@ def _full_least_squares(cameras: list[IdealCamera], xy: Floats, start: Floats, s
     return point
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds)
 def test_equals_full_least_squares_to_a_millionth_of_a_sigma(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -70,7 +70,7 @@ def test_covariance_is_that_of_least_squares() -> None:
         np.testing.assert_allclose(result.covariance[i], np.linalg.inv(fit.jac.T @ fit.jac), rtol=1e-5)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds, st.floats(0.0, 1e7))
 def test_exact_without_noise_also_far_from_the_origin(seed: int, away: float) -> None:
     rng = np.random.default_rng(seed)

@@ -44,7 +44,7 @@ def _lines(xy: Floats) -> tuple[ImageLines, ImageLines]:
     return fit_image_lines(xy[0], SIGMA_PX), fit_image_lines(xy[1], SIGMA_PX)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.permutations(range(3)))
 def test_transfer_is_exact(seed: int, order: list[int]) -> None:
     rng = np.random.default_rng(seed)

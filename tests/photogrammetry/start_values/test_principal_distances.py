@@ -32,7 +32,7 @@ def _by_planes(homographies: list[Floats]) -> float:
     return principal_distance(pair for matrix in homographies for pair in plane_directions(matrix))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds)
 def test_square_by_its_sides(seed: int) -> None:
     """Fig. B2: two pairs of parallel sides of a square give c; the paper's formula needs a minus sign."""
@@ -47,7 +47,7 @@ def test_square_by_its_sides(seed: int) -> None:
     assert (u[0] * v[0] + u[1] * v[1]) / (u[2] * v[2]) < 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds)
 def test_homographies(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -60,7 +60,7 @@ def test_homographies(seed: int) -> None:
     assert _by_planes(noisy) == pytest.approx(first.c, rel=0.1)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds, st.integers(4, 20))
 def test_homography_maps_the_points(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)

@@ -12,7 +12,7 @@ from tests.photogrammetry.scenes import SIGMA_PX, frame_points, lab_cameras, obs
 seeds = st.integers(0, 2**32 - 1)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds, st.integers(6, 40), st.floats(-1e4, 1e4))
 def test_exact_with_principal_point_aspect_and_shear(seed: int, n: int, away: float) -> None:
     rng = np.random.default_rng(seed)

@@ -39,7 +39,7 @@ def _error(solution: RelativeOrientation, truth: tuple[Floats, Floats]) -> float
     return float(np.abs(solution.rotation - truth[0]).max() + np.abs(solution.base - truth[1]).max())
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(seeds, st.integers(5, 40), st.booleans())
 def test_exact(seed: int, n: int, planar: bool) -> None:
     cameras, points = _pair(np.random.default_rng(seed), n, planar)
@@ -54,7 +54,7 @@ def test_exact(seed: int, n: int, planar: bool) -> None:
         assert not result.ambiguous
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(seeds, st.integers(8, 60), st.booleans())
 def test_with_noise_nothing_lies_below(seed: int, n: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -28,7 +28,7 @@ def _scene(rng: np.random.Generator, n: int, planar: bool) -> tuple[IdealCamera,
     ), points
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seeds, st.integers(4, 30), st.booleans())
 def test_exact(seed: int, n: int, planar: bool) -> None:
     camera, points = _scene(np.random.default_rng(seed), n, planar)
@@ -39,7 +39,7 @@ def test_exact(seed: int, n: int, planar: bool) -> None:
     assert n < 6 or not result.ambiguous
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seeds, st.booleans())
 def test_three_points_give_all_poses_and_say_that_they_do(seed: int, planar: bool) -> None:
     camera, points = _scene(np.random.default_rng(seed), 3, planar)
@@ -67,7 +67,7 @@ def test_three_points_next_to_a_double_solution(seed: int, planar: bool) -> None
     assert result.ambiguous
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seeds, st.integers(6, 30), st.booleans())
 def test_with_noise_it_is_the_least_squares_pose(seed: int, n: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -374,7 +374,7 @@ STEPS: st.SearchStrategy[Step] = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=st.lists(STEPS, min_size=3, max_size=25))
 def test_every_pulse_comes_once_and_in_order(
     tmp_path: Path, publisher: Publisher, tmp_path_factory: pytest.TempPathFactory, steps: list[Step]

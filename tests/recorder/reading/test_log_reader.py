@@ -76,7 +76,7 @@ def test_a_whole_log_is_read_whole(sample: Sample) -> None:
     assert _read_pulses(sample.spoilt(sample.data), sample.written) == [1, 2, 3, 4, 5, 6]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_cut_off_anywhere_the_pulses_before_are_read(sample: Sample, data: st.DataObject) -> None:
     edges = [edge for chunk in sample.chunks for edge in (chunk.offset, chunk.offset + chunk.length)]
@@ -100,7 +100,7 @@ def _end_of(chunk: Chunk) -> int:
     return chunk.offset + chunk.length
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(data=st.data())
 def test_a_changed_byte_is_found_and_costs_one_pulse_at_most(sample: Sample, data: st.DataObject) -> None:
     chunk = sample.chunks[data.draw(st.integers(0, len(sample.chunks) - 1))]
@@ -117,7 +117,7 @@ def test_a_changed_byte_is_found_and_costs_one_pulse_at_most(sample: Sample, dat
     info(path)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_a_changed_byte_behind_the_data_is_found(sample: Sample, data: st.DataObject) -> None:
     offset = data.draw(st.integers(sample.data_end, len(sample.data) - 1))
@@ -127,7 +127,7 @@ def test_a_changed_byte_behind_the_data_is_found(sample: Sample, data: st.DataOb
     assert _read_pulses(path, sample.written) == [1, 2, 3, 4, 5, 6]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_no_garbage_makes_reading_fail(sample: Sample, data: st.DataObject) -> None:
     offset = data.draw(st.integers(0, len(sample.data) - 1))

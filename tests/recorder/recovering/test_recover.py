@@ -328,7 +328,7 @@ def _fresh(factory: pytest.TempPathFactory, data: bytes) -> Iterator[Path]:
     shutil.rmtree(folder)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0.05, 1))
 def test_cut_anywhere(
     whole: tuple[Path, list[Written]], tmp_path_factory: pytest.TempPathFactory, where: float
@@ -347,7 +347,7 @@ def test_cut_anywhere(
         assert sum(1 for _, image in triplets(report.path) if image.any()) == pulses
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(flips=st.lists(st.tuples(st.floats(0, 0.9999), st.integers(1, 255)), min_size=1, max_size=4))
 @example(flips=[(0.0, 1)])
 def test_bytes_flipped_anywhere(
@@ -367,7 +367,7 @@ def test_bytes_flipped_anywhere(
         assert report.ledger.pulses == 7 or not report.lossless
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(begin=st.floats(0, 0.9), length=st.floats(0.001, 0.3), fill=st.binary(min_size=1, max_size=64))
 def test_holes_anywhere(
     whole: tuple[Path, list[Written]],

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.clocks import HostNs
@@ -44,7 +44,6 @@ def test_records_come_in_order_and_a_full_queue_is_counted(ring: CameraRing) -> 
 
 
 @given(st.lists(st.booleans(), max_size=200))
-@settings(deadline=None)
 def test_any_interleaving_keeps_order_and_loses_nothing(puts: list[bool]) -> None:
     ring = CameraRing.create("K1", 10, 2, queue=5)
     sent: list[int] = []

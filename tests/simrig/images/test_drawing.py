@@ -3,7 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -21,7 +21,6 @@ def moments(image: NDArray[np.floating[Any]]) -> tuple[float, float, float]:
     return total, float((image * columns).sum() / total), float((image * rows).sum() / total)
 
 
-@settings(deadline=None)
 @given(PLACES, st.floats(0.8, 6), st.floats(0.4, 1.5))
 def test_a_blob_lies_where_it_was_put_and_has_its_area(place: tuple[float, float], radius: float, blur: float) -> None:
     image = np.zeros((49, 49), np.float32)
@@ -31,7 +30,6 @@ def test_a_blob_lies_where_it_was_put_and_has_its_area(place: tuple[float, float
     assert (x, y) == pytest.approx(place, abs=4e-3)
 
 
-@settings(deadline=None)
 @given(PLACES)
 def test_a_blob_is_measured_where_it_was_put(place: tuple[float, float]) -> None:
     image = np.full((49, 49), 40.0, np.float32)
@@ -46,7 +44,6 @@ def test_a_blob_outside_of_the_image_leaves_it_alone(place: tuple[float, float])
     assert image.sum() == 0
 
 
-@settings(deadline=None)
 @given(PLACES, st.floats(0, 2 * math.pi), st.floats(1.2, 3))
 def test_the_middle_of_a_stroke_lies_on_its_axis(place: tuple[float, float], angle: float, radius: float) -> None:
     image, along = np.zeros((49, 49), np.float32), np.array((math.cos(angle), math.sin(angle)))
@@ -57,7 +54,6 @@ def test_the_middle_of_a_stroke_lies_on_its_axis(place: tuple[float, float], ang
     assert area == pytest.approx(math.pi * radius**2 + 40 * radius, rel=0.1)
 
 
-@settings(deadline=None)
 @given(PLACES, st.floats(1.5, 8))
 def test_a_stroke_of_no_length_is_a_disc(place: tuple[float, float], radius: float) -> None:
     image = np.zeros((49, 49), np.float32)

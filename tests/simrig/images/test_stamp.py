@@ -2,14 +2,13 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.pulse import HillPulse
 from simrig.images import stamp
 
 
-@settings(deadline=None)
 @given(st.integers(0, 255), st.integers(0, 2**64 - 1))
 def test_what_is_written_is_read(camera: int, pulse: int) -> None:
     image = np.full((3, 40), 77, np.uint8)
@@ -19,7 +18,6 @@ def test_what_is_written_is_read(camera: int, pulse: int) -> None:
     assert (image[-1, :-16] == 77).all()
 
 
-@settings(deadline=None)
 @given(st.integers(0, 15), st.integers(1, 255))
 def test_one_changed_pixel_breaks_the_stamp(place: int, change: int) -> None:
     image = np.zeros((2, 16), np.uint8)

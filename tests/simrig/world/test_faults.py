@@ -2,7 +2,7 @@ import threading
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -15,7 +15,6 @@ def missed(at_pulse: int | None = None, count: int = 1) -> Fault:
     return Fault(kind=FaultKind.MISSED_PULSE, camera="K1", at_pulse=at_pulse, count=count)
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 5)), max_size=8))
 def test_every_fault_hits_its_pulses_and_no_other(spans: list[tuple[int, int]]) -> None:
     plan = FaultPlan(missed(first, count) for first, count in spans)

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from simrig.world.flight import GRAVITY, STEP_S, Flight, Forces, fly
@@ -27,20 +27,17 @@ def energies(path: Flight) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return energy
 
 
-@settings(deadline=None)
 @given(SPEEDS, st.floats(0, 1))
 def test_without_air_the_path_is_a_parabola(speed: tuple[float, float, float], time: float) -> None:
     expected = np.array(speed) * time - np.array((0, 0, GRAVITY / 2)) * time**2
     assert flight(speed, 0, 0).position(time) == pytest.approx(expected, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(SPEEDS, AREAS)
 def test_drag_takes_energy_at_every_step(speed: tuple[float, float, float], drag: float) -> None:
     assert (np.diff(energies(flight(speed, drag, 0))) < 0).all()
 
 
-@settings(deadline=None)
 @given(SPEEDS, AREAS)
 def test_lift_does_no_work(speed: tuple[float, float, float], lift: float) -> None:
     energy = energies(flight(speed, 0, lift))
@@ -53,7 +50,6 @@ def test_drag_takes_what_its_formula_says() -> None:
     assert -np.diff(energies(path))[0] / STEP_S == pytest.approx(power, rel=0.01)
 
 
-@settings(deadline=None)
 @given(AREAS)
 def test_lift_carries(lift: float) -> None:
     assert flight((26.0, 0.0, -2.5), 0.4, lift).position(1.0)[2] > flight((26.0, 0.0, -2.5), 0.4, 0).position(1.0)[2]

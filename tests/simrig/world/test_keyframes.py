@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from simrig.world.keyframes import Curve, Keyframe
@@ -9,7 +9,6 @@ KEYFRAMES = st.lists(
 ).map(lambda frames: sorted((time / 10, value) for time, value in frames))
 
 
-@settings(deadline=None)
 @given(KEYFRAMES)
 def test_the_curve_meets_its_keyframes(frames: list[Keyframe]) -> None:
     curve = Curve.through(frames)
@@ -17,7 +16,6 @@ def test_the_curve_meets_its_keyframes(frames: list[Keyframe]) -> None:
         assert curve(time) == pytest.approx(value, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(KEYFRAMES, st.floats(-10, 10))
 def test_the_curve_never_overshoots(frames: list[Keyframe], time: float) -> None:
     after = next((i for i, (t, _) in enumerate(frames) if t >= time), len(frames) - 1)
@@ -27,7 +25,6 @@ def test_the_curve_never_overshoots(frames: list[Keyframe], time: float) -> None
     assert min(around) - 1e-9 <= Curve.through(frames)(time) <= max(around) + 1e-9
 
 
-@settings(deadline=None)
 @given(KEYFRAMES)
 def test_the_slope_has_no_jumps(frames: list[Keyframe]) -> None:
     curve, h = Curve.through(frames), 1e-6

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rig.images.viewing import look_at
@@ -20,7 +20,6 @@ def test_a_camera_beside_the_flight_sees_it_from_left_to_right() -> None:
     assert float(camera.distance((12.0, 5.0, 3.0))) == pytest.approx(45.0)
 
 
-@settings(deadline=None)
 @given(POINTS, POINTS, st.floats(-180, 180))
 def test_look_at_is_a_rotation_that_puts_its_target_into_the_middle(
     place: tuple[float, float, float], target: tuple[float, float, float], roll: float

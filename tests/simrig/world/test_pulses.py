@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.clocks import HostNs
@@ -26,7 +26,6 @@ def test_pulses_stand_at_whole_multiples_of_the_period() -> None:
     assert [train.time(HillPulse(n)) for n in (0, 1, 2, 3)] == [1_000, 33_334_333, 66_667_667, 100_001_000]
 
 
-@settings(deadline=None)
 @given(EPOCHS, RATES, PAUSES, st.integers(0, 10**6).map(HillPulse), st.floats(-0.24, 0.24))
 def test_a_pulse_is_told_by_its_time(
     epoch: HostNs, rate: float, pauses: tuple[tuple[int, int], ...], pulse: HillPulse, off: float
@@ -41,7 +40,6 @@ def test_the_error_does_not_grow() -> None:
     assert PulseTrain(HostNs(0), 30.0).time(HillPulse(30 * 86_400)) == 86_400 * 10**9
 
 
-@settings(deadline=None)
 @given(EPOCHS, RATES, PAUSES, st.integers(-(10**9), 10**12))
 def test_next_index_is_the_first_later_pulse_that_fires(
     epoch: HostNs, rate: float, pauses: tuple[tuple[int, int], ...], since_epoch: int
@@ -57,7 +55,6 @@ def test_next_index_is_the_first_later_pulse_that_fires(
     assert earlier < 0 or train.time(HillPulse(earlier)) <= after
 
 
-@settings(deadline=None)
 @given(EPOCHS, RATES, st.integers(0, 10**5))
 def test_the_pulse_itself_is_not_later_than_itself(epoch: HostNs, rate: float, n: int) -> None:
     train = PulseTrain(epoch, rate)

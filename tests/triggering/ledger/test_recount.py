@@ -126,7 +126,7 @@ _NUMBERS = st.one_of(st.integers(0, 100), st.integers(-(10**20), 10**20), st.jus
 _TIMES = st.one_of(st.integers(0, 10**10), st.integers(-(10**20) + 1, 10**20 - 1), st.just(5))
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @example([(pulse, pulse * 2 * NS_PER_S, OK, pulse, pulse, 5, 5) for pulse in (1, 2, 3)])
 @example([(pulse, pulse * NS_PER_S, OK, 10**400 * pulse, 1, 5 * pulse, 5) for pulse in (1, 2, 3)])
 @given(

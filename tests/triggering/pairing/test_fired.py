@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.clocks import HostNs
@@ -16,7 +16,7 @@ from tests.triggering.oracle import ABSENT, MISSED, OK, check_no_pulse_is_mixed
 from tests.triggering.simulation import MS, Hill, Run, Scenario
 from triggering.pairing.alarms import alarms
 
-SETTINGS = settings(deadline=None, max_examples=12, suppress_health_check=[HealthCheck.too_slow])
+SETTINGS = settings(max_examples=12)
 EVERY = 100 * MS
 
 

@@ -1,12 +1,12 @@
 """Property tests: the rules of `oracle` hold under every mixture of faults."""
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.triggering.oracle import check
 from tests.triggering.simulation import MS, Hill, Outage, Run, Scenario
 
-SETTINGS = settings(deadline=None, max_examples=120, suppress_health_check=[HealthCheck.too_slow])
+SETTINGS = settings(max_examples=120)
 
 drifts = st.tuples(*[st.floats(-100, 100)] * 3)
 seldom_or_often = st.sampled_from([0.0, 0.01, 0.1])

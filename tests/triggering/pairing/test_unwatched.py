@@ -1,7 +1,7 @@
 """While no camera is there, the rhythm of the train says which pulses fired; they are tagged absent in all cameras."""
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.clocks import NS_PER_S, HostNs
@@ -128,7 +128,7 @@ def test_a_frame_that_was_on_its_way_when_its_camera_was_given_up_is_used() -> N
     assert fates(feed)[21:] == [{ABSENT}] * 3
 
 
-@settings(deadline=None, max_examples=80, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80)
 @given(
     st.integers(0, 2**32),
     st.sampled_from([10.0, 29.97, 100.0]),

@@ -67,7 +67,7 @@ def test_a_rate_that_the_timer_cannot_make_is_refused(hz: float) -> None:
     assert trigger_source(TriggerBoxTrigger(source="triggerbox", rate_hz=3.82)).spread_ns == 0
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32), st.floats(-4000, 4000), st.sampled_from([0.3, 2.0, 16.0]), st.floats(0.0, 1.0))
 def test_true_times_lie_within_the_uncertainty_of_the_line(
     seed: int, ppm: float, longest_ms: float, share: float

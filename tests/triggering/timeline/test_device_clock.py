@@ -151,7 +151,7 @@ def test_state_does_not_grow() -> None:
     assert len(clock._best) <= 16
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32),
     ppm=st.floats(-100, 100),

@@ -19,8 +19,9 @@ from triggering.timeline.pulse_train import PulseTrain
 _SILENT_NS: Final = NS_PER_S
 #: Decided pulses that wait for the source's word; older ones are forgotten.
 _WAITING: Final = 1024
-#: Weight of a pulse in the offset.
-_GAIN: Final = 0.05
+#: The offset is the median of so many differences, the last ones: the first may be far off, since a camera's clock is
+#: hardly known then, or a busy computer read one late; such a one must not shift the pulses that no camera saw.
+_DIFFERENCES: Final = 21
 #: Half of the distance at which two pulses are the same is left to the source's clock, the rest to the cameras'.
 _SHARE: Final = 0.5
 #: Between pulses further apart than so many periods there is room for another.
@@ -54,7 +55,8 @@ class FiredPulses:
         self._first: HostNs | None = None  # of the decided pulses
         self._intervals: deque[int] = deque(maxlen=2)
         self._before: HostNs | None = None  # the last decided pulse when the source began to tell
-        self._offset_ns: float | None = None
+        self._differences: deque[int] = deque(maxlen=_DIFFERENCES)
+        self._offset_ns = 0
         self.told = self.unseen = self.untagged = self.unfired = 0
         self.uncertainty_ns = 0
         self.unseen_at: HostNs | None = None
@@ -190,13 +192,11 @@ class FiredPulses:
         return min(self._intervals, default=self._train.period_ns) / 2
 
     def _on_line(self, time: HostNs) -> float:
-        return time + (self._offset_ns or 0.0)
+        return time + self._offset_ns
 
     def _learn(self, offset_ns: int) -> None:
-        if self._offset_ns is None:
-            self._offset_ns = float(offset_ns)
-        else:
-            self._offset_ns += _GAIN * (offset_ns - self._offset_ns)
+        self._differences.append(offset_ns)
+        self._offset_ns = sorted(self._differences)[len(self._differences) // 2]
 
     def _pass_over(self, time: HostNs) -> None:
         """Count a pulse that has no tag, unless the source or the cameras have only just begun."""

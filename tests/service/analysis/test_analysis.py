@@ -24,6 +24,7 @@ from tests.support.waiting import wait_until
 
 #: A jump needs 9 s: 4 s for the static images, 4 s until it comes, 1 s to be over. The analysis is nice to all others.
 _MEASURED_S = 3 * PATIENCE_S
+FIGURES = ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body")
 
 
 def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopback) -> None:
@@ -66,11 +67,11 @@ def _balls_are_where_they_should_be(service: Serving, recording: str) -> None:
 
 
 def _await_jump(service: Serving) -> dict[str, Any]:
-    """The first jump whose take-off was recorded; the recording may begin in the middle of one."""
+    """The first whole jump: the recording may begin in the middle of one, and a busy machine may lose frames of one."""
 
     def measured() -> bool:
         jump = service.get("/api/status")["last_jump"]
-        return jump is not None and jump["takeoff_speed"] is not None
+        return jump is not None and None not in [jump[name] for name in FIGURES]
 
     wait_until(measured, "a measured jump", _MEASURED_S, 0.1)
     found: dict[str, Any] = service.get("/api/status")["last_jump"]
@@ -81,7 +82,7 @@ def _figures_are_true(jump: dict[str, Any], recording: str) -> None:
     """The simulated jumpers leave the table at about 26 m/s, each at a speed of his own."""
     assert jump["recording"] == recording
     assert abs(jump["takeoff_speed"]["value"] - 26.1) < 1.0
-    for name in ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body"):
+    for name in FIGURES:
         assert 0 < jump[name]["sigma"] < 1.0, name
 
 

@@ -1,5 +1,6 @@
 """A camera that freezes or dies during a recording: the recorder reports it, and the grabber sets it up again."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from recorder.reading.triplets import triplets
 from rig.api.recordings import Counts
 from rig.clocks import NS_PER_S, host_now
 from rig.frame import FrameStatus
+from rig.tag import TripletTag
 from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill
@@ -17,9 +19,10 @@ from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
-PERIOD_NS = NS_PER_S // 30
-#: Three pulses, their transport, and a processor that others want too.
-NOTICED_NS = 3 * PERIOD_NS + NS_PER_S // 5
+#: After the third frame of the others: a processor that others want too.
+NOTICED_NS = NS_PER_S // 5
+#: The recording ends when so many triplets are whole again.
+WHOLE_AGAIN = 30
 
 
 @pytest.mark.parametrize("how", ["freeze", "kill"])
@@ -38,16 +41,19 @@ def test_a_camera_that_falls_silent_is_noticed_and_comes_back(
                 hill.thaw("K2") if how == "freeze" else hill.restart("K2")
 
         def on_progress(counts: Counts) -> None:
-            """Freeze or kill the camera, once, when the recording has some pulses."""
+            """Freeze or kill the camera, once, when the recording has some pulses, and wait until it is back."""
+            whole.append(counts.complete)
             if counts.pulses > 20 and not gone:
-                gone.append(counts.pulses)
+                gone.append(len(said))
                 hill.freeze("K2") if how == "freeze" else hill.kill("K2")
+            elif gone and not back and any(line.startswith("K2 connected") for line in said[gone[0] :]):
+                back.append(counts.complete)
 
-        gone: list[int] = []
+        gone, back, whole = list[int](), list[int](), [0]
         with HeadlessRig(rig, "", on_event, lambda _: nullcontext({})) as running:
             running.wait_until_warm()
-            running.start_recording(path, session={}, pulses=420, seconds=14)
-            running.wait_until_finished(on_progress, lambda: False)
+            running.start_recording(path, session={}, seconds=60)
+            running.wait_until_finished(on_progress, lambda: bool(back) and whole[-1] >= back[0] + WHOLE_AGAIN)
     tags = [tag for tag, _ in triplets(path)]
     assert all(tag.cameras[i].status is FrameStatus.OK for tag in tags for i in (0, 2)), "the others went on"
     fates = [tag.cameras[1].status for tag in tags]
@@ -59,9 +65,14 @@ def test_a_camera_that_falls_silent_is_noticed_and_comes_back(
     messages = [event.message.partition(":")[0] for event in report.events if event.name == "K2"]
     assert report.recounted.agrees, report.recounted.differences
     assert messages[0] == "silent"
-    assert messages[-1] == "connected"
+    assert "connected" in messages
     noticed = next(event for event in report.events if event.name == "K2")
-    assert noticed.time - tags[lost[0] - 1].time < NOTICED_NS
+    assert noticed.time - _arrived(tags[lost[0] : lost[0] + 3]) < NOTICED_NS
     fault = "a camera freezes, and goes on" if how == "freeze" else "a camera loses its power, and comes back"
     words = f"K2 {noticed.message}; after that K2 connected"
     fault_table.tell("Cameras and pulses", fault, lost=f"none: {len(lost)} frames of K2, lost or absent", said=words)
+
+
+def _arrived(tags: Sequence[TripletTag]) -> int:
+    """When the frames of the cameras that went on had come: the machine may be busy with other things; UTC, ns."""
+    return max(tag.cameras[i].host_time or 0 for tag in tags for i in (0, 2))

@@ -245,6 +245,20 @@ def test_a_single_pulse_of_uncertain_time_is_not_one_that_the_source_did_not_fir
     assert (source.fired, source.unseen, source.untagged, source.unfired) == (25, 0, 0, 0)
 
 
+def test_a_first_time_that_is_wrong_does_not_shift_the_pulses_that_no_camera_saw() -> None:
+    """A busy computer was interrupted between setting the line and reading its clock."""
+    feed = Feed(reads=True, hold_ns=270 * MS)
+    for pulse in range(40):
+        late_ns = PERIOD // 5 if pulse == 0 else 0
+        feed.pairer.fired(pulse, HostNs(feed.time_of(pulse) + late_ns), late_ns or 100_000)
+        feed.pairer.fired_until(feed.time_of(pulse))
+        if pulse == 10:
+            continue
+        feed.all_cameras(pulse, [pulse + 1 - (pulse > 10)] * 3)
+    assert {outcome.status for outcome in feed.closed[10].outcomes} == {MISSED}
+    assert abs(feed.closed[10].time - feed.time_of(10)) < MS
+
+
 @pytest.mark.parametrize(("error_ns", "tagged"), [(PERIOD // 5, 1), (PERIOD // 3, 0)])
 def test_a_source_whose_times_are_too_uncertain_proves_nothing(error_ns: int, tagged: int) -> None:
     feed = _trained()

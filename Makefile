@@ -11,6 +11,9 @@ SHELL := /bin/bash
 # call of pytest, would compile the program anew.
 unexport PYTHONDONTWRITEBYTECODE
 
+# Tests that run at a time. Most start processes and wait for pulses, which come in real time: a test needs about half a core.
+WORKERS ?= 4
+
 ARGS ?=
 PREFIX ?= /usr/local
 BIN := .venv/bin
@@ -34,7 +37,7 @@ bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)
 
 test: setup $(NPM) ## all tests
-	@$(BIN)/pytest -n 2 --dist worksteal $(ARGS) || { status=$$?; test $$status = 1 || exit $$status; \
+	@$(BIN)/pytest -n $(WORKERS) --dist worksteal $(ARGS) || { status=$$?; test $$status = 1 || exit $$status; \
 	  echo "what failed is tried once more, one test at a time, on the now quiet machine"; \
 	  $(BIN)/pytest --last-failed --last-failed-no-failures none $(ARGS); }
 

@@ -54,7 +54,7 @@ export function clearScrubber() {
   recording = null;
   moment = null;
   loading = touched = false;
-  $("frame-moment").hidden = true;
+  for (const button of ["frame-moment", "frame-gap"]) $(button).hidden = true; // until the pulses have come
   viewer.image.removeAttribute("src");
   viewer.image.alt = "";
   for (const words of ["frame-where", "frame-fate"]) setText($(words), "");

@@ -24,7 +24,8 @@ from simrig.world.cable import encode_edge
 
 _HEAD: Final = struct.Struct("=II")
 _BYTES: Final = 1 << 12
-_WAIT_S: Final = 10.0
+#: The program that a test waits for may start on a crowded machine.
+_WAIT_S: Final = 60.0
 
 
 @dataclass(frozen=True, slots=True)

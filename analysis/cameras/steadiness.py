@@ -27,7 +27,7 @@ _BLOCKS = 16  # in which a recording is looked at
 _BLOCK_FRAMES = (4, 10)  # at least and at most
 _FEWEST_FRAMES = 3  # of a jump, for its own pose
 _CORRECTED_RISK = 0.01  # chance that the pose of a still camera is corrected for a jump, which does no harm
-_SHAKE_RISK = 1e-3  # chance that the frames of a still camera are corrected one by one
+SHAKE_RISK = 1e-3  #: chance that the frames of a still camera are corrected one by one
 _MODEL_SIGMA = 0.01  # px, of the mean displacement of a ball: what matching leaves out in all frames alike
 _SEEN = 0.3  # share of the frames in which a ball must have been measured
 
@@ -274,7 +274,7 @@ def _shake(turns: _Turns, mean: Floats, pulses: Sequence[PulseNumber]) -> dict[P
     squares = sum(
         float(d @ np.linalg.solve(turn.covariance, d)) for d, turn in zip(off - _mean(off), turns.values(), strict=True)
     )
-    if chdtrc(3 * (len(turns) - 1), squares) > _SHAKE_RISK:
+    if chdtrc(3 * (len(turns) - 1), squares) > SHAKE_RISK:
         return {}
     back = rotation_from_vector(mean).T
     shake = {

@@ -47,10 +47,13 @@ class WantedTraces(Sequence[Trace]):
     Attributes:
         parts: of the image.
         changes: what is done to the traces that were found, one after the other.
+        origin: what they were before; None: nothing was done. It lives as long as they do: whoever made it finds its
+            traces before the pixels are forgotten.
     """
 
     parts: tuple[_Part, ...]
     changes: tuple[Change, ...] = ()
+    origin: "WantedTraces | None" = None
 
     @classmethod
     def of(cls, regions: Sequence[Region]) -> "WantedTraces":
@@ -59,7 +62,7 @@ class WantedTraces(Sequence[Trace]):
 
     def changed(self, change: Change) -> "WantedTraces":
         """The same traces after a change, which moves them by a few px at most."""
-        return WantedTraces(self.parts, (*self.changes, change))
+        return WantedTraces(self.parts, (*self.changes, change), self)
 
     def near(self, places: Floats, reach: Floats) -> tuple[Trace, ...]:
         """The traces of the parts that lie within `reach` (n,) px of one of the places (n, 2); NaN is nowhere."""

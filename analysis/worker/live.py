@@ -17,25 +17,27 @@ from typing import Final
 
 import numpy as np
 
+from analysis.cameras.frames import Frames
 from analysis.cameras.live_watch import LiveWatch
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.source import orient_from, read_source
+from analysis.cameras.standing import Standing
 from analysis.cameras.steadiness import standing_in
 from analysis.candidates.finder import Finder
+from analysis.candidates.model import PulseCandidates
 from analysis.export.scene_update import camera_frames, scene_update
 from analysis.identification.seeking import Seeker
 from analysis.scene.camera_system import CameraSystem
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.following import Followed, Follower
 from analysis.worker.stream import Received
-from analysis.worker.streamed import Streamed
+from analysis.worker.streamed import Streamed, frames_of
 from analysis.worker.whole_jump import JumpTask
 from analysis.worker.wire_form import wire_form
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
-from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable
 from rig.phrase import phrase, plain
 from rig.pulse import PulseNumber
@@ -45,6 +47,7 @@ from rig.tag import TripletTag
 _SEEK_S: Final = 0.1
 _SOUGHT_S: Final = 0.5
 _WATCH_S: Final = 1.0  #: from one look at the balls to the next
+_BEGUN: Final = 12  #: frames of the time of the static images that tell which cameras shake
 _FEWEST_CAMERAS: Final = 2  # that show something
 #: A jump is over after so long a time without its jumper; what may belong to it is searched as far before and after.
 _OVER_S: Final = 0.7
@@ -154,6 +157,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         self._scene, moved = standing_in(scene)
         recording.seeker = None
         self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
+        self._watch.begin(recording.waiting_frames(_BEGUN))
         self._findings.oriented(recording.id, (recording.last or recording.first).time, self._scene)
         said = (*scene.messages, *(move.message for move in moved))
         if said != self._said:
@@ -165,16 +169,16 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
 
     def _measure(self, recording: Streamed, finder: Finder, tag: TripletTag, image: Grey) -> None:
         """Follow the jumper, or look whether one comes."""
-        follower = recording.follower
+        follower, frames = recording.follower, frames_of(tag, image)
         if follower is None:
-            recording.keep(finder.find(tag, image, sparing=True))
+            self._keep(recording, finder.find(tag, image, sparing=True), frames)
             self._seek(recording)
-            self._look_at_balls(recording, tag, image)
+            self._look_at_balls(recording, tag.pulse, frames)
         elif follower.lost(tag.pulse, tag.time):
             recording.follower = None
-            recording.keep(finder.find(tag, image, sparing=True))
+            self._keep(recording, finder.find(tag, image, sparing=True), frames)
         else:
-            recording.keep(finder.find_expected(tag, image, follower.expected(tag.time)))
+            self._keep(recording, finder.find_expected(tag, image, follower.expected(tag.time)), frames)
             self._tell(recording, follower.follow(recording.candidates[-1]))
             recording.saw(follower)
             if follower.look_is_due():
@@ -182,15 +186,22 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         if recording.follower is None and recording.unseen_s() > _OVER_S:
             self._end_jump(recording)
 
-    def _look_at_balls(self, recording: Streamed, tag: TripletTag, image: Grey) -> None:
+    def _keep(self, recording: Streamed, candidates: PulseCandidates, frames: Frames) -> None:
+        """Keep the candidates of a pulse where its cameras would show them if they did not shake."""
+        if self._scene is None or self._watch is None:
+            raise RuntimeError("candidates are sought when the cameras are oriented and watched")
+        stood = self._watch.stood(frames)
+        shake = {name: {candidates.pulse: one} for name, one in stood.items()}
+        recording.keep(Standing(self._scene.system, shake).candidates([candidates])[0], stood)
+
+    def _look_at_balls(self, recording: Streamed, pulse: PulseNumber, frames: Frames) -> None:
         """Between two jumps, watch the balls in some frames a second; orient the cameras anew if one has moved."""
-        due = tag.pulse - recording.watched >= _WATCH_S * recording.rate_hz
+        due = pulse - recording.watched >= _WATCH_S * recording.rate_hz
         if self._watch is None or recording.seen is not None or not due:
             return
-        frames = {c.name: image[c.part] for c in tag.cameras if c.status is FrameStatus.OK}
-        if not self._watch.look(tag.pulse, frames):
+        if not self._watch.look(pulse, frames):
             return
-        recording.watched = tag.pulse
+        recording.watched = pulse
         if moves := self._watch.moves():
             for move in moves:
                 said = phrase("event_camera_moved", "{what}; the cameras are oriented anew", what=move.message)
@@ -263,7 +274,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.cameras(self._exposures),
             tuple(recording.between(max(seen[0] - around, recording.done + 1), seen[1] + around)),
             scene,
-            finder,
+            Standing(scene.system, {name: dict(of) for name, of in recording.shake.items()}).look(finder),
         )
         recording.done = seen[1]
         self._computing.append(self._thread.submit(task.computed))

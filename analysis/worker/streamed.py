@@ -6,6 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from analysis.cameras.frames import Frames
+from analysis.cameras.standing import FrameShake
 from analysis.candidates.model import PulseCandidates
 from analysis.identification.seeking import Seeker
 from analysis.measurements.model import MeasuredCamera
@@ -38,7 +40,8 @@ class Streamed:
         first: tag of its first pulse.
         last: of its latest.
         waiting: triplets that wait until the cameras are oriented.
-        candidates: of the last seconds.
+        candidates: of the last seconds, where the cameras would show them if they stood still.
+        shake: by camera and pulse, what was taken out of these candidates.
         seeker: seeks one in the candidates; None until the first time.
         follower: follows the jumper; None while nobody is in sight.
         seen: first and last pulse of the jumper who was followed and whose jump is not computed yet; None: nobody.
@@ -55,6 +58,7 @@ class Streamed:
         self.last: TripletTag | None = None
         self.waiting: deque[tuple[TripletTag, Grey]] = deque()
         self.candidates: deque[PulseCandidates] = deque()
+        self.shake: dict[str, dict[PulseNumber, FrameShake]] = {}
         self.seeker: Seeker | None = None
         self.follower: Follower | None = None
         self.seen: tuple[PulseNumber, PulseNumber] | None = None
@@ -123,6 +127,11 @@ class Streamed:
             raise BadInputError("no camera has delivered a frame; see the cameras in the panel")
         return images
 
+    def waiting_frames(self, count: int) -> list[Frames]:
+        """The frames of so many pulses, spread over those that wait."""
+        chosen = np.unique(np.linspace(0, len(self.waiting) - 1, count).round().astype(int))
+        return [frames_of(*self.waiting[i]) for i in chosen]
+
     def follow(self, follower: Follower) -> None:
         """Somebody is in sight: the jumper who was just lost, or the next one."""
         self.jumps += self.seen is None
@@ -140,13 +149,22 @@ class Streamed:
             return 0.0
         return (self.candidates[-1].pulse - self.seen[1]) / self.rate_hz
 
-    def keep(self, candidates: PulseCandidates) -> None:
-        """Keep candidates; the oldest make room."""
+    def keep(self, candidates: PulseCandidates, stood: Mapping[str, FrameShake]) -> None:
+        """Keep candidates, and how the cameras stood that shake; the oldest make room."""
         self.candidates.append(candidates)
+        for name, shake in stood.items():
+            self.shake.setdefault(name, {})[candidates.pulse] = shake
         kept_s = _KEPT_UNSEEN_S if self.seen is None else _KEPT_S
         while self.candidates[-1].pulse - self.candidates[0].pulse > kept_s * self.rate_hz:
-            self.candidates.popleft()
+            gone = self.candidates.popleft().pulse
+            for shakes in self.shake.values():
+                shakes.pop(gone, None)
 
     def between(self, first: float, last: float) -> list[PulseCandidates]:
         """The candidates of the pulses from `first` to `last`."""
         return [kept for kept in self.candidates if first <= kept.pulse <= last]
+
+
+def frames_of(tag: TripletTag, image: Grey) -> Frames:
+    """The frames that cameras delivered at a pulse."""
+    return {c.name: image[c.part] for c in tag.cameras if c.status is FrameStatus.OK}

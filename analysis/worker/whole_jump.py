@@ -21,9 +21,9 @@ class JumpTask:
         number: of the jump in it.
         rate_hz: pulses per second.
         cameras: image size and exposure time by name.
-        candidates: of the pulses in which the jumper may be in sight.
+        candidates: of the pulses in which the jumper may be in sight, where cameras at rest would show them.
         scene: cameras and balls.
-        look: looks again where a marker is expected.
+        look: looks again where a marker is expected, at such places.
     """
 
     recording: str

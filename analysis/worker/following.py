@@ -39,8 +39,9 @@ _SIGMAS, _RADII = 4.0, 8.0
 _ANYHOW_DEG: Final = np.array((25.0, 15.0))  #: slope and heading of skis against the flight, standard deviations
 _FEWEST_CAMERAS: Final = 2  #: that must be able to see any of his markers
 _BEGIN: Final = 4  #: pulses that show somebody before he is followed
-#: Markers whose place is not known are sought after so long a time, then after twice that, and so on.
+#: Markers whose place is not known are sought after so long a time, then again whenever that time has doubled.
 _HIDDEN_S: Final = 0.2
+_AS_THEY_ARE, _EXCHANGED = [0, 1, 2, 3], [0, 1, 3, 2]  # indices of the markers, and with the other binding
 
 _Part = TypeVar("_Part")
 
@@ -167,19 +168,28 @@ class Follower:
         return int(np.count_nonzero(~self._places()[1]))
 
     def look_is_due(self) -> bool:
-        """Whether hidden markers should be sought at the latest pulse; if so, the next time is later."""
-        if self._pulse < self._look_at or not self.hidden():
+        """Whether hidden markers should be sought at the latest pulse; if so, the next time is later and later."""
+        if self._pulse < self._look_at:
             return False
-        self._looks += 1
-        self._look_at = self._pulse + _HIDDEN_S * 2**self._looks * self._rate_hz
-        return True
+        due = self.hidden() > 0
+        self._looks = self._looks + 1 if due else 0
+        self._look_at = self._pulse + _HIDDEN_S * 2 ** max(0, self._looks - 1) * self._rate_hz
+        return due
 
     def knows_more_than(self, other: "Follower") -> bool:
-        """Whether this is the jumper whom another one follows, after the same pulse, with more of his markers."""
+        """Whether this is the jumper whom another one follows, after the same pulse, with more of his markers.
+
+        The other one may take each binding for the other: who sees one of them alone may err.
+        """
         (mine, known), (theirs, also) = self._places(), other._places()
-        both = known & also
-        apart = np.linalg.norm(mine - theirs, axis=1)[both]
-        return bool(both.any() and (apart < MOST_VAGUE_M).all() and np.count_nonzero(known) > np.count_nonzero(also))
+        if np.count_nonzero(known) <= np.count_nonzero(also):
+            return False
+        for names in (_AS_THEY_ARE, _EXCHANGED):
+            both = known & also[names]
+            apart = np.linalg.norm(mine - theirs[names], axis=1)[both]
+            if both.any() and (apart < MOST_VAGUE_M).all():
+                return True
+        return False
 
     def _places(self) -> tuple[Floats, Flags]:
         """Places (4, 3) of the markers after the latest pulse, and which are known (4,)."""

@@ -4,8 +4,12 @@ A binding that is seen alone looks like the other one, and a wrong pair beside i
 the points that were taken as bindings get their names once more as one path: hypotheses about all pulses compete, each
 with its own filter, and pay for what does not move as bindings do. What nearly as good hypotheses name otherwise is
 left out: it cannot be told. The hip goes with them: it is between the bindings, whichever of them is seen.
+
+What is no binding may still be a thing, such as a glove, that goes along with the body. Then its points come one after
+the other by no chance, and tell only once that they are false.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,11 +24,30 @@ _CHOICES = np.array([(0, 1), (1, 0), (0, -1), (1, -1), (-1, 0), (-1, 1), (-1, -1
 #: What they are if their names are right, by whether there is a point of each.
 _AS_THEY_ARE = {(True, True): 0, (True, False): 2, (False, True): 5, (False, False): 6}
 _HIP = 2  #: its place among the points
+_VELOCITY = slice(3, 6)  #: of the first part of `bindings`, their midpoint, in a state
 _BEAM = 12  #: hypotheses that go on to the next pulse
 _FALSE = 0.05  #: share of the points taken as a binding that are none
 _WITHIN_M = 1.0  #: edge of the space in which such points were looked for
 #: Cost of a point that is no binding but chance.
 _BY_CHANCE = float(6 * np.log(_WITHIN_M) - 2 * np.log(_FALSE))
+_LIMBS_M_S = 4.0  #: standard deviation of the velocity of a thing that goes along with the body against the bindings'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """What was taken as bindings, and the hip, at one pulse.
+
+    Attributes:
+        there: (3,) whether there is a point of each.
+        xyz: (3, 3) m.
+        covariance: (3, 3, 3).
+        strange: (2,) cost of both bindings being a pair as they are, and exchanged.
+    """
+
+    there: Flags
+    xyz: Floats
+    covariance: Floats
+    strange: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,26 +83,40 @@ def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floa
         (t, 2) which of the two points is the one and which the other binding; -1: none, or not to be told.
     """
     there: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
-    xyz, covariance = np.nan_to_num(xyz), np.nan_to_num(covariance)
-    ahead = _followed(time_s, there, xyz, covariance, strange, bindings)
-    back = _followed(time_s[::-1], there[::-1], xyz[::-1], covariance[::-1], strange[::-1], bindings)
+    parts = zip(there, np.nan_to_num(xyz), np.nan_to_num(covariance), strange, strict=True)
+    points = [_Points(*of_pulse) for of_pulse in parts]
+    ahead = _followed(time_s, points, bindings)
+    back = _followed(time_s[::-1], points[::-1], bindings)
     chosen = np.concatenate((ahead.chosen, back.chosen[:, ::-1]))
     return _told(_CHOICES[chosen], np.concatenate((ahead.cost, back.cost)))
 
 
-def _followed(
-    time_s: Floats, there: Flags, xyz: Floats, covariance: Floats, strange: Floats, bindings: PathFilter
-) -> _Hypotheses:
+def _followed(time_s: Floats, points: Sequence[_Points], bindings: PathFilter) -> _Hypotheses:
     """The best hypotheses about all pulses, and that all names are right as they are, from one end to the other."""
     mean, sigma = bindings.begin
     none = np.zeros((1, len(bindings.mixing[0])), bool)
     h = _Hypotheses(np.zeros(1), np.zeros((1, 0), int), mean[None], np.diag(sigma**2)[None], none)
-    for t in range(len(time_s)):
+    for t, here in enumerate(points):
+        by_chance = np.full((len(h.cost), 2), _BY_CHANCE)
         if t:
-            state, variance = bindings.moved(h.state, h.variance, np.diff(time_s[t - 1 : t + 1]), h.begun)
+            dt = np.diff(time_s[t - 1 : t + 1])
+            state, variance = bindings.moved(h.state, h.variance, dt, h.begun)
             h = replace(h, state=state, variance=variance)
-        h = _continued(h, there[t], xyz[t], covariance[t], strange[t], bindings)
+            by_chance = _by_chance(h, points[t - 1], here, float(dt[0]))
+        h = _continued(h, here, by_chance, bindings)
     return h
+
+
+def _by_chance(h: _Hypotheses, before: _Points, here: _Points, dt: float) -> Floats:
+    """Costs (h, 2) of each point being no binding: less for a thing that was none at the pulse before either."""
+    way = h.state[:, None, _VELOCITY] * dt
+    off = here.xyz[:2] - before.xyz[:2] - way
+    total = here.covariance[:2] + before.covariance[:2] + (_LIMBS_M_S * dt) ** 2 * np.eye(3)
+    total = total + h.variance[:, None, _VELOCITY, _VELOCITY] * dt**2
+    squares = np.einsum("hpi,hpi->hp", off, np.linalg.solve(total, off[..., None])[..., 0])
+    lasting = squares + np.linalg.slogdet(2 * np.pi * total)[1]
+    used = np.any(_CHOICES[h.chosen[:, -1]][..., None] == np.arange(2), axis=1)
+    return np.where(before.there[:2] & here.there[:2] & ~used, np.minimum(lasting, _BY_CHANCE), _BY_CHANCE)
 
 
 def _told(names: Integers, cost: Floats) -> Integers:
@@ -89,17 +126,16 @@ def _told(names: Integers, cost: Floats) -> Integers:
     return np.where(np.any(rivals != best, axis=0), -1, best)
 
 
-def _continued(
-    h: _Hypotheses, there: Flags, xyz: Floats, covariance: Floats, strange: Floats, bindings: PathFilter
-) -> _Hypotheses:
-    """The best hypotheses after one more pulse: there (3,), xyz (3, 3), covariance (3, 3, 3) of its points.
+def _continued(h: _Hypotheses, here: _Points, by_chance: Floats, bindings: PathFilter) -> _Hypotheses:
+    """The best hypotheses after one more pulse; by_chance (h, 2) costs of its points being no bindings.
 
     The first one is that all names are right.
     """
+    there = here.there
     options = [c for c, pair in enumerate(_CHOICES.tolist()) if all(there[p] for p in pair if p >= 0)]
-    costs = np.stack([_cost(h, _CHOICES[c], there, xyz, covariance, bindings) for c in options])
+    costs = np.stack([_cost(h, _CHOICES[c], here, by_chance, bindings) for c in options])
     for place, option in enumerate(options):
-        costs[place] += strange[option] if option < len(strange) else 0.0
+        costs[place] += here.strange[option] if option < len(here.strange) else 0.0
     as_they_are = options.index(_AS_THEY_ARE[bool(there[0]), bool(there[1])]) * len(h.cost)
     order = np.argsort(costs, axis=None)
     order = order[(costs.ravel()[order] < costs.min() + 2 * DECISIVE) & (order != as_they_are)]
@@ -110,22 +146,21 @@ def _continued(
         chosen = which == place
         seen, points = _used(_CHOICES[option], there)
         if chosen.any() and seen.any():
-            new = _updated(state[chosen], variance[chosen], seen, xyz[points], covariance[points], bindings)
+            new = _updated(state[chosen], variance[chosen], seen, here.xyz[points], here.covariance[points], bindings)
             state[chosen], variance[chosen] = new
             begun[chosen] |= (bindings.mixing[seen] != 0).any(axis=0)
     chosen = np.column_stack((h.chosen[came], np.array(options)[which]))
     return _Hypotheses(costs.ravel()[order], chosen, state, variance, begun)
 
 
-def _cost(
-    h: _Hypotheses, choice: Integers, there: Flags, xyz: Floats, covariance: Floats, bindings: PathFilter
-) -> Floats:
+def _cost(h: _Hypotheses, choice: Integers, here: _Points, by_chance: Floats, bindings: PathFilter) -> Floats:
     """Costs (h,) of the hypotheses if they go on with a choice."""
-    seen, points = _used(choice, there)
-    cost = h.cost + _BY_CHANCE * float(there.sum() - seen.sum())
+    seen, points = _used(choice, here.there)
+    false = [p for p in range(2) if here.there[p] and p not in points]
+    cost = h.cost + by_chance[:, false].sum(axis=1)
     if not seen.any():
         return np.asarray(cost)
-    off, total, _ = _innovation(h.state, h.variance, seen, xyz[points], covariance[points], bindings)
+    off, total, _ = _innovation(h.state, h.variance, seen, here.xyz[points], here.covariance[points], bindings)
     squares = np.einsum("hi,hi->h", off, np.linalg.solve(total, off[..., None])[..., 0])
     return np.asarray(cost + squares + np.linalg.slogdet(2 * np.pi * total)[1])
 

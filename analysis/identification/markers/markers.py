@@ -152,9 +152,15 @@ def _renamed(assigned: Assigned, names: Integers) -> tuple[Floats, Floats]:
 
 
 def _without(markers: Markers, left_out: Flags) -> Markers:
-    """The markers without points of some bindings, left_out (t, 2)."""
+    """The markers without points of some bindings, left_out (t, 2), and without single rays that these have named."""
     out = np.zeros(markers.assigned.rays.shape[:2], bool)
-    out[:, BINDINGS] = left_out & np.isfinite(markers.assigned.xyz[:, BINDINGS, 0])
+    for place, marker in enumerate(BINDINGS):
+        points: Flags = np.isfinite(markers.assigned.xyz[:, marker, 0])
+        if not np.any(left_out[:, place] & points):
+            continue
+        known, all_of = np.flatnonzero(points), np.arange(len(points))
+        nearest = known[np.abs(all_of[:, None] - known).argmin(axis=1)]
+        out[:, marker] = left_out[nearest, place] & np.any(markers.assigned.rays[:, marker] >= 0, axis=1)
     rays, xyz = markers.assigned.rays.copy(), markers.assigned.xyz.copy()
     rays[out], xyz[out] = -1, np.nan
     return replace(markers, assigned=replace(markers.assigned, rays=rays, xyz=xyz))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from analysis.cameras.comparison import scene_of_calibration
+from analysis.cameras.live_watch import LiveWatch
 from analysis.cameras.moves import Block, find_moves, turn_words
 from analysis.cameras.oriented_scene import OrientedScene, scene_of_survey
 from analysis.cameras.poses_file import Calibration, KnownBall
 from analysis.cameras.standing import FrameShake, Standing, steadied
-from analysis.cameras.steadiness import watch
+from analysis.cameras.steadiness import standing_in, watch
 from analysis.measurements.model import ImageMeasurements, PointMeasurement, PulseMeasurements, SkiMeasurement
 from analysis.scene.camera_system import PlacedCamera
 from analysis.scene.naming import MODEL_SIGMA
@@ -39,6 +40,21 @@ def test_shake_is_measured_frame_by_frame_and_is_no_move() -> None:
     assert (np.sqrt(((error / sigma) ** 2).mean(axis=0)) < 1.3).all()
     for name in ("K1", "K3"):
         assert np.array_equal(standing.system[name].rotation, scene.system[name].rotation)
+
+
+def test_live_the_shake_is_measured_in_the_frames_of_cameras_that_shake() -> None:
+    film, watched = shaken_film(), LiveWatch(standing_in(shaken_scene())[0])
+    frames = [dict(of_pulse) for _, of_pulse in film.frames(film.pulses)]
+    assert watched.stood(frames[0]) == {}, "nothing is known yet"
+    watched.begin(frames[::6])
+    stood = [watched.stood(of_pulse) for of_pulse in frames]
+    assert all(list(of_pulse) == ["K2"] for of_pulse in stood)
+    found, true = np.array([of_pulse["K2"].turn for of_pulse in stood]), film.true_turns("K2")
+    error = (found - found.mean(axis=0)) - (true - true.mean(axis=0))
+    assert np.degrees(error.std(axis=0)).max() < 0.001
+    hidden = watched.stood({**frames[0], "K2": np.zeros_like(frames[0]["K2"])})["K2"]
+    assert not hidden.turn.any()
+    assert np.sqrt(np.diagonal(hidden.covariance)) == pytest.approx(true.std(axis=0), rel=0.4)
 
 
 def test_a_knock_is_named_with_direction_size_and_time() -> None:

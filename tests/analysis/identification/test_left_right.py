@@ -67,3 +67,13 @@ def test_a_point_far_from_the_path_is_no_binding() -> None:
     time_s, xyz, strange = _flight(3)
     xyz[20, 1] += (0.0, 0.25, 0.3)
     assert _named(xyz, time_s, strange)[20] == [0, -1]
+
+
+def test_what_goes_along_with_the_body_does_not_make_a_lone_binding_the_other_one() -> None:
+    """A glove beside the right binding: three points of it in a row are no more evidence than one."""
+    for seed in range(5):
+        time_s, xyz, strange = (part[:10] for part in _flight(seed))
+        xyz[:, 1] = xyz[:, 0]
+        xyz[:, 0] = np.nan
+        xyz[4:7, 0] = xyz[4:7, 1] - (0.05, 0.30, 0.02)
+        assert all(pair in ([1, -1], [-1, -1]) for pair in _named(xyz, time_s, np.zeros_like(strange)))

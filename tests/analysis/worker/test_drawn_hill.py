@@ -1,7 +1,6 @@
 """Live and whole: a jump in pictures that no part of Svev has made."""
 
 import json
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -9,46 +8,21 @@ import numpy as np
 import pytest
 
 from analysis.result.model import Status
-from analysis.worker.findings import MeasuredJump
 from analysis.worker.live import LiveAnalysis
 from analysis.worker.stream import Received
-from rig.jumper import JumperState
 from tests.analysis.candidates.judge import scenario
 from tests.analysis.drawn_hill import DrawnHill
+from tests.analysis.worker.found import Found
 
 PULSES = range(75)
 LARGEST_M = 0.02  # in each coordinate
 CLEAR = 0.75  # share of a marker that is in sight; less is not drawn
 
 
-@dataclass
-class _Found:
-    """See `analysis.worker.findings.Findings`."""
-
-    states: list[JumperState] = field(default_factory=list)
-    jumps: list[MeasuredJump] = field(default_factory=list)
-    said: list[str] = field(default_factory=list)
-
-    def state(self, state: JumperState) -> None:
-        self.states.append(state)
-
-    def jump(self, jump: MeasuredJump) -> None:
-        self.jumps.append(jump)
-
-    def message(self, level: Any, said: Any) -> None:
-        self.said.append(f"{level}: {said}")
-
-    def scene(self, *args: Any) -> None: ...
-
-    def cameras(self, *args: Any) -> None: ...
-
-    def oriented(self, *args: Any) -> None: ...
-
-
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[DrawnHill, _Found]:
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[DrawnHill, Found]:
     """The hill, and what was found in its pictures."""
-    hill, found = DrawnHill(scenario(), PULSES, seed=1), _Found()
+    hill, found = DrawnHill(scenario(), PULSES, seed=1), Found()
     survey = tmp_path_factory.mktemp("drawn") / Path("survey.json")
     survey.write_text(json.dumps(hill.survey()))
     with LiveAnalysis(survey, None, found) as worker:
@@ -68,7 +42,7 @@ def _in_clear_sight(state: dict[str, Any]) -> set[str]:
     return {label for label in shown if shown.count(label) > 1}
 
 
-def test_he_is_followed_with_all_markers_that_are_in_sight(drawn: tuple[DrawnHill, _Found]) -> None:
+def test_he_is_followed_with_all_markers_that_are_in_sight(drawn: tuple[DrawnHill, Found]) -> None:
     hill, found = drawn
     assert not [said for said in found.said if said.startswith(("error", "warning"))]
     known = dict(enumerate(hill.known.values(), start=1))
@@ -86,7 +60,7 @@ def test_he_is_followed_with_all_markers_that_are_in_sight(drawn: tuple[DrawnHil
     assert np.mean(squares) < 1.2
 
 
-def test_the_whole_jump_is_measured_as_its_sigmas_say(drawn: tuple[DrawnHill, _Found]) -> None:
+def test_the_whole_jump_is_measured_as_its_sigmas_say(drawn: tuple[DrawnHill, Found]) -> None:
     hill, found = drawn
     (measured,) = found.jumps
     (jump,) = measured.result.jumps

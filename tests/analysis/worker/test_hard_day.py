@@ -1,6 +1,5 @@
 """Live on a hard day: cameras that shake, a binding hidden behind the other leg, an official and another jumper."""
 
-
 import numpy as np
 import pytest
 

@@ -62,6 +62,14 @@ def test_what_is_changed_is_changed_when_it_is_found(hill: Hill) -> None:
         assert list(changed) == list(image.traces)[:1]
 
 
+def test_pixels_are_given_back_where_only_changed_traces_are_kept(hill: Hill, monkeypatch: pytest.MonkeyPatch) -> None:
+    small = Finder(hill.static, memory=1)
+    kept = [_wanted(image).changed(tuple) for image in small.find(hill.tag(PULSE), hill.triplet(PULSE)).images.values()]
+    small.find(hill.tag(PULSE + 1), hill.triplet(PULSE + 1))
+    monkeypatch.setattr(wanted_traces, "find_traces", lambda _: pytest.fail("searched after they were forgotten"))
+    assert len(kept[-1]), "that of the last camera was forgotten last"
+
+
 def _wanted(image: ImageCandidates) -> WantedTraces:
     assert isinstance(image.traces, WantedTraces)
     return image.traces

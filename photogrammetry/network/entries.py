@@ -11,8 +11,15 @@ from rig.settings.strict_toml import StrictModel
 #: Limits in any unit: of lengths, image coordinates and parameters; of sigmas (that of a3 may be 1e-30).
 LARGEST, SMALLEST = 1e12, 1e-60
 
+
+def _large_enough(value: float) -> float:
+    if value < SMALLEST:
+        raise ValueError(f"is smaller than {SMALLEST:g}, which no unit needs")
+    return value
+
+
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST), AfterValidator(_large_enough)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Sigmas = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Pixels = Annotated[int, Field(strict=True, gt=0, le=1_000_000)]

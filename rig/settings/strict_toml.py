@@ -34,7 +34,7 @@ class StrictModel(BaseModel):
 
 
 def read_text(path: Path, format_name: str, existing: str) -> str:
-    """Read a text file (UTF-8).
+    """Read a text file (UTF-8, with or without the mark of byte order that programs on Windows put before it).
 
     Args:
         path: of the file.
@@ -45,7 +45,7 @@ def read_text(path: Path, format_name: str, existing: str) -> str:
         BadInputError: missing, unreadable or not UTF-8.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; name {existing}") from None
     except IsADirectoryError:

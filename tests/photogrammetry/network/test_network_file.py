@@ -85,10 +85,23 @@ def test_what_is_written_is_read_again(network: Network, tmp_path: Path) -> None
     assert np.abs(again.observations.xy - network.observations.xy).max() < 1e-12
 
 
+def test_a_mark_of_byte_order_does_no_harm(tmp_path: Path) -> None:
+    """Programs on Windows put it before a text that they save as UTF-8."""
+    path, marked = tmp_path / "network.json", tmp_path / "marked.json"
+    write_network(network_from_json(_GOOD, "good.json"), path)
+    marked.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert network_to_json(read_network(marked)) == network_to_json(read_network(path))
+
+
 Change = Callable[[dict[str, Any]], object]
 
 #: What is changed in the good file, and what the error must say: the place, and what to do.
 _BAD: dict[str, tuple[Change, str]] = {
+    "sigma of zero": (
+        lambda n: n["points"]["B7"].update(sigma=[0, 1, 1]),
+        "B7.*input should be greater than 0; correct",
+    ),
+    "tiny sigma": (lambda n: n["points"]["B7"].update(sigma=[1e-70, 1, 1]), "B7.*is smaller than 1e-60, which no unit"),
     "other format": (lambda d: d.update(format="svev-network/2"), r"format.*svev-network/1"),
     "no cameras": (lambda d: d.pop("cameras"), r'"cameras" is missing; add it'),
     "unknown key": (lambda d: d.update(observation=[]), r'unknown key "observation"; did you mean "observations"'),

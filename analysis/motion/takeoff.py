@@ -25,8 +25,14 @@ _SUPPORT: Final = 8.0  # of log-likelihood below the greatest: less likely times
 #: Acceleration of O in the first pulse, m/s^2 (Z up): of a table, and of a flight. Their spread covers any in-run.
 _ON_TABLE: Final = (np.array((0.0, 0.0, 0.0)), np.array((5.0, 3.0, 3.0)))
 _IN_FLIGHT: Final = (np.array((-2.0, 0.0, -6.0)), np.array((3.0, 3.0, 3.0)))
+#: The end of an in-run is straight, and before that it bends up: on it O gains downward speed only by its slope, less
+#: than 0.4 m/s^2. In flight it falls by 9.8 m/s^2 less the lift, which is half of it at most.
+_FALLING_M_S2: Final = -2.0
+_BEFORE_S: Final = 0.5  # of the path before the break that tells whether it is a table
+_CERTAIN: Final = 2.0  # sigmas
 _AT_END: Final = 2.0  # pulses: a break nearer to the first or last intersected binding or ski is none
 _BELOW: Final = slice(GROUPS.index("P3"), len(GROUPS))  # bindings and skis
+_SINGULAR: Final = 1e12  # condition of a parabola through too few places
 _LOOSE: Final = 1e4  # m or rad: weak weight that keeps undetermined pulses solvable
 #: Channels that the table guides: O and the slope of the skis.
 _SELECTED: Final = (*range(ORIGIN.start, ORIGIN.stop), SLOPE)
@@ -73,8 +79,24 @@ def find_break(adjusted: Adjusted, densities: Floats) -> Break | None:
     mean = float(weight @ fine)
     if not first <= mean <= last:
         return None
+    if _falls_before(path, times, mean):
+        return None
     sigma = float(np.sqrt(weight @ (fine - mean) ** 2 + (fine[1] - fine[0]) ** 2 / 12))
     return Break(mean, sigma, *_three_nodes(mean, sigma, float(weight @ (fine - mean) ** 3)))
+
+
+def _falls_before(path: "_Path", times: Floats, seconds: float) -> bool:
+    """Whether O falls freely before a break: then it flies already, and the break is not the edge of a table."""
+    of = (times < seconds) & (times > seconds - _BEFORE_S)
+    since = times[of] - seconds
+    height, weight = path.value[of, 2], 1.0 / path.covariance[of, 2, 2]
+    design = np.column_stack((np.ones(len(since)), since, since**2 / 2))
+    normal = design.T @ (weight[:, None] * design)
+    if len(since) < design.shape[1] or np.linalg.cond(normal) > _SINGULAR:
+        return False
+    covariance = np.linalg.inv(normal)
+    fall = float(covariance[2] @ (design.T @ (weight * (height - height.mean()))))
+    return fall + _CERTAIN * float(np.sqrt(covariance[2, 2])) < _FALLING_M_S2
 
 
 def airborne(adjusted: Adjusted) -> float:

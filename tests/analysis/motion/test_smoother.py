@@ -181,6 +181,24 @@ def test_a_jump_with_few_measurements_has_no_states(measured_pulses: int) -> Non
     assert motion.message is not None
 
 
+def test_a_fall_that_bends_is_no_takeoff() -> None:
+    """In flight from the first pulse on; in the last ones all seems to rise, as where names are wrong."""
+    truth, system = true_jump(SEED), true_cameras()
+    measured = simulated_measurements(truth, system, np.random.default_rng(SEED))
+    flight = [pulse for pulse in measured.jumps[0].pulses if truth.since_takeoff(pulse.pulse) > 0.1]
+
+    def risen(image: ImageMeasurements, by_px: float) -> ImageMeasurements:
+        up = np.array((0.0, -by_px))
+        points = {name: replace(point, xy=point.xy + up) for name, point in image.points.items()}
+        return ImageMeasurements(points, {side: replace(ski, xy=ski.xy + up) for side, ski in image.skis.items()})
+
+    for k in range(1, 6):
+        pulse = flight[k - 6]
+        images = {name: risen(image, 1.5 * k**2) for name, image in pulse.images.items()}
+        flight[k - 6] = replace(pulse, images=images)
+    assert smooth(JumpMeasurements(1, tuple(flight)), measured, system).takeoff is None
+
+
 def test_a_known_edge_gives_the_takeoff() -> None:
     truth, system = true_jump(SEED), true_cameras()
     measured = simulated_measurements(truth, system, np.random.default_rng(SEED))

@@ -69,15 +69,14 @@ class BallTracker:
         radius = {name: _radius(static, places[name]) for name in balls}
         half = max((r + _AROUND for r in radius.values()), default=_AROUND) + _MARGIN
         columns, rows = static.size
-        inside = {
-            name: half <= places[name][0] < columns - half and half <= places[name][1] < rows - half for name in balls
-        }
+        pixel = {name: np.rint(places[name][:2]).astype(int) for name in balls}
+        inside = {name: half <= x < columns - half and half <= y < rows - half for name, (x, y) in pixel.items()}
         self.names: Final = tuple(name for name in balls if inside[name])
         self._placed = placed
         self._static = static
         self.places: Final = np.array([places[name][:2] for name in self.names], float).reshape(-1, 2)
         self.xyz: Final = np.array([balls[name] for name in self.names], float).reshape(-1, 3)
-        self._corner = np.rint(self.places).astype(int) - half
+        self._corner = np.array([pixel[name] for name in self.names], int).reshape(-1, 2) - half
         self._half = half
         size = 2 * half + 1
         cut = [np.s_[y : y + size, x : x + size] for x, y in self._corner]

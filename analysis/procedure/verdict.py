@@ -70,6 +70,8 @@ def judge(
         found.append("the take-off was not found, so times are counted from the first pulse")
     unexplained = [name for name in system.names if name not in synchrony or synchrony[name].message is None]
     found += _contradicting(seen, {name: system[name] for name in unexplained}, tests)
+    if seen and not any(of_phase["points"] for of_phase in phases.values()):
+        found.append("no pulse shows all four points, so it is not certain which is which: look at the overlay")
     found += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
     found += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
     for phase in (Phase.EDGE, Phase.FLIGHT):

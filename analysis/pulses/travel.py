@@ -1,19 +1,30 @@
 """How the jumper travels from pulse to pulse: differences of positions, and nothing smoother."""
 
+from typing import Final
+
 import numpy as np
 
 from rig.arrays import Floats, Integers
+
+#: Pulses whose differences tell the velocity: in 0.1 s no jumper changes it by more than some 1 m/s, which shifts a
+#: point by 1 mm between exposures whose middles are 1 ms apart. At least three before and after, so that wrong places
+#: in two neighbouring pulses, which spoil the differences of four, are outvoted.
+_AROUND_S: Final = 0.1
+_LEAST_AROUND: Final = 3
 
 
 def velocities(points: Floats, times: Floats) -> Floats:
     """Approximate velocities (k, 3) of the jumper at k pulses, m/s, for the small shifts between exposures.
 
+    Each is the median of the central differences of all points in the pulses around: where few rays or a wrong one
+    intersect, at the borders of the images above all, a single difference can be wrong by hundreds of m/s.
+
     Args:
         points: (k, q, 3) points that move about alike, NaN where not measured.
-        times: (k,) s.
+        times: (k,) s, ascending.
 
     Returns:
-        Means of the points' central differences, interpolated where nothing was measured; zero if there is nothing.
+        Medians, interpolated where nothing was measured; zero if there is nothing.
     """
     result = np.zeros((len(times), 3))
     if len(times) < 2:
@@ -21,12 +32,16 @@ def velocities(points: Floats, times: Floats) -> Floats:
     before, after = np.maximum(np.arange(len(times)) - 1, 0), np.minimum(np.arange(len(times)) + 1, len(times) - 1)
     step = (points[after] - points[before]) / (times[after] - times[before])[:, None, None]
     there = np.asarray(np.isfinite(step).all(axis=2))
-    known = there.any(axis=1)
-    if not known.any():
+    known = np.flatnonzero(there.any(axis=1))
+    if not len(known):
         return result
-    mean = np.where(there[..., None], step, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)[:, None]
+    middle = np.zeros((len(known), 3))
+    for i, k in enumerate(known):
+        near = np.abs(times - times[k]) <= _AROUND_S
+        near[max(0, k - _LEAST_AROUND) : k + _LEAST_AROUND + 1] = True
+        middle[i] = np.median(step[near][there[near]], axis=0)
     for axis in range(3):
-        result[:, axis] = np.interp(times, times[known], mean[known, axis])
+        result[:, axis] = np.interp(times, times[known], middle[:, axis])
     return result
 
 

@@ -17,6 +17,7 @@ from analysis.measurements.model import (
     Source,
 )
 from analysis.pulses.solution import RawJump, solve_pulses
+from analysis.pulses.travel import velocities
 from analysis.result.model import JumperState, Status
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.rotation import rotation_from_vector
@@ -220,6 +221,17 @@ def test_exposures_of_different_length_belong_to_their_middles() -> None:
     found, true = aware.states[middle].points["P2"], jump.pose(pulse).markers[1]
     assert found is not None
     assert np.abs(found.xyz - true).max() < 5 * np.sqrt(found.covariance.diagonal().max())
+
+
+def test_wrong_places_at_the_ends_do_not_spoil_the_velocity() -> None:
+    """At the borders of the images one marker is in sight first, and its first places are metres off."""
+    times, true = np.arange(20) / RATE_HZ, np.array((25.0, 1.0, -6.0))
+    points = times[:, None, None] * true + np.arange(4)[:, None]
+    points[:2, 0] += (20.0, -12.0, 1.0)
+    points[0, 1:] = np.nan
+    points[-1, :3] = np.nan
+    points[-2:, 3] -= (15.0, 0.0, 4.0)
+    assert np.abs(velocities(points, times) - true).max() < 1e-6
 
 
 def test_sigmas_that_most_measurements_exceed_are_scaled() -> None:

@@ -126,7 +126,8 @@ def analyze(
         measurements = merged(measurements, by_hand)
     if not measurements.jumps:
         raise NoJumpError(
-            f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording"
+            f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording, "
+            "or look whether the survey is in metres with Z up and the markers stand out"
         )
     flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
     if helmet:

@@ -18,6 +18,7 @@ from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLo
 from analysis.identification.identify import find_sightings, identify
 from analysis.measurements.model import JumpMeasurements
 from analysis.procedure.log_facts import LogFacts
+from analysis.procedure.plumb import check_up
 from analysis.scene.camera_system import CameraSystem
 
 #: Pulses around a jump in which it is looked for again, s.
@@ -39,6 +40,9 @@ def find_jumps(
         scene: cameras and balls.
         steadiness: how the cameras stood.
         look: looks again at a place in a frame.
+
+    Raises:
+        BadInputError: the Z axis of the survey does not point up.
     """
     exposures = {name: camera.exposure_s for name, camera in facts.cameras.items()}
     system = changed(scene.system, scene.changes)
@@ -48,7 +52,9 @@ def find_jumps(
     }
     loose = [_loosened(seen, moves_px) for seen in candidates]
     found: list[JumpMeasurements] = []
-    for sighting in find_sightings(loose, system, facts.rate_hz, exposures):
+    sightings = find_sightings(loose, system, facts.rate_hz, exposures)
+    check_up(system, [sighting.flight for sighting in sightings])
+    for sighting in sightings:
         if not (pulses := sighting.pulses()):
             continue
         around = round(_AROUND_S * facts.rate_hz)

@@ -17,7 +17,7 @@ from analysis.scene.hypotheses import Approximate
 from analysis.scene.measured_network import View, measured_network
 from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
 from analysis.scene.static_image import StaticImage, static_images
-from analysis.scene.survey import KnownPoints, Survey
+from analysis.scene.survey import KnownPoints, Survey, check_lengths
 from analysis.scene.ties import Station, Tie, ball_size, find_ties
 from photogrammetry.network.file import pixel_to_metric
 from photogrammetry.network.model import Camera, Image, Network, Role
@@ -124,14 +124,19 @@ def orient_images(
     found = detections or {name: detect_balls(image) for name, image in static.items()}
     views = {name: _view(camera, found[name], survey, known) for name, camera in cameras.items()}
     namings, failures = _named(views, known)
-    ties = _ties(views, namings, known)
+    ties = _ties(views, namings, known, survey.source)
     if failures and len(namings) >= _FEWEST_CAMERAS:
         more, failures = _named({name: views[name] for name in failures}, _with_ties(known, ties))
         if more:
             surveyed = len(known.names)
             namings |= {name: _only_first(naming, surveyed) for name, naming in more.items()}
-            ties = _ties(views, namings, known)
+            ties = _ties(views, namings, known, survey.source)
     if len(namings) < _FEWEST_CAMERAS:
+        if not namings and views and _fits_mirrored(next(iter(views.values())), known):  # one tells, and takes seconds
+            raise BadInputError(
+                f"{survey.source}: the images show the surveyed balls as in a mirror: its axes are left-handed, as "
+                "where north stands before east; interchange two columns of the coordinates, or change the sign of one"
+            )
         reasons = "; ".join(f"camera {name}: {reason}" for name, reason in failures.items())
         raise BadInputError(
             reasons or f"{survey.source}: the log has one camera; two at least are needed to measure in space"
@@ -224,7 +229,17 @@ def _stations(views: Mapping[str, View], namings: Mapping[str, Naming]) -> list[
     ]
 
 
-def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: KnownPoints) -> list[Tie]:
+def _fits_mirrored(view: View, known: KnownPoints) -> bool:
+    """Whether the balls that an image shows are the surveyed ones in a mirror."""
+    try:
+        name_balls(view.camera, view.spots, known.mirrored())
+    except NotNamedError:
+        return False
+    return True
+
+
+def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: KnownPoints, source: str) -> list[Tie]:
+    """Balls without coordinates that several images show; refuses a survey that is not in metres."""
     if len(namings) < _FEWEST_CAMERAS:
         return []
     stations = _stations(views, namings)
@@ -233,7 +248,9 @@ def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: Known
         for station, naming in enumerate(namings.values())
         for point, spot in zip(naming.points, naming.spots, strict=True)
     ]
-    return find_ties(stations, ball_size(stations, named))
+    size = ball_size(stations, named)
+    check_lengths(size, source)
+    return find_ties(stations, size)
 
 
 def _misfit(orientation: Orientation) -> list[str]:

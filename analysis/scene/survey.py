@@ -1,8 +1,9 @@
 """Reads the survey of the balls: a `svev-network/1` file, JSON or TOML, without observations."""
 
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from rig.errors import BadInputError
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)
 _FEWEST = 4  # surveyed balls
+#: Radius of a ball, m: smaller ones no camera resolves from where a jump fits into its image, larger ones hide the
+#: jumper. Coordinates in mm or cm make a ball hundreds of times as large, those in km as small.
+_RADII_M: Final = (0.005, 2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +41,10 @@ class KnownPoints:
             np.concatenate((self.xyz, other.xyz)),
             np.concatenate((self.covariance, other.covariance)),
         )
+
+    def mirrored(self) -> "KnownPoints":
+        """The points with Y to the other side; coordinates do not covary."""
+        return KnownPoints(self.names, self.xyz * (1.0, -1.0, 1.0), self.covariance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +116,35 @@ def read_survey(path: Path) -> Survey:
         raise BadInputError(
             f"{path}: has {count} surveyed balls (control or fixed); a camera needs at least {_FEWEST} in sight"
         )
-    return Survey(network, str(path))
+    survey = Survey(network, str(path))
+    _check_apart(survey.surveyed(), survey.source)
+    return survey
+
+
+def check_lengths(radius: float | None, source: str) -> None:
+    """Refuse a survey that makes the balls in the images larger or smaller than balls can be.
+
+    Args:
+        radius: of the balls in the unit of the survey; None if it is not known.
+        source: the file, for messages.
+
+    Raises:
+        BadInputError: its coordinates are no metres.
+    """
+    if radius is not None and not _RADII_M[0] <= radius <= _RADII_M[1]:
+        raise BadInputError(
+            f"{source}: with these coordinates the balls in the images are {2 * radius:.2g} m across, so they are not "
+            "in metres; write coordinates and their sigmas in metres"
+        )
+
+
+def _check_apart(known: KnownPoints, source: str) -> None:
+    """Refuse two balls at one place: one of them has the coordinates of the other."""
+    for i, j in combinations(range(len(known.names)), 2):
+        if not (known.xyz[i] - known.xyz[j]).any():
+            raise BadInputError(
+                f"{source}: balls {known.names[i]} and {known.names[j]} have the same coordinates; correct one of them"
+            )
 
 
 def _with_uncertain_estimated(cameras: Any) -> Any:

@@ -1,6 +1,7 @@
 """The whole way from images and survey to oriented cameras, on the simulated hill; faults are named, never hidden."""
 
 import json
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -250,9 +251,32 @@ def _wrong_c(data: dict[str, Any]) -> dict[str, Any]:
     return other
 
 
+def _with_coordinates(change: Callable[[list[float]], list[float]]) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    def spoil(data: dict[str, Any]) -> dict[str, Any]:
+        other = deepcopy(data)
+        for point in other["points"].values():
+            if point["X"] is not None:
+                point["X"] = change(point["X"])
+        return other
+
+    return spoil
+
+
+def _same_place(data: dict[str, Any]) -> dict[str, Any]:
+    other = deepcopy(data)
+    other["points"]["B7"]["X"] = other["points"]["B2"]["X"]
+    return other
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
+        (
+            _with_coordinates(lambda xyz: [1000 * x for x in xyz]),
+            "the balls in the images are .* m across, .* in metres",
+        ),
+        (_with_coordinates(lambda xyz: [xyz[1], xyz[0], xyz[2]]), "as in a mirror: its axes are left-handed"),
+        (_same_place, "balls B2 and B7 have the same coordinates; correct one of them"),
         (_scrambled, r"camera K1: \d+ round spots found, which do not fit the 15 surveyed balls.*; camera K2: .*K3: "),
         (_wrong_c, "camera K1: .* do not fit the 15 surveyed balls .*; check survey and interior orientation"),
         (_resized, "camera K2 is calibrated for images of 1936 x 1216 px, those of the log have 640 x 480 px; give"),
@@ -260,7 +284,17 @@ def _wrong_c(data: dict[str, Any]) -> dict[str, Any]:
         (_few, "has 3 surveyed balls .* at least 4"),
         (_metric, '"image_frame" is "metric"; a survey for a log needs c, x0, y0 in px'),
     ],
-    ids=["survey of another hill", "other calibration", "image size", "camera's name", "few balls", "metric"],
+    ids=[
+        "millimetres",
+        "left-handed",
+        "twice the same",
+        "survey of another hill",
+        "other calibration",
+        "image size",
+        "camera's name",
+        "few balls",
+        "metric",
+    ],
 )
 def test_what_does_not_belong_to_the_log_is_refused_in_one_line(tmp_path: Path, spoil: Any, message: str) -> None:
     (tmp_path / "survey.json").write_text(json.dumps(spoil(survey_json(training(), 11))))

@@ -1,6 +1,6 @@
 """The whole analysis of a recording: from its log and the survey of the balls to the measured jumps."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from analysis.scene.static_image import StaticImage, static_images
 from photogrammetry.procedures.orientation import Orientation
 from rig.errors import NoJumpError
 
+_NAMED = 6  # pulses that a message names, at most
 #: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
 Progress = Callable[[str, float], None]
 
@@ -116,8 +117,10 @@ def analyze(
     steadiness = watch(scene, LogFrames(log))
     tell("looking at the balls", 1.0)
     jumps: list[JumpMeasurements] = []
+    unread: list[str] = []
     if images:
         seen = seen or look(log, {name: scene.static[name] for name in scene.system.names}, tell)
+        unread = unread_pulses(seen.candidates)
         tell("naming points and skis", 0.0)
         jumps = find_jumps(seen.candidates, facts, scene, steadiness, seen.finder)
         tell("naming points and skis", 1.0)
@@ -142,13 +145,25 @@ def analyze(
         facts.recording,
         facts.session,
         facts.rate_hz,
-        orientation_result(scene, steadiness.moved, (*facts.messages, *steadiness.messages)),
+        orientation_result(scene, steadiness.moved, (*facts.messages, *unread, *steadiness.messages)),
         _synchrony(computed),
         tuple(each.jump for each in computed),
     )
     tell("computing", 1.0)
     perpendicular = {c.jump.number: c.perpendicular for c in computed if c.perpendicular is not None}
     return Analysis(result, measurements, scene, orientation, perpendicular)
+
+
+def unread_pulses(candidates: Sequence[PulseCandidates]) -> list[str]:
+    """A line for people if pulses of the log are missing between others."""
+    numbers = [seen.pulse for seen in candidates]
+    missing = sorted(set(range(min(numbers), max(numbers) + 1)) - set(numbers)) if numbers else []
+    if not missing:
+        return []
+    which = ", ".join(map(str, missing[:_NAMED])) + (", ..." if len(missing) > _NAMED else "")
+    return [
+        f"pulse{'s' * (len(missing) > 1)} {which} cannot be read from the log: it is damaged; svev verify says more"
+    ]
 
 
 def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> SteadiedJump:

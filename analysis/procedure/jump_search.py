@@ -16,10 +16,12 @@ from analysis.cameras.standing import Standing
 from analysis.cameras.steadiness import Steadiness
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook
 from analysis.identification.identify import find_sightings, identify
-from analysis.measurements.model import JumpMeasurements
+from analysis.measurements.model import JumpMeasurements, PulseMeasurements
 from analysis.procedure.log_facts import LogFacts
 from analysis.procedure.plumb import check_up
 from analysis.scene.camera_system import CameraSystem
+from rig.clocks import UtcNs
+from rig.pulse import PulseNumber
 
 #: Pulses around a jump in which it is looked for again, s.
 _AROUND_S = 0.5
@@ -63,15 +65,29 @@ def find_jumps(
         standing = steadiness.during([seen.pulse for seen in window])
         if not moves_px and _stood_still(standing, system):
             if measured := sighting.measured(look):
-                found.append(JumpMeasurements(len(found) + 1, measured))
+                found.append(JumpMeasurements(len(found) + 1, without_gaps(measured)))
             continue
         steady = standing.candidates(window)
         again = identify(steady, standing.system, facts.rate_hz, exposures, standing.look(look))
         best = max(again, key=lambda one: len(one.pulses), default=None)
         if best is not None:
             steadied = tuple(standing.in_frames(pulse) for pulse in best.pulses)
-            found.append(JumpMeasurements(len(found) + 1, steadied))
+            found.append(JumpMeasurements(len(found) + 1, without_gaps(steadied)))
     return found
+
+
+def without_gaps(pulses: Sequence[PulseMeasurements]) -> tuple[PulseMeasurements, ...]:
+    """Pulses in order, with empty ones where the log is damaged: the motion goes on between, and is predicted there."""
+    numbers = [pulse.pulse for pulse in pulses]
+    known = {pulse.pulse: pulse for pulse in pulses}
+    times_ns = np.array([pulse.time - pulses[0].time for pulse in pulses])
+    return tuple(
+        known.get(PulseNumber(number))
+        or PulseMeasurements(
+            PulseNumber(number), UtcNs(pulses[0].time + round(float(np.interp(number, numbers, times_ns)))), {}
+        )
+        for number in range(numbers[0], numbers[-1] + 1)
+    )
 
 
 def _stood_still(standing: Standing, system: CameraSystem) -> bool:

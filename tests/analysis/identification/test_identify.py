@@ -1,12 +1,13 @@
 """Identification on candidates with much that is neither marker nor ski."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from analysis.candidates.known_discs import DiscShape
-from analysis.candidates.model import Spots
+from analysis.candidates.model import ImageCandidates, Spots
 from analysis.identification.identify import identify
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements
 from rig.arrays import Floats
@@ -107,6 +108,34 @@ def test_a_marker_that_is_not_worn_is_not_found(missing: str) -> None:
     assert not _wrong_points(jumps, made)
     assert not _wrong_skis(jumps, made)
     assert _share(jumps, made) > 0.95
+
+
+def _put_beside(made: Scene, pulses: range, rng: np.random.Generator) -> None:
+    """Put what looks like a marker into K2 and K3, as far to the right of P3 as P4 is to its left."""
+    for at, candidates in enumerate(made.candidates):
+        if candidates.pulse not in pulses:
+            continue
+        images = dict(candidates.images)
+        place = true_jump(7).pose(candidates.pulse).markers[2] + np.array((rng.normal(0.0, 0.03), -0.3, 0.0))
+        for camera in ("K2", "K3"):
+            xy = true_cameras()[camera].project(place) + SIGMA_PX * rng.standard_normal(2)
+            sigma = SIGMA_PX**2 * np.eye(2)
+            one = Spots(xy[None], sigma[None], np.array([1.6]), np.array([80.0]), np.array([20.0]))
+            images[camera] = ImageCandidates(
+                Spots.joined([images[camera].spots, one]), candidates.images[camera].traces
+            )
+        made.candidates[at] = replace(candidates, images=images)
+
+
+def test_rays_lose_the_names_that_they_got_from_untold_points() -> None:
+    """P4 is hidden, and something beside P3 makes a pair with it: which of the two is P3 cannot be told."""
+    rng = np.random.default_rng(7)
+    hidden = (("P4", None, 0, 37), ("P3", "K1", 0, 31))
+    made = scene([true_jump(7)], true_cameras(), rng, PULSES, Disturbed(10, 1, hidden=hidden, lost=0.05))
+    _put_beside(made, range(24, 29), rng)
+    jumps = identify(made.candidates, true_cameras(), RATE_HZ)
+    assert not _wrong_points(jumps, made)
+    assert _share(jumps, made) > 0.93
 
 
 class _SecondLook:

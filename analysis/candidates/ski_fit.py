@@ -45,6 +45,7 @@ _COMPARED = 700  # pixels with which explanations are compared; the best one is 
 _UNSEEN = 1e-3  # 1 / px^2: weight of a bar's shift below which a section says nothing about it
 _BOTH_EDGES = 0.5  # of the weight of a section's width is left beside its shift, at least, where both edges tell it
 _POINT = 0.012  # of the width: a ski's border waves by that, and it is nearer to the camera at one end
+_SIDECUT = 0.03  # of the width, standard deviation along a ski: some 0.11 m at shovel and tail, 0.10 m at the waist
 #: By so much the middle between the edges of a ski may be off its axis, standard deviation, px.
 AXIS_PX: Final = 0.015
 _FEWEST = 30  # pixels
@@ -266,7 +267,9 @@ class _Fit:
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
-        t, shift, sigma = t[fine], shift[fine], np.hypot(max(1.0, self.misfit) * sigma[fine], _POINT * bar.width)
+        t, shift, one_sided = t[fine], shift[fine], one_sided[fine] / (bar.width / 2)
+        model = np.hypot(_POINT, _SIDECUT / 2 * one_sided) * bar.width
+        sigma = np.hypot(max(1.0, self.misfit) * sigma[fine], model)
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
         contrast = median(theta[0] - pixels.behind)
         own, of_width = self._common(k, t, sigma)
@@ -279,7 +282,7 @@ class _Fit:
             float(theta[0]),
             contrast,
             self.misfit,
-            one_sided[fine] / (bar.width / 2),
+            one_sided,
             widening[fine] * bar.width / 2,
             of_width,
             lasting,

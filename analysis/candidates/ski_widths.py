@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.candidates.axis_scatter import axis_scatter
 from analysis.candidates.median import median
 from analysis.candidates.model import Trace
-from analysis.candidates.traces import bent
 from rig.arrays import Floats
 
 _ALIKE = 0.5  # ratio of lengths, and of widths, of two skis that are both in sight
@@ -138,11 +138,12 @@ def _one_of_two(trace: Trace, px: float, side: int) -> Trace:
     xy = trace.xy[told] + aside[:, None] * across
     sigma = _ONE_EDGE * trace.sigma[told]
     place = (xy - trace.ends[0]) @ along
-    sigma = sigma * bent(place, (xy - trace.ends[0]) @ across, sigma)
+    scatter = axis_scatter(place, (xy - trace.ends[0]) @ across, sigma, _length(trace))
     ends, one_sided = trace.ends + side * half * across, np.full(len(xy), -float(side))
-    return replace(
-        trace, xy=xy, sigma=sigma, ends=ends, width=px, one_sided=one_sided, widening=np.full(len(xy), np.nan)
+    found = replace(
+        trace, xy=xy, sigma=scatter.sigma, ends=ends, width=px, one_sided=one_sided, widening=np.full(len(xy), np.nan)
     )
+    return _off(found, scatter.common)
 
 
 def _resolved(traces: Sequence[Trace], i: int) -> Trace:

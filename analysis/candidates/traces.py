@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.candidates.axis_scatter import axis_scatter
 from analysis.candidates.background import Region
 from analysis.candidates.bar_model import Bar
 from analysis.candidates.bars import Bars, find_bars
@@ -42,6 +43,7 @@ _APART = 0.06  # share of their length by which two skis that cover each other m
 _POINTS = 24  # of a trace
 _BOTH = 2  # skis
 _ENDS = 0.05  # share of the length at each end that is not measured: tips are bent, tails are round
+_OBLIQUE = 1.0  # likewise in widths: seen obliquely, one edge ends that much before the other
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,43 +165,27 @@ def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
         return None
     along = (bar.ends[1] - bar.ends[0]) / bar.length
     t = (fitted.xy - bar.ends[0]) @ along
-    spare = max(bar.width / 2, _ENDS * bar.length)
+    spare = max(_OBLIQUE * bar.width, _ENDS * bar.length)
     inner = (t > spare) & (t < bar.length - spare) & (fitted.sigma < _WORST_SIGMA)
     if np.count_nonzero(inner) < _FEWEST_POINTS:
         return None
     offset = np.array((region.x, region.y), float)
     xy, sigma = fitted.xy[inner], fitted.sigma[inner]
-    sigma = sigma * bent(t[inner], (xy - bar.ends[0]) @ np.array((-along[1], along[0])), sigma)
+    scatter = axis_scatter(t[inner], (xy - bar.ends[0]) @ np.array((-along[1], along[0])), sigma, bar.length)
     one_sided = np.clip(fitted.one_sided[inner], -1.0, 1.0)
     ends = bar.ends + offset
     return Trace(
         xy + offset,
-        sigma,
-        fitted.common,
+        scatter.sigma,
+        float(np.hypot(fitted.common, scatter.common)),
         ends,
         bar.width,
         fitted.contrast,
         one_sided,
         fitted.widening[inner],
         fitted.of_width,
-        fitted.lasting,
+        float(np.hypot(fitted.lasting, scatter.common)),
     )
-
-
-def bent(t: Floats, off: Floats, sigma: Floats) -> float:
-    """By how much points scatter more about a straight line than their sigmas say; 1 if they do not.
-
-    A line through parts of two skis, of which a body hides the rest, is such a case.
-
-    Args:
-        t: (k,) px along the line.
-        off: (k,) px across it.
-        sigma: (k,) of these.
-    """
-    design = np.column_stack((np.ones(len(t)), t)) / sigma[:, None]
-    values = off / sigma
-    v = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
-    return max(1.0, float(np.sqrt(v @ v / max(1, len(t) - 2))))
 
 
 def _groups(lines: Sequence[_Line]) -> list[list[_Line]]:

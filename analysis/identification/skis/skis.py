@@ -12,18 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from analysis.identification.over_time.assignment import (
-    DECISIVE,
-    DETECTED,
-    MOST_OPTIONS,
-    MOST_VAGUE_M,
-    Option,
-    jointly_best,
-    nothing,
-)
+from analysis.identification.over_time.assignment import DETECTED, MOST_VAGUE_M, jointly_best
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, Prediction, predict
 from analysis.identification.over_time.window import Window
+from analysis.identification.skis.beams import Beams
 from analysis.identification.skis.ski_traces import Equations, Lines, SeenSkis, StraightTrace
 from analysis.identification.space.views import Views, gate
 from analysis.measurements.model import SIDES
@@ -42,13 +35,16 @@ _PARTS = (
     Part(np.zeros((2, 2)), (0.2, 0.5, 5.0), 8.0),
 )
 _MOST_TURNS = 6
-_BEAM = 12
 _KNOWN_RAD = 0.1  #: standard deviation of a direction that tells a ski from a leg
 _BEYOND_M = 0.35  #: more than a boot
 LONGEST_M: Final = 1.4  #: from a binding to tail or tip: skis of 2.8 m
 _LONGEST_SIGMA_M = 0.1  #: of that
 _END_SIGMA_M = 0.06  #: of a visible end of a ski
 _LEAST_TRACES = 8  #: of each ski that tell where its ends are
+_WHOLE_M = 1.9  #: of a ski, in each of two images: no leg is so long, and skis of 2.2 m without their ends are
+_CONTROLLED = 3  #: images of a ski that contradict each other if one is wrong
+_FEWEST_SOUND = 3  #: pulses with each ski's own evidence: of two that contradict each other nobody knows which is wrong
+_SURE_RAD = 0.035  #: standard deviation of a direction by which traces are judged: a shin is 20 degrees off
 _LENGTH_PX = 40.0  #: of a trace, for the density of traces that are there by chance
 
 
@@ -110,7 +106,7 @@ def follow_skis(
         offsets = search.offsets(lines)
         angles = predict(window.time_s, *search.angles(lines), _PARTS, _MIXING)
         believed = search.belief(angles, offsets)
-    return Skis(found)
+    return Skis(_borne_out(search, window.time_s, broad, found))
 
 
 def assign_skis(
@@ -137,6 +133,30 @@ def assign_skis(
     search = _Search(views, traces, delivered, flight, bindings)
     anywhere = np.zeros((2, 2)), np.tile(_BINDING_M**2 * np.eye(2), (2, 1, 1))
     return search.assigned(search.belief(angles, anywhere))
+
+
+def _borne_out(search: "_Search", time_s: Floats, broad: tuple[Floats, Floats], found: Integers) -> Integers:
+    """The traces (t, 2, m) of skis that something bears out: their own images, or pulses of which these do.
+
+    Two lines in two images are a line in space whatever they show, so a ski that rests on two traces, or on one, needs
+    other evidence: that both show nearly the whole of it, or that skis which are borne out point the same way shortly
+    before or after. A ski turns smoothly. One that a few pulses of the whole jump show is none.
+    """
+    sound = search.controlled(broad, found)
+    sound &= np.count_nonzero(sound, axis=0) >= _FEWEST_SOUND
+    while True:
+        lines = search.measured(broad, np.where(sound[..., None], found, -1))
+        angles = predict(time_s, *search.angles(lines), _PARTS, _MIXING)
+        fits = (search.misfits(search.belief(angles, search.offsets(lines)), found) < gate(2)).all(axis=2)
+        more = fits & _sure(angles) & (found >= 0).any(axis=2) & ~sound
+        if not more.any():
+            return np.where(sound[..., None], found, -1)
+        sound |= more
+
+
+def _sure(angles: Prediction) -> Flags:
+    """Whether angles (t, 2) are predicted so well that they tell whether a trace is of their ski."""
+    return np.asarray(np.linalg.eigvalsh(angles.covariance)[..., -1] < _SURE_RAD**2)
 
 
 class _Search:
@@ -200,7 +220,7 @@ class _Search:
     def assigned(self, belief: tuple[Floats, Floats]) -> Integers:
         """Traces (t, 2, m) of the skis."""
         values, spread = belief[0].reshape(-1, 6), belief[1].reshape(-1, 6, 6)
-        beams = _Beams.begun(np.flatnonzero(self._known.ravel()), spread, len(self._views))
+        beams = Beams.begun(np.flatnonzero(self._known.ravel()), spread, len(self._views))
         for k, sight in enumerate(self._views.see_all(SeenSkis.places(values))):
             beams = self._continued(beams, k, SeenSkis(sight), spread)
         found = np.full((*self._known.shape, len(self._views)), -1)
@@ -210,7 +230,7 @@ class _Search:
                 found[t, side] = np.where(doubtful, -1, option.rays)
         return found
 
-    def _continued(self, beams: "_Beams", k: int, seen: SeenSkis, spread: Floats) -> "_Beams":
+    def _continued(self, beams: Beams, k: int, seen: SeenSkis, spread: Floats) -> Beams:
         """Hypotheses with the traces of one more camera."""
         lines = self._lines[k]
         usable = self._known & self._delivered[:, k, None] & seen.inside.reshape(self._known.shape)
@@ -255,6 +275,25 @@ class _Search:
             state[t, side], covariance[t, side] = equations.updated(state[t, side], covariance[t, side])
         return belief[0] + state, covariance, known
 
+    def controlled(self, belief: tuple[Floats, Floats], found: Integers) -> Flags:
+        """Skis (t, 2) that three images show, or two that both show nearly the whole of it."""
+        values = self.measured(belief, found)[0]
+        values[..., 3:] /= np.linalg.norm(values[..., 3:], axis=-1, keepdims=True)
+        whole = np.zeros(found.shape, bool)
+        for k in range(found.shape[2]):
+            t, side = np.nonzero(found[..., k] >= 0)
+            whole[t, side, k] = np.ptp(self._equations(k, values, found, t, side).along, axis=1) > _WHOLE_M
+        return np.asarray(((found >= 0).sum(axis=2) >= _CONTROLLED) | (whole.sum(axis=2) > 1))
+
+    def misfits(self, belief: tuple[Floats, Floats], found: Integers) -> Floats:
+        """Chi-squares (t, 2, m), of two degrees of freedom, of each trace as one of the ski that is believed in."""
+        squares = np.zeros(found.shape)
+        for k in range(found.shape[2]):
+            t, side = np.nonzero(found[..., k] >= 0)
+            equations = self._equations(k, belief[0], found, t, side)
+            squares[t, side, k] = equations.misfit(np.zeros((len(t), 6)), belief[1][t, side])[0]
+        return squares
+
     def _equations(self, k: int, values: Floats, found: Integers, t: Integers, side: Integers) -> Equations:
         """What the traces of some skis that were found in a camera say about them."""
         lines = self._lines[k].at(t, found[t, side, k])
@@ -294,72 +333,6 @@ class _Search:
             spread[side] = np.linalg.inv(prior + weight.sum(axis=0))
             mean[side] = spread[side] @ (weight @ off[own, side][..., None]).sum(axis=0)[:, 0]
         return mean, spread + _STEADY_M**2 * np.eye(2)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Beams:
-    """Hypotheses about the traces of each ski, those of one ski one after the other, the best first.
-
-    Attributes:
-        ski: (h,) number of the ski, ascending.
-        cost: (h,) as in `assignment`.
-        rays: (h, m) index of the trace in each image; -1: none.
-        state: (h, 6) by how much the ski differs from what was believed.
-        spread: (h, 6, 6) of it.
-    """
-
-    ski: Integers
-    cost: Floats
-    rays: Integers
-    state: Floats
-    spread: Floats
-
-    @classmethod
-    def begun(cls, skis: Integers, spread: Floats, m: int) -> "_Beams":
-        """Skis of which nothing is found yet in m images; spread (n, 6, 6) of all skis."""
-        n = len(skis)
-        return cls(skis, np.zeros(n), np.full((n, m), -1), np.zeros((n, 6)), spread[skis])
-
-    def longer(self, k: int, skis: Integers, traces: Integers, equations: Equations, extra: Floats) -> "_Beams":
-        """The best hypotheses with and without a trace of camera k.
-
-        Args:
-            k: number of the camera.
-            skis: (n,) skis that traces may show.
-            traces: (n,) index of the trace.
-            equations: of these n pairs.
-            extra: (n,) their costs but for how they fit.
-        """
-        first, last = np.searchsorted(self.ski, skis), np.searchsorted(self.ski, skis, side="right")
-        pair = np.repeat(np.arange(len(skis)), last - first)
-        came = np.arange(len(pair)) - np.repeat(np.cumsum(last - first) - last, last - first)
-        misfit, area = equations.only(pair).misfit(self.state[came], self.spread[came])
-        fits = misfit < gate(2)
-        pair, came = pair[fits], came[fits]
-        cost = self.cost[came] + misfit[fits] + extra[pair] + area[fits]
-        rays = self.rays[came]
-        rays[:, k] = traces[pair]
-        state, spread = equations.only(pair).updated(self.state[came], self.spread[came])
-        return _Beams(
-            np.concatenate((self.ski, skis[pair])),
-            np.concatenate((self.cost, cost)),
-            np.concatenate((self.rays, rays)),
-            np.concatenate((self.state, state)),
-            np.concatenate((self.spread, spread)),
-        )._best()
-
-    def _best(self) -> "_Beams":
-        """The best hypotheses of each ski."""
-        order = np.lexsort((self.cost, self.ski))
-        ski = self.ski[order]
-        order = order[np.arange(len(ski)) - np.searchsorted(ski, ski) < _BEAM]
-        return _Beams(self.ski[order], self.cost[order], self.rays[order], self.state[order], self.spread[order])
-
-    def options(self, ski: int) -> list[Option]:
-        """Options of one ski, the best first: nothing, and what chance does not explain."""
-        first, last = np.searchsorted(self.ski, (ski, ski + 1)).tolist()
-        found = [Option(float(self.cost[i]), self.rays[i], 0) for i in range(first, last) if self.cost[i] < -DECISIVE]
-        return [nothing(self.rays.shape[1]), *found[: 2 * MOST_OPTIONS]]
 
 
 def _near(equations: Equations, covariance: Floats) -> Flags:

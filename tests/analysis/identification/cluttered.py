@@ -30,6 +30,7 @@ class Disturbed:
         hidden: (marker, camera or None for all, first, last pulse) that no spot shows.
         absent: (camera, first, last pulse) without an image.
         late_s: by camera, how much later it shows the scene.
+        stubs: all cameras but the first one show, in place of a ski, something of 1 m through its binding, 4 degrees off.
     """
 
     false_spots: int = 0
@@ -40,6 +41,7 @@ class Disturbed:
     hidden: tuple[tuple[str, str | None, int, int], ...] = ()
     absent: tuple[tuple[str, int, int], ...] = ()
     late_s: dict[str, float] = field(default_factory=dict)
+    stubs: bool = False
 
 
 @dataclass
@@ -102,7 +104,9 @@ def _image(
                 made.spots[pulse, name, label] = place
         for side in (0, 1):
             found = _ski(pose, jump, system, name, side, how, rng)
-            if found:
+            if how.stubs:
+                traces += [_stub(found[0], rng)] if found and name != system.names[0] else []
+            elif found:
                 traces += found
                 ends = _axis(pose, jump, side)[[0, -1]]
                 made.skis[pulse, name, SIDES[side]] = system[name].project(system_points(system, ends))
@@ -171,6 +175,14 @@ def _trace(xy: Floats) -> Trace:
         0.0,
         0.05,
     )
+
+
+def _stub(ski: Trace, rng: np.random.Generator) -> Trace:
+    middle = len(ski.xy) // 2
+    part = ski.xy[max(0, middle - 5) : middle + 5]
+    centre, angle = part.mean(axis=0), np.radians(4.0) * rng.choice((-1, 1))
+    turn = np.array(((np.cos(angle), -np.sin(angle)), (np.sin(angle), np.cos(angle))))
+    return _trace(centre + (part - centre) @ turn.T)
 
 
 def _false_trace(size: Floats, rng: np.random.Generator) -> Trace:

@@ -89,6 +89,14 @@ def test_markers_hidden_in_two_views_are_not_invented() -> None:
     assert not named
 
 
+def test_skis_that_nothing_bears_out_are_not_invented() -> None:
+    """Two short lines in two images are a line in space whatever they show."""
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(4), PULSES, Disturbed(8, 1, stubs=True))
+    (jump,) = identify(made.candidates, true_cameras(), RATE_HZ)
+    assert not _wrong_points([jump], made)
+    assert not any(image.skis for pulse in jump.pulses for image in pulse.images.values())
+
+
 def test_a_late_camera_is_named_too() -> None:
     """8 ms are 0.2 m or 7 px: no ray of the late camera meets those of the others."""
     made = scene(

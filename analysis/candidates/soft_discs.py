@@ -8,9 +8,6 @@ spot, from a Gaussian to a disc with a soft border,
 
 fitted to all places of an image together. It is symmetric: an error of its shape does not move the centre, and the
 centre of a streak is the middle of the exposure. Residuals larger than the noise enlarge the covariance.
-
-A marker may have a rim of another brightness, darker than it and darker than the suit, or brighter than both. No
-spot on a plane is like that, so a larger spot of the same shape about the same centre is added, the rim's outside.
 """
 
 from dataclasses import dataclass
@@ -22,9 +19,7 @@ from scipy.special import gamma
 
 from rig.arrays import Flags, Floats, Integers
 
-UNKNOWNS: Final = 10  #: x, y, log size, stretch (2), log shape, contrast, and what is behind: level and slopes
-RIM: Final = 1.6  #: radii, outside of a rim: between those of narrow ones (1.3) and of wide ones (2)
-_RIM_SPREAD = 1.0  # weak prior of its contrast against what is around, in that of the spot against what is around
+UNKNOWNS: Final = 10
 _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residuals that count half
 _COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
@@ -69,13 +64,7 @@ class SoftDiscs:
 
 
 def fit_soft_discs(
-    grey: NDArray[np.float32],
-    sigma: NDArray[np.float32],
-    xy: Floats,
-    radius: Floats,
-    *,
-    tight: bool = False,
-    rims: bool = False,
+    grey: NDArray[np.float32], sigma: NDArray[np.float32], xy: Floats, radius: Floats, *, tight: bool = False
 ) -> SoftDiscs:
     """Fit spots near places; pixels of infinite noise do not count.
 
@@ -85,16 +74,14 @@ def fit_soft_discs(
         xy: (n, 2) approximate centres.
         radius: (n,) approximate radii, px.
         tight: something lies close around the spots: what a spot in a smaller window does not explain counts less.
-        rims: the spots have rims.
     """
-    margin = _TIGHT if tight or rims else MARGIN
+    margin = _TIGHT if tight else MARGIN
     n = len(xy)
-    size = UNKNOWNS + rims
-    theta, covariance = np.zeros((n, size)), np.full((n, size, size), np.nan)
+    theta, covariance = np.zeros((n, UNKNOWNS)), np.full((n, UNKNOWNS, UNKNOWNS), np.nan)
     misfit, rms, good = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, bool)
     reach = np.minimum(radius + margin, FARTHEST)
     for mine in _groups(reach):
-        fitted = _Batch(grey, sigma, xy[mine], radius[mine], reach[mine], tight, rims).solved()
+        fitted = _Batch(grey, sigma, xy[mine], radius[mine], reach[mine], tight).solved()
         theta[mine], covariance[mine], misfit[mine], rms[mine], good[mine] = fitted
     spread = _second_moment(theta[:, 2], theta[:, 5])
     factor = np.maximum(1.0, misfit) ** _PENALTY
@@ -162,25 +149,24 @@ class _Batch:
         radius: Floats,
         reach: Floats,
         robust: bool,
-        rims: bool,
     ) -> None:
         self._centre = np.rint(xy)
-        self._start, self._radius, self._robust, self._rims = xy - self._centre, radius, robust, rims
+        self._start, self._radius, self._robust = xy - self._centre, radius, robust
         self._windows = _windows(grey, sigma, self._centre.astype(int), self._start, reach)
-        self._prior = np.zeros((len(xy), UNKNOWNS + rims))
-        self._prior[:, 2:6] = _SIZE_SPREAD**-2, _STRETCH_SPREAD**-2, _STRETCH_SPREAD**-2, _SHAPE_SPREAD**-2
+        self._prior = np.zeros(UNKNOWNS)
+        self._prior[2:6] = _SIZE_SPREAD**-2, _STRETCH_SPREAD**-2, _STRETCH_SPREAD**-2, _SHAPE_SPREAD**-2
 
     def solved(self) -> _Fitted:
         """Unknowns, their covariance a priori, misfit, rms, and whether the fit is good (Levenberg-Marquardt)."""
         n = len(self._start)
         theta = self._started()
         damping, active = np.full(n, 1e-3), np.flatnonzero(self._promising(theta))
-        cost, normal, gradient = np.full(n, np.inf), np.tile(np.eye(theta.shape[1]), (n, 1, 1)), np.zeros_like(theta)
+        cost, normal, gradient = np.full(n, np.inf), np.tile(np.eye(UNKNOWNS), (n, 1, 1)), np.zeros((n, UNKNOWNS))
         windows = self._windows.only(active)
         if len(active):
             cost[active], normal[active], gradient[active] = self._equations(theta[active], active, windows)
         for taken in range(_STEPS):
-            if taken in _HOPELESS and not self._rims:
+            if taken in _HOPELESS:
                 most = (_HOPELESS[taken] * theta[active, 6]) ** 2
                 hopeless = cost[active] > most * _sums(windows.weight, windows.weight)
                 cost[active[hopeless]] = np.inf
@@ -205,7 +191,7 @@ class _Batch:
 
     def _promising(self, theta: Floats) -> Flags:
         """Whether the spot to start from explains enough; no fit would mend larger residuals."""
-        if self._robust or self._rims:
+        if self._robust:
             return np.ones(len(theta), bool)
         used = self._windows.weight > 0
         v = (self._windows.grey - _Shape(theta, self._windows).grey) * used
@@ -213,19 +199,17 @@ class _Batch:
         return np.asarray(rms < _POOR_START * np.abs(theta[:, 6]))
 
     def _started(self) -> Floats:
-        theta = np.zeros((len(self._start), UNKNOWNS + self._rims))
+        theta = np.zeros((len(self._start), UNKNOWNS))
         theta[:, :2] = self._start
         theta[:, 2] = np.log(np.sqrt(self._radius**2 / 4 + _BLUR**2))
         theta[:, 5] = _SHAPE
         windows = self._windows
         design = _Shape(theta, windows).linear() * windows.weight[:, None, :]
-        normal = (design @ design.transpose(0, 2, 1)).astype(float) + 1e-9 * np.eye(design.shape[1])
+        normal = (design @ design.transpose(0, 2, 1)).astype(float) + 1e-9 * np.eye(4)
         right = design @ (windows.grey * windows.weight)[..., None]
         theta[:, 6:] = np.linalg.solve(normal, right.astype(float))[..., 0]
         self._expected = np.zeros_like(theta)
         self._expected[:, 2], self._expected[:, 5] = theta[:, 2], _SHAPE
-        if self._rims:
-            self._prior[:, UNKNOWNS] = (_RIM_SPREAD * np.maximum(np.abs(theta[:, 6]), 1.0)) ** -2
         return theta
 
     def _equations(self, theta: Floats, chosen: Integers, windows: _Windows) -> tuple[Floats, Floats, Floats]:
@@ -238,10 +222,10 @@ class _Batch:
         v *= weight
         design = shape.design()
         design *= weight[:, None, :]
-        off, prior = self._expected[chosen] - theta, self._prior[chosen]
-        normal = (design @ design.transpose(0, 2, 1)).astype(float) + prior[:, None] * np.eye(prior.shape[1])
-        gradient = (design @ v[..., None])[..., 0] + prior * off
-        return _sums(v, v) + (prior * off**2).sum(axis=1), normal, gradient
+        off = self._expected[chosen] - theta
+        normal = (design @ design.transpose(0, 2, 1)).astype(float) + np.diag(self._prior)
+        gradient = (design @ v[..., None])[..., 0] + self._prior * off
+        return _sums(v, v) + off**2 @ self._prior, normal, gradient
 
     def _judged(self, theta: Floats, normal: Floats, cost: Floats) -> _Fitted:
         windows = self._windows
@@ -251,7 +235,7 @@ class _Batch:
         share = _share(v, windows.weight, theta[:, 6]) * used if self._robust else used.astype(np.float32)
         counted = share.sum(axis=1, dtype=float)
         square, normalized = share * v, v * windows.weight**2
-        misfit = np.sqrt(_sums(square, normalized) / np.maximum(1, counted - theta.shape[1]))
+        misfit = np.sqrt(_sums(square, normalized) / np.maximum(1, counted - UNKNOWNS))
         rms = np.sqrt(_sums(square, v) / np.maximum(1, counted))
         covariance = np.asarray(np.linalg.inv(_damped(normal, np.full(len(normal), 1e-12))), float)
         away = np.hypot(*(theta[:, :2] - self._start).T)
@@ -268,14 +252,14 @@ class _Batch:
 
 
 class _Shape:
-    """What the model says about the pixels of n spots with unknowns (n, 10), or (n, 11) with rims.
+    """What the model says about the pixels of n spots with unknowns (n, 10).
 
     Attributes:
         grey: (n, k) grey values.
     """
 
     def __init__(self, theta: Floats, windows: _Windows) -> None:
-        x, y, log_w, s, t, log_p, contrast, b, bx, by, *rim = theta.T.astype(np.float32)[..., None]
+        x, y, log_w, s, t, log_p, contrast, b, bx, by = theta.T.astype(np.float32)[..., None]
         self._plus, self._minus, self._turn, self._p = 1 + s, 1 - s, t, np.exp(log_p)
         self._scale, self._contrast, self._bx, self._by = np.exp(-2 * log_w), contrast, bx, by
         self._dx, self._dy = windows.x - x, windows.y - y
@@ -291,39 +275,26 @@ class _Shape:
         self.grey = contrast * self._value
         self.grey += b + bx * self._dx
         self.grey += by * self._dy
-        self._rim = None
-        if rim:
-            log_rim = np.float32(np.log(RIM))
-            power = self._power * np.exp(-2 * log_rim * self._p)
-            self._rim = rim[0], power, np.exp(np.float32(-0.5) * power), self._log_q - 2 * log_rim
-            self.grey += rim[0] * self._rim[2]
 
     def linear(self) -> _Pixel:
-        """Derivatives (n, 4, k) of the grey values by contrast and plane; (n, 5, k) with that of the rim."""
-        parts = [self._value, np.ones_like(self._dx), self._dx, self._dy]
-        return np.stack(parts if self._rim is None else [*parts, self._rim[2]], axis=1)
+        """Derivatives (n, 4, k) of the grey values by contrast and plane."""
+        return np.stack((self._value, np.ones_like(self._dx), self._dx, self._dy), axis=1)
 
     def design(self) -> _Pixel:
-        """Derivatives (n, 10, k) of the grey values; (n, 11, k) with rims."""
+        """Derivatives (n, 10, k) of the grey values."""
         u, w, dx, dy = self._u, self._w, self._dx, self._dy
         by_power = self._power * self._value
         by_power *= np.float32(-0.5) * self._contrast * self._p
-        design = np.empty((len(dx), UNKNOWNS + (self._rim is not None), dx.shape[1]), np.float32)
-        np.multiply(by_power, self._log_q, out=design[:, 5])
-        if self._rim is not None:
-            contrast, power, value, log_q = self._rim
-            more = np.float32(-0.5) * contrast * self._p * power * value
-            design[:, 5] += more * log_q
-            by_power += more
-            design[:, 10] = value
         along = by_power / self._q
         along *= 2 * self._scale
         along_u, along_w = along * u, along * w
+        design = np.empty((len(dx), UNKNOWNS, dx.shape[1]), np.float32)
         design[:, 0] = -self._bx - along_u * self._plus - along_w * self._turn
         design[:, 1] = -self._by - along_u * self._turn - along_w * self._minus
         np.multiply(by_power, -2, out=design[:, 2])
         np.subtract(along_u * dx, along_w * dy, out=design[:, 3])
         np.add(along_u * dy, along_w * dx, out=design[:, 4])
+        np.multiply(by_power, self._log_q, out=design[:, 5])
         design[:, 6], design[:, 7] = self._value, 1.0
         design[:, 8], design[:, 9] = dx, dy
         return design

@@ -14,7 +14,7 @@ from scipy.special import chdtri
 from analysis.candidates.background import Region
 from analysis.candidates.median import median
 from analysis.candidates.model import Expected, Spots
-from analysis.candidates.soft_discs import FARTHEST, RIM, SoftDiscs, fit_soft_discs
+from analysis.candidates.soft_discs import FARTHEST, SoftDiscs, fit_soft_discs
 from analysis.scene.static_image import GreyImage
 from rig.arrays import Flags, Floats, Integers
 
@@ -29,8 +29,6 @@ _STRENGTH = 6.0  # contrast over its sigma
 _STRETCH = 0.75  # log of the ratio of the axes: a streak of 26 m/s and 2 ms is no longer
 _MISFIT = 0.25  # residuals over contrast
 _TIGHT, _TIGHT_MISFIT = 14, 0.15  # places that are fitted again in smaller windows, and what is asked of them there
-_WAYS, _ALONG = 8, np.arange(0.0, 3.6, 0.5)  # directions from a spot, and radii, in which a rim is sought
-_DEEP = 4.0  # times the noise, by which a rim is darker than what is inside and outside of it, or brighter
 _THINNEST = 4  # px; a smaller part of a region holds no spot
 _GAP = 26  # px between regions on the sheet
 _WORST_SIGMA = 0.5  # px
@@ -167,21 +165,15 @@ def _fitted(images: Sequence[Sequence[_Places]], strength: float) -> list[Spots]
     first = _spots(wide, sound, home)
     order = np.argsort(-first.strength)
     spots, image_of = first.only(order), image[sound][order]
-    again = _first_of_each(np.flatnonzero(~sound), region)
-    within = _within_rims(sheet, xy[again], radius[again]) if len(again) else np.empty(0)
-    if len(rim := again[within > 0]):
-        rimmed = fit_soft_discs(sheet.grey, sheet.noise, xy[rim], within[within > 0], rims=True)
-        sound = _sound(rimmed, strength, _TIGHT_MISFIT)
-        spots = Spots.joined([spots, _spots(rimmed, sound, home[rim])])
-        image_of = np.concatenate((image_of, image[rim][sound]))
-        again = np.setdiff1d(again, rim[sound])
-    if len(again):
+    apart = _apart(spots, image_of)
+    spots, image_of = spots.only(apart), image_of[apart]
+    if len(again := _first_of_each(np.flatnonzero(~sound), region)):
         tight = fit_soft_discs(sheet.grey, sheet.noise, xy[again], radius[again], tight=True)
         sound = _sound(tight, strength, _TIGHT_MISFIT)
         spots = Spots.joined([spots, _spots(tight, sound, home[again])])
         image_of = np.concatenate((image_of, image[again][sound]))
-    apart = _apart(spots, image_of)
-    spots, image_of = spots.only(apart), image_of[apart]
+        apart = _apart(spots, image_of)
+        spots, image_of = spots.only(apart), image_of[apart]
     return [spots.only(image_of == i) for i in range(len(images))]
 
 
@@ -204,32 +196,6 @@ class _Sheet:
             self.grey[part], self.noise[part] = region.grey, region.noise
         self.offsets = np.column_stack((np.zeros(len(regions)), rows[:-1]))
         self.to_image = np.array([(region.x, region.y) for region in regions]) - self.offsets
-
-
-def _within_rims(sheet: _Sheet, xy: Floats, radius: Floats) -> Floats:
-    """Radii (n,) of spots that have a rim all around which is darker than inside and outside, or brighter than both.
-
-    Args:
-        sheet: the regions.
-        xy: (n, 2) places on it.
-        radius: (n,) px, of their blobs.
-
-    Returns:
-        0 where there is no rim.
-    """
-    angles = np.arange(_WAYS) * 2 * np.pi / _WAYS
-    ways = np.column_stack((np.cos(angles), np.sin(angles)))
-    at = xy[:, None, None] + (radius[:, None] * _ALONG)[:, None, :, None] * ways[:, None]
-    x, y = np.moveaxis(at.astype(np.float32).reshape(len(xy), _WAYS * len(_ALONG), 2), -1, 0)
-    grey = cv2.remap(sheet.grey, x, y, cv2.INTER_LINEAR).reshape(len(xy), _WAYS, len(_ALONG))
-    column, row = np.rint(xy).astype(int).T
-    least = _DEEP * sheet.noise[row, column]
-    within = np.zeros(len(xy))
-    for side in (grey, -grey):
-        deep = (np.minimum(side[..., 0], side[..., -1]) - side.min(axis=2)).min(axis=1) > least
-        middle = _ALONG[side.argmin(axis=2)].mean(axis=1) * radius
-        within = np.where(deep, middle / ((1 + RIM) / 2), within)
-    return within
 
 
 def _first_of_each(chosen: Integers, region: Integers) -> Integers:

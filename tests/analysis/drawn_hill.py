@@ -37,20 +37,11 @@ _PRINTS: Final = (0.3, 0.7, 1.7, 2.1)
 class DrawnHill:
     """The scenario's cameras, balls and first jumper, drawn.
 
-    Args:
-        scenario: tells where things are.
-        pulses: hill pulses.
-        seed: of noise, ground and clothes.
-        marker: grey values of a marker and of its rim.
-
     Attributes:
         known: its truth, as `simrig.world.truth` tells it, by hill pulse.
     """
 
-    def __init__(
-        self, scenario: Scenario, pulses: range, seed: int, marker: tuple[float, float] = (_BRIGHT, _DARK)
-    ) -> None:
-        self._marker, self._rim = marker
+    def __init__(self, scenario: Scenario, pulses: range, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
         told = truth(scenario, map(HillPulse, pulses), RATE_HZ, SIZE)
         self.known: dict[int, dict[str, Any]] = {state["pulse"]: state for state in told["pulses"]}
@@ -154,8 +145,8 @@ class DrawnHill:
             if visible.get(label, 0.0) > 0.75:
                 place = np.array(point) + moved
                 radius = _MARKER_M * camera.c / float(camera.distance(place))
-                drawing.disc(camera.pixels(place), 1.5 * radius, self._rim)
-                drawing.disc(camera.pixels(place), radius, self._marker)
+                drawing.disc(camera.pixels(place), 1.5 * radius, _DARK)
+                drawing.disc(camera.pixels(place), radius, _BRIGHT)
         return drawing.pixels()
 
     def _ski(self, camera: Projection, drawing: "_Drawing", binding: Floats, along: Floats) -> None:

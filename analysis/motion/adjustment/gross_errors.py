@@ -64,7 +64,9 @@ def with_factors(adjusted: Adjusted) -> Adjusted:
     turned = observed.to_mean_and_difference()
     free = np.eye(2) - turned @ _of_adjusted(adjusted) @ turned.swapaxes(-1, -2)
     square = np.where(used[..., None], (turned @ adjusted.equations.v[..., None])[..., 0] ** 2, 0.0).sum(axis=(0, 1))
-    redundancy = np.where(used[..., None], np.diagonal(free, axis1=-2, axis2=-1), 0.0).sum(axis=(0, 1))
+    # The covariance is that of the step before: where hardly anything is left over, what it says may lie beyond the limits.
+    numbers = np.clip(np.diagonal(free, axis1=-2, axis2=-1), 0.0, 1.0)
+    redundancy = np.where(used[..., None], numbers, 0.0).sum(axis=(0, 1))
     of_points = (square[_POINTS].sum() + _PSEUDO) / (redundancy[_POINTS].sum() + _PSEUDO)
     of_skis = (square[_SKIS].sum(axis=0) + _PSEUDO) / (redundancy[_SKIS].sum(axis=0) + _PSEUDO)
     factors = np.sqrt(np.concatenate((np.full((len(POINTS), 2), of_points), np.tile(of_skis, (len(SIDES), 1)))))

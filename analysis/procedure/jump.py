@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.motion.smoother import Motion, smooth
+from analysis.procedure.contradictions import with_contradictions
 from analysis.procedure.verdict import judge
 from analysis.pulses.solution import RawJump, solve_pulses
 from analysis.result.model import CameraMove, CameraOffset, Jump, PulseState, Quantity, TakeOff, phase_at
@@ -40,9 +41,10 @@ def compute_jump(
     """
     raw = solve_pulses(jump, measurements, system)
     motion = smooth(jump, measurements, system)
-    pulses = _pulse_states(jump, measurements, raw, motion)
+    pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion))
     troubles = [motion.message] if motion.message else []
-    verdict = judge(pulses, system, motion.takeoff, raw.tests, motion.offsets, moved, troubles, motion.scale)
+    frames = [pulse.images.keys() for pulse in jump.pulses]
+    verdict = judge(pulses, frames, system, motion.takeoff, raw.tests, motion.offsets, moved, troubles, motion.scale)
     return ComputedJump(
         Jump(jump.number, motion.takeoff, verdict, pulses, raw.tests),
         motion.offsets,

@@ -1,12 +1,13 @@
 """Says whether a measured jump can be trusted, in words for people, with the figures by phase that it rests on."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from analysis.measurements.model import POINTS
+from analysis.procedure.contradictions import told
 from analysis.result.model import (
     CameraMove,
     CameraOffset,
@@ -36,11 +37,10 @@ _ENLARGED: Final = 1.2
 #: Fewest cameras that must have a point in their image for the pulse to count as in sight.
 _CAMERAS: Final = 2
 
-_WORDS: Final = {Phase.EDGE: "around the edge", Phase.FLIGHT: "in flight"}
-
 
 def judge(
     pulses: Sequence[PulseState],
+    frames: Sequence[Collection[str]],
     system: CameraSystem,
     takeoff: TakeOff | None,
     tests: Sequence[RayTest],
@@ -53,6 +53,7 @@ def judge(
 
     Args:
         pulses: of the jump.
+        frames: for each pulse the cameras that delivered a frame.
         system: the oriented cameras.
         takeoff: None where it was not found.
         tests: of all rays.
@@ -62,31 +63,36 @@ def judge(
         scale: by what factors the sigmas of points and skis in the images were too small; they were enlarged.
     """
     found = [*troubles]
-    seen = [pulse for pulse in pulses if in_sight(pulse, system)]
+    delivered = [(pulse, there) for pulse, there in zip(pulses, frames, strict=True) if in_sight(pulse, system)]
+    seen = [pulse for pulse, _ in delivered]
     phases = {phase: figures([pulse for pulse in seen if pulse.phase is phase]) for phase in Phase}
     found += [offset.message for offset in synchrony.values() if offset.message is not None]
     found += [move.message for move in moved]
     if takeoff is None:
         found.append("the take-off was not found, so times are counted from the first pulse")
     unexplained = [name for name in system.names if name not in synchrony or synchrony[name].message is None]
-    found += _contradicting(seen, {name: system[name] for name in unexplained}, tests)
-    if seen and not any(of_phase["points"] for of_phase in phases.values()):
+    found += _contradicting(delivered, {name: system[name] for name in unexplained}, tests)
+    everything = figures(seen)
+    if seen and not everything["points"]:
         found.append("no pulse shows all four points, so it is not certain which is which: look at the overlay")
-    found += _too_few(phases[Phase.FLIGHT], "points", "all points in flight")
-    found += _too_few(phases[Phase.FLIGHT], "skis", "both skis in flight")
-    for phase in (Phase.EDGE, Phase.FLIGHT):
-        coarse, count = phases[phase]["coarse"], phases[phase]["pulses"]
+    # Without a take-off nobody knows which pulses are in flight: all are judged together.
+    flight, where = (everything, "") if takeoff is None else (phases[Phase.FLIGHT], " in flight")
+    found += _too_few(flight, "points", f"all points{where}")
+    found += _too_few(flight, "skis", f"both skis{where}")
+    around = [] if takeoff is None else [(phases[Phase.EDGE], " around the edge")]
+    for of_phase, words in (*around, (flight, where)):
+        coarse, count = of_phase["coarse"], of_phase["pulses"]
         if coarse > _COARSE * count:
-            found.append(
-                f"in {coarse} of {count} pulses {_WORDS[phase]} a point is uncertain by more than {REQUIRED_SIGMA_M} m"
-            )
+            found.append(f"in {coarse} of {count} pulses{words} a point is uncertain by more than {REQUIRED_SIGMA_M} m")
     removed = sum(test.removed for test in tests)
     if tests and removed > _MANY_REMOVED * len(tests):
         found.append(f"{removed} of {len(tests)} rays were taken out as gross errors; see the protocol")
     if not seen:
         found.append("the jumper is never in sight of two cameras")
-    points = sum(of_phase["points"] for of_phase in phases.values())
-    counted = f"all points in {points} of {len(seen)} pulses in sight"
+    counted = f"all points in {everything['points']} of {len(seen)} pulses in sight"
+    contradicted = told(pulses)
+    if contradicted is not None:
+        counted += f"; {contradicted}"
     enlarged = [f"{what} {factor:.1f} times" for what, factor in (scale or {}).items() if factor > _ENLARGED]
     if enlarged:
         counted += f"; sigmas in the images were too small and are enlarged: {', '.join(enlarged)}"
@@ -132,13 +138,22 @@ def in_sight(pulse: PulseState, system: CameraSystem) -> bool:
 
 
 def _contradicting(
-    pulses: Sequence[PulseState], cameras: Mapping[str, PlacedCamera], tests: Sequence[RayTest]
+    delivered: Sequence[tuple[PulseState, Collection[str]]],
+    cameras: Mapping[str, PlacedCamera],
+    tests: Sequence[RayTest],
 ) -> list[str]:
-    """A line for each camera that has the jumper in its image and hardly any point where the others see it."""
+    """A line for each camera that has the jumper in its image and hardly any point where the others see it.
+
+    Args:
+        delivered: pulses with the cameras that delivered a frame: one that was gone contradicts nobody.
+        cameras: by name.
+        tests: of all rays.
+    """
     used = Counter(test.camera for test in tests if not test.removed and test.what in POINTS)
     lines = []
     for name, placed in cameras.items():
-        there = sum(int(_inside(placed, places).sum()) for pulse in pulses if len(places := _places(pulse)))
+        places = [_places(pulse) for pulse, frames in delivered if name in frames]
+        there = sum(int(_inside(placed, of_pulse).sum()) for of_pulse in places if len(of_pulse))
         if there >= _ENOUGH and used[name] < _FITTING * there:
             lines.append(
                 f"camera {name} has the jumper's points in its images {there} times, and only {used[name]} times where "

@@ -64,6 +64,7 @@ class PointEntry(Struct):
     covariance: Matrix
     cameras: list[str]
     status: Status
+    contradicted: bool = False
 
 
 class SkiEntry(Struct):
@@ -323,7 +324,9 @@ def _state(
 
 
 def _point(entry: PointEntry) -> PointState:
-    return PointState(np.array(entry.xyz), np.array(entry.covariance), tuple(entry.cameras), entry.status)
+    return PointState(
+        np.array(entry.xyz), np.array(entry.covariance), tuple(entry.cameras), entry.status, entry.contradicted
+    )
 
 
 def _ski(entry: SkiEntry) -> SkiState:

@@ -205,6 +205,7 @@ def _point(point: PointState | None) -> dict[str, Any] | None:
         "covariance": _list(point.covariance),
         "cameras": list(point.cameras),
         "status": str(point.status),
+        **({"contradicted": True} if point.contradicted else {}),
     }
 
 

@@ -71,12 +71,14 @@ class PointState:
         covariance: (3, 3) m^2.
         cameras: that saw it.
         status: how far it is controlled.
+        contradicted: of a raw point: the motion of the whole jump says that it is wrong.
     """
 
     xyz: Floats
     covariance: Floats
     cameras: tuple[str, ...]
     status: Status
+    contradicted: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

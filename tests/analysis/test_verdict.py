@@ -1,11 +1,13 @@
-"""The verdict on a jump of which not all points are ever seen together."""
+"""The verdict on a jump: what it says when something is missing or wrong, and that it accuses nobody else."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from analysis.measurements.model import JumpMeasurements
+from analysis.measurements.model import ImageMeasurements, JumpMeasurements, Measurements, PulseMeasurements
 from analysis.procedure.jump import compute_jump
+from analysis.result.model import Jump
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
 
 
@@ -27,3 +29,69 @@ def test_points_that_are_never_seen_together_may_be_named_wrong() -> None:
     verdict = compute_jump(JumpMeasurements(1, without), measured, system).jump.verdict
     assert not verdict.ok
     assert "no pulse shows all four points, so it is not certain which is which" in verdict.message
+
+
+def _measured() -> Measurements:
+    return simulated_measurements(true_jump(3), true_cameras(), np.random.default_rng(3))
+
+
+def _computed(change: Callable[[int, PulseMeasurements], PulseMeasurements]) -> Jump:
+    """A simulated jump, computed from changed measurements; pulses are counted from 0."""
+    measured = _measured()
+    changed = tuple(change(k, pulse) for k, pulse in enumerate(measured.jumps[0].pulses))
+    return compute_jump(JumpMeasurements(1, changed), measured, true_cameras()).jump
+
+
+def test_a_camera_that_was_gone_contradicts_nobody() -> None:
+    count = len(_measured().jumps[0].pulses)
+
+    def gone(k: int, pulse: PulseMeasurements) -> PulseMeasurements:
+        return replace(pulse, images={n: i for n, i in pulse.images.items() if n != "K2" or k < count // 5})
+
+    def blind(k: int, pulse: PulseMeasurements) -> PulseMeasurements:
+        nothing = ImageMeasurements({}, {})
+        images = {n: i if n != "K2" or k < count // 5 else nothing for n, i in pulse.images.items()}
+        return replace(pulse, images=images)
+
+    assert "points in its images" not in _computed(gone).verdict.message
+    assert "camera K2 has the jumper's points in its images" in _computed(blind).verdict.message
+
+
+def test_without_a_take_off_nothing_is_said_of_edge_and_flight() -> None:
+    flying = _computed(lambda k, pulse: pulse if k >= 25 and k % 3 else replace(pulse, images={}))
+    assert flying.takeoff is None
+    assert "the take-off was not found" in flying.verdict.message
+    assert "around the edge" not in flying.verdict.message
+    assert "in flight" not in flying.verdict.message
+
+
+def test_a_raw_point_of_two_rays_that_the_motion_contradicts_is_marked() -> None:
+    right, system, wrong = _computed(lambda _, pulse: pulse), true_cameras(), 20
+    state = right.pulses[wrong].smoothed
+    assert state is not None
+    point = state.points["P3"]
+    assert point is not None
+    place = point.xyz
+    ray = place - system["K1"].position
+    along = 0.2 * ray / np.linalg.norm(ray)  # farther away for K1: its ray and that of K3 meet there without a residual
+    off = np.diff(system["K3"].project(np.array((place, place + along))), axis=0)[0]
+
+    def two_rays(k: int, pulse: PulseMeasurements) -> PulseMeasurements:
+        if k != wrong:
+            return pulse
+        images = {name: image for name, image in pulse.images.items() if name != "K2"}
+        point = images["K3"].points["P3"]
+        points = {**images["K3"].points, "P3": replace(point, xy=point.xy + off)}
+        return replace(pulse, images={**images, "K3": replace(images["K3"], points=points)})
+
+    jump = _computed(two_rays)
+    number = jump.pulses[wrong].pulse
+    assert not _marked(right)
+    assert _marked(jump) == [(number, "P3")]
+    assert f"raw points that the motion contradicts: 1, P3 at pulse {number} the most (0.2" in jump.verdict.message
+
+
+def _marked(jump: Jump) -> list[tuple[int, str]]:
+    """Pulse and name of the raw points that the motion contradicts."""
+    points = [(pulse.pulse, name, point) for pulse in jump.pulses for name, point in pulse.raw.points.items()]
+    return [(pulse, name) for pulse, name, point in points if point is not None and point.contradicted]

@@ -1,14 +1,15 @@
 """Computes a jump that is over: identified once more as a whole, then raw, smoothed and judged as in `svev analyze`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.candidates.model import PulseCandidates, SecondLook
 from analysis.identification.identify import identify
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements
 from analysis.procedure.jump import compute_jump
-from analysis.result.model import MeasuredRecording
+from analysis.procedure.jump_search import without_gaps
+from analysis.result.model import Jump, MeasuredRecording
 from analysis.worker.findings import MeasuredJump, summary_of
 
 
@@ -41,9 +42,19 @@ class JumpTask:
         if not found:
             return None
         longest = max(found, key=lambda jump: len(jump.pulses))
-        jump = JumpMeasurements(self.number, longest.pulses)
+        # Another worker of the same replay has pulses that this one has not; a slow one misses some.
+        jump = JumpMeasurements(self.number, without_gaps(longest.pulses))
         measurements = Measurements(self.recording, self.rate_hz, self.cameras, (jump,))
         computed = compute_jump(jump, measurements, self.scene.system)
+        computed = replace(computed, jump=_with_missing(computed.jump, len(jump.pulses) - len(longest.pulses)))
         orientation = orientation_result(self.scene)
         result = MeasuredRecording(self.recording, {}, self.rate_hz, orientation, computed.synchrony, (computed.jump,))
         return MeasuredJump(result, summary_of(self.recording, self.rate_hz, computed))
+
+
+def _with_missing(jump: Jump, missing: int) -> Jump:
+    """The jump; its verdict says how many of its pulses did not come."""
+    if not missing:
+        return jump
+    said = f"{missing} of its {len(jump.pulses)} pulses did not come to this worker: analyze the log"
+    return replace(jump, verdict=replace(jump.verdict, message=f"{jump.verdict.message}; {said}"))

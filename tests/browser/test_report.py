@@ -19,7 +19,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("page")
     write_jump_log(folder / "log.mcap", _EVERY)
     page = report_page(
-        measured_recording(), measurements(), true_cameras(), folder / "log.mcap", {1: Quantity(2.31, 0.08)}
+        measured_recording(), measurements(), true_cameras(), folder / "log.mcap", {1: Quantity(2.052, 0.006)}
     )
     (folder / "report.html").write_text(page, encoding="utf-8")
     return (folder / "report.html").as_uri()
@@ -81,6 +81,20 @@ def test_a_phone_shows_all_without_scrolling_sideways(report: str, open_page: Op
     page.add_script_tag(path=AXE)
     found = page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])")
     assert found == []
+
+
+def test_no_word_of_a_title_is_broken_on_a_phone(report: str, open_page: Open) -> None:
+    page = open_page(report, width=360)
+    broken = page.locator(".five dt").evaluate_all(
+        """titles => titles.flatMap(title => [...title.textContent.matchAll(/[^\\s-]+/g)].filter(word => {
+          const range = document.createRange();
+          range.setStart(title.firstChild, word.index);
+          range.setEnd(title.firstChild, word.index + word[0].length);
+          return range.getClientRects().length > 1;
+        }).map(word => word[0]))"""
+    )
+    assert page.locator(".five dt").count() == 5
+    assert broken == []
 
 
 def test_paper_shows_pictures_and_no_buttons(report: str, open_page: Open) -> None:

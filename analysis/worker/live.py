@@ -88,6 +88,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         self._watch: LiveWatch | None = None
         self._recording: Streamed | None = None
         self._said: tuple[str, ...] = ()
+        self._refused = False
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="whole jump")
         self._computing: deque[Future[MeasuredJump | None]] = deque()
         self.jumps = self.pulses = self.missed = 0
@@ -212,6 +213,8 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
     def _seek(self, recording: Streamed) -> None:
         """Begin to follow a jumper if one is in sight."""
         rate, newest = recording.rate_hz, recording.candidates[-1]
+        if self._refused:
+            return
         showing = sum(bool(len(image.spots)) for image in newest.images.values())
         if self._scene is None or showing < _FEWEST_CAMERAS or newest.pulse < recording.sought + _SEEK_S * rate:
             return
@@ -279,10 +282,21 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recording.done = seen[1]
         self._computing.append(self._thread.submit(task.computed))
 
+    def _refuse(self, error: BadInputError) -> None:
+        """Nobody is followed any more with a survey that a flight has proved wrong; that is said once."""
+        if not self._refused:
+            text = "no jump is measured any more: {why}; then start the analysis again"
+            self._findings.message(Level.ERROR, phrase("event_survey_refused", text, why=error.said))
+        self._refused = True
+
     def _collect(self, *, wait: bool = False) -> None:
         """Tell the jumps that are computed."""
         while self._computing and (wait or self._computing[0].done()):
-            jump = self._computing.popleft().result()
+            try:
+                jump = self._computing.popleft().result()
+            except BadInputError as error:
+                self._refuse(error)
+                continue
             if jump is not None:
                 self.jumps += 1
                 self._findings.jump(jump)

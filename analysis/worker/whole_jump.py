@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.candidates.model import PulseCandidates, SecondLook
-from analysis.identification.identify import identify
+from analysis.identification.identify import find_sightings
 from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements
 from analysis.procedure.jump import compute_jump
 from analysis.procedure.jump_search import without_gaps
+from analysis.procedure.plumb import check_up
 from analysis.result.model import Jump, MeasuredRecording
 from analysis.worker.findings import MeasuredJump, summary_of
 
@@ -36,17 +37,22 @@ class JumpTask:
     look: SecondLook
 
     def computed(self) -> MeasuredJump | None:
-        """The jump; None if nobody jumps in the candidates."""
+        """The jump; None if nobody jumps in the candidates.
+
+        Raises:
+            BadInputError: the Z axis of the survey does not point up.
+        """
         exposures = {name: camera.exposure_s for name, camera in self.cameras.items()}
-        found = identify(self.candidates, self.scene.system, self.rate_hz, exposures, self.look)
-        if not found:
+        sightings = find_sightings(self.candidates, self.scene.system, self.rate_hz, exposures)
+        check_up(self.scene.system, [sighting.flight for sighting in sightings])
+        longest = max((sighting.measured(self.look) for sighting in sightings), key=len, default=())
+        if not longest:
             return None
-        longest = max(found, key=lambda jump: len(jump.pulses))
         # Another worker of the same replay has pulses that this one has not; a slow one misses some.
-        jump = JumpMeasurements(self.number, without_gaps(longest.pulses))
+        jump = JumpMeasurements(self.number, without_gaps(longest))
         measurements = Measurements(self.recording, self.rate_hz, self.cameras, (jump,))
         computed = compute_jump(jump, measurements, self.scene.system)
-        computed = replace(computed, jump=_with_missing(computed.jump, len(jump.pulses) - len(longest.pulses)))
+        computed = replace(computed, jump=_with_missing(computed.jump, len(jump.pulses) - len(longest)))
         orientation = orientation_result(self.scene)
         result = MeasuredRecording(self.recording, {}, self.rate_hz, orientation, computed.synchrony, (computed.jump,))
         return MeasuredJump(result, summary_of(self.recording, self.rate_hz, computed))

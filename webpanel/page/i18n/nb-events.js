@@ -78,6 +78,7 @@ export const events = {
   event_jump: ["hopp {jump} i {recording}: {verdict}"],
   event_no_analysis: ["ingen hopp måles før dette er rettet: {why}"],
   event_not_oriented: ["kameraene er ikke orientert, det prøves igjen: {why}"],
+  event_survey_refused: ["det måles ingen flere hopp: {why}; start så analysen på nytt"],
   event_camera_moved: ["{what}; kameraene orienteres på nytt"],
 
   event_act: ["{act} ({caller})"],

@@ -125,9 +125,9 @@ def _motion(
     free, factors = _with_free_cameras(observed, system, start, unit)
     rank = free.model.root.shape[1]
     took_part = np.asarray(free.used.any(axis=(0, 2)))
-    synchrony = judged(
-        observed.names, took_part, free.late * unit, free.solution.shared_covariance[rank:, rank:] * unit**2, unit
-    )
+    fit = statistics(free)
+    covariance = free.solution.shared_covariance + lasting_covariance(free, fit.square, fit.redundancy).shared
+    synchrony = judged(observed.names, took_part, free.late * unit, covariance[rank:, rank:] * unit**2, unit)
     adjusted, takeoff = _with_takeoff(_synchronised(free, synchrony), edge)
     states: list[SmoothedState | None] = [None] * len(jump.pulses)
     states[sight] = _smoothed(adjusted, takeoff)
@@ -238,7 +238,7 @@ def _smoothed(adjusted: Adjusted, edge: Break | None) -> list[SmoothedState]:
     rank = model.root.shape[1]
     states, covariance, cross = _over_takeoff(adjusted, edge)
     fit = statistics(adjusted)
-    covariance = covariance + lasting_covariance(adjusted, fit.square, fit.redundancy)
+    covariance = covariance + lasting_covariance(adjusted, fit.square, fit.redundancy).states
     return smoothed_states(
         model.frame,
         model.prior.unit,

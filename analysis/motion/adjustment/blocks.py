@@ -57,16 +57,19 @@ class Solution:
     gain: Floats
     response: Floats
 
-    def effects_of(self, by_states: Floats, by_shared: Floats) -> tuple[Floats, Floats]:
-        """Changes of the states (n, s, f) by f right-hand sides, and covariance (f, f) of these as linear functions.
+    def effects_of(self, by_states: Floats, by_shared: Floats) -> tuple[Floats, Floats, Floats]:
+        """Changes of the states (n, s, f) and of the shared unknowns (b, f) by f right-hand sides.
+
+        The third is the covariance (f, f) of these right-hand sides as linear functions of all unknowns.
 
         Args:
             by_states: (n, s, f) right-hand sides of the equations of all pulses.
             by_shared: (b, f) of those of the shared unknowns.
         """
         reduced, pull = self._reduced(by_states, by_shared)
-        moved = _back(self.inverse, self.gain, reduced) - self.response @ (self.shared_covariance @ pull)
-        return np.asarray(moved), self._covariance(reduced, pull)
+        shared = self.shared_covariance @ pull
+        moved = _back(self.inverse, self.gain, reduced) - self.response @ shared
+        return np.asarray(moved), np.asarray(shared), self._covariance(reduced, pull)
 
     def covariance_of(self, by_states: Floats, by_shared: Floats | None = None) -> Floats:
         """Covariance (f, f) of f linear functions.

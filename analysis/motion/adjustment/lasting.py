@@ -3,7 +3,8 @@
 What puts the axis of a ski off in an image, the other ski, a leg or a boot beside it, an edge in the light, a width
 that is not quite known, puts it off alike in the next images of that camera; likewise what is beside a marker. More
 pulses do not average such errors away. The weights of the adjustment stay as they are, so the motion does not change;
-its covariance gains what errors do to it that fade by exp(-t / T) or stay for the whole jump (consider parameters:
+its covariance, and that of how late the cameras are, gain what errors do to them that fade by exp(-t / T) or stay for
+the whole jump (consider parameters:
 Tapley, Schutz and Born 2004, chapter 6). With the normal equations N x = J' W l, an error e that the measurements of a
 short run of pulses share moves the unknowns by N^-1 J' W e; in so short a time it hardly changes.
 
@@ -110,15 +111,29 @@ def pulls(adjusted: Adjusted, found: list[Run], errors: list[Floats]) -> Pulls:
     )
 
 
-def lasting_covariance(adjusted: Adjusted, square: Floats, redundancy: Floats) -> Floats:
-    """What errors that last add to the covariances of the states (n, 48, 48).
+@dataclass(frozen=True, slots=True, eq=False)
+class Added:
+    """What errors that last add to covariances.
+
+    Attributes:
+        states: (n, 48, 48) of each state.
+        shared: (b, b) of the shared unknowns.
+    """
+
+    states: Floats
+    shared: Floats
+
+
+def lasting_covariance(adjusted: Adjusted, square: Floats, redundancy: Floats) -> Added:
+    """What errors that last add to the covariances of a bundle.
 
     Args:
         adjusted: the bundle.
         square: (n, m, 6) weighted square sums of the residuals of its groups.
         redundancy: (n, m, 6) their shares in the degrees of freedom.
     """
-    total = np.zeros((len(adjusted.used), STATE, STATE))
+    b = len(adjusted.shared)
+    total = Added(np.zeros((len(adjusted.used), STATE, STATE)), np.zeros((b, b)))
     shift, turn = AXIS_PX**2 * adjusted.model.observed.factors[_SKIS.start] ** 2
     for things, start in ((_POINTS, _OF_POINTS), (_SKIS, (shift, turn, _TOLD))):
         series = [
@@ -130,14 +145,17 @@ def lasting_covariance(adjusted: Adjusted, square: Floats, redundancy: Floats) -
         if series:
             used = adjusted.used[:, :, things.start : things.stop]
             fit = (float(part[:, :, things.start : things.stop][used].sum()) for part in (square, redundancy))
-            total += _effect(adjusted, series, np.tile(start, (2, 1)) / 2, *fit)
+            _add_effect(total, adjusted, series, np.tile(start, (2, 1)) / 2, *fit)
     return total
 
 
-def _effect(adjusted: Adjusted, series: list[list[Run]], start: Floats, square: float, redundancy: float) -> Floats:
-    """What the errors of s series of runs add to the covariances of the states (n, 48, 48).
+def _add_effect(
+    total: Added, adjusted: Adjusted, series: list[list[Run]], start: Floats, square: float, redundancy: float
+) -> None:
+    """Add what the errors of s series of runs do, in place.
 
     Args:
+        total: to which it is added.
         adjusted: the bundle.
         series: of one camera and one thing each.
         start: (2, f) variances of the f errors of a run before anything is known: of what fades, and of what stays.
@@ -147,20 +165,19 @@ def _effect(adjusted: Adjusted, series: list[list[Run]], start: Floats, square: 
     found = [run for own in series for run in own]
     errors = [error for own in series for error in _shapes(adjusted, own)]
     pulled = pulls(adjusted, found, errors)
-    moved, spread = adjusted.solution.effects_of(pulled.by_states, pulled.by_shared)
+    moved, shared, spread = adjusted.solution.effects_of(pulled.by_states, pulled.by_shared)
     w, f = pulled.right.shape
     normal = -spread
     normal.reshape(w, f, w, f)[range(w), :, range(w)] += pulled.normal
     alike = [_alike(adjusted, own) for own in series]
     variances = variances_of(Residuals.of(normal, pulled.right.ravel(), square, redundancy), alike, start)
-    total = np.zeros((len(moved), STATE, STATE))
     first = 0
     for correlation, variance in zip(alike, variances, strict=True):
         covariance = covariance_of(correlation, variance)
-        part = moved[:, :, first : first + len(covariance)]
-        total += (part @ covariance) @ part.transpose(0, 2, 1)
-        first += len(covariance)
-    return total
+        own = slice(first, first + len(covariance))
+        total.states[:] += (moved[:, :, own] @ covariance) @ moved[:, :, own].transpose(0, 2, 1)
+        total.shared[:] += shared[:, own] @ covariance @ shared[:, own].T
+        first = own.stop
 
 
 def _alike(adjusted: Adjusted, own: list[Run]) -> Floats:

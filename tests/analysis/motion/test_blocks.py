@@ -38,6 +38,7 @@ def test_solution_and_covariances_are_those_of_the_dense_inverse() -> None:
     expected = functions.T @ inverse[: N * S, : N * S] @ functions
     assert np.allclose(found.covariance_of(functions.reshape(N, S, 2)), expected)
     other = rng.standard_normal((N * S + B, 2))
-    moved, spread = found.effects_of(other[: N * S].reshape(N, S, 2), other[N * S :])
+    moved, shared, spread = found.effects_of(other[: N * S].reshape(N, S, 2), other[N * S :])
     assert np.allclose(moved.reshape(N * S, 2), (inverse @ other)[: N * S])
+    assert np.allclose(shared, (inverse @ other)[N * S :])
     assert np.allclose(spread, other.T @ inverse @ other)

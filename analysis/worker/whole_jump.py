@@ -1,12 +1,12 @@
 """Computes a jump that is over: identified once more as a whole, then raw, smoothed and judged as in `svev analyze`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.candidates.model import PulseCandidates, SecondLook
 from analysis.identification.identify import find_sightings
-from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements
+from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
 from analysis.procedure.jump import compute_jump
 from analysis.procedure.jump_search import without_gaps
 from analysis.procedure.plumb import check_up
@@ -46,13 +46,15 @@ class JumpTask:
         sightings = find_sightings(self.candidates, self.scene.system, self.rate_hz, exposures)
         check_up(self.scene.system, [sighting.flight for sighting in sightings])
         longest = max((sighting.measured(self.look) for sighting in sightings), key=len, default=())
-        if not longest:
-            return None
+        return self.computed_of(longest) if longest else None
+
+    def computed_of(self, pulses: Sequence[PulseMeasurements]) -> MeasuredJump:
+        """The jump out of what was measured of it."""
         # Another worker of the same replay has pulses that this one has not; a slow one misses some.
-        jump = JumpMeasurements(self.number, without_gaps(longest))
+        jump = JumpMeasurements(self.number, without_gaps(tuple(pulses)))
         measurements = Measurements(self.recording, self.rate_hz, self.cameras, (jump,))
         computed = compute_jump(jump, measurements, self.scene.system)
-        computed = replace(computed, jump=_with_missing(computed.jump, len(jump.pulses) - len(longest)))
+        computed = replace(computed, jump=_with_missing(computed.jump, len(jump.pulses) - len(pulses)))
         orientation = orientation_result(self.scene)
         result = MeasuredRecording(self.recording, {}, self.rate_hz, orientation, computed.synchrony, (computed.jump,))
         return MeasuredJump(result, summary_of(self.recording, self.rate_hz, computed))

@@ -3,30 +3,25 @@
 from typing import Any
 
 import numpy as np
-import pytest
 
 from analysis.cameras.oriented_scene import OrientedScene
-from analysis.measurements.model import JumpMeasurements
-from analysis.worker import whole_jump
 from analysis.worker.findings import MeasuredJump
+from analysis.worker.whole_jump import JumpTask
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
 
 
-def _computed(monkeypatch: pytest.MonkeyPatch, every: int) -> MeasuredJump:
+def _computed(every: int) -> MeasuredJump:
     """A simulated jump of which one in `every` pulses came."""
     system = true_cameras()
     measured = simulated_measurements(true_jump(3), system, np.random.default_rng(3))
-    came = JumpMeasurements(1, measured.jumps[0].pulses[::every])
-    monkeypatch.setattr(whole_jump, "identify", lambda *_: [came])
     unused: Any = None  # what would look at images
     scene = OrientedScene(system, {}, unused, {}, {}, ())
-    computed = whole_jump.JumpTask("log", 1, measured.rate_hz, measured.cameras, (), scene, unused).computed()
-    assert computed is not None
-    return computed
+    task = JumpTask("log", 1, measured.rate_hz, measured.cameras, (), scene, unused)
+    return task.computed_of(measured.jumps[0].pulses[::every])
 
 
-def test_pulses_that_did_not_come_have_entries_and_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    jump = _computed(monkeypatch, 2).result.jumps[0]
+def test_pulses_that_did_not_come_have_entries_and_are_told() -> None:
+    jump = _computed(2).result.jumps[0]
     numbers = [pulse.pulse for pulse in jump.pulses]
     assert numbers == list(range(numbers[0], numbers[-1] + 1))
     assert all(point is None for point in jump.pulses[1].raw.points.values())
@@ -34,5 +29,5 @@ def test_pulses_that_did_not_come_have_entries_and_are_told(monkeypatch: pytest.
     assert f"{len(numbers) // 2} of its {len(numbers)} pulses did not come to this worker" in jump.verdict.message
 
 
-def test_of_a_jump_that_came_whole_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "did not come" not in _computed(monkeypatch, 1).summary.verdict
+def test_of_a_jump_that_came_whole_nothing_is_said() -> None:
+    assert "did not come" not in _computed(1).summary.verdict

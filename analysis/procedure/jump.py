@@ -39,8 +39,8 @@ def compute_jump(
         system: the cameras as they stood during the jump.
         moved: cameras that moved and whose pose was not corrected for it, for the verdict.
     """
-    raw = solve_pulses(jump, measurements, system)
     motion = smooth(jump, measurements, system)
+    raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
     pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion))
     troubles = [motion.message] if motion.message else []
     frames = [pulse.images.keys() for pulse in jump.pulses]

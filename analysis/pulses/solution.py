@@ -1,20 +1,21 @@
-"""Solves the pulses of a jump one by one: the raw solution, for which nothing is assumed about the motion."""
+"""Solves the pulses of a jump one by one: the raw solution, for whose values nothing is assumed about the motion."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, PulseMeasurements
-from analysis.pulses.gross_errors import Checked, check_points, check_skis
+from analysis.pulses.gross_errors import Checked, Expected, check_points, check_skis, give_up
 from analysis.pulses.least_squares import adjust
 from analysis.pulses.points import points_of
 from analysis.pulses.scaling import scaled_to_fit
 from analysis.pulses.skis import skis_of
 from analysis.pulses.states import Solved, jumper_states
 from analysis.pulses.travel import velocities
-from analysis.result.model import JumperState, RayTest
+from analysis.result.model import JumperState, RayTest, SmoothedState
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from rig.arrays import Integers
 from rig.errors import BadInputError
 
 _NS = 1e-9
@@ -38,13 +39,22 @@ class RawJump:
     scale: Mapping[str, float] = field(default_factory=dict)
 
 
-def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: CameraSystem) -> RawJump:
+def solve_pulses(
+    jump: JumpMeasurements,
+    measurements: Measurements,
+    system: CameraSystem,
+    smoothed: Sequence[SmoothedState | None] = (),
+    doubted: Collection[RayTest] = (),
+) -> RawJump:
     """Intersect points and skis of each pulse, compute angles, height and speed, and test all rays.
 
     Args:
         jump: what was measured; images of cameras that are not oriented are left out.
         measurements: the recording that the jump belongs to, with the cameras' exposure times.
         system: the oriented cameras.
+        smoothed: states of the pulses by the motion over time; a point that contradicts them is given up if nothing
+            else controls the ray that makes it do so. None at all: nothing is known of the motion.
+        doubted: rays that contradict the motion.
 
     Raises:
         BadInputError: images have another size than the camera was calibrated for.
@@ -64,16 +74,38 @@ def solve_pulses(jump: JumpMeasurements, measurements: Measurements, system: Cam
     other_names = [skis.interchanged(image) for image in range(len(cameras))]
     points, places, points_scale = scaled_to_fit(points, system.covariance)
     skis, lines, skis_scale = scaled_to_fit(skis, system.covariance, other_names)
+    numbers = np.array([pulse.pulse for pulse in pulses])
+    checked = check_points(points, places, system.covariance)
+    if smoothed:
+        expected = _expected(smoothed, doubted, numbers, system.names)
+        expected = replace(expected, doubted=expected.doubted & ~points.by_hand)
+        checked = give_up(points, checked, system.covariance, expected)
     solved = Solved(
-        check_points(points, places, system.covariance),
+        checked,
         points.by_hand,
         check_skis(skis, lines, system.covariance),
         skis.by_hand,
     )
-    numbers = np.array([pulse.pulse for pulse in pulses])
     tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))
     scale = {"points": points_scale, "skis": skis_scale}
     return RawJump(jumper_states(solved, numbers, times, system), tuple(tests), scale)
+
+
+def _expected(
+    smoothed: Sequence[SmoothedState | None], doubted: Collection[RayTest], pulses: Integers, names: tuple[str, ...]
+) -> Expected:
+    """What the motion says of all points, P1 to P4 pulse by pulse."""
+    n = len(pulses) * len(POINTS)
+    xyz, covariance, flags = np.full((n, 3), np.nan), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, len(names)), bool)
+    for k, state in enumerate(smoothed):
+        for i, name in enumerate(POINTS):
+            if state is not None and (point := state.points[name]) is not None:
+                xyz[k * len(POINTS) + i], covariance[k * len(POINTS) + i] = point.xyz, point.covariance
+    row = {int(pulse): k * len(POINTS) for k, pulse in enumerate(pulses)}
+    for test in doubted:
+        if test.what in POINTS:
+            flags[row[test.pulse] + POINTS.index(test.what), names.index(test.camera)] = True
+    return Expected(xyz, covariance, flags)
 
 
 def _check_sizes(cameras: list[PlacedCamera], measurements: Measurements) -> None:

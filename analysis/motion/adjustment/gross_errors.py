@@ -27,6 +27,9 @@ _SIGNIFICANT: Final = 3.1  # sigmas; right ones are held for too small with a pr
 _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
 _PSEUDO: Final = 10.0  #: observations that a factor of 1 counts as
 _POINTS, _SKIS = slice(0, len(POINTS)), slice(len(POINTS), len(GROUPS))
+_RUN_S: Final = LASTING_S / 2  # to each side of a measurement
+_SEVERAL: Final = 2  # gross errors that are no coincidence: one in ten thousand rays is one by chance
+_OFTEN: Final = 2  # times that a measurement is left out, after which it is not taken back
 _RIVAL_P: Final = 1e-3  # a suspect that is not that unlikely beside another one has a rival in it
 
 
@@ -78,32 +81,50 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
     """Leave out measurements that contradict all others, the worst around first; take back those that no longer do.
 
     Where two of a point's rays had to go and a single one is left, nothing tells that it is the right one: it goes too.
+    So do those few of a camera that stand among more that had to go (`_deserted`).
     A point that one camera alone sees in a pulse is judged more severely: nothing else of that pulse controls it, so a
     wrong one does harm, and a right one is of little use. Errors that last are looked for when single ones are gone;
     what they take is not taken back.
     """
     seen = adjusted.model.observed.seen
-    alone = (seen.sum(axis=1, keepdims=True) == 1) & (np.arange(len(GROUPS)) < len(POINTS))
-    limit = chdtri(2, np.where(alone, _ALONE_P, FALSE_REMOVAL_P / max(int(seen.sum()), 1)))
-    doubtful = np.zeros(seen.shape, bool)
+    points = np.arange(len(GROUPS)) < len(POINTS)
+    doubtful, left = np.zeros(seen.shape, bool), np.zeros(seen.shape, int)
     for _ in range(most):
+        alone = ((seen & ~doubtful).sum(axis=1, keepdims=True) == 1) & points
+        limit = chdtri(2, np.where(alone, _ALONE_P, FALSE_REMOVAL_P / max(int(seen.sum()), 1)))
         excess = statistics(adjusted).test / limit
         worst = np.where(adjusted.used, excess, 0.0).max(axis=(1, 2))
         around = np.lib.stride_tricks.sliding_window_view(np.pad(worst, 1), 3).max(axis=1)
         leave = adjusted.used & (excess > 1) & (excess >= around[:, None, None])
+        left += leave
         kept = adjusted.used & ~leave
-        used = kept | (seen & ~adjusted.used & (excess < 1))
+        used = kept | (seen & ~adjusted.used & (excess < 1) & (left < _OFTEN))
         lone = (used.sum(axis=1, keepdims=True) == 1) & ((seen & ~used).sum(axis=1, keepdims=True) >= 2)
         doubtful |= lone
         used &= ~doubtful
         if (used == adjusted.used).all():
-            lasting = lasting_errors(adjusted)
-            if not lasting.any():
+            wrong = lasting_errors(adjusted)
+            if not wrong.any():
+                wrong = _deserted(adjusted)
+            if not wrong.any():
                 return adjusted
-            doubtful |= lasting
+            doubtful |= wrong
             used &= ~doubtful
         adjusted = settled(replace(adjusted, used=used), 2)
     return adjusted
+
+
+def _deserted(adjusted: Adjusted) -> Flags:
+    """Which measurements (n, m, 6) are used although most of their camera's of the thing around them had to go.
+
+    What is taken for a marker beside it is so for a while. Such errors agree with each other, so that the motion gives
+    way to the last of them when all others are gone.
+    """
+    seen, used, times = adjusted.model.observed.seen, adjusted.used, adjusted.model.observed.times
+    near = (np.abs(times[:, None] - times) <= _RUN_S).astype(float)
+    gone = np.tensordot(near, (seen & ~used).astype(float), 1)
+    left = np.tensordot(near, used.astype(float), 1)
+    return np.asarray(used & (gone >= _SEVERAL) & (gone > left))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,8 @@ import pytest
 
 from analysis.measurements.model import ImageMeasurements, PointMeasurement, SkiMeasurement
 from analysis.motion.smoother import smooth
+from analysis.procedure.jump import compute_jump
+from analysis.pulses.solution import solve_pulses
 from tests.analysis.simulated import drawn, simulated_measurements, true_cameras, true_jump
 
 SEED, RATE_HZ = 11, 100.0
@@ -15,6 +17,7 @@ LARGEST = 4.5  # sigmas
 RENDERED_HZ, LONE_PX = 30.0, 0.4
 SEEN_S = {"P3": -0.04, "P4": 0.1}  # since the take-off: when they come into sight
 LONE_S = -0.07
+ASIDE_S, ASIDE_PX = (0.28, 0.45), 3.9  # since the take-off: K3 takes something beside P4 for it, which K1 does not see
 
 
 def _half_hidden(image: ImageMeasurements, camera: str, off: float | None) -> ImageMeasurements:
@@ -79,3 +82,41 @@ def test_a_lone_ray_that_is_wrong_does_not_bend_what_was_not_seen() -> None:
         if state is not None and (binding := state.points["P4"]) is not None:
             error = binding.xyz - truth.pose(pulse.pulse).markers[3]
             assert error @ np.linalg.solve(binding.covariance, error) < LARGEST**2
+
+
+def _beside(image: ImageMeasurements, camera: str, since: float) -> ImageMeasurements:
+    """P4 is hidden from K1 and K3 for a while, and K3 takes what is beside it for it."""
+    if camera == "K2" or not ASIDE_S[0] < since < ASIDE_S[1]:
+        return image
+    points = dict(image.points)
+    binding = points.pop("P4", None)
+    if camera == "K3" and binding is not None:
+        points["P4"] = PointMeasurement(binding.xy + np.array((ASIDE_PX, -0.7)), LONE_PX**2 * np.eye(2))
+    return ImageMeasurements(points, image.skis)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_beside_a_marker_for_a_while_neither_bends_the_motion_nor_is_it_a_point(seed: int) -> None:
+    rng, truth = np.random.default_rng(seed), true_jump(seed, RENDERED_HZ)
+    measured = simulated_measurements(truth, true_cameras(), rng)
+    pulses = [
+        replace(
+            pulse,
+            images={n: _beside(image, n, truth.since_takeoff(pulse.pulse)) for n, image in pulse.images.items()},
+        )
+        for pulse in measured.jumps[0].pulses
+    ]
+    jump, system = replace(measured.jumps[0], pulses=tuple(pulses)), drawn(true_cameras(), rng)
+    computed, two_rays = compute_jump(jump, measured, system).jump, solve_pulses(jump, measured, system).states
+    wrong = 0
+    for pulse, alone in zip(computed.pulses, two_rays, strict=True):
+        true = truth.pose(pulse.pulse).markers[3]
+        if pulse.smoothed is not None and (smoothed := pulse.smoothed.points["P4"]) is not None:
+            off = smoothed.xyz - true
+            assert off @ np.linalg.solve(smoothed.covariance, off) < LARGEST**2
+        if ASIDE_S[0] < truth.since_takeoff(pulse.pulse) < ASIDE_S[1] and (point := alone.points["P4"]) is not None:
+            off = point.xyz - true
+            assert off @ np.linalg.solve(point.covariance, off) > LARGEST**2, "a point that two rays determine wrongly"
+            assert pulse.raw.points["P4"] is None
+            wrong += 1
+    assert wrong > 2

@@ -27,7 +27,7 @@ _SIGNIFICANT: Final = 3.1  # sigmas; right ones are held for too small with a pr
 _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less free tell nothing
 _PSEUDO: Final = 10.0  #: observations that a factor of 1 counts as
 _POINTS, _SKIS = slice(0, len(POINTS)), slice(len(POINTS), len(GROUPS))
-_RUN_S: Final = LASTING_S / 2  # to each side of a measurement
+_RUN_S: Final = LASTING_S / 2 - 1e-3  # to each side of a measurement; less 1 ms, since times are rounded
 _SEVERAL: Final = 2  # gross errors that are no coincidence: one in ten thousand rays is one by chance
 _OFTEN: Final = 2  # times that a measurement is left out, after which it is not taken back
 _RIVAL_P: Final = 1e-3  # a suspect that is not that unlikely beside another one has a rival in it
@@ -81,7 +81,7 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
     """Leave out measurements that contradict all others, the worst around first; take back those that no longer do.
 
     Where two of a point's rays had to go and a single one is left, nothing tells that it is the right one: it goes too.
-    So do those few of a camera that stand among more that had to go (`_deserted`).
+    So do those few of a camera that stand among more that had to go (`deserted`).
     A point that one camera alone sees in a pulse is judged more severely: nothing else of that pulse controls it, so a
     wrong one does harm, and a right one is of little use. Errors that last are looked for when single ones are gone;
     what they take is not taken back.
@@ -105,7 +105,7 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
         if (used == adjusted.used).all():
             wrong = lasting_errors(adjusted)
             if not wrong.any():
-                wrong = _deserted(adjusted)
+                wrong = deserted(adjusted.model.observed.times, seen, adjusted.used)
             if not wrong.any():
                 return adjusted
             doubtful |= wrong
@@ -114,13 +114,17 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
     return adjusted
 
 
-def _deserted(adjusted: Adjusted) -> Flags:
-    """Which measurements (n, m, 6) are used although most of their camera's of the thing around them had to go.
+def deserted(times: Floats, seen: Flags, used: Flags) -> Flags:
+    """Which measurements are used although most of their camera's of the same thing around them had to go.
 
     What is taken for a marker beside it is so for a while. Such errors agree with each other, so that the motion gives
     way to the last of them when all others are gone.
+
+    Args:
+        times: (n,) s, of the pulses.
+        seen: (n, m, 6) what was measured.
+        used: (n, m, 6) what was not left out.
     """
-    seen, used, times = adjusted.model.observed.seen, adjusted.used, adjusted.model.observed.times
     near = (np.abs(times[:, None] - times) <= _RUN_S).astype(float)
     gone = np.tensordot(near, (seen & ~used).astype(float), 1)
     left = np.tensordot(near, used.astype(float), 1)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from analysis.measurements.model import ImageMeasurements, PointMeasurement, SkiMeasurement
+from analysis.motion.adjustment.gross_errors import deserted
 from analysis.motion.smoother import smooth
 from analysis.procedure.jump import compute_jump
 from analysis.pulses.solution import solve_pulses
+from rig.arrays import Flags
 from tests.analysis.simulated import drawn, simulated_measurements, true_cameras, true_jump
 
 SEED, RATE_HZ = 11, 100.0
@@ -120,3 +122,13 @@ def test_what_is_beside_a_marker_for_a_while_neither_bends_the_motion_nor_is_it_
             assert pulse.raw.points["P4"] is None
             wrong += 1
     assert wrong > 2
+
+
+def test_what_stands_among_more_that_had_to_go_goes_too() -> None:
+    """`x`: left out, `u`: used, `d`: used and to go, `.`: not measured, of one thing in one camera at 30 Hz."""
+    for run in ("..xxdx..uuu", "uuxuuu", "uuuuxux", "uu.xdx", "..xu..", "u.....xx", "xxxxd.....u"):
+        told = np.array(list(run))
+        used: Flags = np.isin(told, ["u", "d"])
+        seen: Flags = told != "."
+        found = deserted(np.arange(len(told)) / RENDERED_HZ, seen[:, None, None], used[:, None, None])
+        assert (found[:, 0, 0] == (told == "d")).all(), run

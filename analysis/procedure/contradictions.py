@@ -1,8 +1,8 @@
 """Tells which raw points the motion of the whole jump contradicts.
 
 Two rays control nothing: where one of them is wrong by some pixels, as a marker half behind a leg is, the raw point is
-off by decimetres and its sigma does not know it. The raw solution knows nothing of other pulses and stays as it is
-(decision 0029), but whoever reads it is told.
+off by decimetres and its sigma does not know it. Points of which the motion left out a ray that nothing controls are
+given up (decision 0063); what else differs keeps its raw values (decision 0029), and whoever reads them is told.
 """
 
 from collections.abc import Sequence

@@ -11,9 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from analysis.candidates.known_discs import DiscShape
+from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
-from analysis.candidates.wanted_traces import WantedTraces
+from analysis.candidates.skis.wanted_traces import WantedTraces
 from analysis.measurements.model import (
     ImageMeasurements,
     JumpMeasurements,

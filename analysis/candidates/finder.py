@@ -14,13 +14,13 @@ from weakref import ref
 import numpy as np
 from msgspec import UNSET
 
-from analysis.candidates.background import Background, Region
-from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs, half_size
+from analysis.candidates.foreground.background import Background, Region
+from analysis.candidates.foreground.pace import Pace
+from analysis.candidates.markers.known_discs import DiscShape, Windows, fit_known_discs, half_size
+from analysis.candidates.markers.spots import MOST, find_expected, find_spots, look_for_spots
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
-from analysis.candidates.pace import Pace
-from analysis.candidates.spots import MOST, find_expected, find_spots, look_for_spots
-from analysis.candidates.traces import find_expected_traces
-from analysis.candidates.wanted_traces import WantedTraces
+from analysis.candidates.skis.traces import find_expected_traces
+from analysis.candidates.skis.wanted_traces import WantedTraces
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets, triplets

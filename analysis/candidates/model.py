@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.candidates.known_discs import DiscShape
+from analysis.candidates.markers.known_discs import DiscShape
 from rig.arrays import Flags, Floats, Integers
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber

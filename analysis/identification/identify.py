@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook, Trace
-from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
+from analysis.candidates.skis.ski_widths import SkiWidth, clear_widths, told_apart
 from analysis.identification.markers.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.markers.refinement import refined
 from analysis.identification.markers.synchrony import lateness

@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.candidates.median import median
 from analysis.candidates.model import ExpectedSki, Trace
-from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
+from analysis.candidates.skis.ski_widths import SkiWidth, clear_widths, told_apart
 from analysis.identification.space.views import Sight
 from analysis.measurements.model import SIDES
 from analysis.result.model import PointState, SkiState, SmoothedState

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
-from analysis.candidates.wanted_traces import WantedTraces
+from analysis.candidates.skis.wanted_traces import WantedTraces
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.space.body import REACH_M
 from analysis.identification.space.space_points import Appearance, Rays, find_space_points, rays_of

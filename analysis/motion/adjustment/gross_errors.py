@@ -67,7 +67,7 @@ def with_factors(adjusted: Adjusted) -> Adjusted:
     turned = observed.to_mean_and_difference()
     free = np.eye(2) - turned @ _of_adjusted(adjusted) @ turned.swapaxes(-1, -2)
     square = np.where(used[..., None], (turned @ adjusted.equations.v[..., None])[..., 0] ** 2, 0.0).sum(axis=(0, 1))
-    # The covariance is that of the step before: where hardly anything is left over, what it says may lie beyond the limits.
+    # The covariance is that of the step before: where hardly anything is left over, numbers may lie beyond the limits.
     numbers = np.clip(np.diagonal(free, axis1=-2, axis2=-1), 0.0, 1.0)
     redundancy = np.where(used[..., None], numbers, 0.0).sum(axis=(0, 1))
     of_points = (square[_POINTS].sum() + _PSEUDO) / (redundancy[_POINTS].sum() + _PSEUDO)

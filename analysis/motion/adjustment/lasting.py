@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.candidates.ski_fit import AXIS_PX
+from analysis.candidates.skis.ski_fit import AXIS_PX
 from analysis.measurements.model import POINTS
 from analysis.motion.adjustment.bundle import Adjusted, rows_by_shared
 from analysis.motion.adjustment.lasting_variances import Residuals, covariance_of, variances_of

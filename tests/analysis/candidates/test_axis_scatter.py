@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.candidates.axis_scatter import axis_scatter
+from analysis.candidates.skis.axis_scatter import axis_scatter
 from rig.arrays import Floats
 
 LENGTH = 80.0  # px

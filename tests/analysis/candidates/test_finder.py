@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.candidates.known_discs import DiscShape
+from analysis.candidates.markers.known_discs import DiscShape
 from rig.errors import BadInputError
 from rig.pulse import PulseNumber
 from tests.analysis.candidates.judge import Hill, judged, scenario

@@ -7,15 +7,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from analysis.candidates.background import Background, Region
-from analysis.candidates.bar_model import Bar, pixels_around
-from analysis.candidates.bar_model import modelled as model_of_bars
-from analysis.candidates.known_discs import DiscShape, Windows, fit_known_discs
+from analysis.candidates.foreground.background import Background, Region
+from analysis.candidates.markers.known_discs import DiscShape, Windows, fit_known_discs
+from analysis.candidates.markers.soft_discs import fit_soft_discs
 from analysis.candidates.model import ExpectedSki, Trace
-from analysis.candidates.ski_fit import fit_bars
-from analysis.candidates.ski_widths import SkiWidth, clear_widths, told_apart
-from analysis.candidates.soft_discs import fit_soft_discs
-from analysis.candidates.traces import find_expected_traces, find_traces
+from analysis.candidates.skis.bar_model import Bar, pixels_around
+from analysis.candidates.skis.bar_model import modelled as model_of_bars
+from analysis.candidates.skis.ski_fit import fit_bars
+from analysis.candidates.skis.ski_widths import SkiWidth, clear_widths, told_apart
+from analysis.candidates.skis.traces import find_expected_traces, find_traces
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Floats
 from tests.analysis.scene.rendering import Spot, clean_image

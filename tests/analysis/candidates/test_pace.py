@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from analysis.candidates.background import Region
-from analysis.candidates.pace import Pace
+from analysis.candidates.foreground.background import Region
+from analysis.candidates.foreground.pace import Pace
 from rig.clocks import NS_PER_S, UtcNs
 
 _RATE_HZ = 30

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from analysis.candidates import wanted_traces
-from analysis.candidates.background import Region
 from analysis.candidates.finder import Finder
+from analysis.candidates.foreground.background import Region
 from analysis.candidates.model import ImageCandidates, Trace
-from analysis.candidates.traces import find_traces
-from analysis.candidates.wanted_traces import WantedTraces
+from analysis.candidates.skis import wanted_traces
+from analysis.candidates.skis.traces import find_traces
+from analysis.candidates.skis.wanted_traces import WantedTraces
 from tests.analysis.candidates.judge import Hill, scenario
 
 PULSE = 43  # in flight: every camera shows a ski at least

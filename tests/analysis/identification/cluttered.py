@@ -30,7 +30,7 @@ class Disturbed:
         hidden: (marker, camera or None for all, first, last pulse) that no spot shows.
         absent: (camera, first, last pulse) without an image.
         late_s: by camera, how much later it shows the scene.
-        stubs: all cameras but the first one show, in place of a ski, something of 1 m through its binding, 4 degrees off.
+        stubs: all cameras but the first one show, not a ski, but something of 1 m through its binding, 4 degrees off.
     """
 
     false_spots: int = 0

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.candidates.known_discs import DiscShape
+from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, Spots
 from analysis.identification.identify import identify
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.candidates.background import Region
+from analysis.candidates.foreground.background import Region
 from rig.arrays import Flags, Floats
 from rig.clocks import NS_PER_S, UtcNs
 

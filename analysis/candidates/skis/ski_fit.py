@@ -1,4 +1,4 @@
-"""Fits one or several long bars to all pixels around them, before a known background (`analysis.candidates.bar_model`).
+"""Fits one or several long bars (`analysis.candidates.skis.bar_model`) to all pixels around them, background known.
 
 Two skis that nearly cover each other are separated by what is known of each from where it is alone. The adjustment is
 robust in sections along the bars: a section that is not explained (body, boot, marker, a flake of snow) is left out as
@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from analysis.candidates.background import Region
-from analysis.candidates.bar_model import (
+from analysis.candidates.foreground.background import Region
+from analysis.candidates.median import median, quantile
+from analysis.candidates.skis.bar_model import (
     MARGIN,
     OF_BAR,
     SHARED,
@@ -25,7 +26,6 @@ from analysis.candidates.bar_model import (
     modelled,
     pixels_around,
 )
-from analysis.candidates.median import median, quantile
 from rig.arrays import Flags, Floats, Integers
 
 _BLUR, _BLUR_SPREAD = 0.65, 0.4  # px; weak prior of log s: of lens and pixels

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.candidates.background import Region
+from analysis.candidates.foreground.background import Region
+from analysis.candidates.markers.soft_discs import FARTHEST, SoftDiscs, fit_soft_discs
 from analysis.candidates.median import median
 from analysis.candidates.model import Expected, Spots
-from analysis.candidates.soft_discs import FARTHEST, SoftDiscs, fit_soft_discs
 from analysis.scene.static_image import GreyImage
 from rig.arrays import Flags, Floats, Integers
 

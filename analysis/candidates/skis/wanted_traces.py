@@ -9,9 +9,9 @@ from typing import TypeAlias, overload
 
 import numpy as np
 
-from analysis.candidates.background import Region
+from analysis.candidates.foreground.background import Region
 from analysis.candidates.model import Trace
-from analysis.candidates.traces import find_traces
+from analysis.candidates.skis.traces import find_traces
 from rig.arrays import Floats
 
 Change: TypeAlias = Callable[[tuple[Trace, ...]], tuple[Trace, ...]]

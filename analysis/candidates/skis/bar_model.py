@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.candidates.background import Region
+from analysis.candidates.foreground.background import Region
 from analysis.candidates.median import quantile
 from rig.arrays import Floats, Integers
 

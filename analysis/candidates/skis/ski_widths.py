@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.candidates.axis_scatter import axis_scatter
 from analysis.candidates.median import median
 from analysis.candidates.model import Trace
+from analysis.candidates.skis.axis_scatter import axis_scatter
 from rig.arrays import Floats
 
 _ALIKE = 0.5  # ratio of lengths, and of widths, of two skis that are both in sight

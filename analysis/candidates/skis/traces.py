@@ -1,10 +1,10 @@
 """Candidates for skis: long thin straight things, as rows of cross sections on a line.
 
-Lines are found among the middles of the bars (`analysis.candidates.bars`) by a Hough transform and refined by robust
-adjustment. Two skis that partly cover each other make one bar, which is wider: its upper edge belongs to one ski, its
-lower edge to the other, each half a ski's width from its axis. Such a bar stands for two middles. Gaps (body, boots,
-markers) may divide a line. A limb is not long enough for its width. The lines, and two skis that nearly cover each
-other, are then fitted to all pixels around them (`analysis.candidates.ski_fit`).
+Lines are found among the middles of the bars (`analysis.candidates.skis.bars`) by a Hough transform and refined by
+robust adjustment. Two skis that partly cover each other make one bar, which is wider: its upper edge belongs to one
+ski, its lower edge to the other, each half a ski's width from its axis. Such a bar stands for two middles. Gaps (body,
+boots, markers) may divide a line. A limb is not long enough for its width. The lines, and two skis that nearly cover
+each other, are then fitted to all pixels around them (`analysis.candidates.skis.ski_fit`).
 """
 
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.candidates.axis_scatter import axis_scatter
-from analysis.candidates.background import Region
-from analysis.candidates.bar_model import Bar
-from analysis.candidates.bars import Bars, find_bars
+from analysis.candidates.foreground.background import Region
 from analysis.candidates.median import median
 from analysis.candidates.model import ExpectedSki, Trace
-from analysis.candidates.ski_fit import FittedBar, fit_bars
+from analysis.candidates.skis.axis_scatter import axis_scatter
+from analysis.candidates.skis.bar_model import Bar
+from analysis.candidates.skis.bars import Bars, find_bars
+from analysis.candidates.skis.ski_fit import FittedBar, fit_bars
 from rig.arrays import Flags, Floats, Integers
 
 _SLENDER = 7.0  # length over width of a visible part, at least

@@ -1,0 +1,1 @@
+"""What is in front of the static scene."""

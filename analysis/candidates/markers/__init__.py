@@ -1,0 +1,1 @@
+"""Spots and discs in single images that may be markers."""

@@ -1,0 +1,1 @@
+"""Long straight bars in single images that may be skis."""

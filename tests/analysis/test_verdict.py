@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.measurements.model import ImageMeasurements, JumpMeasurements, Measurements, PulseMeasurements
+from analysis.measurements.model import ImageMeasurements, JumpMeasurements, Measurements, PulseMeasurements, Source
 from analysis.procedure.jump import compute_jump
 from analysis.result.model import Jump
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
@@ -29,6 +29,22 @@ def test_points_that_are_never_seen_together_may_be_named_wrong() -> None:
     verdict = compute_jump(JumpMeasurements(1, without), measured, system).jump.verdict
     assert not verdict.ok
     assert "no pulse shows all four points, so it is not certain which is which" in verdict.message
+
+
+def test_nothing_is_given_where_nothing_tells_which_marker_is_which() -> None:
+    def three_markers(_: int, pulse: PulseMeasurements) -> PulseMeasurements:
+        markers = {
+            name: ImageMeasurements({key: of for key, of in image.points.items() if key != "P2"}, {})
+            for name, image in pulse.images.items()
+        }
+        return replace(pulse, images=markers)
+
+    jump = _computed(three_markers)
+    assert len(jump.pulses) == len(_measured().jumps[0].pulses)
+    assert all(point is None for pulse in jump.pulses for point in pulse.raw.points.values())
+    assert all(pulse.smoothed is None for pulse in jump.pulses)
+    assert not jump.verdict.ok
+    assert jump.verdict.message.count("which marker is which cannot be told, so none is given") == 1
 
 
 def _measured() -> Measurements:
@@ -65,7 +81,8 @@ def test_without_a_take_off_nothing_is_said_of_edge_and_flight() -> None:
     assert "in flight" not in flying.verdict.message
 
 
-def test_a_raw_point_of_two_rays_that_the_motion_contradicts_is_marked() -> None:
+def test_a_raw_point_that_the_motion_contradicts_is_marked() -> None:
+    """Measured by hand, so that it is not given up although it has two rays only."""
     right, system, wrong = _computed(lambda _, pulse: pulse), true_cameras(), 20
     state = right.pulses[wrong].smoothed
     assert state is not None
@@ -81,7 +98,7 @@ def test_a_raw_point_of_two_rays_that_the_motion_contradicts_is_marked() -> None
             return pulse
         images = {name: image for name, image in pulse.images.items() if name != "K2"}
         point = images["K3"].points["P3"]
-        points = {**images["K3"].points, "P3": replace(point, xy=point.xy + off)}
+        points = {**images["K3"].points, "P3": replace(point, xy=point.xy + off, source=Source.BY_HAND)}
         return replace(pulse, images={**images, "K3": replace(images["K3"], points=points)})
 
     jump = _computed(two_rays)

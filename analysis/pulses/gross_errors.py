@@ -4,9 +4,6 @@ An image is left out only if the data show that it is the wrong one: without it 
 any other one they are not. Three rays do not always show that (an error along an epipolar line fits another ray), and
 three image lines of one ski never do; then the object is given up instead of being wrong. Interchanged skis are an
 exception: interchanging them back in the right image, and in no other, makes both skis fit.
-
-Two rays hardly contradict each other, whatever they show. There, and where a third one has next to no weight, the
-motion over time is the only control: a point that it contradicts is given up as well.
 """
 
 from dataclasses import dataclass, replace
@@ -23,22 +20,6 @@ from rig.arrays import Flags, Floats, Integers
 RISK = 0.001
 #: By how much the chi-square of the second best explanation must exceed that of the best: one degree of freedom.
 MARGIN = float(special.chdtri(1, RISK))
-_TWICE = 2.0**2  # growth of a variance without an image: with more, it is that image that tells where the object is
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Expected:
-    """What the motion over time says of n points.
-
-    Attributes:
-        xyz: (n, 3) m; NaN where it says nothing.
-        covariance: (n, 3, 3).
-        doubted: (n, m) images that contradict it.
-    """
-
-    xyz: Floats
-    covariance: Floats
-    doubted: Flags
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,34 +62,6 @@ def check_skis(skis: SkiLines, adjusted: Adjusted, calibration: Floats) -> Check
         calibration: (p, p) covariance of the cameras' uncertain parameters.
     """
     return _located(skis, calibration, adjusted, *_interchanged(skis, calibration, adjusted))
-
-
-def give_up(points: Objects, checked: Checked, calibration: Floats, expected: Expected) -> Checked:
-    """Give up points that contradict the motion by images that the others do not control.
-
-    Nothing moves, and what several other images control stays as they have it, whatever the motion says.
-
-    Args:
-        points: n points.
-        checked: from all images that are in order among themselves.
-        calibration: (p, p) covariance of the cameras' uncertain parameters.
-        expected: by the motion.
-    """
-    adjusted = checked.adjusted
-    there = adjusted.ok & np.isfinite(expected.xyz).all(axis=1)
-    rows = np.flatnonzero((checked.used & expected.doubted).any(axis=1) & there)
-    if not len(rows):
-        return checked
-    off = (adjusted.state[rows] - expected.xyz[rows])[..., None]
-    total = adjusted.covariance[rows] + expected.covariance[rows]
-    chi_square = (off * np.linalg.solve(total, off)).sum(axis=(1, 2))
-    without = adjust(points.subset(rows), calibration, checked.used[rows] & ~expected.doubted[rows])
-    growth = np.linalg.eigvals(np.linalg.solve(adjusted.covariance[rows], without.covariance)).real.max(axis=1)
-    lost = rows[(chi_square > special.chdtri(3, RISK)) & (~without.ok | (growth > _TWICE))]
-    condition, used, removed = adjusted.condition.copy(), checked.used.copy(), checked.removed.copy()
-    condition[lost] = Condition.IMPOSSIBLE
-    used[lost], removed[lost] = False, points.seen[lost]
-    return replace(checked, adjusted=replace(adjusted, condition=condition), used=used, removed=removed)
 
 
 def _located(objects: Objects, calibration: Floats, first: Adjusted, removed: Flags, lost: Flags) -> Checked:

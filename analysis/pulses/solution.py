@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, PulseMeasurements
-from analysis.pulses.gross_errors import Checked, Expected, check_points, check_skis, give_up
+from analysis.pulses.giving_up import ExpectedPoints, ExpectedSkis, give_up_points, give_up_skis
+from analysis.pulses.gross_errors import Checked, check_points, check_skis
 from analysis.pulses.least_squares import adjust
 from analysis.pulses.points import points_of
 from analysis.pulses.scaling import scaled_to_fit
@@ -52,8 +53,8 @@ def solve_pulses(
         jump: what was measured; images of cameras that are not oriented are left out.
         measurements: the recording that the jump belongs to, with the cameras' exposure times.
         system: the oriented cameras.
-        smoothed: states of the pulses by the motion over time; a point that contradicts them is given up if nothing
-            else controls the ray that makes it do so. None at all: nothing is known of the motion.
+        smoothed: states of the pulses by the motion over time; points and skis that contradict them are given up if
+            too few images control them. None at all: nothing is known of the motion.
         doubted: rays that contradict the motion.
 
     Raises:
@@ -75,25 +76,22 @@ def solve_pulses(
     points, places, points_scale = scaled_to_fit(points, system.covariance)
     skis, lines, skis_scale = scaled_to_fit(skis, system.covariance, other_names)
     numbers = np.array([pulse.pulse for pulse in pulses])
-    checked = check_points(points, places, system.covariance)
+    good_points = check_points(points, places, system.covariance)
+    good_skis = check_skis(skis, lines, system.covariance)
     if smoothed:
-        expected = _expected(smoothed, doubted, numbers, system.names)
+        expected = _expected_points(smoothed, doubted, numbers, system.names)
         expected = replace(expected, doubted=expected.doubted & ~points.by_hand)
-        checked = give_up(points, checked, system.covariance, expected)
-    solved = Solved(
-        checked,
-        points.by_hand,
-        check_skis(skis, lines, system.covariance),
-        skis.by_hand,
-    )
+        good_points = give_up_points(points, good_points, system.covariance, expected)
+        good_skis = give_up_skis(skis, good_skis, _expected_skis(smoothed))
+    solved = Solved(good_points, points.by_hand, good_skis, skis.by_hand)
     tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))
     scale = {"points": points_scale, "skis": skis_scale}
     return RawJump(jumper_states(solved, numbers, times, system), tuple(tests), scale)
 
 
-def _expected(
+def _expected_points(
     smoothed: Sequence[SmoothedState | None], doubted: Collection[RayTest], pulses: Integers, names: tuple[str, ...]
-) -> Expected:
+) -> ExpectedPoints:
     """What the motion says of all points, P1 to P4 pulse by pulse."""
     n = len(pulses) * len(POINTS)
     xyz, covariance, flags = np.full((n, 3), np.nan), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, len(names)), bool)
@@ -105,7 +103,21 @@ def _expected(
     for test in doubted:
         if test.what in POINTS:
             flags[row[test.pulse] + POINTS.index(test.what), names.index(test.camera)] = True
-    return Expected(xyz, covariance, flags)
+    return ExpectedPoints(xyz, covariance, flags)
+
+
+def _expected_skis(smoothed: Sequence[SmoothedState | None]) -> ExpectedSkis:
+    """What the motion says of all skis, right and left pulse by pulse."""
+    n = len(smoothed) * len(SIDES)
+    direction, covariance = np.full((n, 3), np.nan), np.tile(np.eye(2), (n, 1, 1))
+    for k, state in enumerate(smoothed):
+        for i, side in enumerate(SIDES):
+            if state is not None and (ski := state.skis[side]) is not None:
+                sigma = np.radians((ski.slope.sigma, ski.heading.sigma))
+                direction[k * len(SIDES) + i] = ski.direction
+                both = ((1.0, ski.correlation), (ski.correlation, 1.0))
+                covariance[k * len(SIDES) + i] = np.outer(sigma, sigma) * both
+    return ExpectedSkis(direction, covariance)
 
 
 def _check_sizes(cameras: list[PlacedCamera], measurements: Measurements) -> None:

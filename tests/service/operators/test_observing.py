@@ -66,15 +66,22 @@ def test_arming_and_starting_stand_in_the_log_and_on_zeromq(tmp_path: Path, loop
         context.socket(zmq.SUB) as subscriber,
         serving(tmp_path, rig, loopback, "--preroll", "5") as service,
     ):
-        subscriber.subscribe(b"event")
+        for topic in (b"event", b"health"):
+            subscriber.subscribe(topic)
         subscriber.connect(load_rig(rig).network.publish)
+        topics = set[bytes]()
 
         def heard(text: str) -> bool:
             while subscriber.poll(0):
-                published.append(json.loads(subscriber.recv_multipart()[1])["message"])
+                topic, body = subscriber.recv_multipart()[:2]
+                topics.add(topic)
+                if topic == b"event":
+                    published.append(json.loads(body)["message"])
             return any(text in message for message in published)
 
         service.arm()
+        # A subscriber that connects while events are told misses them: health comes every second.
+        wait_until(lambda: heard("") or b"health" in topics, "the subscriber is connected", PATIENCE_S)
         recording = service.post("/api/recordings", {"duration_s": 0.5})
         wait_until(lambda: heard("recording -> armed"), "the end of the recording is published", PATIENCE_S)
         path = service.data / f"{recording['id']}.mcap"

@@ -12,6 +12,7 @@ from scipy import special
 from analysis.pulses.gross_errors import RISK, Checked
 from analysis.pulses.least_squares import Condition, Objects, adjust
 from analysis.pulses.skis import SkiLines, across_axes
+from photogrammetry.jumper.stick_model import by_slope_and_heading
 from rig.arrays import Flags, Floats, Integers
 
 _TWICE = 2.0**2  # growth of a variance without an image: with more, it is that image that tells where the object is
@@ -89,18 +90,10 @@ def give_up_skis(skis: SkiLines, checked: Checked, expected: ExpectedSkis) -> Ch
     # A line has no sense: which of its ends is the tip is told later.
     other = other * np.sign((measured * other).sum(axis=1, keepdims=True))
     off = (axes @ other[..., None])[..., 0]
-    turns = axes @ _by_slope_and_heading(other)
+    turns = axes @ by_slope_and_heading(other)
     total = adjusted.covariance[rows, 2:, 2:] + turns @ expected.covariance[rows] @ turns.swapaxes(1, 2)
     chi_square = (off[..., None] * np.linalg.solve(total, off[..., None])).sum(axis=(1, 2))
     return _without(skis, checked, rows[chi_square > special.chdtri(2, RISK)])
-
-
-def _by_slope_and_heading(direction: Floats) -> Floats:
-    """Derivatives (n, 3, 2) of unit vectors (n, 3) by slope and heading."""
-    x, y, z = direction.T
-    level = np.hypot(x, y)
-    nothing = np.zeros_like(x)
-    return np.stack((np.stack((-z * x / level, -z * y / level, level)), np.stack((-y, x, nothing)))).transpose(2, 1, 0)
 
 
 def _without(objects: Objects, checked: Checked, lost: Integers) -> Checked:

@@ -113,10 +113,7 @@ def _expected_skis(smoothed: Sequence[SmoothedState | None]) -> ExpectedSkis:
     for k, state in enumerate(smoothed):
         for i, side in enumerate(SIDES):
             if state is not None and (ski := state.skis[side]) is not None:
-                sigma = np.radians((ski.slope.sigma, ski.heading.sigma))
-                direction[k * len(SIDES) + i] = ski.direction
-                both = ((1.0, ski.correlation), (ski.correlation, 1.0))
-                covariance[k * len(SIDES) + i] = np.outer(sigma, sigma) * both
+                direction[k * len(SIDES) + i], covariance[k * len(SIDES) + i] = ski.direction, ski.covariance
     return ExpectedSkis(direction, covariance)
 
 

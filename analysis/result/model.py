@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
+import numpy as np
+
 from rig.arrays import Floats
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
@@ -100,6 +102,12 @@ class SkiState:
     correlation: float
     cameras: tuple[str, ...]
     status: Status
+
+    @property
+    def covariance(self) -> Floats:
+        """(2, 2) of slope and heading, rad^2."""
+        sigma = np.radians((self.slope.sigma, self.heading.sigma))
+        return np.asarray(np.outer(sigma, sigma) * ((1.0, self.correlation), (self.correlation, 1.0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

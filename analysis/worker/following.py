@@ -248,14 +248,13 @@ def _flight(state: SmoothedState, time_s: float) -> Flight:
 def _angles(state: SmoothedState, flight: Flight) -> Prediction:
     """Slope and heading of both skis in the frame of the flight, rad; along the flight if they are unknown."""
     course = np.degrees(np.arctan2(flight.axes[0, 1], flight.axes[0, 0]))
-    values, covariance = np.zeros((1, 2, 2)), np.tile(np.diag(_ANYHOW_DEG**2), (1, 2, 1, 1))
+    values, covariance = np.zeros((1, 2, 2)), np.tile(np.diag(np.radians(_ANYHOW_DEG) ** 2), (1, 2, 1, 1))
     for i, side in enumerate(SIDES):
         if (ski := state.skis[side]) is None:
             continue
         values[0, i] = ski.slope.value, (ski.heading.value - course + 180.0) % 360.0 - 180.0
-        sigma = np.array((ski.slope.sigma, ski.heading.sigma))
-        covariance[0, i] = np.outer(sigma, sigma) * np.array(((1.0, ski.correlation), (ski.correlation, 1.0)))
-    return Prediction(np.radians(values), covariance * np.radians(1.0) ** 2)
+        covariance[0, i] = ski.covariance
+    return Prediction(np.radians(values), covariance)
 
 
 def _known(part: _Part | None) -> _Part:

@@ -16,6 +16,7 @@ from analysis.candidates.skis.ski_widths import SkiWidth, clear_widths, told_apa
 from analysis.identification.space.views import Sight
 from analysis.measurements.model import SIDES
 from analysis.result.model import PointState, SkiState, SmoothedState
+from photogrammetry.jumper.stick_model import by_slope_and_heading
 from rig.arrays import Floats
 
 BINDINGS: Final = ("P3", "P4")  #: of the right and the left ski
@@ -130,12 +131,8 @@ def _aside(by_point: Floats, xy: Floats, binding: PointState, ski: SkiState) -> 
         binding: predicted.
         ski: predicted.
     """
-    x, y, z = ski.direction
-    level = float(np.hypot(x, y))
-    turns = np.array(((-z * x / level, -z * y / level, level), (-y, x, 0.0)))  # of the direction by slope and heading
-    sigma = np.radians((ski.slope.sigma, ski.heading.sigma))
-    angles = np.outer(sigma, sigma) * np.array(((1.0, ski.correlation), (ski.correlation, 1.0)))
-    spread = binding.covariance + _LONGEST_M**2 * turns.T @ angles @ turns
+    turns = by_slope_and_heading(ski.direction[None])[0]
+    spread = binding.covariance + _LONGEST_M**2 * turns @ ski.covariance @ turns.T
     axis = xy[1] - xy[0]
     across = np.array((-axis[1], axis[0])) / np.hypot(*axis) @ by_point
     return float(np.sqrt(((across @ spread) * across).sum(axis=1).max()))

@@ -86,6 +86,14 @@ def direction_of(angles: Floats) -> Floats:
     return np.stack((np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1)
 
 
+def by_slope_and_heading(direction: Floats) -> Floats:
+    """Derivatives (n, 3, 2) of unit vectors (n, 3) by slope and heading, per rad."""
+    x, y, z = direction.T
+    level = np.hypot(x, y)
+    nothing = np.zeros_like(x)
+    return np.stack((np.stack((-z * x / level, -z * y / level, level)), np.stack((-y, x, nothing)))).transpose(2, 1, 0)
+
+
 def _unit(direction: Floats) -> Floats:
     return np.asarray(direction / np.linalg.norm(direction, axis=-1, keepdims=True))
 

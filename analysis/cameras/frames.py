@@ -2,16 +2,21 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable
 from rig.pulse import PulseNumber
+from rig.tag import TripletTag
 
 #: Images (rows, columns) by camera; valid until the next pulse is taken.
 Frames = Mapping[str, Grey]
+_Image = TypeVar("_Image", NDArray[np.uint8], Grey)
 
 
 class FrameSource(Protocol):
@@ -54,11 +59,9 @@ class LogFrames:
                     image = measurable(triplet.image(reader), triplet.tag.pixels)
                 except ValueError:
                     continue  # `svev verify` names it; other pulses are not touched
-                yield (
-                    pulse,
-                    {
-                        camera.name: image[camera.part]
-                        for camera in triplet.tag.cameras
-                        if camera.status is FrameStatus.OK
-                    },
-                )
+                yield pulse, camera_images(triplet.tag, image)
+
+
+def camera_images(tag: TripletTag, image: _Image) -> dict[str, _Image]:
+    """The frames that cameras delivered at a pulse."""
+    return {camera.name: image[camera.part] for camera in tag.cameras if camera.status is FrameStatus.OK}

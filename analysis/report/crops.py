@@ -9,7 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from analysis.report.frames import Grey, camera_images, frames_of
+from analysis.cameras.frames import camera_images
+from analysis.report.frames import Grey, frames_of
 from analysis.report.overlay import Overlay
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets
-from rig.frame import FrameStatus
 from rig.images.picture import shown
 from rig.tag import TripletTag
 
@@ -32,8 +31,3 @@ def frames_of(log: Path, pulses: Collection[int]) -> Iterator[tuple[TripletTag, 
                 except ValueError:
                     continue  # the account of the log (`svev verify`) names damaged chunks
                 yield stored.tag, image
-
-
-def camera_images(tag: TripletTag, image: Grey) -> dict[str, Grey]:
-    """The images of the cameras that delivered, by name; no copies."""
-    return {camera.name: image[camera.part] for camera in tag.cameras if camera.status is FrameStatus.OK}

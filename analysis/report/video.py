@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.cameras.frames import camera_images
 from analysis.film.video_file import ENDINGS, FFV1, VP9, VideoFile
 from analysis.film.whole import whole_file
 from analysis.film.words import write_outlined
@@ -22,7 +23,7 @@ from analysis.measurements.model import Measurements
 from analysis.report.course import Course, course_of
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Windows, windows_of
 from analysis.report.figures import fixed
-from analysis.report.frames import Grey, camera_images, frames_of
+from analysis.report.frames import Grey, frames_of
 from analysis.report.overlay import Overlay, half_axes
 from analysis.report.scrubbing import overlays_of
 from analysis.result.model import MeasuredRecording

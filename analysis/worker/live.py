@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.cameras.frames import Frames
+from analysis.cameras.frames import Frames, camera_images
 from analysis.cameras.live_watch import LiveWatch
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.source import orient_from, read_source
@@ -31,7 +31,7 @@ from analysis.scene.camera_system import CameraSystem
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.following import Followed, Follower
 from analysis.worker.stream import Received
-from analysis.worker.streamed import Streamed, frames_of
+from analysis.worker.streamed import Streamed
 from analysis.worker.whole_jump import JumpTask
 from analysis.worker.wire_form import wire_form
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
@@ -170,7 +170,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
 
     def _measure(self, recording: Streamed, finder: Finder, tag: TripletTag, image: Grey) -> None:
         """Follow the jumper, or look whether one comes."""
-        follower, frames = recording.follower, frames_of(tag, image)
+        follower, frames = recording.follower, camera_images(tag, image)
         if follower is None:
             self._keep(recording, finder.find(tag, image, sparing=True), frames)
             self._seek(recording)

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.cameras.frames import Frames
+from analysis.cameras.frames import Frames, camera_images
 from analysis.cameras.standing import FrameShake
 from analysis.candidates.model import PulseCandidates
 from analysis.identification.seeking import Seeker
@@ -130,7 +130,7 @@ class Streamed:
     def waiting_frames(self, count: int) -> list[Frames]:
         """The frames of so many pulses, spread over those that wait."""
         chosen = np.unique(np.linspace(0, len(self.waiting) - 1, count).round().astype(int))
-        return [frames_of(*self.waiting[i]) for i in chosen]
+        return [camera_images(*self.waiting[i]) for i in chosen]
 
     def follow(self, follower: Follower) -> None:
         """Somebody is in sight: the jumper who was just lost, or the next one."""
@@ -163,8 +163,3 @@ class Streamed:
     def between(self, first: float, last: float) -> list[PulseCandidates]:
         """The candidates of the pulses from `first` to `last`."""
         return [kept for kept in self.candidates if first <= kept.pulse <= last]
-
-
-def frames_of(tag: TripletTag, image: Grey) -> Frames:
-    """The frames that cameras delivered at a pulse."""
-    return {c.name: image[c.part] for c in tag.cameras if c.status is FrameStatus.OK}

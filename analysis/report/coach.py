@@ -125,7 +125,8 @@ def _title(result: MeasuredRecording) -> str:
 
 
 def _head(result: MeasuredRecording) -> str:
-    facts = [f"{key} {value}" for key, value in result.session.items() if key != "athlete" and value.strip()]
+    elsewhere = {"athlete", "recording"}
+    facts = [f"{key} {value}" for key, value in result.session.items() if key not in elsewhere and value.strip()]
     times = [pulse.time for jump in result.jumps for pulse in jump.pulses[:1]]
     if times:
         facts.append(datetime.fromtimestamp(min(times) // NS_PER_S, UTC).strftime("%-d %B %Y, %H:%M:%S UTC"))

@@ -73,6 +73,12 @@ def test_the_session_is_text_and_nothing_else(page: str) -> None:
     assert "gate" not in _text(page)
 
 
+def test_the_recording_is_named_once(jump_log: Path) -> None:
+    result = measured_recording()
+    page = _page(jump_log, replace(result, session={"athlete": "Ola", "recording": result.recording}))
+    assert _text(page).count(f"recording {result.recording}") == 1
+
+
 def test_nothing_comes_from_elsewhere(page: str) -> None:
     assert "://" not in page.replace("http://www.w3.org/2000/svg", "")
     policy = re.search(r'<meta http-equiv="Content-Security-Policy" content="([^"]+)">', page)

@@ -8,7 +8,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
+from rig.frame import FrameStatus
+from tests.recorder.logs import ALL_OK
 from tests.webpanel.conftest import client, panel, service
+from tests.webpanel.memory_service import MemoryService, write_recording
 
 __all__ = ["browser", "client", "open_page", "panel", "service"]
 
@@ -65,3 +68,12 @@ def open_page(browser: Browser) -> Iterator[Open]:
     for context in contexts:
         context.close()
     assert not complaints
+
+
+@pytest.fixture
+def jumps(service: MemoryService) -> None:
+    """Two recordings, one with a lost frame."""
+    folder = service.catalogue.directory
+    write_recording(folder, "jump-1", (ALL_OK,) * 30, {"athlete": "Anna Berg", "bib": "17"})
+    lost = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
+    write_recording(folder, "jump-2", (lost, *(ALL_OK,) * 29), {"athlete": "Ola <b>Nordmann</b>", "bib": "4"})

@@ -16,8 +16,7 @@ from rig.settings.camera import CameraSettings, Region
 from service.regions import unfit
 from svev.doctor.finding import Topic, failure, passed
 from tests.browser.conftest import Open
-from tests.browser.test_layout import BROKEN
-from tests.browser.test_page import SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.browser.views import BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel

@@ -8,7 +8,7 @@ from analysis.result.model import Quantity
 from tests.analysis.report.jumps import measured_recording, measurements, write_jump_log
 from tests.analysis.simulated import true_cameras
 from tests.browser.conftest import Open
-from tests.browser.test_page import AXE
+from tests.browser.views import AXE
 
 _EVERY = 12  # few pulses have pictures, to save time
 

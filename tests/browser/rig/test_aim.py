@@ -19,8 +19,7 @@ from service.aiming.balls import BallPlaces
 from simrig.images.view import CameraView
 from tests.analysis.scene.hill import SIZE, balls_in, training
 from tests.browser.conftest import Open
-from tests.browser.test_layout import BROKEN
-from tests.browser.test_page import SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.browser.views import BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
 from tests.service.cameras.test_balls import survey_file, surveyed, true_pose
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService, write_recording

@@ -15,9 +15,9 @@ from pydantic import BaseModel
 from rig.api import jump, recordings, rehearsal, start_list, statement, status
 from rig.api.cameras import aids, balls, light
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "webpanel" / "page"
-NPM = Path(__file__).with_name("npm")
+NPM = ROOT / "tests" / "browser" / "npm"
 MODULES = sorted(PAGE.rglob("*.js"))
 EVERYTHING = sorted(path for path in PAGE.rglob("*") if path.is_file())
 WORDS = re.compile(r'^  "([\w.]+)": "(.*)",$', re.MULTILINE)

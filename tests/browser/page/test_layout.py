@@ -8,39 +8,12 @@ from playwright.sync_api import TimeoutError as NotInTimeError
 
 from rig.api.status import State
 from tests.browser.conftest import Open
-from tests.browser.test_page import READY, enter, jumps
+from tests.browser.views import BROKEN, READY, enter
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
 
-__all__ = ["jumps"]
-
 PHONE, ACROSS, TABLET, SMALL_LAPTOP, LAPTOP = (360, 780), (780, 360), (768, 1024), (1024, 768), (1280, 800)
-#: Words that stand on two lines, and buttons that do not hold their words.
-BROKEN = r"""() => {
-    const wrong = [];
-    const where = "button, .button, nav a, .brand, .pill, h1, h2, dt, label > span, .state-word";
-    for (const element of document.querySelectorAll(where)) {
-        if (!element.checkVisibility({ visibilityProperty: true })) continue;
-        if (element.matches("button, .button, nav a, .brand, .pill") && !element.matches(".block, .unseen")
-            && element.scrollWidth > element.clientWidth + 1) wrong.push("cut off: " + element.outerHTML);
-        const texts = document.createTreeWalker(element, NodeFilter.SHOW_TEXT);
-        while (texts.nextNode()) {
-            const text = texts.currentNode;
-            if (text.parentElement.closest(".unseen, .cover")) continue;
-            for (const word of text.data.matchAll(/[\p{L}\p{N}]+/gu)) {
-                const range = document.createRange();
-                range.setStart(text, word.index);
-                range.setEnd(text, word.index + word[0].length);
-                const lines = new Set([...range.getClientRects()].map(({ top }) => Math.round(top)));
-                if (lines.size > 1) wrong.push(`broken: ${word[0]}: ${element.outerHTML.slice(0, 200)}`);
-            }
-        }
-    }
-    return wrong;
-}"""
-
-
 BESIDE_THE_MESSAGE = """element => {
     const snack = document.querySelector(".snack").getBoundingClientRect();
     const own = element.getBoundingClientRect();

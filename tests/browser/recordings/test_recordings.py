@@ -13,6 +13,7 @@ from playwright.sync_api import expect
 from recorder.reading.corrected_log import corrected_log
 from rig.frame import FrameStatus
 from tests.browser.conftest import Open
+from tests.browser.views import enter
 from tests.recorder.logs import ALL_OK
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService, write_recording
@@ -317,3 +318,15 @@ def test_without_https_the_button_says_what_the_microphone_needs(
     with page.expect_popup() as opened:
         page.get_by_role("button", name="How to do it").click()
     expect(opened.value.locator("body")).to_contain_text("svev certificate --name NAME")
+
+
+def test_the_focus_stays_on_a_recording_when_the_list_is_drawn_anew(
+    panel: Panel, client: httpx.Client, jumps: None, open_page: Open
+) -> None:
+    page = open_page(panel.url)
+    enter(page, panel, "recordings")
+    link = page.get_by_role("link", name=re.compile("^17 "))
+    link.focus()
+    client.patch("/api/recordings/jump-1", json={"bib": "18"}).raise_for_status()
+    link = page.get_by_role("link", name=re.compile("^18 "))
+    expect(link).to_be_focused()

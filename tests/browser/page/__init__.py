@@ -1,0 +1,1 @@
+"""The page itself: states, sizes, languages, accessibility, connection."""

@@ -1,0 +1,57 @@
+"""The page in English and Norwegian."""
+
+from playwright.sync_api import expect
+
+from rig.errors import StorageError
+from rig.phrase import phrase, plain
+from service.status.statements import recording_ended
+from tests.browser.conftest import Open
+from tests.browser.views import enter
+from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.serving import Panel
+
+
+def test_norwegian_from_the_browser_and_by_choice(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open
+) -> None:
+    page = open_page(panel.url, locale="nb-NO")
+    expect(page.locator("#state-word")).to_have_text("Av")
+    expect(page.locator("#state-text")).to_contain_text("Kameraene er av.")
+    expect(page.locator("html")).to_have_attribute("lang", "nb")
+    enter(page, panel, "recordings/jump-2")
+    expect(page.locator("#recording-verdict")).to_have_text("1 av 30 pulser mangler et bilde")
+    expect(page.locator("#frame-fate")).to_contain_text("K2 tapt")
+    page.keyboard.press("?")
+    page.get_by_label("Språk").select_option("en")
+    expect(page.get_by_role("heading", name="Settings and keys")).to_be_visible()
+    page.get_by_role("button", name="Close").click()
+    expect(page.locator("#frame-fate")).to_contain_text("K2 lost")
+    expect(page.locator("#recording-verdict")).to_contain_text("1 of 30 pulses lack a frame")
+    page.reload()
+    expect(page.locator("html")).to_have_attribute("lang", "en")
+
+
+def test_check_log_and_reasons_are_said_in_the_language_chosen(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    full = phrase("disk_full", "the disk is full: make room on it or record to another one")
+    service.tell("warning", "disk", phrase("event_there_neither", "there neither: {why}", why=full))
+    service.tell("info", "K1", plain("as the library says it"))
+    page = open_page(f"{panel.url}/#/log", locale="nb-NO")
+    told = page.locator("#log-list li", has_text="ikke der heller")
+    expect(told).to_contain_text("advarsel")
+    expect(told).to_contain_text("ikke der heller: disken er full: skaff plass på den, eller ta opp på en annen")
+    expect(page.locator("#log-list li", has_text="K1")).to_contain_text("as the library says it")
+    enter(page, panel, "doctor")
+    first, second = page.locator(".finding").all()
+    expect(first).to_contain_text("ADVARSEL nettverk")
+    expect(first).to_contain_text("K1 gjennom enp2s0: MTU 1500, men ikke alle kameraene er i subnettet 10.0.0.0/24")
+    expect(first.locator(".advice")).to_have_text("gi nettverksporten en adresse i kameraets subnett")
+    expect(second).to_contain_text("fast enough")
+    reason = StorageError(phrase("why_deleted", "{path}: was deleted", path="/data/jump.mcap"))
+    service.notice = recording_ended("jump", reason)
+    service.arm()
+    enter(page, panel, "live")
+    expect(page.locator("#state-notice")).to_contain_text(
+        "Opptaket jump tok slutt for tidlig: /data/jump.mcap: ble slettet under opptaket"
+    )

@@ -1,0 +1,59 @@
+"""The views of the page, and what must hold in each of them."""
+
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.webpanel.serving import Panel
+
+AXE = Path(__file__).with_name("npm") / "node_modules" / "axe-core" / "axe.min.js"
+#: The views, and what is there when a view has what it shows.
+READY = {
+    "live": "#cameras li",
+    "recordings": "#recordings-list li",
+    "trash": "#recordings-empty",
+    "recordings/jump-2": "#frame-slider",
+    "log": "#log-list li, #log-empty",
+    "doctor": "#doctor-run",
+    "aim": "#aim-cameras button",
+    "rig": "#rig-facts div",
+}
+SMALLEST_TOUCH_PX = 44
+#: What a finger has to hit, and fails to have room for it.
+TOO_SMALL = """least =>
+    [...document.querySelectorAll("button, select, textarea, input:not([type=checkbox]), nav a, .button")]
+    .filter(e => e.checkVisibility() && !e.matches(".block"))
+    .filter(e => Math.min(e.getBoundingClientRect().height, e.getBoundingClientRect().width) < least)
+    .map(e => e.outerHTML)"""
+#: Words that stand on two lines, and buttons that do not hold their words.
+BROKEN = r"""() => {
+    const wrong = [];
+    const where = "button, .button, nav a, .brand, .pill, h1, h2, dt, label > span, .state-word";
+    for (const element of document.querySelectorAll(where)) {
+        if (!element.checkVisibility({ visibilityProperty: true })) continue;
+        if (element.matches("button, .button, nav a, .brand, .pill") && !element.matches(".block, .unseen")
+            && element.scrollWidth > element.clientWidth + 1) wrong.push("cut off: " + element.outerHTML);
+        const texts = document.createTreeWalker(element, NodeFilter.SHOW_TEXT);
+        while (texts.nextNode()) {
+            const text = texts.currentNode;
+            if (text.parentElement.closest(".unseen, .cover")) continue;
+            for (const word of text.data.matchAll(/[\p{L}\p{N}]+/gu)) {
+                const range = document.createRange();
+                range.setStart(text, word.index);
+                range.setEnd(text, word.index + word[0].length);
+                const lines = new Set([...range.getClientRects()].map(({ top }) => Math.round(top)));
+                if (lines.size > 1) wrong.push(`broken: ${word[0]}: ${element.outerHTML.slice(0, 200)}`);
+            }
+        }
+    }
+    return wrong;
+}"""
+
+
+def enter(page: Page, panel: Panel, view: str) -> None:
+    """Go to a view, and wait until it has what it shows."""
+    page.goto(f"{panel.url}/#/{view}")
+    expect(page.locator(f":is({READY[view]}):visible").first).to_be_attached()
+    if view == "doctor":
+        page.locator("#doctor-run").click()
+        expect(page.locator(".finding")).to_have_count(2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.motion.smoother import Motion, smooth
 from analysis.procedure.contradictions import with_contradictions
-from analysis.procedure.names import UNTOLD, emptied, names_are_told
+from analysis.procedure.names import only_told, told_names, untold_line
 from analysis.procedure.verdict import judge
 from analysis.pulses.solution import RawJump, solve_pulses
 from analysis.result.model import CameraMove, CameraOffset, Jump, PulseState, Quantity, TakeOff, phase_at
@@ -32,7 +32,7 @@ class ComputedJump:
 def compute_jump(
     jump: JumpMeasurements, measurements: Measurements, system: CameraSystem, moved: Sequence[CameraMove] = ()
 ) -> ComputedJump:
-    """Compute a jump; it is given without any places where its measurements do not tell which marker is which.
+    """Compute a jump; it is given without those points of which its measurements do not tell which marker they are.
 
     Args:
         jump: what was measured.
@@ -43,9 +43,12 @@ def compute_jump(
     motion = smooth(jump, measurements, system)
     raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
     troubles = [motion.message] if motion.message else []
-    if not names_are_told(raw.states):
-        jump, troubles = emptied(jump), [UNTOLD]
-        motion, raw = smooth(jump, measurements, system), solve_pulses(jump, measurements, system)
+    told = told_names(raw.states)
+    if (untold := untold_line(raw.states, told)) is not None:
+        jump = only_told(jump, told)
+        motion = smooth(jump, measurements, system)
+        raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
+        troubles = [untold] if not told or not motion.message else [untold, motion.message]
     pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion))
     frames = [pulse.images.keys() for pulse in jump.pulses]
     verdict = judge(pulses, frames, system, motion.takeoff, raw.tests, motion.offsets, moved, troubles, motion.scale)

@@ -1,42 +1,136 @@
-"""Whether a jump's measurements tell which marker is which.
+"""Which of a jump's markers its measurements tell by name.
 
-Helmet, hip and bindings look alike. Where few of them are found, other things that go along with the body can take the
-place of the others: a helmet and two gloves are as far from each other as a helmet and bindings may be. All four at
-once, or a binding on its ski, are nothing else.
+Helmet, hip and bindings look alike, and gloves, knees, elbows or light seams can look like them. A helmet and two
+gloves are as far from each other as a helmet and bindings may be, and a helmet that is never found leaves its name to
+the hip. So each name must be borne out, in several pulses, by what nothing else on a body does (decision 0067).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import Final
 
-from analysis.measurements.model import ImageMeasurements, JumpMeasurements
+import numpy as np
+
+from analysis.identification.space.body import USUAL, implausibility
+from analysis.measurements.model import POINTS, ImageMeasurements, JumpMeasurements
 from analysis.result.model import JumperState, Status
+from rig.arrays import Floats
 
-#: What is said of a jump that was emptied.
+#: What is said of a jump of which nothing is given.
 UNTOLD: Final = (
-    "which marker is which cannot be told, so none is given: no pulse shows all four, and no binding was seen on its "
-    "ski; look at the overlay, and give the markers more contrast"
+    "which marker is which cannot be told, so none is given: helmet and hip are hardly ever seen together, nor all "
+    "four, and no binding on its ski; look at the overlay, and give the markers more contrast"
 )
+_BODY: Final = ("P1", "P2")
 _BINDINGS: Final = (("P3", "right"), ("P4", "left"))
-_FEWEST: Final = 3  #: bindings with their skis; one may be a coincidence
+_FEWEST: Final = 3  #: pulses that bear a name out; in one or two it may be a coincidence
 
 
-def names_are_told(states: Sequence[JumperState]) -> bool:
-    """Whether raw states of a jump show all four points at once, several bindings with their skis, or any by hand."""
-    points = [point for state in states for point in state.points.values()]
-    if any(point is not None and point.status is Status.BY_HAND for point in points):
-        return True
-    if any(None not in state.points.values() for state in states):
-        return True
+def told_names(states: Sequence[JumperState]) -> frozenset[str]:
+    """The names of P1 to P4 that the raw states of a jump bear out; all of them if a person measured any.
+
+    - Helmet and hip by each other: nothing else that goes with a body is as far from each other in that direction.
+    - A binding by its ski. Where hardly any ski was found, bindings by all four at once, if they look like a body.
+    - The helmet without the hip, or the other way round, by told bindings: it is where it must be beside them, and the
+      other one would not be there.
+    """
+    points = [point for state in states for point in state.points.values() if point is not None]
+    if any(point.status is Status.BY_HAND for point in points):
+        return frozenset(POINTS)
+    body = _Body(states)
+    told: set[str] = set()
+    if body.looks(_BODY):
+        told.update(_BODY)
+    on_ski = {p: sum(s.points[p] is not None and s.skis[side] is not None for s in states) for p, side in _BINDINGS}
+    if max(on_ski.values()) >= _FEWEST:
+        told.update(p for p, count in on_ski.items() if count >= _FEWEST and not body.contradicts(p, told))
+    if sum(None not in state.points.values() for state in states) >= _FEWEST and all(
+        map(body.looks, combinations(POINTS, 2))
+    ):
+        told.update(POINTS)
+    if not told.issuperset(_BODY) and not body.contradicts(_BODY[0], _BODY[1:]):
+        bindings = told.intersection(p for p, _ in _BINDINGS)
+        for name, other in (_BODY, _BODY[::-1]):
+            if any(body.looks((binding, name)) and not body.looks((binding, name), other) for binding in bindings):
+                told.add(name)
+    return frozenset(told)
+
+
+def untold_line(states: Sequence[JumperState], told: Collection[str]) -> str | None:
+    """What is said of the points that are not given; None if all that were measured are."""
+    untold = [name for name in POINTS if name not in told and any(state.points[name] is not None for state in states)]
+    if not untold:
+        return None
+    if not told:
+        return UNTOLD
+    which = " and ".join((", ".join(untold[:-1]), untold[-1])) if len(untold) > 1 else untold[0]
     return (
-        sum(state.points[p] is not None and state.skis[s] is not None for state in states for p, s in _BINDINGS)
-        >= _FEWEST
+        f"{which} {'are' if len(untold) > 1 else 'is'} not given: what was measured there may be something else on the "
+        "jumper; look at the overlay, and give the markers more contrast"
     )
 
 
-def emptied(jump: JumpMeasurements) -> JumpMeasurements:
-    """The jump without anything measured in its images."""
+def only_told(jump: JumpMeasurements, told: Collection[str]) -> JumpMeasurements:
+    """The jump with the told points alone; without any skis where no binding tells which ski is which."""
+    skis = any(binding in told for binding, _ in _BINDINGS)
     pulses = (
-        replace(pulse, images={name: ImageMeasurements({}, {}) for name in pulse.images}) for pulse in jump.pulses
+        replace(
+            pulse,
+            images={
+                camera: ImageMeasurements(
+                    {name: point for name, point in image.points.items() if name in told}, image.skis if skis else {}
+                )
+                for camera, image in pulse.images.items()
+            },
+        )
+        for pulse in jump.pulses
     )
     return replace(jump, pulses=tuple(pulses))
+
+
+class _Body:
+    """How the points of a jump lie to each other, in the frame of the flight.
+
+    Args:
+        states: raw states of its pulses.
+    """
+
+    def __init__(self, states: Sequence[JumperState]) -> None:
+        places = [[point and point.xyz for point in map(state.points.get, POINTS)] for state in states]
+        self._xyz = np.array([[np.full(3, np.nan) if xyz is None else xyz for xyz in of] for of in places], float)
+        self._xyz = self._xyz.reshape(-1, len(POINTS), 3) @ _axes(self._xyz.reshape(-1, len(POINTS), 3)).T
+
+    def looks(self, pair: tuple[str, str], second: str | None = None) -> bool:
+        """Whether two points look like what they are named in most of several pulses.
+
+        Args:
+            pair: the points.
+            second: another name for the second one.
+        """
+        squares = self._squares(pair, second)
+        return len(squares) >= _FEWEST and float(np.median(squares)) < USUAL
+
+    def contradicts(self, name: str, others: Collection[str]) -> bool:
+        """Whether a point does not look like what it is named beside some others."""
+        found = [self._squares((name, other)) for other in others]
+        return any(len(squares) >= _FEWEST and float(np.median(squares)) >= USUAL for squares in found)
+
+    def _squares(self, pair: tuple[str, str], second: str | None = None) -> Floats:
+        """Implausibility in each pulse that shows both."""
+        one, other = map(POINTS.index, pair)
+        difference = self._xyz[:, other] - self._xyz[:, one]
+        difference = difference[np.isfinite(difference).all(axis=1)]
+        return implausibility(one, other if second is None else POINTS.index(second), difference)
+
+
+def _axes(xyz: Floats) -> Floats:
+    """(3, 3) along the way of the points (t, 4, 3), horizontally, to its left, and up."""
+    way = np.zeros(3)
+    for of_point in xyz.swapaxes(0, 1):
+        seen = of_point[np.isfinite(of_point).all(axis=1)]
+        if len(seen):
+            way += seen[-1] - seen[0]
+    length = float(np.hypot(*way[:2]))
+    x, y = way[:2] / length if length > 0 else (1.0, 0.0)
+    return np.array(((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0)))

@@ -8,7 +8,6 @@ import numpy as np
 
 from analysis.measurements.model import POINTS
 from analysis.procedure.contradictions import told
-from analysis.procedure.names import UNTOLD
 from analysis.result.model import (
     CameraMove,
     CameraOffset,
@@ -74,8 +73,6 @@ def judge(
     unexplained = [name for name in system.names if name not in synchrony or synchrony[name].message is None]
     found += _contradicting(delivered, {name: system[name] for name in unexplained}, tests)
     everything = figures(seen)
-    if seen and not everything["points"] and UNTOLD not in troubles:
-        found.append("no pulse shows all four points, so it is not certain which is which: look at the overlay")
     # Without a take-off nobody knows which pulses are in flight: all are judged together.
     flight, where = (everything, "") if takeoff is None else (phases[Phase.FLIGHT], " in flight")
     found += _too_few(flight, "points", f"all points{where}")

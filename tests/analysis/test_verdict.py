@@ -2,49 +2,75 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
+import pytest
 
-from analysis.measurements.model import ImageMeasurements, JumpMeasurements, Measurements, PulseMeasurements, Source
+from analysis.measurements.model import (
+    POINTS,
+    SIDES,
+    ImageMeasurements,
+    JumpMeasurements,
+    Measurements,
+    PulseMeasurements,
+    Source,
+)
 from analysis.procedure.jump import compute_jump
 from analysis.result.model import Jump
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
 
 
-def test_points_that_are_never_seen_together_may_be_named_wrong() -> None:
-    system = true_cameras()
-    measured = simulated_measurements(true_jump(3), system, np.random.default_rng(3))
-    whole = measured.jumps[0]
-    without = tuple(
-        replace(
-            pulse,
-            images={
-                name: replace(image, points={key: of for key, of in image.points.items() if key != "P2"})
-                for name, image in pulse.images.items()
-            },
-        )
-        for pulse in whole.pulses
-    )
-    assert "which is which" not in compute_jump(whole, measured, system).jump.verdict.message
-    verdict = compute_jump(JumpMeasurements(1, without), measured, system).jump.verdict
-    assert not verdict.ok
-    assert "no pulse shows all four points, so it is not certain which is which" in verdict.message
+def _renamed(
+    names: dict[str, str], skis: tuple[str, ...] = ("right", "left")
+) -> Callable[[int, PulseMeasurements], PulseMeasurements]:
+    """Measurements with other names for the points; those without a new one are not measured."""
 
-
-def test_nothing_is_given_where_nothing_tells_which_marker_is_which() -> None:
-    def three_markers(_: int, pulse: PulseMeasurements) -> PulseMeasurements:
-        markers = {
-            name: ImageMeasurements({key: of for key, of in image.points.items() if key != "P2"}, {})
-            for name, image in pulse.images.items()
+    def changed(_: int, pulse: PulseMeasurements) -> PulseMeasurements:
+        images = {
+            camera: ImageMeasurements(
+                {names[key]: of for key, of in image.points.items() if key in names},
+                {side: of for side, of in image.skis.items() if side in skis},
+            )
+            for camera, image in pulse.images.items()
         }
-        return replace(pulse, images=markers)
+        return replace(pulse, images=images)
 
-    jump = _computed(three_markers)
+    return changed
+
+
+_RIGHT: Final = {name: name for name in POINTS}
+_NO_HIP: Final = {name: name for name in POINTS if name != "P2"}
+
+
+@pytest.mark.parametrize(
+    ("names", "skis", "given"),
+    [
+        pytest.param(_RIGHT, (), "P1 P2 P3 P4", id="all four look like a body"),
+        pytest.param(_NO_HIP, ("right", "left"), "P1 P3 P4", id="bindings on skis, and no hip is so far from them"),
+        pytest.param(_NO_HIP, ("left",), "P1 P4", id="of a binding without its ski another thing may be the marker"),
+        pytest.param(_NO_HIP, (), "", id="three markers alone"),
+        pytest.param({"P1": "P1", "P2": "P2"}, (), "P1 P2", id="helmet and hip tell each other"),
+        pytest.param({"P2": "P1", "P4": "P4"}, ("left",), "P4", id="the hip as the helmet"),
+        pytest.param({"P1": "P3", "P2": "P4", "P3": "P1", "P4": "P2"}, (), "", id="not like a body"),
+    ],
+)
+def test_what_nothing_names_is_not_given(names: dict[str, str], skis: tuple[str, ...], given: str) -> None:
+    jump = _computed(_renamed(names, skis))
     assert len(jump.pulses) == len(_measured().jumps[0].pulses)
-    assert all(point is None for pulse in jump.pulses for point in pulse.raw.points.values())
-    assert all(pulse.smoothed is None for pulse in jump.pulses)
-    assert not jump.verdict.ok
-    assert jump.verdict.message.count("which marker is which cannot be told, so none is given") == 1
+    told = {name for pulse in jump.pulses for name, point in pulse.raw.points.items() if point is not None}
+    assert told == set(given.split())
+    smoothed = [pulse.smoothed for pulse in jump.pulses if pulse.smoothed is not None]
+    assert {name for state in smoothed for name, point in state.points.items() if point is not None} <= told
+    lost = sorted(set(names.values()) - told)
+    if not told:
+        assert not smoothed
+        assert jump.verdict.message.count("which marker is which cannot be told, so none is given") == 1
+    elif lost:
+        assert jump.verdict.message.startswith(f"{' and '.join(lost)} is not given: ")
+    else:
+        assert "not given" not in jump.verdict.message
+    assert jump.verdict.ok is (names == _RIGHT and len(skis) == len(SIDES))
 
 
 def _measured() -> Measurements:

@@ -19,7 +19,7 @@ from analysis.cameras.frames import Frames
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.pose_change import changed
 from analysis.cameras.standing import FrameShake
-from analysis.cameras.steadiness import SHAKE_RISK, moves_during, trackers_of
+from analysis.cameras.steadiness import SHAKE_RISK, moves_between, moves_during, trackers_of
 from analysis.result.model import CameraMove
 from rig.pulse import PulseNumber
 
@@ -93,7 +93,7 @@ class LiveWatch:
             turns = {pulse: turn for pulse, turn in self._turns[name].items() if pulse >= self._blocks[0][0]}
             self._turns[name] = turns
             tests = len(self._trackers) * self._looks
-            found += moves_during(self._static, tracker, name, turns, self._blocks, tests)[:1]
+            found += moves_during(self._static, tracker, name, turns, moves_between(turns, self._blocks, tests))[:1]
         return found
 
 

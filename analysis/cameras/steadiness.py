@@ -41,10 +41,12 @@ class Steadiness:
     Attributes:
         moved: cameras that moved since the calibration or during the recording, in order of the cameras.
         messages: what else a person should know, one line each.
+        still: of cameras that were knocked during the recording, the pulses of the longest time without a knock.
     """
 
     moved: tuple[CameraMove, ...]
     messages: tuple[str, ...]
+    still: Mapping[str, range]
     _scene: OrientedScene
     _tracks: "_Tracks"
     _static: CameraSystem
@@ -94,16 +96,20 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
     tracks = followed.during({pulse for block in blocks for pulse in block})
     moved: list[CameraMove] = []
     messages = []
+    still: dict[str, range] = {}
     for name, turns in tracks.items():
         moved += _since_calibration(name, scene.changes.get(name), turns, len(blocks), len(tracks))
-        moved += moves_during(static, trackers[name], name, turns, blocks, len(tracks))
+        found = moves_between(turns, blocks, len(tracks))
+        moved += moves_during(static, trackers[name], name, turns, found)
+        if any(not move.drift for move in found):
+            still[name] = _longest_still(found, source.pulses)
         frames = sum(len(block) for block in blocks)
         if len(turns) < frames / 2:
             messages.append(
                 f"camera {name}: its balls were found in {len(turns)} of {frames} frames that were looked at, so "
                 "whether it stood still is not known for all of the recording"
             )
-    return Steadiness(tuple(moved), tuple(messages), scene, followed, static)
+    return Steadiness(tuple(moved), tuple(messages), still, scene, followed, static)
 
 
 def trackers_of(scene: OrientedScene) -> dict[str, BallTracker]:
@@ -160,20 +166,10 @@ class _Tracks:
         return {name: {pulse: turns[name] for pulse, turns in seen if name in turns} for name in self.trackers}
 
 
-def moves_during(
-    static: CameraSystem,
-    tracker: BallTracker,
-    name: str,
-    turns: _Turns,
-    pulses: Sequence[Sequence[PulseNumber]],
-    cameras: int,
-) -> list[CameraMove]:
+def moves_between(turns: _Turns, pulses: Sequence[Sequence[PulseNumber]], cameras: int) -> list[Move]:
     """The moves of a camera between blocks of frames, in order.
 
     Args:
-        static: the cameras as they stand in the static images.
-        tracker: of the balls of the camera.
-        name: of the camera.
         turns: how it stood in single frames.
         pulses: of the blocks.
         cameras: number of cameras that are tested; all share the risk of a false alarm.
@@ -189,7 +185,21 @@ def moves_during(
         for block, inside in zip(pulses, seen, strict=True)
         if inside
     ]
-    found = find_moves(blocks, cameras)
+    return find_moves(blocks, cameras)
+
+
+def moves_during(
+    static: CameraSystem, tracker: BallTracker, name: str, turns: _Turns, found: Sequence[Move]
+) -> list[CameraMove]:
+    """The moves of a camera in words and numbers.
+
+    Args:
+        static: the cameras as they stand in the static images.
+        tracker: of the balls of the camera.
+        name: of the camera.
+        turns: how it stood in single frames.
+        found: its moves, in order.
+    """
     moves = []
     for i, move in enumerate(found):
         turn, shift = move.turn, np.zeros(3)
@@ -204,6 +214,14 @@ def moves_during(
                 turn, shift = change.turn, change.shift
         moves.append(_camera_move(name, turn, shift, move.p, move))
     return moves
+
+
+def _longest_still(found: Sequence[Move], pulses: Sequence[PulseNumber]) -> range:
+    """The pulses of the longest time between the knocks among the moves of a camera."""
+    knocks = [move for move in found if not move.drift]
+    begins = [int(pulses[0]), *(move.after for move in knocks)]
+    ends = [*(move.before for move in knocks), int(pulses[-1])]
+    return max((range(begin, end + 1) for begin, end in zip(begins, ends, strict=True)), key=len)
 
 
 def _since_calibration(

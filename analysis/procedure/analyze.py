@@ -7,9 +7,9 @@ from pathlib import Path
 from analysis.cameras.frames import LogFrames
 from analysis.cameras.helmet import with_helmet
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
-from analysis.cameras.source import Source, orient_from
+from analysis.cameras.source import Source
 from analysis.cameras.standing import SteadiedJump
-from analysis.cameras.steadiness import Steadiness, watch
+from analysis.cameras.steadiness import Steadiness
 from analysis.candidates.finder import Finder, find_candidates
 from analysis.candidates.model import PulseCandidates
 from analysis.measurements.merging import merged
@@ -17,6 +17,7 @@ from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.procedure.jump import ComputedJump, compute_jump
 from analysis.procedure.jump_search import find_jumps
 from analysis.procedure.log_facts import log_facts
+from analysis.procedure.orienting import oriented
 from analysis.result.model import CameraOffset, MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import StaticImage, static_images
@@ -113,8 +114,9 @@ def analyze(
     facts = log_facts(log)
     tell("looking at the balls", 0.0)
     static = static_images(log) if seen is None else seen.static
-    scene, orientation = orient_from(static, source)
-    steadiness = watch(scene, LogFrames(log))
+    anew = None if seen is not None else lambda name, pulses: static_images(log, pulses)[name]
+    found = oriented(static, source, LogFrames(log), anew)
+    scene, orientation, steadiness = found.scene, found.orientation, found.steadiness
     tell("looking at the balls", 1.0)
     jumps: list[JumpMeasurements] = []
     unread: list[str] = []

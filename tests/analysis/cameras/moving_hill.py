@@ -40,9 +40,10 @@ class Film:
             if pulse in pulses:
                 yield pulse, self._frames[pulse]
 
-    def static(self, frames: int = 15) -> dict[str, StaticImage]:
-        """The static images."""
-        chosen = [self.pulses[i] for i in np.rint(np.linspace(0, len(self.pulses) - 1, frames)).astype(int)]
+    def static(self, frames: int = 15, pulses: range | None = None) -> dict[str, StaticImage]:
+        """The static images, of some pulses if not of all."""
+        there = self.pulses if pulses is None else [pulse for pulse in self.pulses if pulse in pulses]
+        chosen = [there[i] for i in np.rint(np.linspace(0, len(there) - 1, frames)).astype(int)]
         return {
             camera.name: static_image(camera.name, [self._frames[p][camera.name] for p in chosen])
             for camera in self.scenario.cameras

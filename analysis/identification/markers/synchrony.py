@@ -6,7 +6,7 @@ is measured by the bundle over time.
 """
 
 import numpy as np
-from scipy.special import bdtrc
+from scipy.special import bdtrc, pdtrc
 
 from analysis.identification.markers.markers import Markers
 from analysis.identification.over_time.assignment import well_known
@@ -17,7 +17,8 @@ from rig.arrays import Flags, Floats, Integers
 
 _LEAST_CAMERAS = 3  #: two cameras cannot tell which of them is late
 _AGREES = 0.5  #: share of the expected markers that a camera shows, or of the threefold ones, if all are on time
-_FOUND = 0.6  #: share of them that it shows at another time, if that is the right one
+_BY_CHANCE_P = 1e-6  #: that other spots make as many markers at a time that is not the right one
+_APART_M = 0.3  #: of two times: so far behind the right place none of a marker's own spots counts
 _NEAR_M = 0.06  #: so near to the path is a marker on it: the others may differ a little among themselves
 _AGREE_M = 0.03  #: so far may the jumper have moved for three rays still to meet
 _SAMPLE = 8  #: pulses that are tried with other times
@@ -38,17 +39,21 @@ def _off_path(views: Views, window: Window, markers: Markers, flight: Flight) ->
     late = np.zeros(len(views))
     known = well_known(markers.predicted.covariance)
     greatest = max(_MOST_S, _MOST_PULSES * float(np.median(np.diff(window.time_s))))
-    step = _NEAR_M / 2 / float(np.linalg.norm(flight.motion[1]))
+    speed = float(np.linalg.norm(flight.motion[1]))
+    step = _NEAR_M / 2 / speed
     offsets = np.append(np.arange(-greatest, greatest + step, step), 0.0)
-    for k in range(len(views)):
-        sight = views.see(k, markers.predicted.xyz.reshape(-1, 3))
-        expected = known & window.delivered[:, k, None] & sight.inside.reshape(known.shape)
-        shown = expected & (markers.assigned.rays[..., k] >= 0)
-        if not expected.any() or shown.sum() > _AGREES * expected.sum():
-            continue
-        counts = np.array([_met(views, window, markers, k, expected, float(offset)) for offset in offsets])
+    inside = np.stack([views.inside(k, markers.predicted.xyz.reshape(-1, 3)) for k in range(len(views))], axis=1)
+    expected = known[..., None] & window.delivered[:, None] & inside.reshape(*known.shape, len(views))
+    count = expected.sum(axis=(0, 1))
+    shown = (expected & (markers.assigned.rays >= 0)).sum(axis=(0, 1)) / np.maximum(count, 1)
+    for k in np.flatnonzero((count > 0) & (shown <= _AGREES)).tolist():
+        counts = np.array([_met(views, window, markers, k, expected[..., k], float(offset)) for offset in offsets])
         best = int(counts.argmax())
-        if counts[best] > max(_FOUND * expected.sum(), 2 * counts[-1]):
+        chance = float(counts[np.abs(offsets - offsets[best]) > _APART_M / speed].mean())
+        # A marker that the others show less often than not is no more often to be seen in this camera.
+        usual = float(np.median(np.delete(shown, k)))
+        enough = max(_AGREES * usual * float(count[k]), 2.0 * counts[-1])
+        if counts[best] > enough and pdtrc(counts[best] - 1, chance) < _BY_CHANCE_P:
             late[k] = float(offsets[counts == counts[best]].mean())
     return late
 

@@ -101,5 +101,6 @@ def _shakes(turns: Sequence[FrameTurn]) -> bool:
     """Whether frames differ from the static image by more than the noise of their turns."""
     if len(turns) < _FEWEST:
         return False
-    squares = sum(float(turn.turn @ np.linalg.solve(turn.covariance, turn.turn)) for turn in turns)
+    off, covariance = np.array([turn.turn for turn in turns]), np.array([turn.covariance for turn in turns])
+    squares = float((off * np.linalg.solve(covariance, off[..., None])[..., 0]).sum())
     return bool(squares > chdtri(3 * len(turns), SHAKE_RISK))

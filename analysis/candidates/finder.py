@@ -85,7 +85,8 @@ class Finder:
     def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:
         """The candidates of a pulse near where a jumper is expected: faster than all of them.
 
-        Where the expected skis are not seen, or are not known so nearly, traces are sought when they are asked for.
+        Where the expected skis are not seen, or are not known so nearly that a fit can start from there, traces are
+        sought when they are asked for.
 
         Args:
             tag: of the pulse.
@@ -107,8 +108,9 @@ class Finder:
             places.append(place)
             images.append(regions)
             skis = () if place is None else place.skis
-            known = tuple(trace for region in regions for trace in find_expected_traces(region, skis))
-            wanted = None if known else WantedTraces.of(regions)
+            near = skis if all(ski.near for ski in skis) else ()
+            known = tuple(trace for region in regions for trace in find_expected_traces(region, near))
+            wanted = None if known else WantedTraces.of(regions, skis)
             traces.append(known if wanted is None else wanted)
             self._keep(tag.pulse, camera.name, regions, wanted)
         spots = find_expected(images, places)

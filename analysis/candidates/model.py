@@ -5,7 +5,7 @@ Image coordinates are px, pixel frame of `svev-network/1` (x right, y down, (0, 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from analysis.candidates.markers.known_discs import DiscShape
 from rig.arrays import Flags, Floats, Integers
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
+
+EXPECTED_SIGMAS: Final = 3.0  #: of its prediction, by which an expected ski may be off
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,17 +123,24 @@ class PulseCandidates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpectedSki:
-    """Where an image is expected to show a ski, so nearly that a fit can start from there.
+    """Where an image is expected to show a ski.
 
     Attributes:
         ends: (2, 2) ends of its axis, px.
         width: px, from edge to edge.
         brighter: than what is behind it.
+        sigma: px, standard deviation of the axis to the side, at its worse end.
     """
 
     ends: Floats
     width: float
     brighter: bool
+    sigma: float
+
+    @property
+    def near(self) -> bool:
+        """Whether a fit can start from there: it finds a ski that is off by less than its width."""
+        return EXPECTED_SIGMAS * self.sigma < self.width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +151,7 @@ class Expected:
         markers: (n, 2) places of his markers, px.
         reach: (n,) px by which each may be off, with its own size.
         box: (2, 2) smallest and largest column and row (in this order) in which he and his skis may be, px.
-        skis: both; empty if they are not known so nearly that they need not be sought.
+        skis: both; empty if nothing is known of them.
     """
 
     markers: Floats

@@ -35,6 +35,8 @@ _BEYOND_S = 0.6  #: that markers are followed before the first and after the las
 _LEAST_NAMES = 2  #: a jumper has more than one point
 _LEAST_PULSES = 3  #: and shows them in more than a glimpse
 _SIGMAS = 3.0  #: of a binding's place, within which skis are sought
+#: Skis turn with up to 30 rad/s^2, by a third of a radian in this time: how they were before says little of them now.
+_SKIS_S = 0.15
 
 
 def identify(
@@ -139,12 +141,16 @@ class Sighting:
         first, last = (self.window.candidates[int(t)].pulse for t in there[[0, -1]])
         return range(first, last + 1)
 
+    def named(self) -> int:
+        """How many of his markers have a place in any pulse."""
+        return int(np.count_nonzero(np.isfinite(self.markers.assigned.xyz).all(axis=2).any(axis=0)))
+
     def measured(self, look: SecondLook | None, *, briefly: bool = False) -> tuple[PulseMeasurements, ...]:
         """What was measured of him, from his first to his last appearance; empty if he is no jumper.
 
         Args:
             look: as of `identify`; what it finds is added to the window.
-            briefly: seek no skis before the first and after the last pulse with a named marker; faster.
+            briefly: seek skis only in the last moments (`_SKIS_S`) until the last pulse with a named marker; faster.
         """
         views, window, flight, markers = self.views, self.window, self.flight, self.markers
         if look is not None:
@@ -152,9 +158,12 @@ class Sighting:
             markers = refined(views, window, flight, markers, self.appearance, look)
         if not _is_jumper(np.asarray(np.any(markers.assigned.rays >= 0, axis=2))):
             return ()
-        first, last = (self.pulses()[0], self.pulses()[-1]) if briefly else (0, np.inf)
-        steps = [first <= c.pulse <= last for c in window.candidates]
-        look_for_traces(views, window, markers.places(BINDINGS), np.array(steps))
+        steps = np.ones(len(window), bool)
+        if briefly:
+            numbers, named = np.array([c.pulse for c in window.candidates]), self.pulses()
+            steps = (numbers >= named[0]) & (numbers <= named[-1])
+            steps &= window.time_s > window.time_s[steps][-1] - _SKIS_S
+        look_for_traces(views, window, markers.places(BINDINGS), steps)
         _tell_skis_apart(views, window, flight)
         traces = straight_traces(views, window)
         skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))

@@ -35,7 +35,9 @@ class Seeker:
         self._due = PulseNumber(0)
         self._nobody: list[_Evidence] = []
 
-    def seek(self, candidates: Sequence[PulseCandidates], rate_hz: float) -> JumpMeasurements | None:
+    def seek(
+        self, candidates: Sequence[PulseCandidates], rate_hz: float, more_than: int = 0
+    ) -> JumpMeasurements | None:
         """The jumper who was seen last in the candidates of the last moments; None if nobody was.
 
         All cameras are taken to obey the trigger, and skis are sought where markers have names: as he is followed.
@@ -43,6 +45,7 @@ class Seeker:
         Args:
             candidates: of pulses in order; those of pulses that were given before are the same.
             rate_hz: pulses per second.
+            more_than: so many of his markers are known; if no more are named now, his skis are not worth a search.
         """
         sought = self._sought(candidates, rate_hz)
         if not sought:
@@ -56,6 +59,8 @@ class Seeker:
                 continue
             appearance = appearance_of(self._views, sought, flight)
             sighting = sighted(self._views, candidates, rate_hz, flight, appearance, on_time=True)
+            if more_than and sighting.named() <= more_than:
+                continue
             if pulses := sighting.measured(None, briefly=True):
                 return JumpMeasurements(1, pulses)
             self._nobody.append(evidence)

@@ -81,13 +81,18 @@ class Follower:
         self._looks, self._look_at = 0, 0.0
         self.first = self.last = PulseNumber(0)
 
-    def find(self, seeker: Seeker, candidates: Sequence[PulseCandidates]) -> list[Followed]:
+    def find(self, seeker: Seeker, candidates: Sequence[PulseCandidates], more_than: int = 0) -> list[Followed]:
         """Begin with who is found in the candidates of the last moments.
+
+        Args:
+            seeker: of the recording.
+            candidates: of these moments.
+            more_than: so many of his markers are known: nobody is found who does not show more.
 
         Returns:
             His states up to the last candidates; none if nobody is found.
         """
-        found = seeker.seek(candidates, self._rate_hz)
+        found = seeker.seek(candidates, self._rate_hz, more_than)
         if found is None or len(found.pulses) < _BEGIN:
             return []
         states = self.begin(found, candidates)

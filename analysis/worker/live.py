@@ -27,6 +27,7 @@ from analysis.candidates.finder import Finder
 from analysis.candidates.model import PulseCandidates
 from analysis.export.scene_update import camera_frames, scene_update
 from analysis.identification.seeking import Seeker
+from analysis.measurements.model import POINTS
 from analysis.scene.camera_system import CameraSystem
 from analysis.worker.findings import Findings, MeasuredJump
 from analysis.worker.following import Followed, Follower
@@ -229,15 +230,19 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         """Seek the jumper who is followed anew, as if he came into sight: markers may be known by now that were not."""
         if self._scene is None:
             return
-        again, states = self._found_since(recording, follower.first, self._scene.system)
+        known = len(POINTS) - follower.hidden()
+        again, states = self._found_since(recording, follower.first, self._scene.system, known)
         if states and again.knows_more_than(follower):
             again.first = follower.first
             recording.follow(again)
 
     def _found_since(
-        self, recording: Streamed, first: PulseNumber, system: CameraSystem
+        self, recording: Streamed, first: PulseNumber, system: CameraSystem, more_than: int = 0
     ) -> tuple[Follower, list[Followed]]:
-        """A follower of who is found in the candidates of the last moments, and his states; none if nobody is."""
+        """A follower of who is found in the candidates of the last moments, and his states; none if nobody is.
+
+        Of a jumper more markers than `more_than` must be found.
+        """
         rate, newest = recording.rate_hz, recording.candidates[-1].pulse
         cameras = recording.cameras(self._exposures)
         if recording.seeker is None:
@@ -245,7 +250,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.seeker = Seeker(system, exposures)
         follower = Follower(system, cameras, rate)
         recent = recording.between(max(newest - _SOUGHT_S * rate, first), newest)
-        return follower, follower.find(recording.seeker, recent)
+        return follower, follower.find(recording.seeker, recent, more_than)
 
     def _tell(self, recording: Streamed, followed: Followed) -> None:
         """Tell a state."""

@@ -22,7 +22,6 @@ from rig.arrays import Floats
 BINDINGS: Final = ("P3", "P4")  #: of the right and the left ski
 _HALF_M: Final = 1.0  #: of a ski, from its binding: between such points its image is straight
 _LONGEST_M: Final = 1.4  #: from a binding to tail or tip: skis of 2.8 m
-_SIGMAS: Final = 3.0  #: of a prediction: a fit finds a ski that is off by less than its width
 _RECENT: Final = 60  #: widths of a camera that count: those of the last second of two skis at 30 Hz
 
 
@@ -70,7 +69,7 @@ class SkiImages:
         return np.concatenate(points)
 
     def expected(self, k: int, state: SmoothedState, sight: Sight) -> tuple[ExpectedSki, ...]:
-        """Where camera k shows both skis; none if that is not known so nearly that a fit can start from there.
+        """Where camera k shows both skis; none if nothing is known of them.
 
         Args:
             k: number of the camera.
@@ -87,15 +86,12 @@ class SkiImages:
         found = []
         for i, (label, side) in enumerate(zip(BINDINGS, SIDES, strict=True)):
             binding, ski, own = state.points[label], state.skis[side], slice(2 * i, 2 * i + 2)
-            if (
-                binding is None
-                or ski is None
-                or not _SIGMAS * _aside(sight.by_point[own], known.xy[i], binding, ski) < px
-            ):
+            if binding is None or ski is None:
                 return ()
+            aside = _aside(sight.by_point[own], known.xy[i], binding, ski)
             middle, half = known.xy[i].mean(axis=0), (known.xy[i, 1] - known.xy[i, 0]) / 2
             ends = np.where(np.isfinite(known.ends[i]), known.ends[i], either)
-            found.append(ExpectedSki(middle + ends[:, None] / _HALF_M * half, px, known.sign > 0))
+            found.append(ExpectedSki(middle + ends[:, None] / _HALF_M * half, px, known.sign > 0, aside))
         return tuple(found)
 
     def told_apart(self, k: int, traces: tuple[Trace, ...]) -> tuple[Trace, ...]:

@@ -52,8 +52,13 @@ def test_what_was_seen_says_where_the_next_image_shows_the_skis() -> None:
     assert left.ends == pytest.approx(np.array(((267.0, 15.0), (339.0, 15.0))))
     assert right.width == pytest.approx(_WIDTH_PX)
     assert right.brighter
+    assert right.near
+    assert left.near
     vague = _state(2.0)  # 1.4 m turned by that are 1.5 px, and three times that more than a ski's width
-    assert skis.expected(0, vague, sight) == ()
+    right, left = skis.expected(0, vague, sight)
+    assert right.sigma == pytest.approx(_PX_PER_M * 1.4 * np.radians(2.0), rel=0.01)
+    assert not right.near
+    assert not left.near
 
 
 def test_the_width_of_clear_skis_moves_the_axes_of_those_that_hide_each_other() -> None:

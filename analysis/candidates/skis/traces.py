@@ -18,6 +18,7 @@ from analysis.candidates.model import ExpectedSki, Trace
 from analysis.candidates.skis.axis_scatter import axis_scatter
 from analysis.candidates.skis.bar_model import Bar
 from analysis.candidates.skis.bars import Bars, find_bars
+from analysis.candidates.skis.corridors import Corridor, one_each
 from analysis.candidates.skis.ski_fit import FittedBar, fit_bars
 from rig.arrays import Flags, Floats, Integers
 
@@ -82,19 +83,41 @@ class _Middles:
         )
 
 
-def find_traces(region: Region) -> tuple[Trace, ...]:
-    """Traces of a region, in px of the image, the longest first."""
+def find_traces(region: Region, expected: Sequence[ExpectedSki] = ()) -> tuple[Trace, ...]:
+    """Traces of a region, in px of the image, the longest first.
+
+    Args:
+        region: part of an image.
+        expected: skis that it may show. If lines are found where these may be, what is elsewhere is left out.
+    """
+    corridors = [Corridor.of(ski, (region.x, region.y)) for ski in expected]
+    signs = sorted({corridor.sign for corridor in corridors}) or (1, -1)
     noise = median(region.noise)
     widest = max(region.grey.shape) / _LARGEST_WIDTH
     found: list[_Line] = []
     for steep in (False, True):
+        if corridors and not any(corridor.leads(_STEEPEST, steep=steep) for corridor in corridors):
+            continue
         grey, front = (region.grey.T, region.front.T) if steep else (region.grey, region.front)
         bars = find_bars(grey, noise, front, widest)
         bars = bars.only(bars.front)
-        for sign in (1, -1):
+        for sign in signs:
             lines = _lines(bars.only(np.sign(bars.contrast) == sign), grey.shape[0])
             found += [replace(line, ends=line.ends[:, ::-1].copy()) if steep else line for line in lines]
-    return _fitted(region, [(group, _explanations(_bars(group))) for group in _groups(_distinct(found))])
+    lines = _distinct(found)
+    if corridors:
+        lines = [line for line in lines if any(corridor.holds(line.ends) for corridor in corridors)]
+        if not lines:
+            return find_traces(region)
+    return _fitted(region, [(group, _starts(group, corridors)) for group in _groups(lines)])
+
+
+def _starts(lines: Sequence[_Line], corridors: Sequence[Corridor]) -> list[list[Bar]]:
+    """What lines near each other may be: two skis each may nearly cover each other where both are expected."""
+    bars = _bars(lines)
+    if corridors and one_each(corridors, [line.ends for line in lines]):
+        return [bars]
+    return _explanations(bars)
 
 
 def find_expected_traces(region: Region, skis: Sequence[ExpectedSki]) -> tuple[Trace, ...]:

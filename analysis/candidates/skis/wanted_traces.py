@@ -10,7 +10,7 @@ from typing import TypeAlias, overload
 import numpy as np
 
 from analysis.candidates.foreground.background import Region
-from analysis.candidates.model import Trace
+from analysis.candidates.model import ExpectedSki, Trace
 from analysis.candidates.skis.traces import find_traces
 from rig.arrays import Floats
 
@@ -20,8 +20,9 @@ Change: TypeAlias = Callable[[tuple[Trace, ...]], tuple[Trace, ...]]
 class _Part:
     """A part of an image; it gives its pixels back when its traces have been found."""
 
-    def __init__(self, region: Region) -> None:
+    def __init__(self, region: Region, expected: Sequence[ExpectedSki]) -> None:
         self._region: Region | None = region
+        self._expected = expected
         self._found: tuple[Trace, ...] = ()
         self._low = np.array((region.x, region.y), float)
         self._high = self._low + region.grey.shape[::-1] - 1
@@ -30,7 +31,7 @@ class _Part:
         """Its traces; two threads that ask at the same time both find the same ones."""
         region = self._region
         if region is not None:
-            self._found = find_traces(region)
+            self._found = find_traces(region, self._expected)
             self._region = None
         return self._found
 
@@ -56,9 +57,9 @@ class WantedTraces(Sequence[Trace]):
     origin: "WantedTraces | None" = None
 
     @classmethod
-    def of(cls, regions: Sequence[Region]) -> "WantedTraces":
-        """Those of some parts of an image."""
-        return cls(tuple(_Part(region) for region in regions))
+    def of(cls, regions: Sequence[Region], expected: Sequence[ExpectedSki] = ()) -> "WantedTraces":
+        """Those of some parts of an image, where skis may be expected."""
+        return cls(tuple(_Part(region, expected) for region in regions))
 
     def changed(self, change: Change) -> "WantedTraces":
         """The same traces after a change, which moves them by a few px at most."""

@@ -222,7 +222,7 @@ def test_skis_are_fitted_from_where_they_are_expected(begin: tuple[float, float]
         region = _region(clean + NOISE * rng.standard_normal(clean.shape), np.full(clean.shape, 70.0))
         off = rng.normal(0.0, (3.0, 0.7), (2, 2, 2))  # px along and across, about
         traces = find_expected_traces(
-            region, [ExpectedSki(line + o, 4.2, True) for line, o in zip(lines, off, strict=True)]
+            region, [ExpectedSki(line + o, 4.2, True, 0.7) for line, o in zip(lines, off, strict=True)]
         )
         for line in lines:
             normalized.append(
@@ -230,7 +230,36 @@ def test_skis_are_fitted_from_where_they_are_expected(begin: tuple[float, float]
             )
     assert np.mean(np.square(normalized)) < 2.0
     nothing = _region(70.0 + NOISE * rng.standard_normal(clean.shape), np.full(clean.shape, 70.0))
-    assert not find_expected_traces(nothing, [ExpectedSki(lines[0], 4.2, True)])
+    assert not find_expected_traces(nothing, [ExpectedSki(lines[0], 4.2, True, 0.7)])
+
+
+@pytest.mark.parametrize("steep", [False, True])
+def test_skis_that_are_known_vaguely_are_sought_where_they_may_be(steep: bool) -> None:
+    """A pole is as thin and bright as they are. Nothing is left out where no line is found that may be a ski."""
+    rng = np.random.default_rng(31)
+    right, left, pole = (
+        np.array(ends) for ends in (((10.0, 30.0), (95.0, 12.0)), ((12.0, 52.0), (97.0, 44.0)), ((10, 80), (95, 81)))
+    )
+    clean = np.full((95, 110), 70.0)
+    for a, b in (right, left, pole):
+        clean += _capsule(clean.shape, a, b, 2.2) * (200.0 - clean)
+    clean = gaussian_filter(clean, 0.5) + NOISE * rng.standard_normal(clean.shape)
+    region = _region(clean.T if steep else clean, np.full(clean.T.shape if steep else clean.shape, 70.0))
+    turn = slice(None, None, -1 if steep else 1)
+    off = np.array((0.0, 5.0))  # px, more than a width
+
+    def expected(*skis: Floats) -> list[ExpectedSki]:
+        return [ExpectedSki((ski + off)[:, turn], 4.2, True, 3.0) for ski in skis]
+
+    everything = find_traces(region)
+    found = find_traces(region, expected(right, left))
+    assert len(found) == 2 < len(everything)
+    for line in (right, left):
+        shift, turned = min((_normalized(trace, line[:, turn]) for trace in found), key=lambda z: abs(z[0]))
+        assert abs(shift) < 4.0
+        assert abs(turned) < 4.0
+    nowhere = find_traces(region, expected(right - (0.0, 60.0)))
+    assert [trace.xy.tolist() for trace in nowhere] == [trace.xy.tolist() for trace in everything]
 
 
 def test_a_ski_of_another_width_has_an_edge_that_is_not_its_own() -> None:

@@ -1,11 +1,13 @@
 """Traces are sought where and when they are wanted."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 from analysis.candidates.finder import Finder
 from analysis.candidates.foreground.background import Region
-from analysis.candidates.model import ImageCandidates, Trace
+from analysis.candidates.model import ExpectedSki, ImageCandidates, Trace
 from analysis.candidates.skis import wanted_traces
 from analysis.candidates.skis.traces import find_traces
 from analysis.candidates.skis.wanted_traces import WantedTraces
@@ -22,9 +24,9 @@ def hill() -> Hill:
 def test_only_what_is_near_is_searched_and_only_once(hill: Hill, monkeypatch: pytest.MonkeyPatch) -> None:
     searched: list[Region] = []
 
-    def search(region: Region) -> tuple[Trace, ...]:
+    def search(region: Region, expected: Sequence[ExpectedSki]) -> tuple[Trace, ...]:
         searched.append(region)
-        return find_traces(region)
+        return find_traces(region, expected)
 
     monkeypatch.setattr(wanted_traces, "find_traces", search)
     images = hill.find(PULSE).images
@@ -66,7 +68,7 @@ def test_pixels_are_given_back_where_only_changed_traces_are_kept(hill: Hill, mo
     small = Finder(hill.static, memory=1)
     kept = [_wanted(image).changed(tuple) for image in small.find(hill.tag(PULSE), hill.triplet(PULSE)).images.values()]
     small.find(hill.tag(PULSE + 1), hill.triplet(PULSE + 1))
-    monkeypatch.setattr(wanted_traces, "find_traces", lambda _: pytest.fail("searched after they were forgotten"))
+    monkeypatch.setattr(wanted_traces, "find_traces", lambda *_: pytest.fail("searched after they were forgotten"))
     assert len(kept[-1]), "that of the last camera was forgotten last"
 
 

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from analysis.candidates.model import PulseCandidates
+from analysis.identification import identify as identification
 from analysis.identification import seeking
-from analysis.identification.identify import Sighting, identify, sighted
+from analysis.identification.identify import Sighting, find_sightings, identify, sighted
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.seeking import Seeker
+from rig.arrays import Flags
 from tests.analysis.identification.cluttered import Disturbed, scene
 from tests.analysis.simulated import RATE_HZ, true_cameras, true_jump
 
@@ -54,3 +56,21 @@ def test_what_was_nobody_is_not_looked_at_again(monkeypatch: pytest.MonkeyPatch)
     looks.clear()
     assert not any(_found(made.candidates))
     assert 0 < len({flight.end_s for flight in looks}) == len(looks)
+
+
+def test_who_shows_no_more_markers_than_are_known_is_not_found() -> None:
+    hidden = Disturbed(hidden=(("P4", None, 0, 999),))
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), range(25, 45), hidden)
+    assert Seeker(true_cameras(), {}).seek(made.candidates, RATE_HZ, more_than=2) is not None
+    assert Seeker(true_cameras(), {}).seek(made.candidates, RATE_HZ, more_than=3) is None
+
+
+def test_in_a_hurry_skis_are_sought_in_the_last_moments_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), range(25, 45))
+    (sighting,) = find_sightings(made.candidates, true_cameras(), RATE_HZ)
+    sought: list[Flags] = []
+    monkeypatch.setattr(identification, "look_for_traces", lambda *given: sought.append(given[3]))
+    sighting.measured(None)
+    sighting.measured(None, briefly=True)
+    assert sought[0].all()
+    assert np.flatnonzero(sought[1]).tolist() == list(range(len(made.candidates)))[-5:]

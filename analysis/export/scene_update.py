@@ -6,6 +6,7 @@ its image on `/camera/NAME` and of its calibration. As in both of these x is to 
 Foxglove draws the image into the scene.
 """
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -52,10 +53,7 @@ def scene_update(scene: OrientedScene, state: SmoothedState, time: UtcNs) -> byt
     """
     update = SceneUpdate()
     hill = _entity(update, "hill", time)
-    for placed in scene.system.cameras.values():
-        _strip(hill, _pyramid(placed.position, placed.rotation, placed.size / placed.camera.interior[0]), _BLUE)
-    for ball in scene.balls.values():
-        _ellipsoid(hill, ball.xyz, _UPRIGHT, np.full(3, _BALL_M), _WHITE)
+    hill.MergeFrom(_hill(scene))
     jumper = _entity(update, "jumper", time)
     points = {name: point for name, point in state.points.items() if point is not None}
     for one, other in _BODY:
@@ -71,6 +69,17 @@ def scene_update(scene: OrientedScene, state: SmoothedState, time: UtcNs) -> byt
         turn = Rotation.from_matrix(axes * np.sign(np.linalg.det(axes))).as_quat()
         _ellipsoid(jumper, point.xyz, turn, np.maximum(2 * _SIGMAS * np.sqrt(np.maximum(values, 0)), _LEAST_M), _RED)
     return bytes(update.SerializeToString())
+
+
+@lru_cache(maxsize=1)
+def _hill(scene: OrientedScene) -> SceneEntity:
+    """Cameras and balls, which stay the same from pulse to pulse."""
+    hill = SceneEntity()
+    for placed in scene.system.cameras.values():
+        _strip(hill, _pyramid(placed.position, placed.rotation, placed.size / placed.camera.interior[0]), _BLUE)
+    for ball in scene.balls.values():
+        _ellipsoid(hill, ball.xyz, _UPRIGHT, np.full(3, _BALL_M), _WHITE)
+    return hill
 
 
 def camera_frames(system: CameraSystem, time: UtcNs) -> bytes:

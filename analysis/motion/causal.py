@@ -103,26 +103,29 @@ class CausalFilter:
         used = self._measure(self._frame, observed)
         self._known |= known_groups(used)
         belief = self._beliefs.mixed(self._chances[None])
-        return self._result(self._frame, belief, used_cameras(observed, used), by_hand(observed, used), self._known)
+        return self._results(self._frame, belief, used_cameras(observed, used), by_hand(observed, used), self._known)[0]
 
-    def predicted(self, time: UtcNs, *, body: bool = False) -> SmoothedState | None:
-        """Where to look for the jumper at a pulse that is measured next; None before enough pulses are measured.
+    def predicted(self, time: UtcNs) -> tuple[SmoothedState, SmoothedState] | None:
+        """The jumper at a pulse that is measured next; None before enough pulses are measured.
 
         Args:
             time: of the pulse.
-            body: whether what was not seen for long is taken to be where people have it. That tells where to look, but
-                not what is there: a binding could be the other one. The filter itself never knows it: told at each
-                pulse anew, it would count as often.
 
         Returns:
-            A state with all points, also those that were never measured: their covariance tells.
+            A state with all points, also those that were never measured: their covariance tells. And the state in
+            which what was not seen for long is taken to be where people have it: that tells where to look, but not what
+            is there: a binding could be the other one. The filter itself never knows it: told at each pulse anew, it
+            would count as often.
         """
         if self._frame is None:
             return None
         self._advance(time)
         belief = self._beliefs.mixed(self._chances[None])
-        belief = _with_body(belief) if body else belief
-        return self._result(self._frame, belief, [_UNSEEN], [_BY_NOBODY], np.ones(len(GROUPS), bool))
+        with_body = _with_body(belief)
+        mean = np.concatenate((belief.mean, with_body.mean))
+        both = _Beliefs(mean, np.concatenate((belief.covariance, with_body.covariance)))
+        known, searched = self._results(self._frame, both, [_UNSEEN], [_BY_NOBODY], np.ones(len(GROUPS), bool))
+        return known, searched
 
     def _observed(self, pulses: tuple[PulseMeasurements, ...]) -> Observations:
         return observations(JumpMeasurements(0, pulses), self._header, self._cameras)
@@ -179,7 +182,7 @@ class CausalFilter:
             used_cameras(observed, adjusted.used),
             by_hand(observed, adjusted.used),
             self._known,
-            vague=np.inf,  # as in `_result`
+            vague=np.inf,  # as in `_results`
         )
 
     def _advance(self, time: UtcNs) -> None:
@@ -257,26 +260,26 @@ class CausalFilter:
         self._chances = weight / weight.sum()
         return used
 
-    def _result(
+    def _results(
         self,
         frame: MotionFrame,
         belief: _Beliefs,
         cameras: Sequence[Mapping[str, tuple[str, ...]]],
         hands: Sequence[Mapping[str, bool]],
         known: Flags,
-    ) -> SmoothedState:
-        """The state of a belief (k = 1) at the pulse of which `cameras` and `hands` tell who measured."""
+    ) -> list[SmoothedState]:
+        """The states of k beliefs at the pulse of which `cameras` and `hands` tell who measured."""
         return smoothed_states(
             frame,
             self._unit,
             belief.mean[:, :STATE],
             belief.covariance[:, :STATE, :STATE],
             belief.covariance[:, :STATE, STATE:] @ self._back,
-            cameras,
-            hands,
+            [*cameras] * len(belief.mean),
+            [*hands] * len(belief.mean),
             known,
             vague=np.inf,  # the filter itself bounds what it does not know, and whoever follows needs all parts
-        )[0]
+        )
 
 
 def _with_body(belief: _Beliefs) -> _Beliefs:

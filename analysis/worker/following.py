@@ -75,7 +75,7 @@ class Follower:
         self._skis = SkiImages(len(self._views))
         self._rate_hz = rate_hz
         self._appearance: Appearance | None = None
-        self._next: tuple[UtcNs, SmoothedState | None] = UtcNs(0), None
+        self._next: tuple[UtcNs, tuple[SmoothedState, SmoothedState]] | None = None
         self._latest: SmoothedState | None = None
         self._pulse, self._time = PulseNumber(0), UtcNs(0)
         self._looks, self._look_at = 0, 0.0
@@ -120,7 +120,7 @@ class Follower:
 
     def expected(self, time: UtcNs) -> dict[str, Expected]:
         """Where each camera is expected to show him at a pulse; cameras that do not see him are left out."""
-        state = _known(self._filter.predicted(time, body=True))
+        _, state = self._predicted(time)
         xyz = np.array([_known(point).xyz for point in state.points.values()])
         covariance = np.array([_known(point).covariance for point in state.points.values()])
         places = np.concatenate((xyz, state.origin.value[None], self._skis.places(state)))
@@ -142,7 +142,7 @@ class Follower:
     def follow(self, candidates: PulseCandidates) -> Followed:
         """Measure him at the next pulse."""
         views = self._views
-        state = self._predicted(candidates.time)
+        state, _ = self._predicted(candidates.time)
         flight = _flight(state, candidates.pulse / self._rate_hz)
         window = Window(views, [candidates], self._rate_hz, flight, self._appearance)
         points = [_known(point) for point in state.points.values()]
@@ -200,7 +200,7 @@ class Follower:
         """Places (4, 3) of the markers after the latest pulse, and which are known (4,)."""
         state = self._latest
         if state is None or None in state.points.values():
-            state = _known(self._filter.predicted(self._time))
+            state, _ = _known(self._filter.predicted(self._time))
         points = [_known(point) for point in state.points.values()]
         known = well_known(np.array([point.covariance for point in points]))
         return np.array([point.xyz for point in points]), known
@@ -209,19 +209,16 @@ class Follower:
         """Whether he is followed no more at a pulse: nothing was measured for too long, or he has left the images."""
         if pulse - self.last > _LOST_S * self._rate_hz:
             return True
-        state = self._predicted(time)
+        state, _ = self._predicted(time)
         xyz = np.array([_known(point).xyz for point in state.points.values()])
         seeing = sum(bool(self._views.inside(k, xyz).any()) for k in range(len(self._views)))
         return seeing < _FEWEST_CAMERAS
 
-    def _predicted(self, time: UtcNs) -> SmoothedState:
-        known, state = self._next
-        if state is None or known != time:
-            state = self._filter.predicted(time)
-            self._next = time, state
-        if state is None:
-            raise AssertionError("following has begun")
-        return state
+    def _predicted(self, time: UtcNs) -> tuple[SmoothedState, SmoothedState]:
+        """`CausalFilter.predicted`, computed once for each pulse."""
+        if self._next is None or self._next[0] != time:
+            self._next = time, _known(self._filter.predicted(time))
+        return self._next[1]
 
 
 def _appearance(

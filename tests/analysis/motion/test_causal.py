@@ -58,11 +58,12 @@ def test_skis_that_are_hidden_stay_what_skis_are_and_a_prediction_changes_nothin
         if given.pulse - measured.jumps[0].pulses[0].pulse in HIDDEN:
             images = {name: ImageMeasurements(image.points, {}) for name, image in images.items()}
         pulse = replace(given, images=images)
-        predicted = live.predicted(pulse.time)
+        predictions = live.predicted(pulse.time)
         state, same = live.update(pulse), other.update(pulse)
     assert state is not None
     assert same is not None
-    assert predicted is not None
+    assert predictions is not None
+    predicted, _ = predictions
     assert (state.origin.value == same.origin.value).all()
     for side, heading in zip(("right", "left"), truth.pose(pulse.pulse).skis, strict=True):
         ski = state.skis[side]

@@ -77,6 +77,7 @@ class Trace:
         one_sided: (k,) by how much the points move across the axis, to the side (-y, x) of its direction (x, y) from
             end to end, if half of the width grows by 1: 0 where both edges are seen, -1 or 1 where one is.
         widening: (k,) by how much half of the width is larger there than `width / 2`, px; NaN where nothing tells.
+        width_spread: standard deviation of the logarithm of `width`.
         of_width: px, the part of `common` and `lasting` that the uncertainty of the width makes.
         lasting: px, the part of `common` that neighbouring images share.
     """
@@ -89,6 +90,7 @@ class Trace:
     contrast: float
     one_sided: Floats
     widening: Floats
+    width_spread: float
     of_width: float
     lasting: float
 

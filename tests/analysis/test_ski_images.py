@@ -39,7 +39,7 @@ def _trace(row: float, width: float, one_sided: float = 0.0) -> Trace:
     column = np.linspace(270.0, 335.0, 12)
     xy, points = np.column_stack((column, np.full(12, row))), np.full(12, one_sided)
     ends = np.array(((267.0, row), (339.0, row)))
-    return Trace(xy, np.full(12, 0.05), 0.02, ends, width, 120.0, points, np.zeros(12), 0.01, 0.01)
+    return Trace(xy, np.full(12, 0.05), 0.02, ends, width, 120.0, points, np.zeros(12), 0.1, 0.01, 0.01)
 
 
 def test_what_was_seen_says_where_the_next_image_shows_the_skis() -> None:
@@ -69,6 +69,8 @@ def test_the_width_of_clear_skis_moves_the_axes_of_those_that_hide_each_other() 
     for _ in range(4):
         skis.told_apart(0, (_trace(0.0, _WIDTH_PX), _trace(15.0, _WIDTH_PX)))
     (told,) = skis.told_apart(0, (hidden,))
-    assert told.width == pytest.approx(_WIDTH_PX)
-    assert told.xy - hidden.xy == pytest.approx(np.tile((0.0, -0.3), (12, 1)), abs=1e-6)
+    assert told.width == pytest.approx(_WIDTH_PX, abs=0.03), "the fit alone knows it five times worse"
+    assert told.xy - hidden.xy == pytest.approx(np.tile((0.0, -0.3), (12, 1)), abs=0.015)
+    (sure,) = skis.told_apart(0, (replace(hidden, width_spread=0.004),))
+    assert sure.xy == pytest.approx(hidden.xy, abs=0.015), "the skis of a V look differently wide"
     assert skis.told_apart(0, (replace(hidden, width=_WIDTH_PX),))[0].xy == pytest.approx(hidden.xy, abs=1e-6)

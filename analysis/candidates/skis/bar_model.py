@@ -5,13 +5,14 @@ distribution, across and along:
 
     cover(u, t) = [F((u + h) / s) - F((u - h) / s)] [F((t - t0) / s) - F((t - t1) / s)].
 
-Bars of one brightness B that cover each other hide what is behind by 1 - product(1 - cover). Width, blur and
-brightness are those of a pair of skis: one for all bars.
+Bars of one brightness B that cover each other hide what is behind by 1 - product(1 - cover). Blur and brightness are
+those of a pair of skis: one for all bars. Each bar has a width of its own: two flat skis of a V turn their faces to a
+camera at different angles, and are up to 1 : 2 as wide.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import Final
 
 import cv2
@@ -22,11 +23,15 @@ from analysis.candidates.foreground.background import Region
 from analysis.candidates.median import quantile
 from rig.arrays import Floats, Integers
 
-SHARED: Final = 3  #: unknowns that all bars share: brightness, log of the half width, log of the blur
-OF_BAR: Final = 4  #: unknowns of each bar: rho, theta, t0, t1
+SHARED: Final = 2  #: unknowns that all bars share: brightness, log of the blur
+OF_BAR: Final = 5  #: unknowns of each bar: rho, theta, t0, t1, log of the half width
+WIDTH: Final = 4  #: place of the last one among these
 MARGIN: Final = 2.6  #: px beside and beyond a bar that are fitted
 _OPPOSITE = 1  # px around pixels in front that differ from the background in the other direction
-_MODEL = 0.03  # of the contrast: residuals that the model itself leaves
+MODEL: Final = 0.03  #: of the contrast: residuals that the model itself leaves
+#: Two parallel skis look equally wide but for some edging; of two that are turned against each other each is seen at
+#: another angle. Flat skis are seen at some 0.3 rad, so a turn of 0.1 changes a width by a third.
+_EDGED, _SEEN_AT = 0.1, 0.3
 _FAR = 6.0  # of the normal distribution: 1e-9 from its limit
 _NORMAL = 1.59577, 0.07056  # logit of the normal distribution: error below 2e-4, one exponential for it and its slope
 
@@ -125,14 +130,31 @@ def pixels_around(region: Region, bars: Sequence[Bar], brighter: bool) -> Pixels
     grey, behind = region.grey[part][near], region.behind[part][near]
     inside = grey[region.front[part][near]]
     brightness = quantile(inside, 0.75 if brighter else 0.25) if len(inside) else 0.0
-    sigma = np.hypot(region.sigma[part][near], np.float32(_MODEL) * np.abs(np.float32(brightness) - behind))
+    sigma = np.hypot(region.sigma[part][near], np.float32(MODEL) * np.abs(np.float32(brightness) - behind))
     row, column = np.nonzero(near)
     return Pixels(origin, x[column], y[row, 0], grey, behind, sigma, brightness)
 
 
 def lines_of(theta: Floats) -> Floats:
-    """(bars, 4) rho, theta, t0, t1 among the unknowns."""
+    """(bars, 5) rho, theta, t0, t1, log h among the unknowns."""
     return np.asarray(theta[SHARED:].reshape(-1, OF_BAR))
+
+
+def place_of_width(k: int) -> int:
+    """Where among the unknowns the width of a bar is."""
+    return SHARED + OF_BAR * k + WIDTH
+
+
+def alike_widths(bars: Sequence[Bar]) -> Floats:
+    """What is expected of the ratios of the widths of bars, as a part of normal equations of all unknowns."""
+    normal = np.zeros((SHARED + OF_BAR * len(bars),) * 2)
+    for i, j in combinations(range(len(bars)), 2):
+        one, two = (bars[k].ends[1] - bars[k].ends[0] for k in (i, j))
+        turned = abs(one[0] * two[1] - one[1] * two[0]) / (bars[i].length * bars[j].length)
+        difference = np.zeros(len(normal))
+        difference[[place_of_width(i), place_of_width(j)]] = 1.0, -1.0
+        normal += np.outer(difference, difference) / (_EDGED**2 + (turned / _SEEN_AT) ** 2)
+    return normal
 
 
 def modelled(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues]:
@@ -140,9 +162,9 @@ def modelled(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues]:
 
     Args:
         pixels: where.
-        theta: B, log h, log s, then rho, theta, t0, t1 of each bar.
+        theta: B, log s, then rho, theta, t0, t1, log h of each bar.
     """
-    cover, by_line, by_shape = _covers(pixels, theta)
+    cover, by_line, by_blur = _covers(pixels, theta)
     contrast = theta[0].astype(pixels.behind.dtype) - pixels.behind
     open_ = 1 - cover
     design = np.empty((len(theta), len(pixels)), pixels.behind.dtype)
@@ -151,20 +173,21 @@ def modelled(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues]:
     for k, i in permutations(range(len(cover)), 2):
         through[k] *= open_[i]
     np.multiply(by_line, through[:, None], out=of_bars)
-    by_shape *= through[:, None]
-    np.sum(by_shape, axis=0, out=design[1:SHARED])
+    by_blur *= through
+    np.sum(by_blur, axis=0, out=design[1])
     np.subtract(1, np.prod(open_, axis=0), out=design[0])
     return pixels.behind + contrast * design[0], design
 
 
 def _covers(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues, GreyValues]:
-    """Covers (bars, n), and their derivatives by rho, theta, t0, t1 (bars, 4, n), and by log h, log s (bars, 2, n)."""
+    """Covers (bars, n), and their derivatives by rho, theta, t0, t1, log h (bars, 5, n), and by log s (bars, n)."""
     lines = lines_of(theta).astype(pixels.x.dtype)
-    h, s = np.exp(theta[1:SHARED]).astype(pixels.x.dtype)
-    rho, angle, t0, t1 = lines.T[..., None]
+    s = np.exp(theta[1]).astype(pixels.x.dtype)
+    rho, angle, t0, t1, log_h = lines.T[..., None]
+    h = np.exp(log_h)
     cosine, sine = np.cos(angle), np.sin(angle)
     t, w = pixels.x * cosine + pixels.y * sine, pixels.y * cosine - pixels.x * sine
-    border = np.empty((len(lines), OF_BAR, len(pixels)), t.dtype)  # distance from each, in units of the blur
+    border = np.empty((len(lines), 4, len(pixels)), t.dtype)  # distance from each, in units of the blur
     u, along = (w - rho) / s, t / s
     np.add(u, h / s, out=border[:, 0])
     np.subtract(u, h / s, out=border[:, 1])
@@ -174,16 +197,15 @@ def _covers(pixels: Pixels, theta: Floats) -> tuple[GreyValues, GreyValues, Grey
     across, length = value[:, 0] - value[:, 1], value[:, 2] - value[:, 3]
     edge, side = across / s, length / s
     by_u, by_t = (slope[:, 0] - slope[:, 1]) * side, (slope[:, 2] - slope[:, 3]) * edge
-    by_line, by_shape = np.empty_like(border), np.empty((len(lines), 2, len(pixels)), t.dtype)
+    by_line = np.empty((len(lines), OF_BAR, len(pixels)), t.dtype)
     np.negative(by_u, out=by_line[:, 0])
     np.subtract(by_t * w, by_u * t, out=by_line[:, 1])
     np.multiply(slope[:, 2], -edge, out=by_line[:, 2])
     np.multiply(slope[:, 3], edge, out=by_line[:, 3])
-    np.multiply(slope[:, 0] + slope[:, 1], h * side, out=by_shape[:, 0])
+    np.multiply(slope[:, 0] + slope[:, 1], h * side, out=by_line[:, WIDTH])
     border *= slope
-    np.multiply(border[:, 1] - border[:, 0], length, out=by_shape[:, 1])
-    by_shape[:, 1] -= (border[:, 2] - border[:, 3]) * across
-    return across * length, by_line, by_shape
+    by_blur = (border[:, 1] - border[:, 0]) * length - (border[:, 2] - border[:, 3]) * across
+    return across * length, by_line, by_blur
 
 
 def _normal(x: GreyValues) -> tuple[GreyValues, GreyValues]:

@@ -16,15 +16,19 @@ from analysis.candidates.foreground.background import Region
 from analysis.candidates.median import median, quantile
 from analysis.candidates.skis.bar_model import (
     MARGIN,
+    MODEL,
     OF_BAR,
     SHARED,
+    WIDTH,
     Bar,
     GreyValues,
     Pixels,
+    alike_widths,
     directions,
     lines_of,
     modelled,
     pixels_around,
+    place_of_width,
 )
 from rig.arrays import Flags, Floats, Integers
 
@@ -49,6 +53,7 @@ _SIDECUT = 0.03  # of the width, standard deviation along a ski: some 0.11 m at 
 #: By so much the middle between the edges of a ski may be off its axis, standard deviation, px.
 AXIS_PX: Final = 0.015
 _FEWEST = 30  # pixels
+_KNOWS_NOTHING = 1e-2  # precision of a width's logarithm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +70,9 @@ class FittedBar:
         misfit: root mean square of the normalized residuals of the sections that count.
         one_sided: (k,) by how much the points move across the axis if the bar's half width grows by 1: 0 where both its
             edges are seen, -1 or 1 where one is.
-        widening: (k,) by how much half of the width is larger there than the bar's, px; NaN where nothing tells.
+        widening: (k,) by how much half of the width is larger there than the bar's, px; NaN where nothing tells, and in
+            bars that were fitted together: another one may be what is wider.
+        width_spread: standard deviation of the width's logarithm, without what was expected of it.
         of_width: px, the part of `common` and `lasting` that the uncertainty of the width makes.
         lasting: px, the part of `common` that neighbouring images share: they show the same things beside the ski.
     """
@@ -79,6 +86,7 @@ class FittedBar:
     misfit: float
     one_sided: Floats
     widening: Floats
+    width_spread: float
     of_width: float
     lasting: float
 
@@ -126,17 +134,18 @@ class _Fit:
     def __init__(self, pixels: Pixels, bars: Sequence[Bar], begin: Floats | None = None) -> None:
         """Prepare the adjustment of bars to pixels, from these bars or from unknowns that are known better."""
         self._pixels, self._bars, self.count = pixels, bars, len(bars)
-        width = median(np.array([bar.width for bar in bars]))
-        lines = [bar.line(pixels.origin) for bar in bars]
-        start = np.concatenate(([pixels.brightness, np.log(max(width, 0.8) / 2), np.log(_BLUR)], *lines))
+        lines = [(*bar.line(pixels.origin), np.log(max(bar.width, 0.8) / 2)) for bar in bars]
+        start = np.concatenate(([pixels.brightness, np.log(_BLUR)], *lines))
         spread = np.full(len(start), np.inf)
         spread[0] = _BRIGHTNESS_SPREAD * (1 + abs(pixels.brightness - median(pixels.behind)))
-        spread[1:SHARED] = _WIDTH_SPREAD, _BLUR_SPREAD
-        lines_of(spread)[:, 2:] = _END_SPREAD
-        self._expected, self._prior = start, spread**-2.0
-        self._of_prior = np.diag(self._prior + 1e-9)
+        spread[1] = _BLUR_SPREAD
+        lines_of(spread)[:, 2:] = _END_SPREAD, _END_SPREAD, _WIDTH_SPREAD
+        alone = np.diag(spread**-2.0)
+        self._prior = alone + alike_widths(bars)
+        self._of_prior = self._prior + 1e-9 * np.eye(len(start))
+        self._expected = np.linalg.solve(self._of_prior, (alone + 1e-9 * np.eye(len(start))) @ start)
         self._largest = np.full(len(start), np.inf)
-        self._largest[1:SHARED] = _LARGEST_STEPS[0]
+        self._largest[1] = lines_of(self._largest)[:, WIDTH] = _LARGEST_STEPS[0]
         lines_of(self._largest)[:, :2] = _LARGEST_STEPS[1:]
         theta = lines[int(np.argmax([bar.length for bar in bars]))][1]
         along = pixels.x * np.cos(theta) + pixels.y * np.sin(theta)
@@ -199,13 +208,13 @@ class _Fit:
         return moved
 
     def _moved(self, step: Floats) -> float:
-        reach = float(np.abs(lines_of(self.theta)[:, 2:]).max())
+        reach = float(np.abs(lines_of(self.theta)[:, 2:WIDTH]).max())
         lines = lines_of(step)
         return float((np.abs(lines[:, 0]) + reach * np.abs(lines[:, 1])).max())
 
     def _bounded(self, step: Floats) -> Floats:
         new = self.theta + np.minimum(np.maximum(step, -self._largest), self._largest)
-        new[2] = min(max(new[2], _BLURS[0]), _BLURS[1])
+        new[1] = min(max(new[1], _BLURS[0]), _BLURS[1])
         return np.asarray(new)
 
     def _choose(self) -> None:
@@ -234,16 +243,17 @@ class _Fit:
             cost = float(square @ weight)
         weighted = at.design * weight
         normal = (weighted @ at.design.T).astype(float) + self._of_prior
-        gradient = weighted @ at.residuals + self._prior * off
-        return _Equations(cost + float(self._prior @ off**2), normal, gradient)
+        pulled = self._prior @ off
+        gradient = weighted @ at.residuals + pulled
+        return _Equations(cost + float(pulled @ off), normal, gradient)
 
     def farthest(self, other: "_Fit") -> float:
         """By how much the axes of this explanation lie aside the nearest axis of another one, at their middles, px."""
         worst = 0.0
-        for rho, theta, t0, t1 in lines_of(self.theta):
+        for rho, theta, t0, t1, _ in lines_of(self.theta):
             along, across = directions(theta)
             place = (t0 + t1) / 2 * along + rho * across
-            off = [abs(float(place @ directions(a)[1]) - r) for r, a, _, _ in lines_of(other.theta)]
+            off = [abs(float(place @ directions(a)[1]) - r) for r, a, *_ in lines_of(other.theta)]
             worst = max(worst, min(off))
         return min(worst, MARGIN)
 
@@ -256,23 +266,26 @@ class _Fit:
             doubt: px by which another explanation has axes elsewhere.
         """
         theta, pixels = self.theta, self._pixels
-        rho, angle, t0, t1 = lines_of(theta)[k]
+        rho, angle, t0, t1, log_h = lines_of(theta)[k]
         axis, across = directions(angle)
         along = pixels.x * axis[0] + pixels.y * axis[1]
         sections = max(1, int(min(points, (t1 - t0) / _SECTION)))
         place = np.floor((along - t0) / max(1e-9, t1 - t0) * sections).astype(int)
         good = self._good & (place >= 0) & (place < sections)
-        bar = Bar(pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across, 2 * float(np.exp(theta[1])))
-        t, shift, sigma, one_sided, widening = self._shifts(k, good, place[good], along[good], sections)
+        bar = Bar(pixels.origin + np.array((t0, t1))[:, None] * axis + rho * across, 2 * float(np.exp(log_h)))
+        t, shift, sigma, one_sided, widening, doubtful = self._shifts(k, good, place[good], along[good], sections)
         fine = np.isfinite(sigma)
         if np.count_nonzero(fine) < 2:
             return None
         t, shift, one_sided = t[fine], shift[fine], one_sided[fine] / (bar.width / 2)
         model = np.hypot(_POINT, _SIDECUT / 2 * one_sided) * bar.width
-        sigma = np.hypot(max(1.0, self.misfit) * sigma[fine], model)
+        scale = max(1.0, self.misfit)
+        # what is wider by more than that has an edge which is not its own: its middle is off by as much
+        foreign = np.maximum(0.0, widening[fine] ** 2 - (scale * doubtful[fine]) ** 2 - _SIDECUT**2)
+        sigma = np.sqrt((scale * sigma[fine]) ** 2 + model**2 + np.nan_to_num(foreign) * (bar.width / 2) ** 2)
         xy = pixels.origin + t[:, None] * axis + (rho + shift)[:, None] * across
         contrast = median(theta[0] - pixels.behind)
-        own, of_width = self._common(k, t, sigma)
+        own, of_width, width_spread = self._common(k, t, sigma)
         lasting = float(np.hypot(of_width, doubt))
         return FittedBar(
             bar,
@@ -283,21 +296,23 @@ class _Fit:
             contrast,
             self.misfit,
             one_sided,
-            widening[fine] * bar.width / 2,
+            widening[fine] * bar.width / 2 if self.count == 1 else np.full(len(t), np.nan),
+            width_spread,
             of_width,
             lasting,
         )
 
     def _shifts(
         self, k: int, good: Flags, place: Integers, along: Floats, sections: int
-    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
         """Where along, how far off the axis, and with which sigma, section by section: all bars' shifts together.
 
-        The last two arrays are how the shifts change with the logarithm of the width, and by how much that logarithm
-        differs in the section; NaN where both edges do not tell it.
+        The last three arrays are how the shifts change with the logarithm of the bar's width, by how much it differs in
+        the section, and the sigma of this; the last two are NaN where both edges do not tell it.
         """
         j, v, by_width = (
-            part[..., good] for part in (self._at.design[SHARED::OF_BAR], self._at.residuals, self._at.design[1])
+            part[..., good]
+            for part in (self._at.design[SHARED::OF_BAR], self._at.residuals, self._at.design[place_of_width(k)])
         )
         normal = np.empty((sections, self.count, self.count))
         right, right_width = np.empty((sections, self.count)), np.empty((sections, self.count))
@@ -307,34 +322,52 @@ class _Fit:
             for b in range(self.count):
                 normal[:, a, b] = np.bincount(place, j[a] * j[b], sections)
         seen = normal[:, k, k] > _UNSEEN
+        right, right_width = right[seen], right_width[seen]
         inverse = np.linalg.inv(normal[seen] + _UNSEEN * np.eye(self.count))
-        t, shift, sigma, one_sided, widening = (np.full(sections, np.nan) for _ in range(5))
+        shifts, of_width = ((inverse @ part[..., None])[..., 0] for part in (right, right_width))
+        t, shift, sigma, one_sided, widening, doubtful = (np.full(sections, np.nan) for _ in range(6))
         t[seen] = np.bincount(place, j[k] ** 2 * along, sections)[seen] / normal[seen, k, k]
-        shift[seen] = np.einsum("na,na->n", inverse[:, k], right[seen])
-        one_sided[seen] = -np.einsum("na,na->n", inverse[:, k], right_width[seen])
+        shift[seen], one_sided[seen] = shifts[:, k], -of_width[:, k]
         sigma[seen] = np.sqrt(inverse[:, k, k])
         sigma[~(sigma < MARGIN)] = np.nan
         width = np.bincount(place, by_width**2, sections)[seen]
-        left = (
-            width + (right_width[seen] * one_sided[seen, None]).sum(axis=1) if self.count == 1 else np.zeros_like(width)
-        )
-        off = np.bincount(place, by_width * v, sections)[seen] - (right_width[seen] * shift[seen, None]).sum(axis=1)
+        left = width - (right_width * of_width).sum(axis=1)
+        off = np.bincount(place, by_width * v, sections)[seen] - (right_width * shifts).sum(axis=1)
+        told = left > _BOTH_EDGES * width
         with np.errstate(all="ignore"):
-            widening[seen] = np.where(left > _BOTH_EDGES * width, off / left, np.nan)
-        return t, shift, sigma, one_sided, widening
+            widening[seen], doubtful[seen] = np.where(told, (off / left, left**-0.5), np.nan)
+        return t, shift, sigma, one_sided, widening, doubtful
 
-    def _common(self, k: int, t: Floats, sigma: Floats) -> tuple[float, float]:
-        """What brightness and blur add to the sigma of the axis, and what the width does; all points share it."""
+    def _common(self, k: int, t: Floats, sigma: Floats) -> tuple[float, float, float]:
+        """What all points of an axis share: from brightness and blur, from the width, px; and the width's own spread.
+
+        What a model does not know of a border (its softness, a stripe, a print) is alike all along a bar: it does not
+        average out over the length as noise does, and the width takes it up. It moves both edges alike, not the axis.
+        """
         inverse = np.linalg.inv(self._normal)
-        line = slice(SHARED + OF_BAR * k, SHARED + OF_BAR * k + 2)
-        by_width = inverse[line, 1]
-        whole = inverse[line, line]
+        line, width = slice(SHARED + OF_BAR * k, SHARED + OF_BAR * k + 2), place_of_width(k)
+        by_width = inverse[line, width] / inverse[width, width]
+        given = inverse[line, line] - np.outer(by_width, by_width) * inverse[width, width]
         weight = sigma**-2
         row = np.array((1.0, float(np.average(t, weights=weight))))
         scale, own = max(1.0, self.misfit) ** 2, 1 / float(weight.sum())
-        parts = whole, whole - np.outer(by_width, by_width) / inverse[1, 1]
-        common, given_width = (max(0.0, scale * float(row @ part @ row) - own) for part in parts)
-        return float(np.sqrt(given_width)), float(np.sqrt(common - given_width))
+        common = max(0.0, scale * float(row @ given @ row) - own)
+        # of the pixels, without what was expected
+        precision = max(_KNOWS_NOTHING, 1 / float(inverse[width, width]) - _WIDTH_SPREAD**-2.0)
+        variance = (scale + self._alike(k)) / precision
+        whole = 1 / (1 / variance + _WIDTH_SPREAD**-2.0)
+        return float(np.sqrt(common)), abs(float(row @ by_width)) * float(np.sqrt(whole)), float(np.sqrt(variance))
+
+    def _alike(self, k: int) -> float:
+        """How much more the model's own errors, alike along a bar, add to the variance of its width than noise does."""
+        pixels, (_, angle, t0, t1, _) = self._pixels, lines_of(self.theta)[k]
+        along = pixels.x * np.cos(angle) + pixels.y * np.sin(angle)
+        here = self._good & (along > t0) & (along < t1)
+        if not here.any():
+            return 0.0
+        of_model = MODEL * (self.theta[0] - pixels.behind[here]) / pixels.sigma[here]
+        rows = _SECTION * len(np.unique(self._section[here]))
+        return rows * float(np.minimum(of_model**2, 1.0).mean())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,10 +2,11 @@
 
 Where two skis lie side by side and overlap, an image shows one long thing. Its outer edges are measured well, but what
 is between them is one brightness: how far the axes are apart, only the width of a ski tells. The fit estimates the
-width together with the axes, but what it has of it may be little and wrong: a boot, a bent tip. The width is told by
-the images of the same jump in which the skis lie apart. It is learned for each camera, since a flat ski shows each of
-them another width, and in metres, since the jumper comes nearer. Then it replaces what the fit found, as if the fit had
-been made with it: the fit knows how its points depend on the width (`Trace.one_sided`).
+width together with the axes, but what it has of it may be little and wrong: a boot, a bent tip. The images of the same
+jump in which the skis lie apart tell the width as well. It is learned for each camera, since a flat ski shows each of
+them another width, and in metres, since the jumper comes nearer. Both count as they are sure: skis of a V, which look
+differently wide, tell little about each other. The trace becomes what the fit would have found with that width: it
+knows how its points depend on it (`Trace.one_sided`).
 """
 
 from collections.abc import Sequence
@@ -91,16 +92,24 @@ def told_apart(traces: Sequence[Trace], px: float, spread: float) -> tuple[Trace
             found += [_off(_one_of_two(trace, px, side), sigma) for side in (-1, 1)]
         else:
             foreign = abs(excess) * (1 - float(hidden.max()))
-            found.append(_off(_given(trace, excess, sigma), float(np.sqrt(max(0.0, foreign**2 - sigma**2)))))
+            found.append(_off(_given(trace, px, spread), float(np.sqrt(max(0.0, foreign**2 - sigma**2)))))
     return tuple(_resolved(found, i) for i in range(len(found)))
 
 
-def _given(trace: Trace, excess: float, sigma: float) -> Trace:
-    """A trace as if it had been fitted with another half width, which is known with sigma, px.
+def _given(trace: Trace, px: float, spread: float) -> Trace:
+    """A trace as if it had been fitted with what else is known of its width; each counts as it is sure.
 
     The error of the width is common to the points: it shifts the axis by their mean dependence, and turns it where they
     depend on it differently.
+
+    Args:
+        trace: as fitted.
+        px: width of a ski there.
+        spread: standard deviation of its logarithm.
     """
+    trust = spread**2 / (spread**2 + trace.width_spread**2)  # in the fit
+    width, left = trace.width**trust * px ** (1 - trust), float(np.sqrt(trust)) * trace.width_spread
+    excess, sigma = (trace.width - width) / 2, left * width / 2
     share, weight = trace.one_sided, trace.sigma**-2
     along, across = _axes(trace)
     mean = float(weight @ share / weight.sum())
@@ -114,7 +123,8 @@ def _given(trace: Trace, excess: float, sigma: float) -> Trace:
         of_width=abs(mean * sigma),
         lasting=_exchanged(trace.lasting, trace.of_width, mean * sigma),
         ends=trace.ends - excess * mean * across,
-        width=trace.width - 2 * excess,
+        width=width,
+        width_spread=left,
     )
 
 

@@ -206,6 +206,7 @@ def _trace_of(fitted: FittedBar, region: Region) -> Trace | None:
         fitted.contrast,
         one_sided,
         fitted.widening[inner],
+        fitted.width_spread,
         fitted.of_width,
         float(np.hypot(fitted.lasting, scatter.common)),
     )

@@ -172,6 +172,7 @@ def _trace(xy: Floats) -> Trace:
         100.0,
         np.zeros(len(xy)),
         np.zeros(len(xy)),
+        0.02,
         0.0,
         0.05,
     )

@@ -16,9 +16,8 @@ from tests.analysis.worker.found import Found
 
 PULSES = range(75)
 LARGEST_M = 0.02  # in each coordinate
-#: Mean square of error over sigma of slopes and headings. Two skis of a V are fitted with one width, which is not so;
-#: without what the scatter of the points tells it is 3.8.
-SKI_SQUARES = 3.5
+#: Mean square of error over sigma of slopes and headings; with one width for both skis of a V it is 3.2.
+SKI_SQUARES = 1.6
 CLEAR = 0.75  # share of a marker that is in sight; less is not drawn
 
 
@@ -92,5 +91,5 @@ def test_the_whole_jump_is_measured_as_its_sigmas_say(drawn: tuple[DrawnHill, Fo
     assert np.mean(near) > 0.95
     assert np.mean(squares) < 1.2
     assert len(slopes) > 40
-    assert np.quantile(slopes, 0.9) < 0.5
+    assert np.quantile(slopes, 0.9) < 0.3
     assert np.mean(of_skis) < SKI_SQUARES

@@ -54,13 +54,14 @@ class Finder:
         self._paces: dict[str, Pace] = {}
         self._kept, self._memory = 0, memory
 
-    def find(self, tag: TripletTag, image: Grey, *, sparing: bool = False) -> PulseCandidates:
+    def find(self, tag: TripletTag, image: Grey) -> PulseCandidates:
         """The candidates of a pulse; keeps what a second look needs.
 
+        Few places are fitted in what was in the same part of the image a moment ago, as people who stand and walk.
+
         Args:
-            tag: of the pulse.
+            tag: of the pulse; pulses come in order.
             image: (rows, columns) all cameras side by side.
-            sparing: fit few places in what hardly moves, as people who stand and walk do; pulses come in order.
 
         Raises:
             BadInputError: an image is not as large as the static image of its camera.
@@ -71,7 +72,7 @@ class Finder:
         traces: list[WantedTraces] = []
         for camera, background, block in self._blocks(tag, image):
             regions = background.regions(block, _stamped(camera))
-            still = self._paces.setdefault(camera.name, Pace()).still(tag.time, regions) if sparing else ()
+            still = self._paces.setdefault(camera.name, Pace()).still(tag.time, regions)
             most.append([MOST, *[_FITS_OF_OTHERS] * (len(regions) - 1)][: len(regions)])
             for i in np.flatnonzero(still):
                 most[-1][i] = _FITS_OF_STILL

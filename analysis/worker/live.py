@@ -173,12 +173,12 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         """Follow the jumper, or look whether one comes."""
         follower, frames = recording.follower, camera_images(tag, image)
         if follower is None:
-            self._keep(recording, finder.find(tag, image, sparing=True), frames)
+            self._keep(recording, finder.find(tag, image), frames)
             self._seek(recording)
             self._look_at_balls(recording, tag.pulse, frames)
         elif follower.lost(tag.pulse, tag.time):
             recording.follower = None
-            self._keep(recording, finder.find(tag, image, sparing=True), frames)
+            self._keep(recording, finder.find(tag, image), frames)
         else:
             self._keep(recording, finder.find_expected(tag, image, follower.expected(tag.time)), frames)
             self._tell(recording, follower.follow(recording.candidates[-1]))

@@ -11,18 +11,16 @@ The problem has several minima where much is covered. It is started from several
 about as well as the best one makes the covariance larger.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import chndtr
 
+from analysis.candidates.markers.disc_profiles import Pixels, Profiles, middle_size
 from rig.arrays import Flags, Floats, Integers
 
 UNKNOWNS: Final = 9  #: x, y, logarithm of the radius, contrast, and what is behind: level, slopes and bends
 _BEHIND = 5  # index of the first slope
-BLUR_PX: Final = 0.62  #: of lens and pixel, typical; what differs is absorbed by the size that was learned with it
 _MARGIN = 1.6  # px beyond the disc that are fitted: what lies farther away tells of other things, not of the disc
 _STARTS_AWAY = 0.55  # radii, of the starts in eight directions about a place
 _MOVED = 1.3  # radii: a centre that ends farther from its start belongs to something else
@@ -30,8 +28,6 @@ _STEPS, _LAST_STEPS, _ENOUGH = 12, 4, 3e-3  # iterations, with all pixels and wi
 _STREAKS = 0.1, 1.5  # px; a longer streak is the mean of two discs, and of three (Gauss-Legendre)
 _BLOCK = 48  # windows whose pixels are computed at a time: they stay in the processor's cache
 _TINY = np.float32(1e-12)
-_GRID = 0.04  # px, of the table of profiles
-_SIZE_STEP = 0.03  # of the logarithm of the radius, likewise
 _MODEL = 0.015  # of the contrast, standard deviation: uneven light on marker and suit, pixels cut by a border
 _HALF = 3.0  # standard deviations at which a pixel counts a quarter and less (Geman and McClure 1987)
 _USUAL = 0.84  # so much counts a pixel on average whose residual is but noise
@@ -44,10 +40,9 @@ _SHARE = 0.4  # of the disc and of its border that must agree: of less than a ha
 _LIKE = 2.0  # standard deviations by which its contrast may differ
 _WORST = 1.0  # radii; a centre that is less certain than this says nothing
 _FIRST_STEPS, _KEPT = 4, 3  # iterations after which only so many of the starts of a place go on
-_TELLING = 24  # places that tell how much larger or smaller all discs are than expected
-_COMMON = 0.1  # standard deviation of the logarithm of that
-
-_Pixels = NDArray[np.float32]  # (k, p) a number for each pixel of each window
+_TELLING = 24  # places that tell what all discs are like
+_MAD_TO_SIGMA = 1.4826
+_COMMON = 0.1  # standard deviation of the logarithm of how much larger they all are than expected
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,9 +117,8 @@ def fit_known_discs(windows: Windows, shape: DiscShape) -> KnownDiscs:
     """
     n = len(windows.xy)
     owner = np.arange(n)
-    larger = _larger(windows, shape, owner[:: max(1, n // _TELLING)])
-    shape = replace(shape, radius=larger * shape.radius)
-    tables = _Profiles(shape.radius)
+    shape = _as_clear_ones(windows, shape, owner[:: max(1, n // _TELLING)])
+    tables = Profiles(shape.radius)
     found = _solved(windows, shape, tables, owner, windows.xy)
     doubtful = np.flatnonzero(found.share < _UNCOVERED)
     if len(doubtful):
@@ -134,13 +128,14 @@ def fit_known_discs(windows: Windows, shape: DiscShape) -> KnownDiscs:
     return _best(windows, shape, owner, found)
 
 
-def _larger(windows: Windows, shape: DiscShape, places: Integers) -> float:
-    """How many times as large as expected the discs are, by some places where they are not covered.
+def _as_clear_ones(windows: Windows, shape: DiscShape, places: Integers) -> DiscShape:
+    """The shape with size and contrast of those discs among some places that are not covered.
 
-    What is expected comes from spots that are no discs yet, and a lens may blur otherwise than `BLUR_PX`.
+    What is expected comes from spots that are no discs yet: covered ones are smaller and fainter, and a lens may blur
+    otherwise than `BLUR_PX`. A contrast that is hardly known lets a faint disc explain what is left of a covered one.
     """
-    found = _solved(windows, shape, _Profiles(shape.radius), places, windows.xy[places])
-    off = found.theta[:, 2] - np.log(shape.radius[places] / _middle(shape.radius))
+    found = _solved(windows, shape, Profiles(shape.radius), places, windows.xy[places])
+    off = found.theta[:, 2] - np.log(shape.radius[places] / middle_size(shape.radius))
     # Each is weighted towards what was expected; without that its image alone tells more, and less surely.
     told = 1 / found.covariance[:, 2, 2]
     clear = (found.share >= _UNCOVERED) & (told > shape.spread**-2)
@@ -149,10 +144,20 @@ def _larger(windows: Windows, shape: DiscShape, places: Integers) -> float:
     weights = np.append(1 / (1 / alone + shape.spread**2), _COMMON**-2)
     order = np.argsort(sizes)
     middle = np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2)
-    return float(np.exp(sizes[order[middle]]))
+    contrasts = np.append(found.theta[clear, 3], shape.contrast)
+    contrast = float(np.median(contrasts))
+    scatter = _MAD_TO_SIGMA * float(np.median(np.abs(contrasts - contrast)))
+    variance = (clear.sum() * scatter**2 + shape.sigma_contrast**2) / len(contrasts)
+    return DiscShape(
+        float(np.exp(sizes[order[middle]])) * shape.radius,
+        shape.spread,
+        shape.streak,
+        contrast,
+        float(np.sqrt(variance)),
+    )
 
 
-def _promising(windows: Windows, shape: DiscShape, tables: "_Profiles", places: Integers) -> tuple[Integers, Floats]:
+def _promising(windows: Windows, shape: DiscShape, tables: "Profiles", places: Integers) -> tuple[Integers, Floats]:
     """Other starts for some places: the best ones of those around, each with the place that it belongs to."""
     angles = np.arange(8) * np.pi / 4
     which = np.repeat(places, len(angles))
@@ -206,7 +211,7 @@ def _best(windows: Windows, shape: DiscShape, owner: Integers, found: _Solutions
     return KnownDiscs(xy, covariance, contrast, sigma, share)
 
 
-def _solved(windows: Windows, shape: DiscShape, tables: "_Profiles", which: Integers, xy: Floats) -> _Solutions:
+def _solved(windows: Windows, shape: DiscShape, tables: "Profiles", which: Integers, xy: Floats) -> _Solutions:
     """Solutions started at xy (k, 2) in the windows `which` (k,): with all pixels, then with those that agree."""
     fit = _Fit(windows, shape.of(which), tables, which)
     theta = fit.started(xy)
@@ -224,41 +229,10 @@ def _solved(windows: Windows, shape: DiscShape, tables: "_Profiles", which: Inte
     return _Solutions(theta, covariance, cost, share)
 
 
-def _around(images: _Pixels) -> _Pixels:
+def _around(images: Pixels) -> Pixels:
     """Sums over 3 x 3 pixels of images (k, s, s)."""
     wide = np.pad(images, ((0, 0), (1, 1), (1, 1)))
     return np.asarray(np.lib.stride_tricks.sliding_window_view(wide, (3, 3), (1, 2)).sum(axis=(-1, -2)))
-
-
-def _middle(radius: Floats) -> float:
-    """Geometric mean of radii (n,)."""
-    return float(np.exp(np.log(radius).mean())) if len(radius) else 1.0
-
-
-class _Profiles:
-    """Profiles of blurred discs of several sizes about a middle one, as a table over distances and sizes."""
-
-    def __init__(self, radius: Floats) -> None:
-        self.middle = _middle(radius)
-        most = float(np.abs(np.log(radius / self.middle)).max(initial=0.0)) + 0.15
-        self._half = int(np.ceil(most / _SIZE_STEP))
-        sizes = self.middle * np.exp(np.arange(-self._half, self._half + 1) * _SIZE_STEP)
-        self._length = int(np.ceil((sizes[-1] + 5 * BLUR_PX) / _GRID)) + 2
-        rho = np.asarray(np.arange(self._length) * _GRID, float)
-        # A blurred disc is the probability that a normally distributed shift leads into it: a noncentral chi-square.
-        profile = np.stack([chndtr((size / BLUR_PX) ** 2, 2.0, (rho / BLUR_PX) ** 2) for size in sizes])
-        by_size, by_rho = np.gradient(profile, _SIZE_STEP, _GRID)
-        self._tables = [table.astype(np.float32).ravel() for table in (profile, by_rho, by_size)]
-
-    def at(self, rho: _Pixels, size: Floats) -> tuple[_Pixels, _Pixels, _Pixels]:
-        """Values and derivatives by distance and logarithm of the radius, at distances (k, p) for sizes (k,)."""
-        row = np.clip(np.rint(size / _SIZE_STEP).astype(int) + self._half, 0, 2 * self._half)
-        column = np.minimum(np.rint(rho * np.float32(1 / _GRID)), np.float32(self._length - 1))
-        place = column.astype(np.int32) + (row * self._length).astype(np.int32)[:, None]
-        value, by_rho, by_size = (table.take(place) for table in self._tables)
-        value += by_rho * np.minimum(rho - column * np.float32(_GRID), np.float32(_GRID))
-        value += by_size * (size - (row - self._half) * _SIZE_STEP).astype(np.float32)[:, None]
-        return value, by_rho, by_size
 
 
 class _Fit:
@@ -267,7 +241,7 @@ class _Fit:
     Unknowns and equations are 64 bits wide, pixels 32: they are noisier than that.
     """
 
-    def __init__(self, windows: Windows, shape: DiscShape, tables: _Profiles, which: Integers) -> None:
+    def __init__(self, windows: Windows, shape: DiscShape, tables: Profiles, which: Integers) -> None:
         self._shape, self._tables = shape, tables
         self._side, place, noise = windows.grey.shape[1], windows.xy[which], windows.noise[which]
         steps = np.arange(self._side, dtype=np.float32)
@@ -332,7 +306,7 @@ class _Fit:
         rejected |= (_around(off) / count) ** 2 > _TOGETHER**2 * (_around(noise) / count**2 + model)
         self._used &= _around(rejected * used).reshape(len(theta), -1)[:, self._at] == 0
 
-    def _image(self, values: _Pixels | Flags) -> _Pixels:
+    def _image(self, values: Pixels | Flags) -> Pixels:
         """Values of the pixels (k, p) as images (k, s, s)."""
         image = np.zeros((len(values), self._side**2), np.float32)
         image[:, self._at] = values
@@ -347,7 +321,7 @@ class _Fit:
         )
         return np.asarray(np.minimum(1.0, np.minimum(of_disc, of_border) / _USUAL))
 
-    def _model(self, theta: Floats, which: Integers) -> tuple[_Pixels, _Pixels]:
+    def _model(self, theta: Floats, which: Integers) -> tuple[Pixels, Pixels]:
         """Grey values (k, p) and derivatives (k, 9, p)."""
         x, y, _, contrast, level, right, down, right_bend, down_bend = theta.T.astype(np.float32)[..., None]
         streak_x, streak_y = self._shape.streak[which].T.astype(np.float32)[..., None]
@@ -370,7 +344,7 @@ class _Fit:
         behind = level + right * dx + down * dy + right_bend * design[:, 7] + down_bend * design[:, 8]
         return contrast * design[:, 3] + behind, design
 
-    def _residuals(self, theta: Floats, which: Integers) -> tuple[_Pixels, _Pixels, _Pixels, _Pixels]:
+    def _residuals(self, theta: Floats, which: Integers) -> tuple[Pixels, Pixels, Pixels, Pixels]:
         """Residuals over their standard deviations (k, p), these, shares that they count, derivatives (k, 9, p)."""
         value, design = self._model(theta, which)
         sigma = np.sqrt(self._noise[which] ** 2 + np.float32((_MODEL * self._shape.contrast) ** 2))

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.candidates.markers.known_discs import BLUR_PX, DiscShape
+from analysis.candidates.markers.disc_profiles import BLUR_PX
+from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import SecondLook, Spots
 from analysis.identification.markers.markers import Markers, settled_again
 from analysis.identification.over_time.assignment import well_known

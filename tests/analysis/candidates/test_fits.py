@@ -120,6 +120,29 @@ def test_discs_tell_their_size_themselves() -> None:
     assert squares.mean() < 1.0
 
 
+def test_discs_tell_their_contrast_themselves() -> None:
+    """They are brighter than the spots that were first fitted to them, and a sliver is no whole disc that is faint."""
+    rng = np.random.default_rng(11)
+    radius, side, count = 1.4, 21, 96
+    covered = np.arange(count) % 3 == 0
+    angles = rng.uniform(0.0, 2 * np.pi, count)
+    centres = (side - 1) / 2 + rng.uniform(-0.5, 0.5, (count, 2))
+    images = np.stack(
+        [
+            _covered_disc(side, centre, radius, angle, (-0.3 if hidden else 2.0) * radius, 70.0)
+            for centre, angle, hidden in zip(centres, angles, covered, strict=True)
+        ]
+    )
+    images += NOISE * rng.standard_normal(images.shape)
+    away = np.where(covered, 0.6 * radius, 0.0)
+    starts = centres - away[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+    shape = DiscShape(np.full(count, radius), 0.04, np.zeros((count, 2)), 95.0, 24.0)
+    found = fit_known_discs(Windows(starts, images, np.full(images.shape, NOISE)), shape)
+    there = np.asarray(np.isfinite(found.xy).all(axis=1))
+    assert there[~covered].mean() > 0.95
+    assert there[covered].mean() < 0.1
+
+
 def _beside(side: int, centre: Floats, radius: float, angle: float, border: float) -> NDArray[np.float64]:
     """A bright disc; beyond a line at `border` px from its centre the ground is brighter by a seventh of it."""
     steps = (np.arange(side * _PARTS) + 0.5) / _PARTS - 0.5

@@ -23,7 +23,7 @@ _DEGREES[[12, 13, 14, 15, *range(19, 25)]] = np.degrees(1.0)
 #: an angle and its sine differ by a sixth. An angle that is less certain is as good as unknown.
 _VAGUE: Final = 1 / 2
 #: What each quantity needs, of GROUPS.
-_NEEDS: Final[Mapping[str, tuple[str, ...]]] = {
+NEEDS: Final[Mapping[str, tuple[str, ...]]] = {
     "alpha": ("P2", "P3", "P4", "right", "left"),
     "beta": ("P1", "P2", "P3", "P4"),
     "gamma": ("right", "left"),
@@ -147,7 +147,7 @@ def _state(
         skis[side] = ski if known[side] else None
     first = _QUANTITY_ROWS.start
     missing = [
-        bool(unknown[first + i]) or not all(known[group] for group in _NEEDS.get(name, ()))
+        bool(unknown[first + i]) or not all(known[group] for group in NEEDS.get(name, ()))
         for i, name in enumerate(QUANTITIES)
     ]
     gradient = np.where(np.array(missing)[:, None], np.nan, gradient)

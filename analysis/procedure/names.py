@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 
 from analysis.identification.space.body import USUAL, implausibility
-from analysis.measurements.model import POINTS, ImageMeasurements, JumpMeasurements
-from analysis.result.model import JumperState, Status
+from analysis.measurements.model import POINTS, SIDES, ImageMeasurements, JumpMeasurements
+from analysis.motion.quantities import NEEDS
+from analysis.result.model import QUANTITIES, JumperState, SmoothedState, Status
 from rig.arrays import Floats
 
 #: What is said of a jump of which nothing is given.
@@ -87,6 +88,37 @@ def only_told(jump: JumpMeasurements, told: Collection[str]) -> JumpMeasurements
         for pulse in jump.pulses
     )
     return replace(jump, pulses=tuple(pulses))
+
+
+def measured_parts(state: JumperState) -> JumperState:
+    """Of a state from the model over time, what was measured at its own pulse, without quantities."""
+    return JumperState(
+        {
+            name: None if point is None or point.status is Status.PREDICTED else point
+            for name, point in state.points.items()
+        },
+        {side: None if ski is None or ski.status is Status.PREDICTED else ski for side, ski in state.skis.items()},
+        {},
+        None,
+        None,
+    )
+
+
+def told_state(state: SmoothedState, told: Collection[str]) -> SmoothedState:
+    """A state without the points that are not told, and without what follows from them."""
+    given = {*told, *(SIDES if any(binding in told for binding, _ in _BINDINGS) else ())}
+    missing = [not given.issuperset(NEEDS.get(name, ())) for name in QUANTITIES]
+    lost = {name for name, gone in zip(QUANTITIES, missing, strict=True) if gone}
+    return replace(
+        state,
+        points={name: point if name in given else None for name, point in state.points.items()},
+        skis={side: ski if side in given else None for side, ski in state.skis.items()},
+        angles={name: None if name in lost else angle for name, angle in state.angles.items()},
+        height=None if "height" in lost else state.height,
+        speed=None if "speed" in lost else state.speed,
+        angle_of_attack=None if "angle_of_attack" in lost else state.angle_of_attack,
+        by_calibration=np.where(np.array(missing)[:, None], np.nan, state.by_calibration),
+    )
 
 
 class _Body:

@@ -23,9 +23,10 @@ from analysis.identification.skis.skis import assign_skis
 from analysis.identification.space.body import REACH_M
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
-from analysis.measurements.model import SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
+from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
 from analysis.motion.causal import CausalFilter
-from analysis.result.model import SmoothedState, Status
+from analysis.procedure.names import measured_parts, told_names, told_state
+from analysis.result.model import JumperState, SmoothedState, Status
 from analysis.scene.camera_system import CameraSystem
 from analysis.worker.ski_images import SkiImages
 from rig.arrays import Flags, Floats
@@ -53,7 +54,7 @@ class Followed:
     Attributes:
         pulse: its number.
         time: when it fired.
-        state: of the jumper, from all pulses until this one.
+        state: of the jumper, from all pulses until this one, without markers whose names nothing bears out yet.
     """
 
     pulse: PulseNumber
@@ -79,6 +80,8 @@ class Follower:
         self._latest: SmoothedState | None = None
         self._pulse, self._time = PulseNumber(0), UtcNs(0)
         self._looks, self._look_at = 0, 0.0
+        self._measured: list[JumperState] = []
+        self._told = frozenset[str]()
         self.first = self.last = PulseNumber(0)
 
     def find(self, seeker: Seeker, candidates: Sequence[PulseCandidates], more_than: int = 0) -> list[Followed]:
@@ -116,7 +119,9 @@ class Follower:
         self.first, self._pulse = found.pulses[0].pulse, found.pulses[-1].pulse
         self.last, self._time = self._pulse, found.pulses[-1].time
         self._look_at = self._pulse + _HIDDEN_S * self._rate_hz
-        return [Followed(pulse.pulse, pulse.time, state) for pulse, state in zip(pulses, states, strict=True)]
+        self._learn_names(states)
+        named = (told_state(state, self._told) for state in states)
+        return [Followed(pulse.pulse, pulse.time, state) for pulse, state in zip(pulses, named, strict=True)]
 
     def expected(self, time: UtcNs) -> dict[str, Expected]:
         """Where each camera is expected to show him at a pulse; cameras that do not see him are left out."""
@@ -166,7 +171,14 @@ class Follower:
         if any(part is not None and part.status is not Status.PREDICTED for part in found.points.values()):
             self.last = candidates.pulse
         self._pulse, self._time, self._latest = candidates.pulse, candidates.time, found
-        return Followed(candidates.pulse, candidates.time, found)
+        self._learn_names([found])
+        return Followed(candidates.pulse, candidates.time, told_state(found, self._told))
+
+    def _learn_names(self, states: Sequence[SmoothedState]) -> None:
+        """Learn which names of markers more states bear out; what was told once is not taken back."""
+        if len(self._told) < len(POINTS):
+            self._measured += map(measured_parts, states)
+            self._told |= told_names(self._measured)
 
     def hidden(self) -> int:
         """How many markers are somewhere unknown after the latest pulse."""

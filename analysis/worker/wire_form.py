@@ -29,7 +29,10 @@ def wire_form(
         angles={name: _measured(angle) for name, angle in state.angles.items()},
         height=_measured(state.height),
         speed=_measured(state.speed),
-        velocity=jumper.JumperVector(_triple(state.velocity.value), _rows(state.velocity.covariance)),
+        # O lies between the bindings: without any its velocity is nobody's
+        velocity=None
+        if state.points["P3"] is None and state.points["P4"] is None
+        else jumper.JumperVector(_triple(state.velocity.value), _rows(state.velocity.covariance)),
         angle_of_attack=_measured(state.angle_of_attack),
     )
 

@@ -1,7 +1,11 @@
 """Who is followed from pulse to pulse, and what becomes of markers that come into sight later."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from analysis.candidates.model import ImageCandidates
 from analysis.identification.seeking import Seeker
 from analysis.measurements.model import MeasuredCamera
 from analysis.result.model import Status
@@ -69,3 +73,28 @@ def test_what_was_never_seen_is_expected_where_people_have_it() -> None:
             assert (of.reach[2:] < 100.0).all()  # px; the filter alone knows nothing within metres
         follower.follow(candidates)
     assert follower.hidden() == 2
+
+
+@pytest.mark.parametrize(
+    ("hidden", "given"),
+    [pytest.param(("P2",), set(), id="three markers alone"), pytest.param((), {"P1", "P2", "P3", "P4"}, id="all")],
+)
+def test_markers_whose_names_nothing_bears_out_are_not_told(hidden: tuple[str, ...], given: set[str]) -> None:
+    """No ski is seen: a helmet and two gloves would look the same."""
+    system, truth = true_cameras(), true_jump(7)
+    disturbed = Disturbed(hidden=tuple((label, None, 0, 999) for label in hidden))
+    made = scene([truth], system, np.random.default_rng(1), range(15, 40), disturbed)
+    made.candidates[:] = [
+        replace(c, images={name: ImageCandidates(image.spots, ()) for name, image in c.images.items()})
+        for c in made.candidates
+    ]
+    cameras = {name: MeasuredCamera((640, 480), 0.0) for name in system.names}
+    follower = Follower(system, cameras, RATE_HZ)
+    told = follower.find(Seeker(system, {}), made.candidates[:SOUGHT])
+    told += [follower.follow(candidates) for candidates in made.candidates[SOUGHT:]]
+    assert told
+    assert follower.last == made.candidates[-1].pulse, "he is followed, whatever is told of him"
+    for followed in told:
+        assert {label for label, point in followed.state.points.items() if point is not None} == given
+        assert (followed.state.height is not None) == bool(given)
+        assert all(ski is None for ski in followed.state.skis.values())

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
+from analysis.measurements.model import POINTS, JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
 from analysis.motion.adjustment.bundle import Model, begun, near, root_of, settled
 from analysis.motion.adjustment.gross_errors import without_gross_errors
 from analysis.motion.model.camera_arrays import CameraArrays, own_root
@@ -30,6 +30,9 @@ from rig.clocks import NS_PER_S, UtcNs
 _TRIGGER_S: Final = 20e-6  # of cameras that obey one trigger
 _STAY_S: Final = 0.15  #: mean time that a motion stays calm, or lively
 _GATE_P: Final = 1e-5  #: a measurement that is less likely than this is not used
+#: Likewise of a ski that fewer images show than contradict each other if one is wrong.
+_ALONE_P: Final = 1e-3
+_CONTROLLED: Final = 3
 _STEPS, _REMOVALS = 8, 4
 #: How far a jumper's skis turn at all: standard deviations of slope, its difference, heading and opening (rows), of
 #: value, speed and acceleration (columns), rad, rad/s, rad/s^2. Nothing may be less certain: so much is known unseen.
@@ -245,8 +248,7 @@ class CausalFilter:
         v = equations.v.reshape(-1) + by_u @ point[STATE:]
         off = v + (mean - point) @ rows.T
         cross = rows @ covariance
-        plausible = _plausible(off[_LIVELY], rows, cross[_LIVELY])
-        used = observed.seen & plausible.reshape(observed.seen.shape)
+        used = _plausible(observed, _distances(off[_LIVELY], rows, cross[_LIVELY]))
         take = np.repeat(used.ravel(), 2)
         off, cross, rows = off[:, take], cross[:, take], rows[take]
         spread = cross @ rows.T + np.eye(len(rows))
@@ -295,8 +297,20 @@ def _moved(move: Floats, rows: Floats) -> Floats:
     return np.asarray((move @ rows.reshape(len(rows), 3, -1)).reshape(rows.shape))
 
 
-def _plausible(off: Floats, rows: Floats, cross: Floats) -> Flags:
-    """Which groups of two observations agree with a prediction.
+def _plausible(observed: Observations, distances: Floats) -> Flags:
+    """Which measurements (1, m, 6) agree with a prediction, by their chi-squares against it.
+
+    Two images of a ski, or one, do not contradict each other whatever they show; there the prediction is the only
+    control, and judges as strictly as the motion over time does afterwards. What a hand measured is believed.
+    """
+    distance = distances.reshape(observed.seen.shape)
+    used = observed.seen & (distance < chdtri(2, _GATE_P))
+    alone = (used.sum(axis=1, keepdims=True) < _CONTROLLED) & (np.arange(len(GROUPS)) >= len(POINTS))
+    return np.asarray(used & ~(alone & ~observed.by_hand & (distance > chdtri(2, _ALONE_P))))
+
+
+def _distances(off: Floats, rows: Floats, cross: Floats) -> Floats:
+    """Chi-squares (g,) of groups of two observations against a prediction.
 
     Args:
         off: (2 g,) computed - observed.
@@ -306,5 +320,4 @@ def _plausible(off: Floats, rows: Floats, cross: Floats) -> Flags:
     pairs = rows.reshape(-1, 2, rows.shape[1])
     spread = cross.reshape(pairs.shape) @ pairs.swapaxes(1, 2) + np.eye(2)
     apart = off.reshape(-1, 2, 1)
-    distance = (apart * np.linalg.solve(spread, apart)).sum(axis=(1, 2))
-    return np.asarray(distance < chdtri(2, _GATE_P))
+    return np.asarray((apart * np.linalg.solve(spread, apart)).sum(axis=(1, 2)))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from analysis.measurements.model import ImageMeasurements, PointMeasurement
 from analysis.motion.causal import CausalFilter
@@ -14,6 +15,8 @@ SEED = 5
 FIRST = 5  # pulses until there is a state
 LARGEST = 4.5  # sigmas; 6e-6 of single errors are larger
 HIDDEN = range(8, 11)  # pulses without skis
+BAD_SKI = 20  # pulse in which one image shows a ski aside
+ASIDE_PX = 1.0  # some 4.3 standard deviations against the prediction
 AT_CHANGES = 6.0  # where the motion has just changed, the distribution is a mixture with longer tails
 
 
@@ -75,3 +78,27 @@ def test_skis_that_are_hidden_stay_what_skis_are_and_a_prediction_changes_nothin
     hip = predicted.points["P2"]
     assert hip is not None
     assert _distance(hip.xyz - truth.pose(pulse.pulse).markers[1], hip.covariance) < AT_CHANGES
+
+
+@pytest.mark.parametrize(("cameras", "used"), [(("K1", "K2", "K3"), True), (("K1", "K2"), False)])
+def test_what_two_images_say_of_a_ski_the_motion_controls(cameras: tuple[str, ...], used: bool) -> None:
+    """The ski lies aside in one image, by so much that three images would decide themselves."""
+    rng, truth = np.random.default_rng(SEED), true_jump(SEED)
+    measured = simulated_measurements(truth, true_cameras(), rng)
+    live = CausalFilter(true_cameras(), measured.cameras, RATE_HZ)
+    for given in measured.jumps[0].pulses[:BAD_SKI]:
+        live.update(given)
+    given = measured.jumps[0].pulses[BAD_SKI]
+    shown = {
+        name: ImageMeasurements(
+            image.points, {side: ski for side, ski in image.skis.items() if side == "left" or name in cameras}
+        )
+        for name, image in given.images.items()
+    }
+    ski = shown["K1"].skis["right"]
+    aside = {**shown["K1"].skis, "right": replace(ski, xy=ski.xy + np.array((0.0, ASIDE_PX)))}
+    state = live.update(replace(given, images={**shown, "K1": ImageMeasurements(shown["K1"].points, aside)}))
+    assert state is not None
+    right = state.skis["right"]
+    assert right is not None
+    assert ("K1" in right.cameras) == used

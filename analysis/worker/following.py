@@ -193,6 +193,11 @@ class Follower:
         self._look_at = self._pulse + _HIDDEN_S * 2 ** max(0, self._looks - 1) * self._rate_hz
         return due
 
+    def continue_from(self, other: "Follower") -> None:
+        """Go on in place of another one, who has followed the same jumper."""
+        self.first = other.first
+        self._skis.continue_from(other._skis)
+
     def knows_more_than(self, other: "Follower") -> bool:
         """Whether this is the jumper whom another one follows, after the same pulse, with more of his markers.
 

@@ -233,7 +233,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         known = len(POINTS) - follower.hidden()
         again, states = self._found_since(recording, follower.first, self._scene.system, known)
         if states and again.knows_more_than(follower):
-            again.first = follower.first
+            again.continue_from(follower)
             recording.follow(again)
 
     def _found_since(

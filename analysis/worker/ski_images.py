@@ -56,6 +56,13 @@ class SkiImages:
     def __init__(self, cameras: int) -> None:
         self._known = [_Known() for _ in range(cameras)]
 
+    def continue_from(self, other: "SkiImages") -> None:
+        """Take over what another one has learned of the same jumper, who may have had the sides exchanged."""
+        for own, known in zip(self._known, other._known, strict=True):
+            if known.widths:
+                own.widths, own.clear, own.sign = list(known.widths), list(known.clear), known.sign
+                own.ends[:] = np.nanmean(known.ends, axis=0)
+
     @staticmethod
     def places(state: SmoothedState) -> Floats:
         """Object points (4, 3) that a camera must be asked for to say what it shows: two of each ski, tail first."""

@@ -54,6 +54,9 @@ def test_what_was_seen_says_where_the_next_image_shows_the_skis() -> None:
     assert right.brighter
     assert right.near
     assert left.near
+    anew = SkiImages(1)
+    anew.continue_from(skis)
+    assert [ski.ends.tolist() for ski in anew.expected(0, state, sight)] == [right.ends.tolist(), left.ends.tolist()]
     vague = _state(2.0)  # 1.4 m turned by that are 1.5 px, and three times that more than a ski's width
     right, left = skis.expected(0, vague, sight)
     assert right.sigma == pytest.approx(_PX_PER_M * 1.4 * np.radians(2.0), rel=0.01)

@@ -44,6 +44,7 @@ def test_bindings_that_come_into_sight_later_are_found_by_seeking_anew() -> None
         recent = [c for c in made.candidates if candidates.pulse - SOUGHT < c.pulse <= candidates.pulse]
         if again.find(seeker, recent, 4 - follower.hidden()) and again.knows_more_than(follower):
             assert not follower.knows_more_than(again)
+            again.continue_from(follower)
             follower = again
     assert [left for followed, left in told if followed.pulse <= SHOWN] == [2] * (SHOWN - BEGUN)
     assert [left for _, left in told][-5:] == [0] * 5

@@ -65,7 +65,8 @@ def refined(
         discs = look.fit_discs(pulses, views.names[k], places.xy, shape)
         for t in sorted(set(places.step)):
             own = np.flatnonzero(np.array(places.step) == t)
-            window.put(t, k, _replaced(window.candidates[t].images[views.names[k]].spots, places, discs, own))
+            spots = window.candidates[t].images[views.names[k]].spots
+            window.put(t, k, _replaced(spots, places, discs, own, appearance.contrast))
             changed.add(t)
     window.renew(sorted(changed))
     return settled_again(views, window, flight, markers)
@@ -146,7 +147,7 @@ def _places(
     )
 
 
-def _replaced(spots: Spots, places: _Places, discs: Spots, own: Integers) -> Spots:
+def _replaced(spots: Spots, places: _Places, discs: Spots, own: Integers, contrast: float) -> Spots:
     """The spots of an image with those discs instead that were found; a spot that is no disc is less certain."""
     spots = spots.only(np.arange(len(spots)))
     new: list[int] = []
@@ -155,7 +156,8 @@ def _replaced(spots: Spots, places: _Places, discs: Spots, own: Integers) -> Spo
         s, radius = places.spot[i], float(places.radius[i])
         if not np.isfinite(discs.xy[i]).all():
             if s >= 0:
-                spots.covariance[s] += _away(float(spots.radius[s]), radius) ** 2 * np.eye(2)
+                light = float(spots.contrast[s]) / contrast
+                spots.covariance[s] += off_centre(float(spots.radius[s]), radius, light) ** 2 * np.eye(2)
             continue
         others = np.delete(spots.xy, s, axis=0) if s >= 0 else spots.xy
         if len(others) and np.linalg.norm(others - discs.xy[i], axis=1).min() < radius / 2:
@@ -172,10 +174,16 @@ def _replaced(spots: Spots, places: _Places, discs: Spots, own: Integers) -> Spo
     return Spots.joined([spots, discs.only(np.array(new, int))]) if new else spots
 
 
-def _away(shown: float, radius: float) -> float:
+def off_centre(shown: float, radius: float, light: float) -> float:
     """How far the centre of a disc may be from that of a spot which shows a part of it, or more than it, px.
 
     A spot of the same area as what a chord leaves of the disc is so much narrower; in a larger spot the disc may lie
-    at any border.
+    at any border. Where a disc is hardly larger than the blur, what is left of it looks as large as all of it, but its
+    light goes with its area: of a disc with a share s in sight the middle of the rest is off by (1 - s) radii, nearly.
+
+    Args:
+        shown: radius of the spot, px.
+        radius: of the disc, px.
+        light: contrast of the spot by that of whole markers.
     """
-    return max(radius - shown**2 / radius, shown - radius, 0.0)
+    return max(radius - shown**2 / radius, shown - radius, (1.0 - max(light, 0.0)) * radius, 0.0)

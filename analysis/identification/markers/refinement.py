@@ -23,6 +23,7 @@ from rig.arrays import Floats, Integers
 
 _SPREAD = 0.04  #: standard deviation of the logarithm of a marker's radius: they are made alike, cloth bends them
 _FEW = 6  #: spots of a marker that tell its size; likewise of a camera, below which those of all cameras do
+_LIT = 0.75  #: of the light of a whole marker, what three quarters of one have
 _SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
 _NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
 _SURE = 1.5  #: radii; where a prediction is less certain, a disc beside it would be another one's
@@ -74,36 +75,41 @@ def refined(
 
 def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sights: Sequence[Sight]) -> list[float]:
     """Radius of the markers, m, as each camera shows it: the median of the spots of a marker that is in full view."""
-    found: list[tuple[Floats, Integers]] = []
+    found: list[tuple[Floats, Floats, Integers]] = []
     for k, (name, sight) in enumerate(zip(views.names, sights, strict=True)):
         steps, which = np.nonzero(markers.assigned.rays[..., k] >= 0)
         spots = markers.assigned.rays[steps, which, k]
-        radius = np.array(
-            [
-                window.candidates[t].images[name].spots.radius[s]
-                for t, s in zip(steps.tolist(), spots.tolist(), strict=True)
-            ]
-        )
+        of_marker = [
+            window.candidates[t].images[name].spots.only(np.array([s]))
+            for t, s in zip(steps.tolist(), spots.tolist(), strict=True)
+        ]
+        seen = Spots.joined(of_marker)
+        radius, contrast = seen.radius, seen.contrast
         at = steps * len(POINTS) + which
         streak = _streaks(views, window, flight, k, sight, at)
         # A streak makes the spot longer, and with it the radius of the disc of the same area.
         more = (streak**2).sum(axis=1) / 12
         size = (np.sqrt(more**2 + 4 * (radius**2 / 4 + BLUR_PX**2) ** 2) - more) / 2
-        found.append((2 * np.sqrt(np.maximum(size - BLUR_PX**2, _SMALLEST_PX**2 / 4)) / _scale(sight)[at], which))
-    everywhere = _in_full_view(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
-    return [_in_full_view(*of) if len(of[0]) >= _FEW else everywhere for of in found]
+        px = 2 * np.sqrt(np.maximum(size - BLUR_PX**2, _SMALLEST_PX**2 / 4))
+        found.append((px / _scale(sight)[at], contrast, which))
+    everywhere = radius_in_full_view(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    return [radius_in_full_view(*of) if len(of[0]) >= _FEW else everywhere for of in found]
 
 
-def _in_full_view(radius: Floats, which: Integers) -> float:
-    """Radius of the markers out of those of n spots and their markers.
+def radius_in_full_view(radius: Floats, contrast: Floats, which: Integers) -> float:
+    """Radius of the markers out of those of n spots, their contrasts and their markers.
 
-    What covers a marker makes its spots smaller, perhaps in most pulses, and what is alike beside one makes them
-    larger. So it is the second largest of the markers' medians.
+    What covers a marker makes its spots smaller and fainter, perhaps in most pulses, and what is alike beside one makes
+    them larger. So it is the second largest of the medians of those markers that are about as bright as the brightest.
     """
-    medians = [np.median(radius[which == i]) for i in range(len(POINTS)) if np.count_nonzero(which == i) >= _FEW]
-    if not medians:
+    own = [which == i for i in range(len(POINTS)) if np.count_nonzero(which == i) >= _FEW]
+    if not own:
         return float(np.median(radius)) if len(radius) else np.nan
-    return float(sorted(medians)[-2:][0])
+    light = np.array([abs(np.median(contrast[of])) for of in own])
+    medians = [
+        float(np.median(radius[of])) for of, enough in zip(own, light >= _LIT * light.max(), strict=True) if enough
+    ]
+    return sorted(medians)[-2:][0]
 
 
 def _scale(sight: Sight) -> Floats:

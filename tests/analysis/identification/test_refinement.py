@@ -4,7 +4,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from analysis.candidates.markers.soft_discs import fit_soft_discs
-from analysis.identification.markers.refinement import off_centre
+from analysis.identification.markers.refinement import off_centre, radius_in_full_view
 
 _PARTS = 10  # of a pixel's side, in which a disc is drawn
 _RADIUS, _SIDE, _NOISE, _GROUND, _BRIGHT = 1.3, 20, 1.5, 45.0, 220.0
@@ -45,3 +45,12 @@ def test_what_is_left_of_a_small_marker_is_as_uncertain_as_it_is_faint() -> None
         squares.append(float(e @ np.linalg.solve(total, e)) / 2)
     assert 0.3 < np.mean(squares) < 2.0
     assert np.mean(np.array(squares) > 8) < 0.03
+
+
+def test_the_size_of_markers_is_that_of_whole_ones() -> None:
+    """Of helmet and hip alone, the hip is half behind an arm in all images, or something bright is beside it."""
+    which = np.repeat((0, 1), 10)
+    whole, bright = 1.5 * np.ones(10), 80.0 * np.ones(10)
+    covered = radius_in_full_view(np.concatenate((whole, 0.3 * whole)), np.concatenate((bright, 0.5 * bright)), which)
+    beside = radius_in_full_view(np.concatenate((whole, 1.4 * whole)), np.concatenate((bright, bright)), which)
+    assert covered == beside == 1.5

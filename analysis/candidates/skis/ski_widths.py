@@ -157,18 +157,23 @@ def _one_of_two(trace: Trace, px: float, side: int) -> Trace:
 
 
 def _resolved(traces: Sequence[Trace], i: int) -> Trace:
-    """A trace with a larger standard deviation where another one is too near to be told from it."""
+    """A trace with a larger standard deviation where another one is too near to be told from it.
+
+    Where another trace ends too early, since a ski is as long as the other, its ski may go on, and be what is seen.
+    """
     trace = traces[i]
-    near = np.zeros(len(trace.xy), bool)
+    near, taken = np.zeros(len(trace.xy), bool), np.zeros(len(trace.xy), bool)
     for other in (other for k, other in enumerate(traces) if k != i):
         along, across = _axes(other)
-        from_end = trace.xy - other.ends[0]
-        place = from_end @ along
-        near |= (np.abs(from_end @ across) < _RESOLUTION) & (place > 0) & (place < _length(other))
+        from_end, length = trace.xy - other.ends[0], _length(other)
+        beside = np.abs(from_end @ across) < _RESOLUTION
+        beyond = np.abs(from_end @ along - length / 2) - length / 2
+        near |= beside & (beyond < 0)
+        taken |= beside & (beyond >= 0) & (beyond < _length(trace) - length)
     near &= np.abs(trace.one_sided) > _FREE
-    sigma = np.where(near, np.hypot(trace.sigma, _UNRESOLVED), trace.sigma)
-    share = float((sigma[near] ** -2.0).sum() / (sigma**-2.0).sum())
-    return _off(replace(trace, sigma=sigma), share * _UNRESOLVED)
+    more = np.where(taken, _RESOLUTION, np.where(near, _UNRESOLVED, 0.0))
+    sigma = np.hypot(trace.sigma, more)
+    return _off(replace(trace, sigma=sigma), float(sigma**-2.0 @ more / (sigma**-2.0).sum()))
 
 
 def _off(trace: Trace, more: float) -> Trace:

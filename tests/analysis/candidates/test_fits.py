@@ -342,6 +342,19 @@ def test_skis_that_nearly_cover_each_other_may_lie_anywhere_within_a_pixel(apart
     assert [trace.common for trace in told_apart([one, two], 4.4, 0.02)] == pytest.approx([common] * 2, abs=0.01)
 
 
+def test_where_one_of_two_skis_ends_too_early_the_other_one_may_be_what_is_seen() -> None:
+    xy = np.column_stack((np.linspace(10, 80, 15), np.full(15, 20.0)))
+    ends, aside = np.array(((8.0, 20.0), (82.0, 20.0))), np.array((0.0, 0.8))
+    whole = Trace(xy, np.full(15, 0.05), 0.02, ends, 4.4, 120.0, np.zeros(15), np.full(15, np.nan), 0.03, 0.0, 0.02)
+    short = replace(whole, xy=xy[5:] + aside, sigma=whole.sigma[5:], ends=np.array(((32.0, 20.8), (82.0, 20.8))))
+    short = replace(short, one_sided=whole.one_sided[5:], widening=whole.widening[5:])
+    doubtful = told_apart([whole, short], 4.4, 0.02)[0]
+    assert (doubtful.sigma[:5] > 1.0).all()
+    assert doubtful.sigma[5:] == pytest.approx(0.05)
+    far = replace(short, xy=short.xy + aside, ends=short.ends + aside)
+    assert told_apart([whole, far], 4.4, 0.02)[0].sigma == pytest.approx(0.05)
+
+
 def test_skis_that_lie_apart_tell_their_width() -> None:
     rng = np.random.default_rng(23)
     clean = np.full((60, 110), 70.0)

@@ -49,7 +49,10 @@ def _off_path(views: Views, window: Window, markers: Markers, flight: Flight) ->
     for k in np.flatnonzero((count > 0) & (shown <= _AGREES)).tolist():
         counts = np.array([_met(views, window, markers, k, expected[..., k], float(offset)) for offset in offsets])
         best = int(counts.argmax())
-        chance = float(counts[np.abs(offsets - offsets[best]) > _APART_M / speed].mean())
+        wrong = np.abs(offsets - offsets[best]) > _APART_M / speed
+        if not wrong.any():  # he is too slow for times to differ
+            continue
+        chance = float(counts[wrong].mean())
         # A marker that the others show less often than not is no more often to be seen in this camera.
         usual = float(np.median(np.delete(shown, k)))
         enough = max(_AGREES * usual * float(count[k]), 2.0 * counts[-1])

@@ -9,6 +9,11 @@ import pytest
 from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, Spots
 from analysis.identification.identify import identify
+from analysis.identification.markers.markers import Markers
+from analysis.identification.markers.synchrony import lateness
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.window import Window
+from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements
 from rig.arrays import Floats
 from rig.pulse import PulseNumber
@@ -116,6 +121,26 @@ def test_a_camera_one_frame_late_is_named_where_markers_are_often_missed() -> No
     assert not _wrong_points(jumps, made)
     in_k2 = [label for jump in jumps for p in jump.pulses if "K2" in p.images for label in p.images["K2"].points]
     assert len(in_k2) > 0.75 * sum(camera == "K2" for _, camera, _ in made.spots)
+
+
+def test_who_is_too_slow_for_times_to_differ_shows_no_late_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[Views, Window, Markers, Flight]] = []
+
+    def noted(views: Views, window: Window, markers: Markers, flight: Flight) -> Floats:
+        asked.append((views, window, markers, flight))
+        return lateness(views, window, markers, flight)
+
+    monkeypatch.setattr("analysis.identification.identify.lateness", noted)
+    disturbed = Disturbed(8, 1, late_s={"K2": 1 / RATE_HZ})
+    identify(
+        scene([true_jump(8)], true_cameras(), np.random.default_rng(5), PULSES, disturbed).candidates,
+        true_cameras(),
+        RATE_HZ,
+    )
+    views, window, markers, flight = asked[0]
+    assert lateness(views, window, markers, flight).any()
+    walking = flight.motion * np.array(((1.0,), (0.03,), (1.0,)))
+    assert not lateness(views, window, markers, replace(flight, motion=walking)).any()
 
 
 @pytest.mark.parametrize("missing", ["P2", "P4"])

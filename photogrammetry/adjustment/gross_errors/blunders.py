@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,6 +26,9 @@ class Observation:
 
     kind: BlunderKind
     index: int
+
+
+_LARGE_W: Final = 3.29  #: a sound observation exceeds that with a probability of 0.001
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,15 +153,24 @@ def describe(network: Network, blunder: Blunder) -> str:
     """A gross error in words."""
     if len(blunder.candidates) == 1:
         name = name_of(network, blunder.suspect)
-        return f"{name} is suspected (w = {abs(blunder.w):.1f}), but there is no result without it; measure it again"
+        return f"{name} is suspected{_test_value(blunder)}, but there is no result without it; measure it again"
     if not blunder.locatable:
         names = "; ".join(name_of(network, candidate) for candidate in blunder.candidates)
         return (
-            f"one of these observations is wrong (w = {abs(blunder.w):.1f}), but the data cannot tell which: {names}; "
+            f"one of these observations is wrong{_test_value(blunder)}, but the data cannot tell which: {names}; "
             "measure them again or add an observation"
         )
     image = blunder.suspect.kind is BlunderKind.IMAGE
     unit = network.image_unit if image else network.length_unit
     size = ", ".join(f"{value:.3g}" for value in estimate_in_file(network, blunder))
     name = name_of(network, blunder.suspect)
-    return f"{name}: wrong by about ({size}) {unit or 'length units'} (w = {abs(blunder.w):.1f}); measure it again"
+    return f"{name}: wrong by about ({size}) {unit or 'length units'}{_test_value(blunder)}; measure it again"
+
+
+def _test_value(blunder: Blunder) -> str:
+    """The test value in brackets, if it is large.
+
+    It is scaled by the estimated sigma0. With few redundant observations the gross error itself makes sigma0 large:
+    then it is found by the a-priori sigmas, and a small test value would only seem to deny it.
+    """
+    return f" (w = {abs(blunder.w):.1f})" if abs(blunder.w) >= _LARGE_W else ""

@@ -130,8 +130,9 @@ class _Body:
 
     def __init__(self, states: Sequence[JumperState]) -> None:
         places = [[point and point.xyz for point in map(state.points.get, POINTS)] for state in states]
-        self._xyz = np.array([[np.full(3, np.nan) if xyz is None else xyz for xyz in of] for of in places], float)
-        self._xyz = self._xyz.reshape(-1, len(POINTS), 3) @ _axes(self._xyz.reshape(-1, len(POINTS), 3)).T
+        found = np.array([[np.full(3, np.nan) if xyz is None else xyz for xyz in of] for of in places], float)
+        found = found.reshape(-1, len(POINTS), 3)
+        self._xyz = found @ _axes(found).T
 
     def looks(self, pair: tuple[str, str], second: str | None = None) -> bool:
         """Whether two points look like what they are named in most of several pulses.

@@ -57,3 +57,10 @@ def enter(page: Page, panel: Panel, view: str) -> None:
     if view == "doctor":
         page.locator("#doctor-run").click()
         expect(page.locator(".finding")).to_have_count(2)
+
+
+def assert_fits_a_phone(page: Page) -> None:
+    """A phone 360 px wide scrolls down only, breaks no word, and has nothing that a finger fails to hit."""
+    scrolled, broken = page.evaluate("document.documentElement.scrollWidth"), page.evaluate(BROKEN)
+    too_small = page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+    assert (scrolled, broken, too_small) == (360, [], []), (scrolled, broken, too_small)

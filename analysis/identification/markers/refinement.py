@@ -79,12 +79,9 @@ def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sight
     for k, (name, sight) in enumerate(zip(views.names, sights, strict=True)):
         steps, which = np.nonzero(markers.assigned.rays[..., k] >= 0)
         spots = markers.assigned.rays[steps, which, k]
-        of_marker = [
-            window.candidates[t].images[name].spots.only(np.array([s]))
-            for t, s in zip(steps.tolist(), spots.tolist(), strict=True)
-        ]
-        seen = Spots.joined(of_marker)
-        radius, contrast = seen.radius, seen.contrast
+        of_image = [window.candidates[t].images[name].spots for t in steps.tolist()]
+        seen = np.array([(of.radius[s], of.contrast[s]) for of, s in zip(of_image, spots.tolist(), strict=True)])
+        radius, contrast = seen.reshape(-1, 2).T
         at = steps * len(POINTS) + which
         streak = _streaks(views, window, flight, k, sight, at)
         # A streak makes the spot longer, and with it the radius of the disc of the same area.

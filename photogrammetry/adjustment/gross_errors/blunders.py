@@ -28,7 +28,7 @@ class Observation:
     index: int
 
 
-_LARGE_W: Final = 3.29  #: a sound observation exceeds that with a probability of 0.001
+LARGE_W: Final = 3.29  #: |w| that one of 1000 sound observations exceeds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,4 +173,4 @@ def _test_value(blunder: Blunder) -> str:
     It is scaled by the estimated sigma0. With few redundant observations the gross error itself makes sigma0 large:
     then it is found by the a-priori sigmas, and a small test value would only seem to deny it.
     """
-    return f" (w = {abs(blunder.w):.1f})" if abs(blunder.w) >= _LARGE_W else ""
+    return f" (w = {abs(blunder.w):.1f})" if abs(blunder.w) >= LARGE_W else ""

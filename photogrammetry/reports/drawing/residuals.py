@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import ndtr
 
+from photogrammetry.adjustment.gross_errors.blunders import LARGE_W
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.reports.document import Drawing
 from photogrammetry.reports.drawing.svg import Colour
@@ -16,7 +17,6 @@ _STARS = 40  # length of the longest row in plain text
 _BANDS = 10
 _DOTS = 3000  # at most; more are a cloud, and slow to draw
 _NAMES = 12  # images that fit as names under a chart
-LARGE = 3.29  # |w| that one of 1000 sound observations exceeds
 _IMAGES = 24  # with more of them only the means are drawn
 _VECTOR = 17.0  # page units of a typical vector, at most
 _LONGEST = 60.0  # page units of the longest vector, at most
@@ -44,9 +44,9 @@ def histogram(a: Adjustment) -> Drawing:
     chart.curve(x, len(w) * (_BINS[1] - _BINS[0]) * np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), Colour.RED)
     chart.legend(Colour.BLUE, f"{len(w)} observations")
     chart.legend(Colour.RED, "standard normal")
-    outside, there = int(np.sum(np.abs(w) > LARGE)), 2.0 * float(ndtr(-LARGE)) * len(w)
+    outside, there = int(np.sum(np.abs(w) > LARGE_W)), 2.0 * float(ndtr(-LARGE_W)) * len(w)
     caption = (
-        f"Normalized residuals w: {outside} of {len(w)} beyond {LARGE}, {there:.1f} expected. "
+        f"Normalized residuals w: {outside} of {len(w)} beyond {LARGE_W}, {there:.1f} expected. "
         "What is beyond 5 stands in the last bar."
     )
     return Drawing(caption, chart.svg.rendered(caption), (*_text_histogram(w), caption))
@@ -133,7 +133,7 @@ def vectors_of_images(a: Adjustment) -> list[Drawing]:
     if len(a.network.images) > _IMAGES:
         return []
     drawings, residuals = [], a.image_residuals()
-    large = np.nan_to_num(np.abs(a.image_w())).max(axis=1) > LARGE
+    large = np.nan_to_num(np.abs(a.image_w())).max(axis=1) > LARGE_W
     typical = float(np.median(np.linalg.norm(residuals, axis=1)))
     for i, image in enumerate(a.network.images):
         rows = a.problem.image == i
@@ -142,7 +142,7 @@ def vectors_of_images(a: Adjustment) -> list[Drawing]:
         size = a.network.cameras[image.camera].size
         canvas = _drawn(size, a.problem.xy[rows], residuals[rows], large[rows], typical, a.network.image_unit)
         root = float(np.sqrt(np.mean(residuals[rows] ** 2)))
-        beyond = f", {int(large[rows].sum())} beyond |w| = {LARGE} (red)" if large[rows].any() else ""
+        beyond = f", {int(large[rows].sum())} beyond |w| = {LARGE_W} (red)" if large[rows].any() else ""
         caption = (
             f"Image {image.name}: {int(rows.sum())} residuals{beyond}, the bar is their scale; rms {root:.3g} "
             f"{a.network.image_unit}."

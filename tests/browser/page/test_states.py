@@ -5,7 +5,7 @@ import threading
 from datetime import UTC, datetime
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, Page, expect
 
 from rig.api.jump import LastJump, MeasuredValue
 from rig.api.recordings import Recording, RecordingOrder
@@ -113,15 +113,21 @@ def test_a_refusal_is_shown_with_what_to_do(
     expect(page.locator("#next-step")).to_have_attribute("aria-busy", "false")
 
 
-def test_a_second_tap_is_said_beside_the_button_and_a_long_press_stops(
-    panel: Panel, service: MemoryService, open_page: Open
-) -> None:
+def _begun(panel: Panel, service: MemoryService, open_page: Open) -> tuple[Page, Locator]:
+    """A page on which a recording has just been begun, and the button that began it and stops it."""
     service.arm()
     page = open_page(panel.url)
     button = page.locator("#next-step")
     expect(button).to_be_enabled()
     button.click()
     expect(button).to_have_text("Stophold to stop")
+    return page, button
+
+
+def test_a_second_tap_is_said_beside_the_button_and_a_long_press_stops(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    page, button = _begun(panel, service, open_page)
     button.click()
     expect(page.locator("#action-reason")).to_contain_text("has only just begun and goes on. Hold the button")
     assert service.state is State.RECORDING
@@ -139,12 +145,7 @@ def test_a_second_tap_is_said_beside_the_button_and_a_long_press_stops(
 def test_a_long_press_stops_at_any_time_wherever_the_button_goes_and_its_end_is_no_tap(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
-    service.arm()
-    page = open_page(panel.url)
-    button = page.locator("#next-step")
-    expect(button).to_be_enabled()
-    button.click()
-    expect(button).to_have_text("Stophold to stop")
+    page, button = _begun(panel, service, open_page)
     expect(button).to_have_text("Stop")
     button.hover()
     page.mouse.down()

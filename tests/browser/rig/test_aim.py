@@ -19,7 +19,7 @@ from service.aiming.balls import BallPlaces
 from simrig.images.view import CameraView
 from tests.analysis.scene.hill import SIZE, balls_in, training
 from tests.browser.conftest import Open
-from tests.browser.views import BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.browser.views import BROKEN, assert_fits_a_phone
 from tests.service.cameras.test_balls import survey_file, surveyed, true_pose
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService, write_recording
@@ -65,9 +65,7 @@ def test_the_bar_falls_behind_its_best_when_the_lens_is_turned_too_far(
     wait_until(lambda: share(page) == 100, "it is forgotten", 20, 0.05)
     expect(page.locator("#aim-figures [data-level=warning] dd")).to_contain_text("%")  # the snow is clipped
     expect(page.locator("#aim-image")).to_have_js_property("naturalWidth", COLUMNS[0][1])
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
-    assert page.evaluate(BROKEN) == []
-    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+    assert_fits_a_phone(page)
 
 
 def test_an_earlier_picture_of_the_camera_lies_over_the_live_one(
@@ -143,9 +141,7 @@ def test_a_camera_is_made_brighter_and_kept_so(panel: Panel, service: MemoryServ
     service.start_recording(RecordingOrder())
     expect(page.locator("#light-shorter")).to_be_disabled()
     expect(said).to_have_text("Not while a recording runs.")
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
-    assert page.evaluate(BROKEN) == []
-    assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []
+    assert_fits_a_phone(page)
 
 
 def show_hill(service: MemoryService, folder: Path) -> NDArray[np.uint8]:

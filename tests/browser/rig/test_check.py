@@ -16,7 +16,7 @@ from rig.settings.camera import CameraSettings, Region
 from service.regions import unfit
 from svev.doctor.finding import Topic, failure, passed
 from tests.browser.conftest import Open
-from tests.browser.views import BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.browser.views import BROKEN, assert_fits_a_phone
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
@@ -100,9 +100,7 @@ def test_what_is_wrong_comes_first_with_what_to_do(panel: Panel, service: Memory
     expect(page.locator("#rehearsal-figures [data-level=error] dd")).to_have_count(1)
     page.locator("#rehearsal-everything summary").click()
     expect(page.locator("#rehearsal-findings .finding").first).to_have_attribute("data-level", "error")
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
-    assert page.evaluate(BROKEN) == []
-    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+    assert_fits_a_phone(page)
 
 
 def test_the_rate_of_the_pulses_is_changed_and_kept_and_they_are_stopped_and_started(
@@ -122,9 +120,7 @@ def test_the_rate_of_the_pulses_is_changed_and_kept_and_they_are_stopped_and_sta
     save.click()
     expect(said).to_have_text("Riggfilen sier det samme.")
     assert (service.pulses_made.rate_hz, service.pulses_made.saved) == (50, True)
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
-    assert page.evaluate(BROKEN) == []
-    assert page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX) == []
+    assert_fits_a_phone(page)
     made = page.locator("#pulses-fired")
     expect(made).to_be_hidden()
     expect(page.locator("#pulses-run")).to_be_hidden()
@@ -180,6 +176,4 @@ def test_another_region_is_used_and_kept_and_calibrations_that_do_not_fit_are_sa
     service.start_recording(RecordingOrder())
     expect(width).to_be_disabled()
     expect(said).to_have_text("Ikke mens et opptak går.")
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
-    assert page.evaluate(BROKEN) == []
-    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+    assert_fits_a_phone(page)

@@ -10,8 +10,8 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from tests.support import cost, processes, reliability
 from tests.support import loopback as loopback_blocks
-from tests.support import processes, reliability
 from tests.support.leaks import Leaks, Snapshot, await_nothing_left
 from tests.support.loopback import Loopback
 
@@ -35,6 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--write-reliability", action="store_true", help="write what faults come to into docs/reliability.md"
     )
+    parser.addoption("--cost", action="store_true", help="show the CPU-seconds of tests with all that they started")
     parser.addoption("--leak-grace", type=float, default=2.0, help="seconds that what a test started has to go away")
 
 
@@ -61,7 +62,10 @@ class _ReliabilityWriter:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """With --write-reliability the table of faults is written anew."""
+    """Each test's cost is measured; with --write-reliability the table of faults is written anew."""
+    config.pluginmanager.register(cost.Meter())
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(cost.Ledger(config))
     if config.getoption("--write-reliability") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_ReliabilityWriter(config))
 

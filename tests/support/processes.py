@@ -7,7 +7,7 @@ process inherits from the test process that started it.
 import os
 import signal
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 TOKEN_VARIABLE = "SVEV_TEST_TOKEN"  # noqa: S105 - marks processes, guards nothing
@@ -20,13 +20,17 @@ _STAT_BYTES = 4096
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """One process; `started` (clock ticks since boot) tells it from a later one with the same pid."""
+    """One process; `started` (clock ticks since boot) tells it from a later one with the same pid.
+
+    `cpu_ticks` is what it and the children that it waited for have used until now.
+    """
 
     pid: int
     parent: int
     started: int
     state: str
     command: str
+    cpu_ticks: int = field(default=0, compare=False)
 
     def __str__(self) -> str:
         """For people."""
@@ -74,7 +78,8 @@ def _read(pid: int, since: int = 0) -> Process | None:
         command = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
     except OSError:
         return None
-    return Process(pid, int(fields[1]), int(fields[19]), fields[0], command or f"[{name}]")
+    cpu_ticks = sum(int(ticks) for ticks in fields[11:15])
+    return Process(pid, int(fields[1]), int(fields[19]), fields[0], command or f"[{name}]", cpu_ticks)
 
 
 def _stat(pid: int) -> str:

@@ -1,28 +1,26 @@
 """Starts child processes, speaks to them, ends them: single ones, or a table of them that are restarted by name.
 
-A child is a plain program. It inherits exactly the descriptors that its row names, and a control channel whose end
-tells it that the parent is gone. Nothing is forked, nothing is named in the file system, so nothing is left behind.
+A child is a plain program, started by the launcher. It inherits exactly the descriptors that its row names, and a
+control channel whose end tells it that the parent is gone. Nothing is named in the file system, so nothing is left
+behind.
 """
 
-import os
 import select
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import IO, Any, Final
 
 from rig.errors import ProcessDiedError
 from rig.phrase import phrase
 from rig.transport.channel import ControlChannel
+from rig.transport.launcher import start_program
 from rig.transport.message import Quit
 
 _STOP_S: Final = 8.0
-_ROOT: Final = str(Path(__file__).resolve().parents[2])
 _KILLED_S: Final = 3.0  # after SIGKILL the kernel needs a moment
 _FIRST_WAIT_S: Final = 1.0
 _LONGEST_WAIT_S: Final = 30.0
@@ -35,7 +33,7 @@ class ProcessSpec:
 
     Attributes:
         name: unique, shown in messages and in `ps`.
-        module: run as `python -m MODULE NAME CONTROL_FD`; it calls `rig.transport.child.begin` first.
+        module: run as `python -m MODULE NAME CONTROL_FD`; its function `main` calls `rig.transport.child.begin` first.
         config: first message that the child receives.
         inherit: descriptors that the child inherits under the same numbers.
         environment: variables that the child has beside ours.
@@ -68,14 +66,13 @@ class Child:
         self.started = time.monotonic()
         ours, theirs = socket.socketpair()
         with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", spec.module, spec.name, str(theirs.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=spec.output,
-                stderr=spec.output,
-                pass_fds=(*spec.inherit, theirs.fileno()),
-                env={**os.environ, "PYTHONPATH": _python_path(), **spec.environment},
-                process_group=0 if spec.own_group else None,
+            self._process = start_program(
+                spec.module,
+                (spec.name, str(theirs.fileno())),
+                (*spec.inherit, theirs.fileno()),
+                spec.environment,
+                own_group=spec.own_group,
+                output=None if spec.output is None else spec.output.fileno(),
             )
         self.control: ControlChannel[Any] = ControlChannel(ours, spec.reports)
         self.control.send(spec.config)
@@ -197,11 +194,6 @@ class ProcessTable:
         left = [name for name, child in self._children.items() if child.stop(max(0.0, deadline - time.monotonic()))]
         self._children.clear()
         return left
-
-
-def _python_path() -> str:
-    """Lets a child import the same code as this process, wherever that was started."""
-    return os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 class BackOff:

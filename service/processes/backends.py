@@ -10,6 +10,7 @@ from rig.errors import BadInputError, CameraNotFoundError
 from rig.settings.camera import Backend
 from rig.settings.model import RigSettings
 from rig.settings.trigger import IidcBroadcastTrigger, SoftwareTrigger
+from rig.transport.launcher import launcher
 from rig.transport.ring import CameraRing
 
 _Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
@@ -55,6 +56,11 @@ def _replay(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> Op
     return lambda: ReplayCamera(camera, ring, timeline())
 
 
+_PROGRAMS: Final = "service.processes.programs."
+_DRIVERS: Final[dict[Backend, str]] = {
+    "aravis": "capture.aravis.camera", "iidc": "capture.iidc.camera", "sim": "capture.sim.camera",
+    "replay": "capture.replay.camera",
+}  # fmt: skip
 _BACKENDS: Final[dict[Backend, _Opener]] = {"aravis": _aravis, "iidc": _iidc, "sim": _sim, "replay": _replay}
 
 
@@ -76,6 +82,15 @@ def check_backends(rig: RigSettings) -> None:
         from service.processes.replayed_log import check_replay  # noqa: PLC0415
 
         check_replay(rig)
+
+
+def prepare_programs(rig: RigSettings) -> None:
+    """Have the programs of a rig's processes imported in good time, so that arming does not wait for it."""
+    backends = {camera.backend for camera in rig.cameras}
+    modules = [_PROGRAMS + "recorder", _PROGRAMS + "grabber", *(_DRIVERS[backend] for backend in sorted(backends))]
+    if rig.simulation is not None and "aravis" in backends:
+        modules.insert(0, "simrig.programs.gige_camera")
+    launcher().prepare(*modules)
 
 
 def camera_opener(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:

@@ -14,6 +14,7 @@ from rig.events import Event
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.transport.recorder_commands import RecorderOptions, TellEvent
+from service.processes.backends import prepare_programs
 from service.processes.rig_processes import RigProcesses
 from service.processes.simulation import WriteTruth, hill_environment, simulated_truth
 
@@ -57,6 +58,7 @@ class RigSession:
         self._job: Future[RigProcesses | None] | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rig session")
         self.processes: RigProcesses | None = None
+        prepare_programs(rig)
 
     @property
     def busy(self) -> bool:

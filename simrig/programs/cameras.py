@@ -25,8 +25,6 @@ from simrig.world.statistics import CameraStatistics
 START_S: Final = 30.0
 _ANSWER_S: Final = 10.0
 _STOP_S: Final = 3.0
-#: Linear algebra on one thread: the cameras of a rig share the processors.
-_ENVIRONMENT: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 Wanted = TypeVar("Wanted", bound=Message)
 
@@ -42,7 +40,7 @@ class CameraProcess:
     """
 
     def __init__(self, name: str, module: str, config: Message, launch: Callable[[ProcessSpec], Child]) -> None:
-        self._spec = ProcessSpec(name, module, config, environment=_ENVIRONMENT, reports=Answer, own_group=True)
+        self._spec = ProcessSpec(name, module, config, reports=Answer, own_group=True)
         self._launch = launch
         self._child: Child | None = None
 

@@ -160,5 +160,10 @@ def of_whole_sensor(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"cameras": tuple(cameras)})
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Be a bus until told to stop."""
     sys.exit(run(FireWireBus, BusCommand, lambda first: BusProgram(first.config)))
+
+
+if __name__ == "__main__":
+    main()

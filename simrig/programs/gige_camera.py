@@ -19,6 +19,11 @@ class CameraProgram(Camera):
         return Statistics(statistics=self.statistics())
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Be one camera until told to stop."""
     watch_for_freezes()
     sys.exit(run(GigeCamera, CameraCommand, lambda first: CameraProgram(first.config)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,8 +1,11 @@
-"""Debian's Chromium without a window, and pages in it that must not complain."""
+"""Debian's Chromium without a window (its headless shell starts in half the time), and pages that must not complain."""
 
+import asyncio
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
@@ -10,6 +13,7 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, e
 
 from rig.frame import FrameStatus
 from tests.recorder.logs import ALL_OK
+from tests.support.processes import shared_from_now_on
 from tests.webpanel.conftest import client, panel, service
 from tests.webpanel.memory_service import MemoryService, write_recording
 
@@ -28,17 +32,50 @@ expect.set_options(timeout=PATIENCE_MS)
 Open = Callable[..., Page]
 
 
-@pytest.fixture
-def browser() -> Iterator[Browser]:
-    """A browser of this test's own."""
-    path = shutil.which("chromium")
+@dataclass(frozen=True, slots=True)
+class SharedBrowser:
+    """A browser, and the event loop that serves it in this thread.
+
+    Between two calls Playwright's loop counts as running, so that a test which knows nothing of the browser could not
+    run one of its own.
+    """
+
+    browser: Browser
+    loop: asyncio.AbstractEventLoop
+
+    @contextmanager
+    def in_use(self) -> Iterator[Browser]:
+        """Within, its loop counts as running."""
+        asyncio.events._set_running_loop(self.loop)
+        try:
+            yield self.browser
+        finally:
+            asyncio.events._set_running_loop(None)
+
+
+@pytest.fixture(scope="session")
+def shared_browser(run_token: str) -> Iterator[SharedBrowser]:
+    """One browser for all tests of this worker; each test has a context of its own, with its own cache and storage."""
+    path = shutil.which("chromium-headless-shell")
     if path is None:
-        pytest.skip("chromium is not installed (Debian package chromium): the page cannot be tried")
+        pytest.skip("no browser (Debian package chromium-headless-shell): the page cannot be tried")
     arguments = [*_MICROPHONE, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=arguments, timeout=PATIENCE_MS)
-        yield chromium
+    with ExitStack() as stack:
+        with shared_from_now_on(run_token):
+            playwright = stack.enter_context(sync_playwright())
+            chromium = playwright.chromium.launch(executable_path=path, args=arguments, timeout=PATIENCE_MS)
+            shared = SharedBrowser(chromium, asyncio.get_running_loop())
+        asyncio.events._set_running_loop(None)
+        yield shared
+        stack.enter_context(shared.in_use())
         chromium.close()
+
+
+@pytest.fixture
+def browser(shared_browser: SharedBrowser) -> Iterator[Browser]:
+    """The browser, for one test."""
+    with shared_browser.in_use() as chromium:
+        yield chromium
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from pathlib import PurePosixPath
 
 import pytest
 
-from tests.support.processes import TOKEN_VARIABLE, own_processes
+from tests.support.processes import TOKEN_VARIABLE, all_processes
 
 _PROPERTY = "cpu_s"
 _KEPT = "svev/cost"
@@ -25,7 +25,7 @@ def used_cpu_s() -> float:
     """CPU-seconds that this process, the children that it waited for, and all that still run have used until now."""
     times = os.times()
     token = os.environ.get(TOKEN_VARIABLE)
-    running = sum(process.cpu_ticks for process in own_processes(token)) if token else 0
+    running = sum(process.cpu_ticks for process in all_processes(token)) if token else 0
     return sum(times[:4]) + running / _OWN_TICKS_PER_S
 
 
@@ -43,7 +43,8 @@ class Meter:
         """Note what the test has cost once its fixtures are gone."""
         report = yield
         if isinstance(report, pytest.TestReport) and report.when == "teardown":
-            report.user_properties.append((_PROPERTY, used_cpu_s() - item.stash[_begun]))
+            # What a process has used is forgotten if it ends and nobody waits for it, as a browser's children may.
+            report.user_properties.append((_PROPERTY, max(0.0, used_cpu_s() - item.stash[_begun])))
         return report
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:

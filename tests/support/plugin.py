@@ -10,6 +10,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from rig.transport.launcher import end_launcher, launcher
 from tests.support import cost, processes, reliability
 from tests.support import loopback as loopback_blocks
 from tests.support.leaks import Leaks, Snapshot, await_nothing_left
@@ -84,11 +85,14 @@ def run_token(request: pytest.FixtureRequest) -> Iterator[str]:
     """Marks every process that this run starts; at its end nothing may be left (after failures: no process)."""
     token = uuid.uuid4().hex
     os.environ[processes.TOKEN_VARIABLE] = token
+    with processes.shared_from_now_on(token):
+        launcher()
     before = Snapshot.take(token)
     yield token
     grace_s: float = request.config.getoption("--leak-grace")
     whole = not request.session.testsfailed
     _complain("the test session", await_nothing_left(before, token, grace_s, _SPARE_EVENTS_SESSION, all_kinds=whole))
+    end_launcher()
     del os.environ[processes.TOKEN_VARIABLE]
 
 

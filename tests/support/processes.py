@@ -6,7 +6,8 @@ process inherits from the test process that started it.
 
 import os
 import signal
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,7 +40,30 @@ class Process:
         return f"process {self.pid} still runs: {self.command}"
 
 
+#: Processes that serve many tests, and so do not belong to the one that used them first.
+_shared: set[int] = set()
+
+
+@contextmanager
+def shared_from_now_on(token: str) -> Iterator[None]:
+    """What is started within serves many tests: with its children it counts as nobody's until it ends.
+
+    Args:
+        token: marks the processes of this run.
+    """
+    before = own_processes(token)
+    yield
+    _shared.update(process.pid for process in own_processes(token) - before)
+
+
 def own_processes(token: str) -> frozenset[Process]:
+    """All processes below this one and all that carry `token` in their environment, but for those that tests share."""
+    everyone = all_processes(token)
+    by_pid = {process.pid: process for process in everyone}
+    return frozenset(p for p in everyone if p.pid not in _shared and not _descends(p, _shared, by_pid))
+
+
+def all_processes(token: str) -> frozenset[Process]:
     """All processes below this one and all that carry `token` in their environment."""
     here = os.getpid()
     us = _read(here)
@@ -52,7 +76,7 @@ def own_processes(token: str) -> frozenset[Process]:
         for process in everyone.values()
         if process.pid != here
         and _RESOURCE_TRACKER not in process.command
-        and (_descends(process, here, everyone) or _carries(process.pid, token))
+        and (_descends(process, {here}, everyone) or _carries(process.pid, token))
     )
 
 
@@ -91,11 +115,11 @@ def _stat(pid: int) -> str:
         os.close(descriptor)
 
 
-def _descends(process: Process, ancestor: int, everyone: dict[int, Process]) -> bool:
+def _descends(process: Process, ancestors: Set[int], everyone: Mapping[int, Process]) -> bool:
     seen = set()
     current: Process | None = process
     while current is not None and current.pid not in seen:
-        if current.parent == ancestor:
+        if current.parent in ancestors:
             return True
         seen.add(current.pid)
         current = everyone.get(current.parent)

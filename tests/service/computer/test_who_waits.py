@@ -27,8 +27,10 @@ WAIT_S = 60.0
 SMALL_CHANNELS = """
 import socket, sys
 make = socket.socketpair
-def small():
-    pair = make()
+def small(*kind):
+    pair = make(*kind)
+    if kind:
+        return pair
     for end in pair:
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
     return pair

@@ -1,0 +1,128 @@
+"""The program of the launcher: imports modules and forks children that run them. It never has a second thread."""
+
+import ctypes
+import fcntl
+import gc
+import importlib
+import os
+import signal
+import socket
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from rig.transport.launcher import Import, Launch
+
+_REQUEST_BYTES: Final = 1 << 16
+_MOST_DESCRIPTORS: Final = 253  # SCM_MAX_FD of the kernel
+#: Fields of /proc/PID/stat (proc(5)), counted from the one after the program's name.
+_ARG_START, _ARG_END = 45, 46
+
+
+def main() -> None:
+    """Serve until the process that asks is gone; in each child: run its program."""
+    with socket.socket(fileno=int(sys.argv[1])) as asking:
+        for number in (signal.SIGINT, signal.SIGTSTP):  # of the terminal; whoever asks decides
+            signal.signal(number, signal.SIG_IGN)
+        _show_as(tuple(sys.orig_argv[:-1]))
+        launch = _serve(asking)
+    if launch is not None:
+        importlib.import_module(launch.module).main()
+
+
+def _serve(asking: socket.socket) -> Launch | None:
+    """Do what is asked; returns None at the end, and in each child what it shall run."""
+    decode = msgspec.json.Decoder(Launch | Import).decode
+    while True:
+        data, descriptors, _, _ = socket.recv_fds(asking, _REQUEST_BYTES, _MOST_DESCRIPTORS)
+        if not data:
+            return None
+        match decode(data):
+            case Import(modules):
+                for module in modules:
+                    _load(module)
+            case Launch() as launch:
+                pid = _fork_for_who_asks(own_group=launch.own_group) if _load(launch.module) else None
+                if pid == 0:
+                    asking.close()
+                    _become(launch, descriptors)
+                    return launch
+                for descriptor in descriptors:
+                    os.close(descriptor)
+                with suppress(OSError):  # who asked is gone: the next turn sees it
+                    asking.send(str(pid or "").encode())
+
+
+def _load(module: str) -> bool:
+    """Import a module; whether children may be forked that run it."""
+    if module not in sys.modules:
+        try:
+            importlib.import_module(module)
+        except Exception:  # noqa: BLE001 - whoever starts it otherwise sees the same error in its own output
+            return False
+        gc.collect()
+        gc.freeze()  # what is there now is shared with the children, as long as nobody writes to it
+    return len(list(Path("/proc/self/task").iterdir())) == 1
+
+
+def _fork_for_who_asks(*, own_group: bool) -> int:
+    """Fork a child whose parent is not we, but who asked: a child of a child that ends at once.
+
+    Returns:
+        Its number; 0 in the child itself, once it has its new parent.
+    """
+    told, tell = os.pipe()
+    wait, go = os.pipe()
+    if (between := os.fork()) == 0:
+        if (child := os.fork()) != 0:
+            if own_group:
+                os.setpgid(child, child)
+            os.write(tell, str(child).encode())
+            os._exit(0)
+        for descriptor in (told, tell, go):
+            os.close(descriptor)
+        os.read(wait, 1)
+        os.close(wait)
+        return 0
+    for descriptor in (tell, wait):
+        os.close(descriptor)
+    os.waitpid(between, 0)
+    pid = int(os.read(told, 32))
+    for descriptor in (told, go):
+        os.close(descriptor)
+    return pid
+
+
+def _become(launch: Launch, descriptors: list[int]) -> None:
+    """Have the place, the descriptors and the name that a program has which was started by its command line."""
+    for of_the_terminal in (signal.SIGINT, signal.SIGTSTP):
+        signal.signal(of_the_terminal, signal.SIG_DFL)
+    numbers = (1, 2, *launch.numbers)
+    above = max(*numbers, *descriptors) + 1
+    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, above) for descriptor in descriptors]
+    for descriptor, number in zip(moved, numbers, strict=True):
+        os.dup2(descriptor, number)
+    for descriptor in {*moved, *descriptors} - set(numbers):
+        os.close(descriptor)
+    os.chdir(launch.folder)
+    os.environ.clear()
+    os.environ.update(launch.environment)
+    sys.argv = [sys.argv[0], *launch.command[4:]]
+    sys.orig_argv = list(launch.command)
+    _show_as(launch.command)
+
+
+def _show_as(command: tuple[str, ...]) -> None:
+    """Let `ps` show this command line. It has the room of the one that the launcher was started with."""
+    fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    start, end = int(fields[_ARG_START]), int(fields[_ARG_END])
+    text = b"".join(word.encode() + b"\0" for word in command)[: end - start - 1]
+    if start:
+        ctypes.memmove(start, text.ljust(end - start, b"\0"), end - start)
+
+
+if __name__ == "__main__":
+    main()

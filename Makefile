@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench test check style wheel bundle install rollback uninstall lock clean setup system
+.PHONY: help demo run bench test test-long check style wheel bundle install rollback uninstall lock clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -36,12 +36,13 @@ run: setup ## the service on the simulated hill, with its panel at http://127.0.
 bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)
 
-test: setup $(NPM) ## all tests
-	@$(BIN)/pytest -n $(WORKERS) --dist worksteal $(ARGS) || { status=$$?; test $$status = 1 || exit $$status; \
-	  echo "what failed is tried once more, one test at a time, on the now quiet machine"; \
-	  $(BIN)/pytest --last-failed --last-failed-no-failures none $(ARGS); }
+test: setup $(NPM) ## all tests but the long ones
+	@tests/run $(WORKERS) "not long" $(ARGS)
 
-check: style test ## what CI does, except that it tries the wheel as well: format, lint, types, layers, tests
+test-long: setup $(NPM) ## the tests that take long by nature: soak, every fault, statistics of sigmas, packaging
+	@tests/run $(WORKERS) long $(ARGS)
+
+check: style test ## format, lint, types, layers, tests; CI tries the wheel and runs the long tests as well
 
 # `nice`, since with -j2 it runs beside the tests, whose simulated cameras keep time.
 style: setup
@@ -76,11 +77,11 @@ clean: ## remove everything that make made; keep recordings
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Set-up. Each step makes a stamp file when it is done, so that an interrupted step is repeated.
-setup: $(SVEV)
+setup: $(SVEV) ## the program in .venv, to look around: .venv/bin/svev --help
 
-# Who only installs needs neither compiler nor browser.
+# Who only looks or installs needs neither compiler nor browser nor Node.
 system:
-	@.ci/system-packages $(if $(filter-out bundle install,$(or $(MAKECMDGOALS),test)),develop,run)
+	@.ci/system-packages $(if $(filter-out setup demo run bundle install,$(MAKECMDGOALS)),develop,run)
 
 $(VENV): | system
 	@echo "setting up .venv from the distribution's Python"

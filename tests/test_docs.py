@@ -193,6 +193,7 @@ def test_examples_run(example: re.Match[str], log: Path, loopback: Loopback, tmp
         _run(example, tmp_path, LOG=str(log), ADDRESS=address, KEYS=str(public))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("example", list(_examples(serve=True)))
 def test_examples_run_beside_the_service(example: re.Match[str], service: Serving, tmp_path: Path) -> None:
     service.await_state("armed")

@@ -128,6 +128,7 @@ def test_what_cannot_be_measured_is_said_in_one_line(jump: HillLog, tmp_path: Pa
     assert not out.exists()
 
 
+@pytest.mark.long
 def test_a_worker_measures_a_replayed_log(jump: HillLog, tmp_path: Path, loopback: Loopback) -> None:
     replay = [sys.executable, "-m", "svev", "replay", str(jump.path), "--reliable", "--speed", "max"]
     address, results = loopback.endpoint(), loopback.endpoint()

@@ -1,6 +1,10 @@
 """The benchmark of gross errors: no spoilt hill ends in a wrong result, and nothing sound is taken out."""
 
+import pytest
+
 from bench.photogrammetry.gross_errors import run_gross_errors
+
+pytestmark = pytest.mark.long
 
 
 def test_no_result_is_wrong() -> None:

@@ -11,6 +11,8 @@ from bench.recording.loads import MANY
 from bench.recording.many import scenario_of
 from simrig.world.scenario import load_scenario
 
+pytestmark = pytest.mark.long
+
 
 def _may_have_a_network() -> bool:
     command = ["unshare", "--net", "true"]

@@ -49,6 +49,37 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skip(reason="needs real cameras; run with --hardware"))
 
 
+class _LeftOut:
+    """Counts the long tests that were left out, by folder, in the workers, and says so at the end."""
+
+    _COUNTS = "long tests left out"
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+        self._counts: dict[str, int] = {}
+
+    def pytest_deselected(self, items: list[pytest.Item]) -> None:
+        for item in items:
+            if item.get_closest_marker("long"):
+                folder = "/".join(item.nodeid.partition("::")[0].split("/")[:2])
+                self._counts[folder] = self._counts.get(folder, 0) + 1
+
+    def pytest_sessionfinish(self) -> None:
+        output = getattr(self._config, "workeroutput", None)
+        if output is not None:
+            output[self._COUNTS] = self._counts
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: object) -> None:
+        self._counts = getattr(node, "workeroutput", {}).get(self._COUNTS, self._counts)  # all workers collect the same
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if self._counts and "not long" in self._config.option.markexpr:
+            folders = ", ".join(f"{folder} {count}" for folder, count in sorted(self._counts.items()))
+            total = sum(self._counts.values())
+            terminalreporter.write_line(f"left out: {total} long tests, which `make test-long` runs ({folders})")
+
+
 class _ReliabilityWriter:
     """Collects the rows that tests tell, in the process that starts the workers."""
 
@@ -63,8 +94,9 @@ class _ReliabilityWriter:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Each test's cost is measured; with --write-reliability the table of faults is written anew."""
+    """Each test's cost is measured, and what is left out is said; with --write-reliability the table of faults is written anew."""
     config.pluginmanager.register(cost.Meter())
+    config.pluginmanager.register(_LeftOut(config))
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(cost.Ledger(config))
     if config.getoption("--write-reliability") and not hasattr(config, "workerinput"):

@@ -9,7 +9,9 @@ import cv2
 import pytest
 
 
-@pytest.mark.parametrize("bus", ["gige", "firewire", "sim"])
+@pytest.mark.parametrize(
+    "bus", ["gige", pytest.param("firewire", marks=pytest.mark.long), pytest.param("sim", marks=pytest.mark.long)]
+)
 def test_the_demo_records_publishes_verifies_and_shows(tmp_path: Path, bus: str) -> None:
     options = ["--seconds", "4", "--bus", bus, "--out", str(tmp_path), "--no-analyze", "--json"]
     command = [sys.executable, "-m", "svev", "demo", *options]
@@ -31,6 +33,7 @@ def test_the_demo_records_publishes_verifies_and_shows(tmp_path: Path, bus: str)
     assert [pulses[str(number)] - pulses["1"] for number in range(1, 121)] == list(range(120))
 
 
+@pytest.mark.long
 def test_the_demo_measures_the_jumper_and_shows_the_truth_beside(tmp_path: Path) -> None:
     """Six seconds hold a whole jump, whenever they begin: one comes every four seconds and is in sight for 1.3 s."""
     command = [sys.executable, "-m", "svev", "demo", "--seconds", "6", "--out", str(tmp_path), "--json"]

@@ -13,6 +13,8 @@ from tests.service.serving import serving
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
+pytestmark = pytest.mark.long
+
 
 def _svev(files: int, *arguments: str, taken: int = 0) -> "subprocess.CompletedProcess[str]":
     """A command that may have so many files open, some of which are taken already."""

@@ -10,6 +10,8 @@ from tests.support.waiting import wait_until
 from tests.systemd.booted import CHECKOUT, Booted, booted
 from tests.systemd.prefixes import units_into
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> Path:

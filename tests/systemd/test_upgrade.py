@@ -20,6 +20,8 @@ from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
 
+pytestmark = pytest.mark.long
+
 _EVERY_S = 0.05
 _INSTALL_S = 400.0
 

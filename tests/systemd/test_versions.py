@@ -16,6 +16,8 @@ import pytest
 
 from tests.systemd.prefixes import SYSTEMD
 
+pytestmark = pytest.mark.long
+
 # It runs until its standard input ends, as a service would until it is stopped.
 _CLI = """
 import sys

@@ -15,6 +15,8 @@ from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.long
+
 PULSES = 180
 #: Simulated cameras may fail where other programs keep the computer busy; three times in a row would be our fault.
 ATTEMPTS = 3

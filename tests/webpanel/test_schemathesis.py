@@ -14,6 +14,8 @@ from tests.support.rigs import write_rig
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel
 
+pytestmark = pytest.mark.long
+
 K2_LOST = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
 #: These answers have no end; they are tested on their own.
 ENDLESS = ("/api/events", "/api/preview.mjpg")

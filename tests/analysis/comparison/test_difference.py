@@ -45,6 +45,7 @@ def repeated() -> list[Difference]:
     ]
 
 
+@pytest.mark.long
 def test_the_same_jump_is_rarely_found_different(repeated: list[Difference]) -> None:
     """Of 32 comparisons 1.6 are expected; more than 6 come with a probability of 0.1 %."""
     assert sum(bool(d.found()) for d in repeated) <= 6

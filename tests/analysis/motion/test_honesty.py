@@ -13,6 +13,8 @@ from rig.arrays import Floats
 from simrig.world.jumper import Jump
 from tests.analysis.simulated import drawn, simulated_measurements, true_cameras, true_jump
 
+pytestmark = pytest.mark.long
+
 DRAWS = 5
 INDEPENDENT = 3 * DRAWS  # errors of one draw are correlated over time: its three coordinates count once
 LIMITS = chi2.ppf((0.001, 0.999), INDEPENDENT) / INDEPENDENT

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from analysis.measurements.model import POINTS, JumpMeasurements
 from analysis.motion.adjustment.lasting import LASTING_S
@@ -10,6 +11,8 @@ from analysis.motion.smoother import smooth
 from bench.analysis.smoothing import Honesty, judge
 from rig.arrays import Floats
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
+
+pytestmark = pytest.mark.long
 
 DRAWS = 4
 OFF_PX, MARKER_OFF_PX = 0.1, 0.3

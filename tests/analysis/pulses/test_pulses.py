@@ -72,6 +72,7 @@ def truth(jump: TrueJump, pulse: float) -> dict[str, float]:
     return values | dict(zip(ANGLES, angles, strict=True)) | {"height": float(pose.origin[2]), "speed": speed}
 
 
+@pytest.mark.long
 def test_normalized_errors_over_calibration_draws() -> None:
     system, rng = true_cameras(), np.random.default_rng(1)
     errors: dict[str, list[list[float]]] = {}

@@ -85,6 +85,7 @@ def test_a_log_and_a_survey_file_give_the_poses(tmp_path: Path) -> None:
     assert "camera K1: 15 of 15 surveyed balls in sight named, 21 balls measured" in scene.messages[0]
 
 
+@pytest.mark.long
 def test_errors_of_the_poses_agree_with_their_sigmas() -> None:
     squares = np.array(
         [normalized_error(oriented(survey_json(training(), seed)), training()) ** 2 for seed in range(10, 22)]

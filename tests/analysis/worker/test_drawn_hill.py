@@ -14,6 +14,8 @@ from tests.analysis.candidates.judge import scenario
 from tests.analysis.drawn_hill import DrawnHill
 from tests.analysis.worker.found import Found
 
+pytestmark = pytest.mark.long
+
 PULSES = range(75)
 LARGEST_M = 0.02  # in each coordinate
 #: Mean square of error over sigma of slopes and headings; with one width for both skis of a V it is 3.2.

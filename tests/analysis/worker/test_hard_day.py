@@ -11,6 +11,8 @@ from bench.analysis.jumps import scenario_of
 from recorder.reading.triplets import triplets
 from tests.analysis.worker.found import Found
 
+pytestmark = pytest.mark.long
+
 PULSES = range(15, 60)
 SEED = 5005  # on the table only the right binding shows, and beside it something that looks like the other one
 FAR_M = 0.2  # another marker, or another man

@@ -20,6 +20,8 @@ from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.long
+
 JUMPERS = [(str(bib), f"Jumper {bib}") for bib in range(101, 141)]
 #: Between the two taps of a double tap, ms; one of 0.5 s is slow.
 APART_MS = (60, 120, 250, 500)

@@ -136,6 +136,7 @@ def test_a_jump_from_arming_to_the_verified_file(training: Serving, open_page: O
     assert kept["counts"]["pulses"] == kept["counts"]["complete"] > 30, "one second, and what was kept before it"
 
 
+@pytest.mark.long
 def test_a_deleted_jump_comes_back(training: Serving, open_page: Open) -> None:
     page = open_page(training.url)
     page.get_by_role("textbox", name="Bib").fill("3")
@@ -163,6 +164,7 @@ def test_a_deleted_jump_comes_back(training: Serving, open_page: Open) -> None:
     assert back["session"]["bib"] == "3"
 
 
+@pytest.mark.long
 def test_two_pages_show_the_same(training: Serving, open_page: Open) -> None:
     first, second = open_page(training.url), open_page(training.url, width=360, height=780)
     arm(first)
@@ -177,6 +179,7 @@ def test_two_pages_show_the_same(training: Serving, open_page: Open) -> None:
     assert len(training.get("/api/recordings")) == 1
 
 
+@pytest.mark.long
 def test_a_dead_camera_is_named_with_what_to_do(tmp_path: Path, loopback: Loopback, open_page: Open) -> None:
     with hill_and_service(tmp_path, loopback) as (hill, service):
         page = open_page(service.url)
@@ -221,6 +224,7 @@ def test_a_lost_connection_is_said_and_comes_back(tmp_path: Path, loopback: Loop
         expect(page.locator("#next-step")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_a_whole_jump_by_keys_alone(training: Serving, open_page: Open) -> None:
     page = open_page(training.url)
     await_state(page, "Idle")

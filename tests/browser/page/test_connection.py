@@ -46,6 +46,7 @@ def await_picture(page: Page) -> str:
     return page.locator("#preview img").get_attribute("src") or ""
 
 
+@pytest.mark.long
 def test_commands_of_seven_tabs_do_not_wait(
     panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:

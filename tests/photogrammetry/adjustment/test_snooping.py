@@ -31,6 +31,7 @@ def _spoilt(network: Network, row: int, error: tuple[float, float]) -> Network:
     return replace(network, observations=replace(network.observations, xy=xy))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("seed", "row", "error"),
     [
@@ -51,6 +52,7 @@ def test_300_px_in_a_weak_network_without_start_values(seed: int, row: int, erro
     assert np.abs(outcome.removed[0].blunder.estimate - error).max() < 15.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "index", "error"), [(13, 1, 1.6), (30, 7, -2.8), (15, 8, 3.1)])
 def test_a_rod_that_leans_by_metres_is_named(seed: int, index: int, error: float) -> None:
     """Verticality 80 to 160 sigma off: a network with redundancy 15 is deformed by it, or has no optimum."""

@@ -43,6 +43,7 @@ def _flat(sigmas: Sigmas) -> Floats:
     return np.concatenate([part.ravel() for part in astuple(sigmas)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "samples"), [("hill-1", 4000), ("hill-2", 2000), ("rods", 1000), ("laboratory", 500)])
 def test_covariance_and_monte_carlo_agree(name: str, samples: int) -> None:
     """A simulated sigma scatters by 1 / sqrt(2 samples); beyond that there is no systematic difference."""

@@ -54,6 +54,7 @@ def test_exact(seed: int, n: int, planar: bool) -> None:
         assert not result.ambiguous
 
 
+@pytest.mark.long
 @settings(max_examples=120)
 @given(seeds, st.integers(8, 60), st.booleans())
 def test_with_noise_nothing_lies_below(seed: int, n: int, planar: bool) -> None:

@@ -5,10 +5,14 @@ import random
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from recorder.checking.verify import Verdict, verify
 from rig.errors import BadInputError
 from tests.recorder.logs import ALL_OK, LOST, OK, write_log
 from tests.support.reliability import FaultTable
+
+pytestmark = pytest.mark.long
 
 PULSES = (ALL_OK, (OK, LOST, OK), ALL_OK)
 #: All of it: 20 000, half a minute.

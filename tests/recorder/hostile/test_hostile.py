@@ -9,6 +9,8 @@ import pytest
 
 from tests.recorder.hostile.corpus import corpus
 
+pytestmark = pytest.mark.long
+
 REPOSITORY = Path(__file__).parents[3]
 #: A log takes the memory of its longest chunk (256 MB at most), and this program itself.
 PEAK_MB = 600

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from photogrammetry.procedures.calibrated_cameras import read_calibration
 from recorder.checking.verify import verify
@@ -23,6 +24,8 @@ from simrig.programs.simulated_hill import GigeOptions, SimulatedHill
 from tests.capture.rigs import SCENARIO
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 RATE_HZ, WIDTH, HEIGHT = 15.0, 160, 120
 #: The recorder is killed when its file has room for so many pulses; most of them are in it by then.

@@ -106,6 +106,7 @@ def test_many_ordinary_subscribers_are_welcome_again_and_again(loopback: Loopbac
         assert publisher.refused() == {}
 
 
+@pytest.mark.long
 def test_a_recording_loses_nothing_to_hostile_subscribers(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:

@@ -131,6 +131,7 @@ def test_a_recording_with_keys_in_the_rig_file(tmp_path: Path, loopback: Loopbac
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.long
 def test_whoever_publishes_to_everybody_is_warned(tmp_path: Path, loopback: Loopback) -> None:
     rig = write_rig(tmp_path, "sim", loopback)
     rig.write_text(rig.read_text().replace(f"tcp://{loopback.host}:", "tcp://0.0.0.0:"))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from analysis.result import file as result_file
 from recorder.checking.verify import verify
@@ -21,6 +22,8 @@ from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 #: A jump needs 9 s: 4 s for the static images, 4 s until it comes, 1 s to be over. The analysis is nice to all others.
 _MEASURED_S = 3 * PATIENCE_S

@@ -4,11 +4,15 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from recorder.checking.verify import verify
 from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 NAMES = ["Anna", "Berit", "Cecilie"]
 AUTOMATIC = """

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from rig.clocks import host_now
 from rig.settings.file import load_rig
 from service.processes.simulation import simulated_hill
@@ -12,6 +14,8 @@ from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
+
+pytestmark = pytest.mark.long
 
 
 @contextmanager

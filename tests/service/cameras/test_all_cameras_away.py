@@ -21,6 +21,8 @@ from tests.capture.rigs import make_rig, write_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
+pytestmark = pytest.mark.long
+
 NAMES = ("K1", "K2", "K3")
 BUSES = {"aravis": "GigE Vision", "iidc": "FireWire"}
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import httpx
 import numpy as np
+import pytest
 
 from analysis.scene.detection import detect_balls
 from analysis.scene.orientation import orient_images
@@ -24,6 +25,8 @@ from tests.analysis.scene.hill import balls_in, normalized_error, survey_json, s
 from tests.capture.rigs import guids, write_rig
 from tests.service.serving import serving
 from tests.support.loopback import Loopback
+
+pytestmark = pytest.mark.long
 
 NAMES = ("K1", "K2", "K3")
 RATE_HZ = 4.0

@@ -2,7 +2,11 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.service.cameras.firewire_matrix import committed, rows
+
+pytestmark = pytest.mark.long
 
 
 def test_each_fault_comes_to_what_the_documentation_says(tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
+pytestmark = pytest.mark.long
+
 #: After the third frame of the others: a processor that others want too.
 NOTICED_NS = NS_PER_S // 5
 #: The recording ends when so many triplets are whole again.

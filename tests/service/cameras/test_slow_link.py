@@ -13,6 +13,8 @@ from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("mbit_s", [40.0, 15.0])
 def test_frames_of_a_slow_link_are_lost_not_absent(

@@ -22,6 +22,8 @@ from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.long
+
 WAIT_S = 60.0
 #: `svev record` whose channels hold a second of reports: they would take a minute to fill.
 SMALL_CHANNELS = """

@@ -26,6 +26,8 @@ from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.long
+
 DISK = "The disk"
 AFTER = "those from then on"
 SVEV = [sys.executable, "-m", "svev"]

@@ -11,6 +11,8 @@ from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.long
+
 
 def _may_mount() -> bool:
     command = ["unshare", "--mount", "true"]

@@ -4,11 +4,15 @@ import os
 import signal
 from pathlib import Path
 
+import pytest
+
 from recorder.checking.verify import verify
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 
 def _told(service: Serving) -> list[str]:

@@ -31,6 +31,7 @@ def _json(done: "subprocess.CompletedProcess[str]") -> Any:
     return json.loads(done.stdout)
 
 
+@pytest.mark.long
 def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) -> None:
     (tmp_path / "token").write_text(TOKEN + "\n")
     rig = write_rig(tmp_path, "sim", loopback)

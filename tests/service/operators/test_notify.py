@@ -41,6 +41,7 @@ class _Heard(list[str]):
                 return self
 
 
+@pytest.mark.long
 def test_what_systemd_hears_also_of_a_stuck_recorder(tmp_path: Path, short_path: Path, loopback: Loopback) -> None:
     rig = write_rig(tmp_path, "sim", loopback)
     with _systemd(short_path) as (path, heard):

@@ -22,6 +22,8 @@ from tests.capture.rigs import write_rig
 from tests.service.serving import serving
 from tests.support.loopback import Loopback
 
+pytestmark = pytest.mark.long
+
 _TOPICS = {f"/camera/K{number}" for number in (1, 2, 3)}
 
 

@@ -3,6 +3,8 @@
 from contextlib import closing
 from pathlib import Path
 
+import pytest
+
 from rig.events import Event
 from rig.settings.file import load_rig
 from service.rehearsals import Rehearser
@@ -11,6 +13,8 @@ from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 
 def _progress(service: Serving) -> str:

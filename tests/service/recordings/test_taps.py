@@ -4,12 +4,16 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from recorder.reading.info import info
 from recorder.reading.triplets import tags
 from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 
 def _seen(service: Serving, name: str) -> tuple[int, float]:

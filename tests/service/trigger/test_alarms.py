@@ -2,10 +2,14 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.long
 
 #: Every 12 s the pulses stop for 5 s; before that K2 misses every second pulse for two seconds.
 EVERY, PAUSE, MISSED = 360, (210, 360), range(100, 160, 2)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from recorder.reading.log_reader import LogReader
 from rig.frame import FrameStatus
 from rig.settings.file import load_rig
@@ -15,6 +17,8 @@ from rig.topics import TAG
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 from tests.support.stamps import hill_pulses
+
+pytestmark = pytest.mark.long
 
 RATE_HZ = 8.0
 CYCLE_US = 125.0

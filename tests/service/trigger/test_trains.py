@@ -25,6 +25,8 @@ from tests.support.loopback import Loopback
 from tests.support.stamps import hill_pulses
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.long
+
 TRIGGER, BURST = "/api/trigger", "/api/trigger/burst"
 
 

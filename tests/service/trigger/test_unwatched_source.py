@@ -20,6 +20,8 @@ from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import write_rig
 from tests.support.loopback import Loopback
 
+pytestmark = pytest.mark.long
+
 NAMES = ("K1", "K2")
 RATE_HZ = 10.0
 LINE, GATE = 1, 2

@@ -4,10 +4,14 @@ import pickle
 import random
 from collections import Counter
 
+import pytest
+
 from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record, RecordKind
 from triggering.pairing.pairer import ClosedPulse, Pairer
+
+pytestmark = pytest.mark.long
 
 PULSES = 200_000
 PERIOD = NS_PER_S // 30

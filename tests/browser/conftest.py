@@ -4,6 +4,7 @@ import asyncio
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -53,6 +54,13 @@ class SharedBrowser:
             asyncio.events._set_running_loop(None)
 
 
+def _one_thread() -> ThreadPoolExecutor:
+    """What Playwright reads files in: a thread that is there from the beginning, so that no test leaves it behind."""
+    executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="playwright")
+    executor.submit(lambda: None).result()
+    return executor
+
+
 @pytest.fixture(scope="session")
 def shared_browser(run_token: str) -> Iterator[SharedBrowser]:
     """One browser for all tests of this worker; each test has a context of its own, with its own cache and storage."""
@@ -65,6 +73,7 @@ def shared_browser(run_token: str) -> Iterator[SharedBrowser]:
             playwright = stack.enter_context(sync_playwright())
             chromium = playwright.chromium.launch(executable_path=path, args=arguments, timeout=PATIENCE_MS)
             shared = SharedBrowser(chromium, asyncio.get_running_loop())
+            shared.loop.set_default_executor(stack.enter_context(_one_thread()))
         asyncio.events._set_running_loop(None)
         yield shared
         stack.enter_context(shared.in_use())

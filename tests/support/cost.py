@@ -77,7 +77,8 @@ class Ledger:
         """Keep it."""
         cache = getattr(self._config, "cache", None)
         if cache is not None and self._costs:
-            cache.set(_KEPT, {name: round(cost, 2) for name, cost in self._costs.items()})
+            known = cache.get(_KEPT, {})  # of runs of other tests
+            cache.set(_KEPT, known | {name: round(cost, 2) for name, cost in self._costs.items()})
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """With --cost: folders and tests, the dearest first."""

@@ -94,7 +94,7 @@ class _ReliabilityWriter:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Each test's cost is measured, and what is left out is said; with --write-reliability the table of faults is written anew."""
+    """Measure what tests cost, say what is left out, and with --write-reliability write the table of faults anew."""
     config.pluginmanager.register(cost.Meter())
     config.pluginmanager.register(_LeftOut(config))
     if not hasattr(config, "workerinput"):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.worker.findings import MeasuredJump
@@ -59,6 +60,7 @@ def knocked() -> Scenario:
     return Scenario.model_validate(scenario.model_dump() | {"cameras": cameras, "first_takeoff_s": 100.0})
 
 
+@pytest.mark.long
 def test_a_knock_is_told_once_and_the_cameras_are_oriented_anew(tmp_path: Path) -> None:
     log = write_hill_log(tmp_path / "knocked", knocked(), range(round(LAST_S * RATE_HZ)), rate_hz=RATE_HZ)
     told = Told()

@@ -22,7 +22,11 @@ BESIDE_THE_MESSAGE = """element => {
 }"""
 
 
-@pytest.mark.parametrize("size", [PHONE, ACROSS, TABLET, SMALL_LAPTOP, LAPTOP], ids="{0[0]}x{0[1]}".format)
+@pytest.mark.parametrize(
+    "size",
+    [PHONE, LAPTOP, *(pytest.param(size, marks=pytest.mark.long) for size in (ACROSS, TABLET, SMALL_LAPTOP))],
+    ids="{0[0]}x{0[1]}".format,
+)
 def test_no_word_is_broken_and_nothing_is_cut_off(
     panel: Panel, service: MemoryService, jumps: None, open_page: Open, size: tuple[int, int]
 ) -> None:

@@ -63,7 +63,7 @@ def test_a_camera_reads_out_another_region_and_the_rig_is_armed_anew(tmp_path: P
         assert (status, answer["region"], answer["exposure_us"], answer["saved"]) == (200, PART, 1500, False), answer
         unfit = "K1 was calibrated with 640 x 480 px from 0, 0, and reads out 320 x 240 px from 160, 96"
         assert answer["calibration"]["text"].endswith(unfit)
-        assert service.state() == "armed"
+        service.await_state("armed")
         service.await_cameras("ready", "ready")
         after = _recorded(service)
         assert path.read_text() == first

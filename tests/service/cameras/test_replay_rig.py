@@ -82,6 +82,7 @@ def test_what_is_recorded_from_replayed_cameras_is_the_log(tmp_path: Path, loopb
             assert np.array_equal(block, pixels), (pulse, name)
 
 
+@pytest.mark.long
 def test_a_camera_that_was_away_is_away_again(tmp_path: Path, loopback: Loopback) -> None:
     """Until its connection is up again more pulses may go by than in the log, so the pulses of its return are free."""
     faults = [{"kind": "restart", "camera": "K3", "at_pulse": pulse, "duration_s": 0.3} for pulse in range(60, 900, 60)]

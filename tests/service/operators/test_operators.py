@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from recorder.checking.verify import verify
 from rig.api.status import State
 from service.supervision.state_machine import FOLLOWS
@@ -65,6 +67,7 @@ class _Operator(threading.Thread):
             self.wrong.append(status)
 
 
+@pytest.mark.long
 def test_three_operators_do_not_tear_the_state(tmp_path: Path, loopback: Loopback) -> None:
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
         service.arm()

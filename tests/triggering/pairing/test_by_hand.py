@@ -35,6 +35,7 @@ def test_each_cause_is_right_though_the_next_pulse_comes_long_after_the_deadline
     assert done.pairer.counters[1].presumed == 0
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(st.integers(0, 2**32), st.floats(0.5, 25.0), st.sampled_from([0.0, 0.1]), st.sampled_from([0.0, 0.1]))
 def test_pulses_at_any_time_keep_the_rules(seed: int, slowest_s: float, missed: float, lost: float) -> None:

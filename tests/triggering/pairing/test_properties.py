@@ -1,5 +1,6 @@
 """Property tests: the rules of `oracle` hold under every mixture of faults."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -36,6 +37,7 @@ def test_any_faults(scenario: Scenario) -> None:
     assert run.silent or run.unplaced == []
 
 
+@pytest.mark.long
 @SETTINGS
 @given(
     st.builds(Scenario, pulses=st.just(160), hold_periods=st.just(9.0), **common),
@@ -51,6 +53,7 @@ def test_pauses_of_the_pulse_train(scenario: Scenario, pauses: dict[int, float])
     assert run.silent or run.unplaced == []
 
 
+@pytest.mark.long
 @SETTINGS
 @given(
     st.builds(Scenario, pulses=st.just(200), hold_periods=st.sampled_from([3.0, 9.0]), **common),

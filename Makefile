@@ -11,7 +11,7 @@ SHELL := /bin/bash
 # call of pytest, would compile the program anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Tests that run at a time. Four of them took two cores no less time (24 min), and 13 of 4100 missed frames or deadlines.
+# Tests that run at a time.
 WORKERS ?= 2
 
 ARGS ?=

@@ -30,7 +30,7 @@ def main() -> None:
         _show_as(tuple(sys.orig_argv[:-1]))
         launch = _serve(asking)
     if launch is not None:
-        importlib.import_module(launch.module).main()
+        sys.exit(importlib.import_module(launch.module).main())
 
 
 def _serve(asking: socket.socket) -> Launch | None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import httpx
 
+from rig.transport.launcher import Process, launcher, start_program
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -28,7 +29,7 @@ class Serving:
         log: what it writes to standard error.
     """
 
-    def __init__(self, process: "subprocess.Popen[str]", url: str, data: Path, log: Path, token: str) -> None:
+    def __init__(self, process: Process, url: str, data: Path, log: Path, token: str) -> None:
         self._process, self.url, self.data, self.log = process, url, data, log
         # A connection for each call: the service may be stopped, and another one be there, at any time.
         self._client = httpx.Client(
@@ -174,18 +175,22 @@ def serving(
     log, data = folder / "service.log", folder / "data" if data is None else data
     arguments = ["--rig", str(rig), "--host", loopback.host, "--port", str(port), "--data", str(data), *more]
     with log.open("w") as file:
-        process = subprocess.Popen(
-            [*prefix, *command, *arguments],
-            stdout=file,
-            stderr=file,
-            text=True,
-            env={**os.environ, **(environment or {})},
-        )
+        process: Process
+        if (*prefix, *command) == _COMMAND:
+            # Forked by the launcher of this worker, which imports once what a service takes a second to import.
+            launcher().prepare("svev.commands.rig.serve")
+            process = start_program(
+                "svev.cli", ("serve", *arguments), (), environment or {}, own_group=False, output=file.fileno()
+            )
+        else:
+            process = subprocess.Popen(
+                [*prefix, *command, *arguments], stdout=file, stderr=file, env={**os.environ, **(environment or {})}
+            )
     service = Serving(process, f"http://{loopback.host}:{port}", data, log, token)
     try:
         wait_until(lambda: _answers(service), "the API answers", PATIENCE_S)
         yield service
-        process.terminate()
+        process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE_S) == ends_with, log.read_text()
     finally:
         service.close()

@@ -1,0 +1,108 @@
+"""A rig whose processes are in memory: it obeys the supervisor's commands and reports what the test lets happen."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from rig.api.recordings import Counts
+from rig.clocks import UtcNs
+from rig.errors import ProcessDiedError, StorageError
+from rig.health import Health
+from rig.phrase import phrase
+from rig.settings.model import RigSettings
+from rig.transport.recorder_commands import RecorderCommand, StartRecording, StopRecording
+from rig.transport.recorder_reports import (
+    CameraNews,
+    RecorderFailed,
+    RecorderReport,
+    RecordingFinished,
+    RecordingStarted,
+)
+from service.processes.rig_processes import CameraPresence
+
+
+class ProcessesInMemory:
+    """See `service.processes.rig_processes.RigProcesses`.
+
+    Attributes:
+        fails: raised when the processes are started; set on the class by tests.
+        latest: the instance that was made last.
+    """
+
+    fails: Exception | None = None
+    latest: "ProcessesInMemory"
+
+    def __init__(self, rig: RigSettings, *_: Any, **__: Any) -> None:
+        self._count = len(rig.cameras)
+        self._connect()
+        self.recorder_died = self.still = False
+        self.health: Health | None = None
+        self.rate = None
+        self.pids: dict[str, int] = {}
+        self.restarts: dict[str, int] = {}
+        self.started = 0.0
+        self.commands: list[RecorderCommand] = []
+        self.disk_full = False
+        self._reports: list[RecorderReport] = []
+        self._dying = False
+        self._recording: Path | None = None
+        type(self).latest = self
+
+    def _connect(self) -> None:
+        self.cameras = [CameraPresence(CameraNews.CONNECTED)] * self._count
+        self.warm = self.ready = True
+
+    def __enter__(self) -> Self:
+        if self.fails is not None:
+            raise self.fails
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Nothing is left to stop."""
+
+    def tell(self, command: RecorderCommand) -> None:
+        """Obey."""
+        self.commands.append(command)
+        match command:
+            case StartRecording() if self.disk_full:
+                full = StorageError(phrase("why_full", "the disk is full: make room"))
+                self._reports.append(RecorderFailed.of(full))
+            case StartRecording():
+                self._recording = command.path
+                self._reports.append(RecordingStarted(first_pulse=UtcNs(1)))
+            case StopRecording() if self._recording is not None:
+                path, self._recording = self._recording, None
+                self._reports.append(_finished(path))
+
+    def camera(self, index: int, news: CameraNews) -> None:
+        """Let a camera come or go."""
+        self.cameras[index] = CameraPresence(news)
+
+    def die(self) -> None:
+        """Let the recorder die."""
+        self._dying = True
+
+    def turn(self, _timeout_s: float, _wake: tuple[int, ...] = ()) -> list[RecorderReport]:
+        """What has happened."""
+        reports, self._reports = self._reports, []
+        if self._dying and not reports:
+            self._dying, self.recorder_died = False, True
+            self.ready = self.warm = False
+            self.cameras = [CameraPresence()] * self._count
+            raise ProcessDiedError(phrase("why_recorder_died", "the recorder died: killed by SIGKILL"))
+        return reports
+
+    def restart_recorder(self) -> None:
+        """Start another one."""
+        self.recorder_died = False
+        self._connect()
+
+    def kill_recorder(self) -> None:
+        """End it."""
+        self.die()
+
+
+def _finished(path: Path) -> RecordingFinished:
+    return RecordingFinished(path=path, bytes=0, unpublished=0, counts=Counts(), first_pulse=None, pauses=())

@@ -211,8 +211,12 @@ def _environment() -> dict[str, str]:
 
 
 def _read_once(environment: Mapping[str, str]) -> dict[str, str]:
-    """Variables that the loader, the interpreter and libraries read when they start."""
-    return {name: value for name, value in environment.items() if name.startswith(_READ_ONCE)}
+    """Variables that the loader, the interpreter and libraries read when they start.
+
+    OpenCV, when it is imported, names its own folder in LD_LIBRARY_PATH; that changes nothing for our programs.
+    """
+    read = {name: value for name, value in environment.items() if name.startswith(_READ_ONCE)}
+    return read | {"LD_LIBRARY_PATH": ""}
 
 
 def _command(module: str) -> tuple[str, ...]:

@@ -180,7 +180,7 @@ def serving(
             # Forked by the launcher of this worker, which imports once what a service takes a second to import.
             launcher().prepare("svev.commands.rig.serve")
             process = start_program(
-                "svev.cli", ("serve", *arguments), (), environment or {}, own_group=False, output=file.fileno()
+                "svev.__main__", ("serve", *arguments), (), environment or {}, own_group=False, output=file.fileno()
             )
         else:
             process = subprocess.Popen(

@@ -38,7 +38,7 @@ def test_parent_name_arguments_and_folder_are_those_of_a_program(
     command = [sys.executable, "-P", "-m", PROGRAM, "facts"]
     assert said == {
         "parent": str(os.getpid()), "shown": repr(command), "argv": "['facts']", "folder": str(tmp_path),
-        "group": str(os.getpgrp()), "ignores Ctrl-C": "False", "threads": "1",
+        "group": str(os.getpgrp()), "ignores Ctrl-C": str(bool(more) and _ignored(signal.SIGINT)), "threads": "1",
     }  # fmt: skip
 
 
@@ -53,6 +53,11 @@ def test_it_has_the_environment_of_now_and_variables_of_its_own(
     monkeypatch.setenv("LD_BIND_NOW", "1")
     assert isinstance(plain := _start("ends", {}, tmp_path / "out"), subprocess.Popen)
     assert plain.wait(20) == 7
+
+
+def _ignored(number: signal.Signals) -> bool:
+    """Whether this process ignores a signal, as one does that a shell has put into the background."""
+    return signal.getsignal(number) is signal.SIG_IGN
 
 
 @pytest.mark.parametrize(("what", "code"), [("ends", 7), ("fails", 1), ("killed", -signal.SIGKILL)])

@@ -76,7 +76,7 @@ def shared_browser(run_token: str) -> Iterator[SharedBrowser]:
             shared.loop.set_default_executor(stack.enter_context(_one_thread()))
         asyncio.events._set_running_loop(None)
         yield shared
-        stack.enter_context(shared.in_use())
+        asyncio.events._set_running_loop(shared.loop)  # until Playwright has ended it
         chromium.close()
 
 

@@ -1,7 +1,6 @@
 """The program of the launcher: imports modules and forks children that run them. It never has a second thread."""
 
 import ctypes
-import fcntl
 import gc
 import importlib
 import os
@@ -45,7 +44,10 @@ def _serve(asking: socket.socket) -> Launch | None:
                 for module in modules:
                     _load(module)
             case Launch() as launch:
-                pid = _fork_for_who_asks(own_group=launch.own_group) if _load(launch.module) else None
+                pid = None
+                if _load(launch.module):
+                    with suppress(OSError):  # of files or processes: whoever starts it otherwise sees the same error
+                        pid = _fork_for_who_asks(own_group=launch.own_group)
                 if pid == 0:
                     asking.close()
                     _become(launch, descriptors)
@@ -101,12 +103,16 @@ def _become(launch: Launch, descriptors: list[int]) -> None:
     for of_the_terminal in (signal.SIGINT, signal.SIGTSTP):
         signal.signal(of_the_terminal, signal.SIG_DFL)
     numbers = (1, 2, *launch.numbers)
-    above = max(*numbers, *descriptors) + 1
-    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, above) for descriptor in descriptors]
+    moved = list(descriptors)
+    for place in range(len(moved)):
+        while moved[place] in numbers:  # it stands where another one belongs
+            moved[place] = os.dup(moved[place])
+    others = set(range(3, max(*descriptors, *moved) + 1)) - set(numbers)
     for descriptor, number in zip(moved, numbers, strict=True):
         os.dup2(descriptor, number)
-    for descriptor in {*moved, *descriptors} - set(numbers):
-        os.close(descriptor)
+    for descriptor in others:
+        with suppress(OSError):  # nothing is open there
+            os.close(descriptor)
     os.chdir(launch.folder)
     os.environ.clear()
     os.environ.update(launch.environment)

@@ -7,7 +7,6 @@ counted for the test that used it first.
 import os
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from pathlib import PurePosixPath
 
 import pytest
 
@@ -94,11 +93,16 @@ class Ledger:
             terminalreporter.write_line(f"{cost:8.1f} s  {name}")
 
 
+def folder_of(nodeid: str) -> str:
+    """The folder of `tests` in which a test lies, e.g. `tests/rig`."""
+    return "/".join(nodeid.partition("::")[0].split("/")[:2])
+
+
 def _by_folder(costs: Mapping[str, float]) -> Mapping[str, float]:
     folders: dict[str, float] = defaultdict(float)
     counts: dict[str, int] = defaultdict(int)
     for name, cost in costs.items():
-        folder = "/".join(PurePosixPath(name.partition("::")[0]).parts[:2])
+        folder = folder_of(name)
         folders[folder] += cost
         counts[folder] += 1
     return {f"{folder} ({counts[folder]} tests)": cost for folder, cost in folders.items()}

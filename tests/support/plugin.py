@@ -61,7 +61,7 @@ class _LeftOut:
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
         for item in items:
             if item.get_closest_marker("long"):
-                folder = "/".join(item.nodeid.partition("::")[0].split("/")[:2])
+                folder = cost.folder_of(item.nodeid)
                 self._counts[folder] = self._counts.get(folder, 0) + 1
 
     def pytest_sessionfinish(self) -> None:

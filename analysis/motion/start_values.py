@@ -8,6 +8,7 @@ import numpy as np
 from analysis.motion.model.channels import CHANNELS, START_MEAN, VECTORS, MotionFrame, ski_channels
 from analysis.motion.model.observations import Observations
 from analysis.scene.camera_system import CameraSystem
+from photogrammetry.geometry.rotation import cross
 from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.jumper.stick_model import slope_and_heading
 from rig.arrays import Flags, Floats
@@ -167,7 +168,7 @@ def _ski(observed: Observations, system: CameraSystem, frame: MotionFrame, side:
         placed = system[name]
         flat = placed.reduced(observed.xy[:, i, group])
         rays = placed.ideal().rays(flat)
-        normal = np.cross(rays[:, 0], rays[:, 1])
+        normal = cross(rays[:, 0], rays[:, 1])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         use = observed.seen[:, i, group, None] & (length > 0)
         normals[:, i] = np.where(use, normal / np.where(length > 0, length, 1.0), 0.0)

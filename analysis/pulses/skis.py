@@ -14,6 +14,7 @@ from analysis.measurements.model import SIDES, PulseMeasurements, Source
 from analysis.pulses.least_squares import Equations
 from analysis.pulses.points import nearest, rays
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from photogrammetry.geometry.rotation import cross
 from rig.arrays import Flags, Floats, Integers
 
 _LARGEST_IMAGE_TURN = 0.1  # rad, sigma of the direction of an image line: with a larger one it is a point
@@ -205,8 +206,8 @@ def skis_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Fl
 def across_axes(direction: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors (n, 3) at right angles to unit directions (n, 3) and to each other."""
     least = np.eye(3)[np.abs(direction).argmin(axis=1)]
-    one = _unit(np.cross(direction, least))
-    return one, np.cross(direction, one)
+    one = _unit(cross(direction, least))
+    return one, cross(direction, one)
 
 
 def _long(xy: Floats, weight: Floats) -> Flags:

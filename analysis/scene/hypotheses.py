@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.scene.three_points import poses_from_three_points
 from photogrammetry.geometry.ideal_camera import unit_rays
+from photogrammetry.geometry.rotation import cross
 from rig.arrays import Flags, Floats, Integers
 
 _NEAR = 0.008  # of the image's width: a projected ball so near to a detection is a hit
@@ -197,7 +198,7 @@ def spread_triples(points: Floats, most: int) -> list[Integers]:
     corners = points[triples]
     sides = corners - np.roll(corners, 1, axis=1)
     longest = (sides**2).sum(axis=2).max(axis=1)
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    area = np.linalg.norm(cross(sides[:, 0], sides[:, 1]), axis=1)
     good = area > _COLLINEAR * longest
     triples, area = triples[good], area[good]
     chosen: list[Integers] = []

@@ -7,6 +7,7 @@ thousands of hypotheses are computed, most of them wrong, so they are neither re
 import numpy as np
 from numpy.typing import NDArray
 
+from photogrammetry.geometry.rotation import cross
 from rig.arrays import Floats, Integers
 
 _Complex = NDArray[np.complex128]
@@ -102,6 +103,6 @@ def _frames(points: Floats) -> Floats:
     """Orthonormal frames (n, 3, 3), columns, of triangles (n, 3, 3)."""
     first = points[:, 1] - points[:, 0]
     first = first / np.linalg.norm(first, axis=1, keepdims=True)
-    third = np.cross(first, points[:, 2] - points[:, 0])
+    third = cross(first, points[:, 2] - points[:, 0])
     third = third / np.linalg.norm(third, axis=1, keepdims=True)
-    return np.asarray(np.stack((first, np.cross(third, first), third), axis=2))
+    return np.asarray(np.stack((first, cross(third, first), third), axis=2))

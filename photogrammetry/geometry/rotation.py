@@ -21,17 +21,23 @@ def skew(vectors: Numbers) -> Numbers:
     return matrices
 
 
+def cross(one: Floats, other: Floats) -> Floats:
+    """Cross products (..., 3): as `np.cross`, which takes several times as long for a few vectors."""
+    a, b, c = one[..., 0], one[..., 1], one[..., 2]
+    x, y, z = other[..., 0], other[..., 1], other[..., 2]
+    out = np.empty(np.broadcast_shapes(one.shape, other.shape))
+    out[..., 0], out[..., 1], out[..., 2] = b * z - c * y, c * x - a * z, a * y - b * x
+    return out
+
+
 def rotation_from_vector(vectors: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
     vectors = np.asarray(vectors, dtype=float)
-    square = np.sum(vectors * vectors, axis=-1)[..., None, None]
-    angle = np.sqrt(square)
-    small = angle < _SMALL
-    safe = np.where(small, 1.0, angle)
-    first = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
-    second = np.where(small, 0.5 - square / 24.0, 2.0 * (np.sin(safe / 2.0) / safe) ** 2)
-    cross = skew(vectors)
-    rotation: Floats = np.eye(3) + first * cross + second * (cross @ cross)
+    angle = np.sqrt(np.sum(vectors * vectors, axis=-1))[..., None, None]
+    across = skew(vectors)
+    # np.sinc(x) is sin(pi x) / (pi x), and 1 at 0.
+    rotation: Floats = np.eye(3) + np.sinc(angle / np.pi) * across
+    rotation += 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (across @ across)
     return rotation
 
 
@@ -62,11 +68,11 @@ def vector_from_rotation(rotations: Floats) -> Floats:
 def increment_jacobian(vector: Floats) -> Floats:
     """Derivative (3, 3) of log(R exp([d]x)) by d at d = 0 (inverse right Jacobian), for vector (3,) = log(R)."""
     angle = float(np.linalg.norm(vector))
-    cross = skew(vector)
+    across = skew(vector)
     second = 1.0 / 12.0
     if angle >= _SMALL:
         second = 1.0 / angle**2 - (1.0 + np.cos(angle)) / (2.0 * angle * np.sin(angle))
-    jacobian: Floats = np.eye(3) + 0.5 * cross + second * (cross @ cross)
+    jacobian: Floats = np.eye(3) + 0.5 * across + second * (across @ across)
     return jacobian
 
 

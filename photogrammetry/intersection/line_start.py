@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.geometry.rotation import cross
 from photogrammetry.intersection.image_line import ImageLines
 from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
@@ -64,7 +65,7 @@ def start_lines(cameras: Sequence[IdealCamera], lines: ImageLines) -> LineStart:
     best = np.linalg.svd(planes)[2][:, :2]
     normals = best[:, :, :3] / np.linalg.norm(best[:, :, :3], axis=2, keepdims=True)
     offsets = best[:, :, 3] / np.linalg.norm(best[:, :, :3], axis=2)
-    direction = np.cross(normals[:, 0], normals[:, 1])
+    direction = cross(normals[:, 0], normals[:, 1])
     coincident = _coincident(planes, lines) | ~(np.linalg.norm(direction, axis=1) > _COINCIDENT)
     direction[coincident] = (1.0, 0.0, 0.0)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -113,8 +114,8 @@ def _seen_points(cameras: Sequence[IdealCamera], lines: ImageLines, point: Float
     centres = np.array([camera.X0 for camera in cameras])[first]
     middle = np.nan_to_num(lines.centre)
     rays = np.stack([camera.rays(middle[:, i]) for i, camera in enumerate(cameras)], axis=1)[each, first]
-    across = np.cross(direction, rays)
+    across = cross(direction, rays)
     square = np.maximum((across**2).sum(axis=1), np.finfo(float).tiny)
-    along = np.einsum("ni,ni->n", np.cross(centres - point, rays), across) / square
+    along = np.einsum("ni,ni->n", cross(centres - point, rays), across) / square
     # a ray parallel to the line has no nearest point: stay near the cameras then
     return np.asarray(point + np.where(square > 1e-12, along, 0.0)[:, None] * direction)

@@ -15,6 +15,7 @@ import numpy as np
 from photogrammetry.adjustment.equations.unknowns import State
 from photogrammetry.geometry.camera_model import Lens, camera_coordinates, ideal_point, undistort
 from photogrammetry.geometry.ideal_camera import IdealCamera
+from photogrammetry.geometry.rotation import cross
 from photogrammetry.intersection.line_intersection import intersect_lines_in_one_step
 from photogrammetry.intersection.point_intersection import intersect_points
 from photogrammetry.jumper.stick_model import body_angles, direction_of
@@ -182,7 +183,7 @@ def _line_gradient(c: Floats, rotation: Floats, position: Floats, lines: Floats,
     zero, one = np.zeros_like(alpha), np.ones_like(alpha)
     a = camera_coordinates(rotation, position, np.stack((zero, delta, gamma), axis=-1))
     d = camera_coordinates(rotation, np.zeros(3), np.stack((one, beta, alpha), axis=-1))
-    f = np.cross(a, d)
+    f = cross(a, d)
     root = np.hypot(f[..., 0], f[..., 1])[..., None]
     x, y = xy[..., 0], xy[..., 1]
     distance = (f[..., :1] * x + f[..., 1:2] * y - (c * f[..., 2])[..., None]) / root
@@ -197,7 +198,7 @@ def _line_gradient(c: Floats, rotation: Floats, position: Floats, lines: Floats,
         axis=-1,
     )
     by_direction, by_place = (
-        np.einsum("nmij,nlmj->nli", rotation[:, 0], np.cross(*pair), optimize=True) for pair in ((by_f, a), (d, by_f))
+        np.einsum("nmij,nlmj->nli", rotation[:, 0], cross(*pair), optimize=True) for pair in ((by_f, a), (d, by_f))
     )
     return np.stack((by_direction[..., 2], by_direction[..., 1], by_place[..., 2], by_place[..., 1]), axis=-1)
 

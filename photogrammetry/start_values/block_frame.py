@@ -10,7 +10,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.geometry.rotation import cross, rotation_from_vector
 from photogrammetry.geometry.similarity import Similarity, fit_similarity
 from photogrammetry.network.model import Network, Role
 from photogrammetry.start_values.image_block import ImageBlock
@@ -18,6 +18,8 @@ from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 
 _STEPS = 30
+_SETTLED = 1e-14  # relative decrease of the square sum that ends the iteration
+_GIVEN_UP = 1e8  # damping at which no shorter step decreases it
 _ROBUST_ROUNDS = 8
 _WRONG = 6.0  # times the typical residual: a larger one calls for the robust fit
 _LENGTH = -1  # in place of an axis: the length of the vector was observed
@@ -103,7 +105,7 @@ class _Ties:
         direction = direction / np.where(norm > 0, norm, 1.0)
         computed = (direction * moved).sum(axis=1)
         shift = self.shifted[:, None] * direction
-        jacobian = np.column_stack((computed, np.cross(moved, direction), shift))
+        jacobian = np.column_stack((computed, cross(moved, direction), shift))
         residuals = computed + shift @ transform.translation - self.values
         return residuals * self.weights, jacobian * self.weights[:, None]
 
@@ -195,10 +197,13 @@ def _improved(ties: _Ties, transform: Similarity) -> tuple[Similarity, float]:
             transform.translation + step[4:],
         )
         new_residuals, new_jacobian = ties.linearised(candidate)
-        if new_residuals @ new_residuals < residuals @ residuals:
+        before, after = residuals @ residuals, new_residuals @ new_residuals
+        if after < before:
             transform, residuals, jacobian, damping = candidate, new_residuals, new_jacobian, damping / 10
-        else:
-            damping *= 10
+            if after > (1 - _SETTLED) * before:
+                break
+        elif (damping := damping * 10) > _GIVEN_UP:
+            break
     return transform, float(residuals @ residuals)
 
 

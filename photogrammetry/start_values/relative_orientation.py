@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogrammetry.geometry.ideal_camera import IdealCamera
-from photogrammetry.geometry.rotation import rotation_from_vector, skew
+from photogrammetry.geometry.rotation import cross, rotation_from_vector, skew
 from photogrammetry.start_values.essential_matrix import essential_matrices, orientations_of
 from rig.arrays import Flags, Floats
 from rig.errors import BadInputError
@@ -175,7 +175,7 @@ def _vectors(xy: Floats, c: float) -> Floats:
 
 def _linear_bases(rotations: Floats, u: Floats, v: Floats) -> Floats:
     """For each rotation the base (k, 3) nearest to all epipolar planes."""
-    normals = np.cross(u, v @ rotations.transpose(0, 2, 1))
+    normals = cross(u, v @ rotations.transpose(0, 2, 1))
     normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
     return np.asarray(np.linalg.eigh(normals.transpose(0, 2, 1) @ normals)[1][:, :, 0])
 
@@ -202,9 +202,9 @@ def _conditions(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> tuple
 def _across(bases: Floats) -> Floats:
     """Two unit vectors (k, 3, 2) at right angles to each base."""
     helper = np.eye(3)[np.abs(bases).argmin(axis=1)]
-    first = np.cross(bases, helper)
+    first = cross(bases, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack((first, np.cross(bases, first)), axis=2)
+    return np.stack((first, cross(bases, first)), axis=2)
 
 
 def _iterate(rotations: Floats, bases: Floats, u: Floats, v: Floats, steps: int) -> _Minima:
@@ -284,4 +284,4 @@ def _share_in_front(rotation: Floats, base: Floats, u: Floats, v: Floats) -> flo
 def _parallax(rotation: Floats, u: Floats, v: Floats) -> float:
     a, b = u / np.linalg.norm(u, axis=1, keepdims=True), v @ rotation.T
     b = b / np.linalg.norm(b, axis=1, keepdims=True)
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)).mean())
+    return float(np.arctan2(np.linalg.norm(cross(a, b), axis=1), (a * b).sum(axis=1)).mean())

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogrammetry.geometry.ideal_camera import IdealCamera, unit_rays
-from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.geometry.rotation import cross, rotation_from_vector
 from photogrammetry.geometry.similarity import fit_similarity
 from rig.arrays import Floats
 from rig.errors import BadInputError
@@ -115,7 +115,7 @@ def _triples(points: Floats) -> list[list[int]]:
         a = int(np.linalg.norm(there - there.mean(axis=0), axis=1).argmax())
         away = there - there[a]
         b = int(np.linalg.norm(away, axis=1).argmax())
-        heights = np.linalg.norm(np.cross(away, away[b]), axis=1)
+        heights = np.linalg.norm(cross(away, away[b]), axis=1)
         third = int(heights.argmax())
         if not heights[third] > _COLLINEAR * float(away[b] @ away[b]):
             break
@@ -255,6 +255,6 @@ def _linearised(camera: IdealCamera, points: Floats, xy: Floats) -> tuple[Floats
     by_k = np.zeros((len(k), 2, 3))
     by_k[:, 0, 0] = by_k[:, 1, 1] = -camera.c / k[:, 2]
     by_k[:, :, 2] = -image / k[:, 2:]
-    by_turn = np.cross(by_k, k[:, None, :])
+    by_turn = cross(by_k, k[:, None, :])
     jacobian = np.concatenate((-by_k @ camera.R.T, by_turn), axis=2)
     return (xy - image).ravel(), jacobian.reshape(-1, 6)

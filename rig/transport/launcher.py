@@ -41,6 +41,7 @@ class Launch(msgspec.Struct, frozen=True, tag=True):
         command: the command line, as if it had been started by it.
         numbers: of the descriptors that the child inherits.
         own_group: whether it leads a process group of its own.
+        launches: whether it will start programs: then it has a launcher from the beginning, forked with it.
         folder: its working directory.
         environment: its environment variables.
     """
@@ -49,6 +50,7 @@ class Launch(msgspec.Struct, frozen=True, tag=True):
     command: tuple[str, ...]
     numbers: tuple[int, ...]
     own_group: bool
+    launches: bool
     folder: str
     environment: dict[str, str]
 
@@ -128,19 +130,29 @@ class Launched:
 
 
 class Launcher:
-    """The launcher process, as who asks sees it."""
+    """The launcher process, as who asks sees it.
 
-    def __init__(self) -> None:
+    Args:
+        asking: our end of the connection to it.
+        process: it.
+    """
+
+    def __init__(self, asking: socket.socket, process: Process) -> None:
         self._loaded_with = _read_once(_environment())
         self._lock = threading.Lock()
-        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket, self._process = asking, process
         self._socket.settimeout(_ANSWER_S)
+
+    @classmethod
+    def start(cls) -> "Launcher":
+        """Start one by its command line."""
+        ours, theirs = connection()
         with theirs:
-            self._process = subprocess.Popen(
-                [*_command(_PROGRAM), str(theirs.fileno()), _ROOM],
-                stdin=subprocess.DEVNULL,
-                pass_fds=(theirs.fileno(),),
-                env=_environment(),
+            command = [*_command(_PROGRAM), str(theirs.fileno()), _ROOM]
+            descriptors = (theirs.fileno(),)
+            return cls(
+                ours,
+                subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=descriptors, env=_environment()),
             )
 
     @property
@@ -195,6 +207,11 @@ class Launcher:
             return b""
 
 
+def connection() -> tuple[socket.socket, socket.socket]:
+    """The two ends of a connection between who asks and its launcher."""
+    return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+
+
 @contextmanager
 def _adopting() -> Iterator[None]:
     """Within, a process below this one whose parent ends becomes a child of ours, as what the launcher forks does."""
@@ -241,8 +258,16 @@ def launcher() -> Launcher:
         elif not _the_launcher.runs:
             _the_launcher.end()
             _the_launcher = None
-        _the_launcher = _the_launcher or Launcher()
+        _the_launcher = _the_launcher or Launcher.start()
         return _the_launcher
+
+
+def take_over(forked: Launcher) -> None:
+    """Have a launcher that was forked with this process, before anything was asked of one."""
+    global _the_launcher  # noqa: PLW0603 - see above
+    with _the_lock:
+        atexit.register(end_launcher)
+        _the_launcher = forked
 
 
 def end_launcher() -> None:
@@ -261,7 +286,8 @@ def start_program(
     more: Mapping[str, str],
     *,
     own_group: bool,
-    output: int | None,
+    output: int | tuple[int, int] | None,
+    launches: bool = False,
 ) -> Process:
     """Start a program, a module with a function `main`: `python -m MODULE ARGUMENTS`.
 
@@ -271,15 +297,17 @@ def start_program(
         inherit: descriptors that it has under the same numbers.
         more: variables that it has beside ours.
         own_group: put it into a process group of its own.
-        output: descriptor of its standard output and error; None: ours.
+        output: descriptor of its standard output and error, or those of both; None: ours.
+        launches: it will start programs itself, soon after its start.
     """
     command, environment = (*_command(module), *arguments), {**_environment(), **more}
-    launch = Launch(module, command, inherit, own_group, str(Path.cwd()), environment)
-    return launcher().launch(launch, (1, 2) if output is None else (output, output)) or subprocess.Popen(
+    launch = Launch(module, command, inherit, own_group, launches, str(Path.cwd()), environment)
+    out, err = output if isinstance(output, tuple) else (output, output)
+    return launcher().launch(launch, (1 if out is None else out, 2 if err is None else err)) or subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
-        stdout=output,
-        stderr=output,
+        stdout=out,
+        stderr=err,
         pass_fds=inherit,
         env=environment,
         process_group=0 if own_group else None,

@@ -13,7 +13,7 @@ from typing import Final
 
 import msgspec
 
-from rig.transport.launcher import Import, Launch
+from rig.transport.launcher import Import, Launch, Launched, Launcher, connection, take_over
 
 _REQUEST_BYTES: Final = 1 << 16
 _MOST_DESCRIPTORS: Final = 253  # SCM_MAX_FD of the kernel
@@ -23,13 +23,34 @@ _ARG_START, _ARG_END = 45, 46
 
 def main() -> None:
     """Serve until the process that asks is gone; in each child: run its program."""
-    with socket.socket(fileno=int(sys.argv[1])) as asking:
+    asking: socket.socket | None = socket.socket(fileno=int(sys.argv[1]))
+    command, launch = tuple(sys.orig_argv[:-1]), None
+    while asking is not None:
         for number in (signal.SIGINT, signal.SIGTSTP):  # of the terminal; whoever asks decides
             signal.signal(number, signal.SIG_IGN)
-        _show_as(tuple(sys.orig_argv[:-1]))
-        launch = _serve(asking)
+        _show_as(command)
+        with asking:
+            launch = _serve(asking)
+        asking = _fork_launcher(launch) if launch is not None and launch.launches else None
     if launch is not None:
         sys.exit(importlib.import_module(launch.module).main())
+
+
+def _fork_launcher(launch: Launch) -> socket.socket | None:
+    """Fork a launcher for the program that this process is about to run.
+
+    Returns:
+        In the launcher: its end of the connection to the program; in the program nothing.
+    """
+    ours, theirs = connection()
+    if (pid := os.fork()) != 0:
+        theirs.close()
+        take_over(Launcher(ours, Launched(pid)))
+        return None
+    ours.close()
+    for descriptor in launch.numbers:
+        os.close(descriptor)
+    return theirs
 
 
 def _serve(asking: socket.socket) -> Launch | None:
@@ -49,7 +70,7 @@ def _serve(asking: socket.socket) -> Launch | None:
                     with suppress(OSError):  # of files or processes: whoever starts it otherwise sees the same error
                         pid = _fork_for_who_asks(own_group=launch.own_group)
                 if pid == 0:
-                    asking.close()
+                    asking.close()  # its number may be one of those that the program has
                     _become(launch, descriptors)
                     return launch
                 for descriptor in descriptors:

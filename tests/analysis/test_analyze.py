@@ -16,6 +16,7 @@ from analysis.measurements.file import read_measurements
 from analysis.procedure.analyze import analyze
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from tests.analysis.simulated import training
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 #: The jumper is in sight from hill pulse 23 to 60.
@@ -29,8 +30,7 @@ def jump(tmp_path_factory: pytest.TempPathFactory) -> HillLog:
 
 
 def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "svev", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=170, check=False)
+    done = run_svev(*map(str, arguments), timeout_s=170)
     assert done.returncode == code, done.stderr
     return done
 

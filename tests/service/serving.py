@@ -11,7 +11,8 @@ from typing import Any
 
 import httpx
 
-from rig.transport.launcher import Process, launcher, start_program
+from rig.transport.launcher import Process
+from tests.support.commands import launch_svev
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -177,11 +178,7 @@ def serving(
     with log.open("w") as file:
         process: Process
         if (*prefix, *command) == _COMMAND:
-            # Forked by the launcher of this worker, which imports once what a service takes a second to import.
-            launcher().prepare("svev.commands.rig.serve")
-            process = start_program(
-                "svev.__main__", ("serve", *arguments), (), environment or {}, own_group=False, output=file.fileno()
-            )
+            process = launch_svev("serve", *arguments, environment=environment, output=file.fileno())
         else:
             process = subprocess.Popen(
                 [*prefix, *command, *arguments], stdout=file, stderr=file, env={**os.environ, **(environment or {})}

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,6 +10,7 @@ import pytest
 from rig.settings.file import CONFIG
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.simrig.gige.raw_client import CCP, GvcpClient
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 _CURRENT_CONFIGURATION, _PERSISTENT_ADDRESS, _PERSISTENT_BIT = 0x0014, 0x064C, 1
@@ -18,8 +18,7 @@ _CONTROL = 2
 
 
 def _cameras(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "svev", "cameras", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return run_svev("cameras", *arguments)
 
 
 def _answer(*arguments: str) -> Any:

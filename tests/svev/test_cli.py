@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 
 from rig.settings.file import rig_schema
 from svev import cli
+from tests.support.commands import run_svev
 
 
 def _commands() -> list[str]:
@@ -19,8 +20,7 @@ def _commands() -> list[str]:
 
 
 def _run(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "svev", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return run_svev(*arguments)
 
 
 @pytest.mark.parametrize("command", _commands())

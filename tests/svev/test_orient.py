@@ -13,6 +13,7 @@ from photogrammetry.network.file_writer import network_to_json, write_network
 from photogrammetry.network.model import Network, Role
 from svev.cli import main
 from tests.photogrammetry.synthetic import hill
+from tests.support.repeats import repeats
 
 Run = Callable[..., tuple[int, dict[str, Any]]]
 
@@ -149,7 +150,7 @@ def test_no_reference_points_is_not_solvable(run: Run, capsys: pytest.CaptureFix
     assert "datum" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", repeats((1, 4, 11, *range(2, 4), *range(5, 11), 0), quick=3))
 def test_absurd_numbers_end_in_one_of_four_ways(seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     data = network_to_json(hill(1, helmets=5).network)

@@ -12,6 +12,7 @@ from scipy.special import chdtri
 
 from analysis.candidates.model import PulseCandidates, Spots
 from analysis.identification.space.views import Views, gate
+from photogrammetry.geometry.rotation import cross
 from photogrammetry.intersection.point_intersection import intersect_points
 from rig.arrays import Flags, Floats, Integers
 
@@ -212,7 +213,7 @@ def _epipolar_pairs(views: Views, pulses: Sequence[Sequence[Rays]]) -> tuple[Int
             if not len(vectors[i]) or not len(vectors[j]):
                 continue
             base = views.ideal[j].X0 - views.ideal[i].X0
-            across_j, across_i = np.cross(vectors[j], base), np.cross(base, vectors[i])
+            across_j, across_i = cross(vectors[j], base), cross(base, vectors[i])
             closure = vectors[i] @ across_j.T
             by_i = ((across_j @ views.ideal[i].R[:, :2]) ** 2).sum(axis=1)
             by_j = ((across_i @ views.ideal[j].R[:, :2]) ** 2).sum(axis=1)

@@ -12,6 +12,7 @@ from analysis.procedure.jump import compute_jump
 from analysis.pulses.solution import solve_pulses
 from rig.arrays import Flags
 from tests.analysis.simulated import drawn, simulated_measurements, true_cameras, true_jump
+from tests.support.repeats import repeats
 
 SEED, RATE_HZ = 11, 100.0
 HIDDEN_S, SHADOW_S = -0.03, -0.1  # since the take-off: P4 is half hidden until, the ski not seen from, until
@@ -97,7 +98,7 @@ def _beside(image: ImageMeasurements, camera: str, since: float) -> ImageMeasure
     return ImageMeasurements(points, image.skis)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", repeats(range(3)))
 def test_what_is_beside_a_marker_for_a_while_neither_bends_the_motion_nor_is_it_a_point(seed: int) -> None:
     rng, truth = np.random.default_rng(seed), true_jump(seed, RENDERED_HZ)
     measured = simulated_measurements(truth, true_cameras(), rng)

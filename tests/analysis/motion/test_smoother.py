@@ -10,6 +10,7 @@ from analysis.motion.smoother import Motion, smooth
 from analysis.result.model import QUANTITIES, Phase, SmoothedState, Status
 from rig.arrays import Floats
 from tests.analysis.simulated import TrueJump, drawn, simulated_measurements, true_cameras, true_jump
+from tests.support.repeats import repeats
 
 SEED = 11
 LARGEST = 4.5  # sigmas, of some thousand correlated errors of one jump; 6e-6 of single ones are larger
@@ -149,7 +150,7 @@ def test_a_wrong_identification_is_left_out() -> None:
     assert _distance(point.xyz - truth.pose(jump.pulses[20].pulse).markers[0], point.covariance) < LARGEST
 
 
-@pytest.mark.parametrize(("camera", "seconds"), [("K2", 1 / 30), ("K1", 0.008), ("K3", -0.008)])
+@pytest.mark.parametrize(("camera", "seconds"), repeats([("K2", 1 / 30), ("K1", 0.008), ("K3", -0.008)]))
 def test_a_camera_that_is_late_is_named(camera: str, seconds: float) -> None:
     truth, jump, motion = _motion(SEED + 1, {camera: seconds})
     named = {name: offset for name, offset in motion.offsets.items() if offset.message}

@@ -35,6 +35,7 @@ from tests.analysis.scene.hill import (
     without_balls,
 )
 from tests.recorder.logs import LOST, OK, START, acquire, make_tag, open_writer
+from tests.support.repeats import repeats
 
 
 def _check(scene: Scene, scenario: Scenario, size: tuple[int, int] = SIZE) -> None:
@@ -125,7 +126,7 @@ def _other_hill(seed: int) -> Scenario:
     return scenario.model_copy(update={"seed": seed, "cameras": tuple(cameras), "balls": balls, "image": image})
 
 
-@pytest.mark.parametrize("seed", [5, 6, 7])
+@pytest.mark.parametrize("seed", repeats([5, 6, 7]))
 def test_other_hills_and_cameras_are_oriented_too(seed: int) -> None:
     scenario = _other_hill(seed)
     scene = orient_images(hill_images(scenario), survey_of(survey_json(scenario, seed)))

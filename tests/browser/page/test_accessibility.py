@@ -9,11 +9,12 @@ from playwright.sync_api import Page, expect
 from rig.api.status import State
 from tests.browser.conftest import Open
 from tests.browser.views import AXE, READY, SMALLEST_TOUCH_PX, TOO_SMALL, enter
+from tests.support.repeats import repeats
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
 
 
-@pytest.mark.parametrize("locale", ["en-GB", "nb-NO"])
+@pytest.mark.parametrize("locale", repeats(["nb-NO", "en-GB"]))
 def test_a_narrow_phone_scrolls_down_only_and_takes_gloves(
     panel: Panel, service: MemoryService, jumps: None, open_page: Open, locale: str
 ) -> None:
@@ -37,8 +38,8 @@ def _grave(page: Page) -> list[str]:
 @pytest.mark.parametrize(
     ("look", "width"),
     [
-        ("light", 1280),
         ("outdoor", 360),
+        pytest.param("light", 1280, marks=pytest.mark.long),
         pytest.param("light", 360, marks=pytest.mark.long),
         pytest.param("dark", 360, marks=pytest.mark.long),
         pytest.param("dark", 1280, marks=pytest.mark.long),

@@ -9,6 +9,7 @@ from playwright.sync_api import TimeoutError as NotInTimeError
 from rig.api.status import State
 from tests.browser.conftest import Open
 from tests.browser.views import BROKEN, READY, enter
+from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
@@ -24,7 +25,7 @@ BESIDE_THE_MESSAGE = """element => {
 
 @pytest.mark.parametrize(
     "size",
-    [PHONE, LAPTOP, *(pytest.param(size, marks=pytest.mark.long) for size in (ACROSS, TABLET, SMALL_LAPTOP))],
+    repeats([[PHONE], [LAPTOP], [ACROSS], [TABLET], [SMALL_LAPTOP]]),
     ids="{0[0]}x{0[1]}".format,
 )
 def test_no_word_is_broken_and_nothing_is_cut_off(
@@ -58,7 +59,7 @@ def in_sight(page: Page, element: Locator) -> bool:
     return found
 
 
-@pytest.mark.parametrize("size", [ACROSS, SMALL_LAPTOP, LAPTOP], ids="{0[0]}x{0[1]}".format)
+@pytest.mark.parametrize("size", repeats([[ACROSS], [SMALL_LAPTOP], [LAPTOP]]), ids="{0[0]}x{0[1]}".format)
 def test_the_slider_of_a_jump_is_in_sight_also_with_one_camera_large(
     panel: Panel, jumps: None, open_page: Open, size: tuple[int, int]
 ) -> None:
@@ -71,7 +72,7 @@ def test_the_slider_of_a_jump_is_in_sight_also_with_one_camera_large(
     assert all(in_sight(page, element) for element in needed)
 
 
-@pytest.mark.parametrize("size", [PHONE, SMALL_LAPTOP, LAPTOP], ids="{0[0]}x{0[1]}".format)
+@pytest.mark.parametrize("size", repeats([[PHONE], [SMALL_LAPTOP], [LAPTOP]]), ids="{0[0]}x{0[1]}".format)
 def test_messages_cover_neither_the_next_jumper_nor_the_buttons(
     panel: Panel, service: MemoryService, open_page: Open, size: tuple[int, int]
 ) -> None:

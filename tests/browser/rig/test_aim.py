@@ -21,6 +21,7 @@ from tests.analysis.scene.hill import SIZE, balls_in, training
 from tests.browser.conftest import Open
 from tests.browser.views import BROKEN, assert_fits_a_phone
 from tests.service.cameras.test_balls import survey_file, surveyed, true_pose
+from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import COLUMNS, SHAPE, MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused
@@ -172,7 +173,7 @@ def circles(page: Page) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-@pytest.mark.parametrize(("width", "look"), [(360, "dark"), (1280, "light")])
+@pytest.mark.parametrize(("width", "look"), repeats([(360, "dark"), (1280, "light")]))
 def test_circles_lie_on_the_balls_of_the_simulated_hill(
     panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path, width: int, look: str
 ) -> None:

@@ -17,6 +17,7 @@ from simrig.gige.protocol.gvsp import FrameFormat, PacketTable
 from tests.capture.aravis.camera import OneCamera, one_camera
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
+from tests.support.repeats import repeats
 
 _AHEAD = 12  # block ids that are forged at a time: those of frames under way, and of the next ones
 _PAUSE_S = 0.002
@@ -95,7 +96,9 @@ _RATES = {"off": 30.0, "auto": 70.0}
 
 
 @pytest.mark.parametrize("packet_socket", _RATES)
-@pytest.mark.parametrize("from_the_camera", [False, True], ids=["another address", "another port of the camera"])
+@pytest.mark.parametrize(
+    "from_the_camera", repeats([False, True]), ids=["another address", "another port of the camera"]
+)
 def test_what_the_camera_did_not_send_costs_nothing(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, packet_socket: str, from_the_camera: bool
 ) -> None:

@@ -9,14 +9,15 @@ import pytest
 from photogrammetry.adjustment.equations.problem import build_problem
 from photogrammetry.adjustment.solution.adjustment import adjust_once, refine
 from tests.photogrammetry.synthetic import Synthetic, hill, lab_frame, rods, with_noise, with_state
+from tests.support.repeats import repeats
 
 _RUNS = 200
 
 
 @pytest.mark.parametrize(
     "case",
-    [lambda: lab_frame(5, points=16, noise=0.0), lambda: hill(1, noise=0.0), lambda: rods(1, noise=0.0)],
-    ids=["lab", "hill", "rods"],
+    repeats([lambda: hill(1, noise=0.0), lambda: lab_frame(5, points=16, noise=0.0), lambda: rods(1, noise=0.0)]),
+    ids=["hill", "lab", "rods"],
 )
 def test_scatter_equals_covariance(case: Callable[[], Synthetic]) -> None:
     """Standardised errors have mean square one: its sigma is below sqrt(2 / runs) = 0.1 for a single unknown."""

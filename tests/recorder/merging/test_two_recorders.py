@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from rig.topics import CALIBRATION_ATTACHMENT
 from simrig.images import stamp
 from simrig.programs.simulated_hill import GigeOptions, SimulatedHill
 from tests.capture.rigs import SCENARIO
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -123,8 +124,7 @@ def _bytes(folder: Path) -> int:
 
 
 def _svev(*arguments: object, code: int = 0) -> "subprocess.CompletedProcess[str]":
-    command: Sequence[str] = [sys.executable, "-m", "svev", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = run_svev(*map(str, arguments), timeout_s=120)
     assert done.returncode == code, done.stderr
     return done
 

@@ -93,15 +93,24 @@ def test_a_slow_flood_of_topics_is_refused_as_well(loopback: Loopback) -> None:
         wait_until(too_many, "one of them is refused", WAIT_S)
 
 
+def _is_served(publisher: Publisher, subscriber: "zmq.Socket[bytes]") -> bool:
+    """Whether something that was published has come; who leaves before that may look as if he spoke no ZeroMQ."""
+    publisher.event(Event.now(Level.INFO, "test", plain("hello")))
+    return bool(subscriber.poll(0))
+
+
 def test_many_ordinary_subscribers_are_welcome_again_and_again(loopback: Loopback) -> None:
     with closing(Publisher(loopback.endpoint())) as publisher:
         for _ in range(5):
             with ExitStack() as stack:
                 context = stack.enter_context(zmq.Context())
-                for sub in [stack.enter_context(context.socket(zmq.SUB)) for _ in range(20)]:
-                    sub.subscribe(b"triplet")
+                waiting = [stack.enter_context(context.socket(zmq.SUB)) for _ in range(20)]
+                for sub in waiting:
+                    sub.subscribe(b"")
                     sub.connect(publisher.address)
-                assert publisher.wait_for_subscriber(WAIT_S)
+                wait_until(
+                    lambda subs=waiting: all(_is_served(publisher, sub) for sub in subs), "all are there", WAIT_S
+                )
             wait_until(lambda: not publisher.wait_for_subscriber(0.0), "all are gone", WAIT_S)
         assert publisher.refused() == {}
 

@@ -2,7 +2,6 @@
 
 import os
 import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from svev import cli
 from tests.capture.rigs import make_rig, write_rig
 from tests.recorder.logs import acquire
 from tests.service.serving import serving
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -113,8 +113,7 @@ def test_an_address_that_others_reach_is_warned_of(address: str, exposed: bool, 
 
 
 def _record(rig: Path, out: Path) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "1", "--out", str(out)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    return run_svev("record", "--rig", str(rig), "--seconds", "1", "--out", str(out), timeout_s=90)
 
 
 def test_a_recording_with_keys_in_the_rig_file(tmp_path: Path, loopback: Loopback) -> None:

@@ -11,6 +11,7 @@ from rig.settings.file import CONFIG
 from service.automatic.motion import MotionDetector
 from simrig.images.view import CameraView
 from simrig.world.scenario import load_scenario
+from tests.support.repeats import repeats
 
 RATE_HZ, EVERY = 30.0, 3  # ten images a second, as the service looks
 SHARE = 0.004
@@ -28,7 +29,7 @@ def found(folder: Path, base: str, camera: int, seconds: float, more: str = "") 
             yield pulse / RATE_HZ
 
 
-@pytest.mark.parametrize(("base", "camera"), [("training", 0), ("training", 2), ("hard", 0)])
+@pytest.mark.parametrize(("base", "camera"), repeats([("training", 0), ("training", 2), ("hard", 0)], quick=2))
 def test_every_jump_is_found_and_nothing_between(tmp_path: Path, base: str, camera: int) -> None:
     every_s, jumps = 4.0, 5
     times = list(found(tmp_path, base, camera, (jumps + 1) * every_s))
@@ -42,7 +43,7 @@ WEATHER = {
 }
 
 
-@pytest.mark.parametrize("weather", WEATHER)
+@pytest.mark.parametrize("weather", repeats(WEATHER))
 def test_snow_light_trees_and_spectators_begin_nothing(tmp_path: Path, weather: str) -> None:
     assert list(found(tmp_path, "hard", 0, 25.0, WEATHER[weather])) == []
 

@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import make_rig, write_rig
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
@@ -95,8 +94,7 @@ def test_a_recording_in_which_all_cameras_froze_is_never_called_clean(
         for name in NAMES
     ]
     rig = write_rig(tmp_path, backend, loopback, faults=faults)
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "8", "--out", str(tmp_path)]
-    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=90, check=False)
+    done = run_svev("record", "--rig", str(rig), "--seconds", "8", "--out", str(tmp_path), "--json", timeout_s=90)
     assert done.returncode == 5, done.stderr
     assert "no pulses for" in done.stderr.splitlines()[-1]
     assert "look at the trigger" in done.stderr

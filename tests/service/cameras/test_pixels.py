@@ -1,8 +1,6 @@
 """Rigs of cameras that differ in size and send 10 or 12 bits, or colours: recorded, published, read, exported."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,6 +23,7 @@ from rig.settings.file import load_rig
 from simrig.images import stamp
 from tests.capture.rigs import write_rig
 from tests.service.serving import serving
+from tests.support.commands import Command, start_svev
 from tests.support.loopback import Loopback
 
 SIZES = [(320, 240), (200, 160), (48, 300)]
@@ -41,13 +40,11 @@ def _rig(folder: Path, backend: str, loopback: Loopback, formats: Sequence[str],
     return path
 
 
-def _start(rig: Path, out: Path, seconds: int) -> "subprocess.Popen[str]":
-    length = ["--seconds", str(seconds), "--out", str(out)]
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), *length, "--json"]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def _start(rig: Path, out: Path, seconds: int) -> Command:
+    return start_svev("record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out), "--json")
 
 
-def _log(process: "subprocess.Popen[str]") -> Path:
+def _log(process: Command) -> Path:
     out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     result = json.loads(out)
@@ -59,8 +56,9 @@ def _log(process: "subprocess.Popen[str]") -> Path:
     ("backend", "formats", "seconds"),
     [
         ("aravis", ("Mono12Packed", "Mono12p", "Mono12"), 1),
-        ("iidc", ("Mono10",) * 3, 2),  # one process is all of its cameras: at half the rate
-        ("sim", ("BayerRG8",) * 3, 1),
+        # One process is all of its cameras: at half the rate.
+        pytest.param("iidc", ("Mono10",) * 3, 2, marks=pytest.mark.long),
+        pytest.param("sim", ("BayerRG8",) * 3, 1, marks=pytest.mark.long),
     ],
     ids=["mono16", "firewire", "bayer"],
 )

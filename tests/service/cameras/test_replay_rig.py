@@ -1,7 +1,6 @@
 """A rig of replayed cameras, as a user runs it: what is recorded from it is what stands in the log that it replays."""
 
 import json
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,14 +26,15 @@ from simrig.images import stamp
 from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, DAMAGED, OK, SHAPE, write_log
 from tests.service.serving import serving
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 SVEV = [sys.executable, "-m", "svev"]
 
 
 def _record(rig: Path, out: Path, seconds: float) -> dict[str, Any]:
-    command = [*SVEV, "record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    length = ("--seconds", str(seconds))
+    done = run_svev("record", "--rig", str(rig), *length, "--out", str(out), "--json", timeout_s=90)
     assert done.returncode == 0, done.stderr
     result: dict[str, Any] = json.loads(done.stdout)
     assert not verify(Path(result["log"])).damaged

@@ -2,14 +2,13 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from recorder.checking.verify import verify
 from tests.capture.rigs import write_rig
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
 
@@ -26,8 +25,7 @@ def test_frames_of_a_slow_link_are_lost_not_absent(
         for pulse in range(240, 3000, 240)
     ]
     rig = write_rig(tmp_path, "aravis", loopback, faults=faults)
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "10", "--out", str(tmp_path)]
-    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=90, check=False)
+    done = run_svev("record", "--rig", str(rig), "--seconds", "10", "--out", str(tmp_path), "--json", timeout_s=90)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert result["pulses"] == 300

@@ -15,15 +15,15 @@ from recorder.checking.verify import verify
 from recorder.reading.info import info
 from tests.capture.rigs import write_rig
 from tests.service.serving import serving
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 TOKEN = "a-token-for-the-tests-only"  # noqa: S105
 
 
 def _ctl(url: str, *arguments: str, token: str = "") -> "subprocess.CompletedProcess[str]":
-    environment = {**os.environ, "SVEV_URL": url, "SVEV_TOKEN": token}
-    command = [sys.executable, "-m", "svev", "ctl", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
+    environment = {"SVEV_URL": url, "SVEV_TOKEN": token}
+    return run_svev("ctl", *arguments, timeout_s=120, environment=environment)
 
 
 def _json(done: "subprocess.CompletedProcess[str]") -> Any:

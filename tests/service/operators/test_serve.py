@@ -20,6 +20,7 @@ from tests.recorder.catalogue.bad_files import GOOD, write_bad_files
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
+from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
 
 
@@ -65,7 +66,7 @@ def test_a_recording_of_a_given_length_ends_by_itself(tmp_path: Path, loopback: 
     assert 30 <= found["counts"]["pulses"] <= 33
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", repeats([signal.SIGTERM, signal.SIGINT]))
 def test_a_signal_while_recording_finishes_the_file(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, number: signal.Signals
 ) -> None:

@@ -16,6 +16,7 @@ from svev.cli import main
 from tests.capture.rigs import write_rig
 from tests.photogrammetry.synthetic import lab_frame
 from tests.service.serving import PATIENCE_S, serving
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 CAMERA: dict[str, Any] = dict.fromkeys(
@@ -32,8 +33,7 @@ def _calibrated_rig(folder: Path, loopback: Loopback) -> Path:
 
 
 def _svev(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "svev", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    return run_svev(*arguments, timeout_s=PATIENCE_S)
 
 
 def _calibration(log: Path) -> tuple[bytes, dict[str, CameraCalibration]]:

@@ -1,8 +1,6 @@
 """Logs with a topic for each camera, from real processes to everybody who uses triplets."""
 
 import json
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from rig.settings.file import load_rig
 from rig.tag import TripletTag
 from tests.capture.rigs import write_rig
 from tests.service.serving import serving
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 pytestmark = pytest.mark.long
@@ -35,8 +34,7 @@ def _rig(folder: Path, backend: str, loopback: Loopback, log: Path | None = None
 
 
 def _record(rig: Path, out: Path) -> Path:
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "2", "--out", str(out), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = run_svev("record", "--rig", str(rig), "--seconds", "2", "--out", str(out), "--json", timeout_s=120)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert result["pulses"] == result["complete"] >= 59, done.stderr

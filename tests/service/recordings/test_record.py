@@ -23,23 +23,23 @@ from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.settings.file import load_rig
 from tests.capture.rigs import write_rig
+from tests.support.commands import Command, start_svev
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
+from tests.support.repeats import repeats
 from tests.support.stamps import hill_pulses
 from tests.support.waiting import wait_until
 
 PROCESSES = "Processes"
-SVEV = [sys.executable, "-m", "svev"]
 
 
-def _record(rig: Path, out: Path, seconds: float, *more: str) -> "subprocess.Popen[str]":
-    command = [*SVEV, "record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out), "--json", *more]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def _record(rig: Path, out: Path, seconds: float, *more: str) -> Command:
+    return start_svev("record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out), "--json", *more)
 
 
-def _result(process: "subprocess.Popen[str]", timeout_s: float = 60) -> tuple[int, dict[str, Any], str]:
+def _result(process: Command, timeout_s: float = 60) -> tuple[int, dict[str, Any], str]:
     out, err = process.communicate(timeout=timeout_s)
-    return process.returncode, json.loads(out) if out else {}, err
+    return process.wait(), json.loads(out) if out else {}, err
 
 
 def _children(pid: int) -> dict[str, int]:
@@ -63,7 +63,7 @@ def _recording(out: Path) -> Callable[[], bool]:
     return lambda: any(log.stat().st_size > 5_000_000 for log in out.glob("*.mcap"))
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis", "iidc", "mixed"])
+@pytest.mark.parametrize("backend", repeats(["aravis", "sim", "iidc", "mixed"]))
 def test_every_pulse_is_recorded_whole_and_unmixed(tmp_path: Path, loopback: Loopback, backend: str) -> None:
     path = write_rig(tmp_path, backend, loopback)
     code, result, err = _result(_record(path, tmp_path / "logs", 2))
@@ -88,7 +88,7 @@ def _true_pulses(log: Path) -> dict[int, int]:
     return {int(pulse): hill for pulse, hill in truth["hill_pulse_of_recording"].items()}
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis", "iidc"])
+@pytest.mark.parametrize("backend", repeats(["aravis", "sim", "iidc"]))
 def test_the_truth_is_found_without_stamps_beside_pauses_and_missed_pulses(
     tmp_path: Path, loopback: Loopback, backend: str
 ) -> None:
@@ -150,7 +150,7 @@ BEFALLEN = {
 }
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis"])
+@pytest.mark.parametrize("backend", repeats(["aravis", "sim"]))
 def test_each_fault_is_recorded_with_its_cause(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str
 ) -> None:
@@ -197,7 +197,7 @@ def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback, 
     fault_table.tell(PROCESSES, "Ctrl-C during `svev record`", lost=0, said='"stopped_early": true', code=code)
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis"])
+@pytest.mark.parametrize("backend", repeats(["sim", "aravis"]))
 def test_a_killed_grabber_costs_its_own_frames_only(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str
 ) -> None:

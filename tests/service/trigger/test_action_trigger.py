@@ -1,8 +1,6 @@
 """`svev record` with pulses that are GigE Vision action commands: real processes, real Aravis, real packets."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 from mcap.reader import make_reader
@@ -14,6 +12,7 @@ from rig.transport import wire
 from service.status.measurements import measurements
 from tests.capture.rigs import write_rig
 from tests.service.trigger.armed import armed
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.stamps import hill_pulses
 
@@ -24,9 +23,8 @@ def test_scheduled_commands_by_broadcast_are_recorded_unmixed_and_their_answers_
     path = write_rig(tmp_path, "aravis", loopback, source="action", rate_hz=8.0)
     keys = 'source = "action"\nscheduled = true\nlead_ms = 50\nbroadcast = ["127.255.255.255"]'
     path.write_text(path.read_text().replace('source = "action"', keys))
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(path), "--seconds", "2"]
-    command += ["--out", str(tmp_path / "logs"), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    out = str(tmp_path / "logs")
+    done = run_svev("record", "--rig", str(path), "--seconds", "2", "--out", out, "--json", timeout_s=90)
     assert done.returncode in {0, 5}, done.stderr  # 5: the busy machine did not send a command in time
     result = json.loads(done.stdout)
     assert result["alarms"] == []

@@ -1,8 +1,6 @@
 """`svev record` with one command for all FireWire cameras: real libdc1394 on an emulated bus."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ from rig.settings.file import load_rig
 from rig.tag import TripletTag
 from rig.topics import TAG
 from tests.capture.rigs import write_rig
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.stamps import hill_pulses
 
@@ -25,8 +24,8 @@ CYCLE_US = 125.0
 
 
 def _record(rig: Path, out: Path, seconds: float) -> tuple[int, dict[str, Any], str]:
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out)]
-    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=90, check=False)
+    length = ("--seconds", str(seconds))
+    done = run_svev("record", "--rig", str(rig), *length, "--out", str(out), "--json", timeout_s=90)
     return done.returncode, json.loads(done.stdout) if done.stdout else {}, done.stderr
 
 

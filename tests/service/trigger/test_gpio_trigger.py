@@ -30,6 +30,7 @@ from tests.capture.rigs import write_rig
 from tests.service.serving import serving
 from tests.service.trigger.armed import armed
 from tests.support.loopback import Loopback
+from tests.support.repeats import repeats
 from triggering.sources.gpio.pulser import LATEST
 
 RATE_HZ = 10.0
@@ -62,7 +63,7 @@ def _record(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("backend", ["sim", "aravis"])
+@pytest.mark.parametrize("backend", repeats(["aravis", "sim"]))
 def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_camera_saw(
     tmp_path: Path, loopback: Loopback, chip: GpioChip, backend: str
 ) -> None:

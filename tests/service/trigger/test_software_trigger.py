@@ -4,7 +4,6 @@ import json
 import shutil
 import socket
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +13,9 @@ import pytest
 
 from rig.settings.file import load_rig
 from tests.capture.rigs import write_rig
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
+from tests.support.repeats import repeats
 from tests.support.stamps import hill_pulses
 
 _GVCP_PORT = 3956
@@ -22,12 +23,12 @@ FAKE_CAMERA = shutil.which("arv-fake-gv-camera-0.8")
 
 
 def _record(rig: Path, out: Path, seconds: float) -> tuple[int, dict[str, Any], str]:
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", str(seconds), "--out", str(out)]
-    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=90, check=False)
+    length = ("--seconds", str(seconds))
+    done = run_svev("record", "--rig", str(rig), *length, "--out", str(out), "--json", timeout_s=90)
     return done.returncode, json.loads(done.stdout) if done.stdout else {}, done.stderr
 
 
-@pytest.mark.parametrize("backend", ["aravis", "mixed"])
+@pytest.mark.parametrize("backend", repeats(["aravis", "mixed"]))
 def test_three_cameras_are_recorded_unmixed_and_their_spread_is_told(
     tmp_path: Path, loopback: Loopback, backend: str
 ) -> None:

@@ -1,11 +1,10 @@
 """`svev record` with a trigger box: svev starts it, and it tells of the pulses that reach no camera."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 from rig.settings.file import CONFIG
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 
@@ -21,10 +20,8 @@ def test_pulses_that_the_box_fired_and_no_camera_saw_are_in_the_log(tmp_path: Pa
         f'[simulation]\nscenario = "{scenario}"\n'
         '[[cameras]]\nname = "K1"\nbackend = "sim"\n[[cameras]]\nname = "K2"\nbackend = "sim"\n'
     )
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "3", "--json"]
-    done = subprocess.run(
-        [*command, "--out", str(tmp_path / "logs")], capture_output=True, text=True, timeout=120, check=False
-    )
+    out = str(tmp_path / "logs")
+    done = run_svev("record", "--rig", str(rig), "--seconds", "3", "--json", "--out", out, timeout_s=120)
     assert done.returncode == 5, done.stderr
     result = json.loads(done.stdout)
     assert result["pauses"] == []

@@ -1,7 +1,5 @@
 """A rig is not armed while pulses come at another rate than its file names."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from service.processes.rig_processes import CameraPresence, RigProcesses
 from service.supervision.watching import why_not_armed
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import SCENARIO, make_rig, write_rig
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from triggering.timeline.steady_rate import SteadyRate
 
@@ -63,11 +62,9 @@ def test_a_recording_does_not_begin_at_another_rate(tmp_path: Path, loopback: Lo
     path = write_rig(tmp_path, "aravis", loopback, rate_hz=30.0, names=("K1",))
     text = path.read_text().replace('[simulation]\nscenario = "scenario.toml"\n', "")
     path.write_text(text)
-    command = [sys.executable, "-m", "svev", "record", "--rig", str(path), "--seconds", "1"]
+    out = str(tmp_path / "logs")
     with SimulatedHill(SCENARIO, {"K1": loopback.cameras(1)[0]}, 36.0, epoch=host_now(), test_pattern=True):
-        done = subprocess.run(
-            [*command, "--out", str(tmp_path / "logs")], capture_output=True, text=True, timeout=90, check=False
-        )
+        done = run_svev("record", "--rig", str(path), "--seconds", "1", "--out", out, timeout_s=90)
     assert done.returncode == 2, done.stderr
     assert "not armed: pulses come at 36.0 Hz, the rig file says rate_hz = 30: set the generator right" in done.stderr
     assert not list(tmp_path.glob("logs/*.mcap"))

@@ -6,6 +6,7 @@ from simrig.world.jumper import JumpSeries
 from simrig.world.scenario import Scenario
 from tests.simrig.images.measuring import centroid
 from tests.simrig.images.scenes import RATE_HZ, Renderer, with_keys
+from tests.support.repeats import repeats
 
 MARKERS = ("P1", "P2", "P3", "P4")
 
@@ -15,7 +16,7 @@ def hidden(calm: Scenario) -> Scenario:
     return with_keys(calm, jumper={"occlusion": True})
 
 
-@pytest.mark.parametrize("camera", [0, 1, 2])
+@pytest.mark.parametrize("camera", repeats([0, 1, 2]))
 def test_what_is_said_to_be_in_sight_is_what_is_drawn(hidden: Scenario, camera: int) -> None:
     """A marker's light is the difference between the images with it and with a marker as dark as its patch."""
     dark = with_keys(hidden, jumper={"marker": hidden.jumper.patch})

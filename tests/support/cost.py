@@ -31,10 +31,13 @@ def used_cpu_s() -> float:
 class Meter:
     """Measures each test, in the process that runs it."""
 
+    def __init__(self) -> None:
+        self._used_s: float | None = None  # when the last test had ended
+
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         """Look at the clock before the test's fixtures are made."""
-        item.stash[_begun] = used_cpu_s()
+        item.stash[_begun] = used_cpu_s() if self._used_s is None else self._used_s
         return (yield)
 
     @pytest.hookimpl(wrapper=True)
@@ -43,7 +46,8 @@ class Meter:
         report = yield
         if isinstance(report, pytest.TestReport) and report.when == "teardown":
             # What a process has used is forgotten if it ends and nobody waits for it, as a browser's children may.
-            report.user_properties.append((_PROPERTY, max(0.0, used_cpu_s() - item.stash[_begun])))
+            self._used_s = used_cpu_s()
+            report.user_properties.append((_PROPERTY, max(0.0, self._used_s - item.stash[_begun])))
         return report
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:

@@ -1,5 +1,6 @@
 """The fixtures of all rooms' tests, as a pytest plugin (so that they can be tested themselves)."""
 
+import gc
 import os
 import shutil
 import tempfile
@@ -101,6 +102,12 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(cost.Ledger(config))
     if config.getoption("--write-reliability") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_ReliabilityWriter(config))
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector leave alone what stays until the end: the modules, and thousands of tests."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)

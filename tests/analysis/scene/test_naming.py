@@ -120,9 +120,8 @@ def test_an_approximate_pose_that_is_elsewhere_names_nothing() -> None:
         name_balls(sight.camera, sight.spots, sight.known, far)
 
 
-@pytest.mark.parametrize(
-    "seed", repeats(range(3))
-)  # each compares 10^5 poses with chance; one in 10^3 draws may be believed
+# Each compares 10^5 poses with chance; one in 10^3 draws may be believed.
+@pytest.mark.parametrize("seed", repeats(range(3)))
 def test_spots_that_are_no_balls_are_never_named(seed: int) -> None:
     sight = _sight(seed)
     rng = np.random.default_rng(100 + seed)

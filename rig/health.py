@@ -80,6 +80,10 @@ class CameraPairing(CameraCounters, kw_only=True):
     clock_uncertainty_us: float | None
     latency_ms: Annotated[float, Meta(description="from the trigger to the frame in memory")]
     clock_set: Annotated[bool, Meta(description="the device clock was set in the last ten seconds")] = False
+    doubted: Annotated[
+        int,
+        Meta(description="frames not used since its numbers, times and arrivals contradict each other; 0: they agree"),
+    ] = 0
     exposure_subtracted_us: Annotated[
         float, Meta(description="the camera notes the end of so long an exposure; 0: its beginning, or it is not known")
     ] = 0.0

@@ -37,6 +37,13 @@ class Case:
         rate_hz: what the rig file says.
         steps_ms: by how much device clocks are set, in turns; `math.inf`: by one period, `-math.inf`: back by one.
         every_s: time between two steps, reboots, suspensions or pauses.
+        slips_ms: by how much the times of frames are off from then on, in turns, while the clock that is read goes on.
+        at_miss: the camera whose clock is set, or whose times slip, misses the pulse.
+        together: all clocks are set, or slip, at once.
+        spikes_ms: by how much the time of a single frame is off, in turns; then it goes on as before.
+        stalls_ms: for how long the computer takes no frames; then it takes all at once.
+        skipped_ids: by how much the numbers of frames go on without any frame, in turns.
+        tick_ppm: how much faster a camera's clock runs than it should, beside `drift_ppm`: its rate was read wrongly.
         doubled: probability of a second pulse, `double_ms` later; half of them hide the first from some cameras.
     """
 
@@ -44,6 +51,13 @@ class Case:
     rates_hz: tuple[float, ...] = (30.0,)
     rate_hz: float = 30.0
     steps_ms: tuple[float, ...] = ()
+    slips_ms: tuple[float, ...] = ()
+    at_miss: bool = False
+    together: bool = False
+    spikes_ms: tuple[float, ...] = ()
+    stalls_ms: tuple[float, ...] = ()
+    skipped_ids: tuple[int, ...] = ()
+    tick_ppm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     every_s: float = 20.0
     reboots: bool = False
     suspended: bool = False
@@ -93,6 +107,8 @@ class _Camera:
     case: Case
     rng: random.Random
     offset: int = 0
+    slip: int = 0
+    spike: int = 0
     next_id: int = 1
     busy_until: float = -math.inf
     away_until: float = -math.inf
@@ -103,7 +119,8 @@ class _Camera:
         """The clock at a true time."""
         phase = 2 * math.pi * time / (_WANDER_S * NS_PER_S) + self.number
         wander = self.case.wander_ppm * 1e-6 * _WANDER_S * NS_PER_S / (2 * math.pi) * math.sin(phase)
-        return DeviceNs(self.offset + round(time * (1 + self.case.drift_ppm[self.number] * 1e-6) + wander))
+        ppm = self.case.drift_ppm[self.number] + self.case.tick_ppm[self.number]
+        return DeviceNs(self.offset + round(time * (1 + ppm * 1e-6) + wander))
 
 
 class Hill:
@@ -124,7 +141,7 @@ class Hill:
         self._times: dict[int, float] = {}  # true time of the pulses that may still be decided
         self._decided: set[int] = set()
         self._suspensions: list[tuple[float, float]] = []
-        self._slept = 0.0
+        self._slept = self._stalled_until = 0.0
         self._next_trouble = max(_QUIET_S, case.every_s) * NS_PER_S
         self._troubles = self._count = 0
         self._held: dict[int, int] = {}
@@ -169,16 +186,26 @@ class Hill:
             return
         self._next_trouble = time + case.every_s * NS_PER_S
         camera = self._cameras[self._troubles % 3]
-        if case.steps_ms:
-            step = case.steps_ms[self._troubles // 3 % len(case.steps_ms)] * MS
-            period = NS_PER_S / case.rates_hz[0]
-            camera.offset += round(math.copysign(period, step) if math.isinf(step) else step)
+        for each in self._cameras if case.together else [camera]:
+            each.offset += round(self._turn(case.steps_ms) * MS)
+            each.slip += round(self._turn(case.slips_ms) * MS)
+            each.spike = round(self._turn(case.spikes_ms) * MS)
+            each.next_id = (each.next_id - 1 + round(self._turn(case.skipped_ids))) % 65535 + 1
+            if case.at_miss:
+                each.busy_until = time + MS
+        if case.stalls_ms:
+            self._stalled_until = time + self._turn(case.stalls_ms) * MS
         if case.reboots:
             camera.offset -= camera.device(time + _BOOT_S * NS_PER_S)
             camera.next_id, camera.away_until = 1, time + _BOOT_S * NS_PER_S
         if case.suspended:
             self._suspensions.append((time, _SUSPENDED_S * NS_PER_S))
         self._troubles += 1
+
+    def _turn(self, values: tuple[float, ...]) -> float:
+        """The value whose turn it is; infinite: one period, ms."""
+        value = values[self._troubles // 3 % len(values)] if values else 0.0
+        return math.copysign(1000 / self._case.rates_hz[0], value) if math.isinf(value) else value
 
     def _expose(self, pulse: int, time: float) -> None:
         case, rng, came = self._case, self._rng, 0
@@ -201,9 +228,10 @@ class Hill:
 
     def _send(self, camera: _Camera, pulse: int, number: int, time: float) -> None:
         case, rng = self._case, self._rng
-        arrival = max(camera.last_arrival, time + rng.uniform(*case.latency_ms) * MS)
+        arrival = max(camera.last_arrival, time + rng.uniform(*case.latency_ms) * MS, self._stalled_until)
         camera.last_arrival = arrival
-        device = camera.device(time + rng.random() * case.jitter_ms * MS)
+        device = DeviceNs(camera.device(time + rng.random() * case.jitter_ms * MS) + camera.slip + camera.spike)
+        camera.spike = 0
         record = Record(RecordKind.FRAME, 1, self._host(arrival), pulse, number, 65535, device)
         self._count += 1
         heapq.heappush(self._arrivals, (arrival, self._count, camera.number, record))

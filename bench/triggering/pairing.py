@@ -30,6 +30,19 @@ CASES: Final = (
     Case("double pulses, 5 ms apart", doubled=0.02, double_ms=5.0),
     Case("cameras restart unannounced", reboots=True),
     Case("the computer is suspended", suspended=True),
+    *(
+        Case(f"times slip {words}{', at a missed pulse' * missed}", slips_ms=slips, at_miss=missed, every_s=15.0)
+        for words, slips in (("one period back", (-math.inf,)), ("one period on", (math.inf,)), ("by 2 ms", (2.0,)))
+        for missed in (False, True)
+    ),
+    *(Case(f"clocks step by {ms:g} ms", steps_ms=(ms, -ms)) for ms in (0.8, 2.0, 5.0)),
+    Case("clocks step back at a missed pulse", steps_ms=(-math.inf,), at_miss=True),
+    Case("all clocks step together", steps_ms=(math.inf, -math.inf, 2.0), together=True),
+    Case("single times are off", spikes_ms=(-math.inf, math.inf, -5.0, 16.0)),
+    Case("the computer stands still for 0.3 s", stalls_ms=(300.0,)),
+    Case("the computer stands still, clocks step", stalls_ms=(300.0,), steps_ms=(math.inf, -math.inf)),
+    Case("the computer stands still, times slip", stalls_ms=(300.0,), slips_ms=(-math.inf, math.inf), every_s=15.0),
+    Case("frame numbers skip", skipped_ids=(1, 2, 100)),
 )
 
 

@@ -8,6 +8,8 @@ from rig.phrase import Phrase, phrase
 
 #: A rate that differs from the rig file's by more than this share contradicts it.
 _RATE: Final = 0.02
+#: A camera whose frames are refused for longer than that does not come right by itself.
+_DOUBTED: Final = 4
 
 
 def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float, *, one_edge: bool = True) -> Iterator[Phrase]:
@@ -29,6 +31,12 @@ def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float, *, one_e
                 "the clock of {camera} was set while pulses came, some of its frames are not used: let PTP lock first"
             )
             yield phrase("pairing_clock", text, camera=name)
+        elif camera.doubted > _DOUBTED:
+            text = (
+                "numbers, times and arrivals of the frames of {camera} contradict each other, and its frames are not "
+                "used: disarm, restart the camera, and arm again"
+            )
+            yield phrase("pairing_doubt", text, camera=name)
     if health.source is not None and health.source.unseen_lately:
         count = health.source.unseen + health.source.untagged
         text = "the source has fired {count} pulses that no camera saw: check the trigger cable from it to the cameras"

@@ -13,7 +13,7 @@ from typing import Final
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.frame import FrameStatus, Record
 from rig.health import CameraCounters
-from triggering.pairing.belief import Witness
+from triggering.pairing.belief import Belief, Others, Timed, Verdict
 from triggering.pairing.frame_ids import id_step, overruns_between
 from triggering.pairing.gaps import DamageMatcher, Gap
 from triggering.pairing.outcomes import NO_FRAME, Outcome
@@ -65,7 +65,8 @@ class CameraTrack:
         self.lag_ns = 0.0
         self.set_at: HostNs | None = None
         self._late_run = 0  # whole frames in a row whose pulses were decided already
-        self._train, self._witness = train, Witness(train)
+        self._train, self.belief = train, Belief(train)
+        self._confirmed: ClockLatch | None = None  # the last reading of the clock that agrees with those before
         self._unsettled_until = HostNs(0)  # frames that come before may have the time of a clock that is no more
         self._matcher = DamageMatcher(train.period_ns, self.counters)
         self._gaps: deque[Gap] = deque()
@@ -109,7 +110,8 @@ class CameraTrack:
         self.epoch, self.connected, self.silent = epoch, True, False
         self._since = self._seen = self.alive = host
         self._last = self._first = None
-        self._readings = 0
+        self._readings = self.belief.doubted = 0
+        self._confirmed = None
         self._begin_running_gap()
 
     def disconnect(self, host: HostNs) -> None:
@@ -133,9 +135,12 @@ class CameraTrack:
         agrees = self.clock.latch(latch)
         self._readings += 1
         self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
+        if agrees and latch.round_trip_ns < self._train.shortest_ns:
+            self._confirmed = latch
         if stepped := self.clock.steps != steps:
+            self._confirmed, self.belief.doubted = None, 0
             self.counters.clock_steps += 1
-            self.set_at, self._unsettled_until = latch.host, HostNs(latch.host + round(self._witness.longest_ns))
+            self.set_at, self._unsettled_until = latch.host, HostNs(latch.host + round(self.belief.longest_ns))
         if self.stamping.confirmed(agrees=agrees) or stepped:
             # Times before and after it cannot be compared: the next frame counts as a first one.
             self._last, self._broken = None, True
@@ -174,23 +179,45 @@ class CameraTrack:
             self._broken = self._broken or first  # the ids of later frames no longer count from the beginning
             return None
         time, arrival = self.trigger_time(record.device_time), record.host_time
-        settled = arrival > self._unsettled_until and time <= arrival + self._train.widest_ns
-        if not settled or self.stamping.contradicts(time, arrival, 2 * clock.uncertainty_at(record.device_time)):
+        if arrival > self._unsettled_until and time > arrival + self._train.widest_ns:
+            self.contradict(record)
+            return None
+        if arrival <= self._unsettled_until or self.stamping.contradicts(
+            time, arrival, 2 * clock.uncertainty_at(record.device_time)
+        ):
             self.refuse(record)
             return None
         return time
 
-    def believes(self, record: Record, time: HostNs) -> bool:
-        """Whether a whole frame, triggered at `time` as the camera's clock says, is to be believed at once."""
-        if self._last is None:
-            return self._witness.believes(None, 0)
-        last, last_time = self._last
-        if time <= last_time:
-            return True  # it is not newer than the last one, and `follow` will refuse it
-        steps = record.frame_id - last.frame_id
-        if steps != 1:
-            steps = id_step(last.frame_id, record.frame_id, record.id_modulus)
-        return self._witness.believes(time - last_time, steps)
+    def judge(self, waiting: Sequence[Record], others: Others, *, now_or_never: bool = False) -> Verdict:
+        """Judge the first of the whole frames that wait, by all that is known.
+
+        Args:
+            waiting: they, in the order of their coming.
+            others: the frames of the other cameras.
+            now_or_never: no more evidence can be waited for.
+        """
+        first = waiting[0]
+        last, last_time = self._last or (None, None)
+        if last is not None and first.frame_id == last.frame_id and first.device_time == last.device_time:
+            return Verdict.BELIEVED  # it came twice, which `follow` notes
+        timed, before = [], last
+        for record in waiting:
+            step = None if before is None else id_step(before.frame_id, record.frame_id, record.id_modulus)
+            timed.append(Timed(step, self.trigger_time(record.device_time), record.host_time))
+            before = record
+        confirmed = self._confirmed
+        read = confirmed is not None and (first.host_time <= confirmed.host and first.device_time <= confirmed.device)
+        return self.belief.judge(last_time, timed, read=read, others=others, now_or_never=now_or_never)
+
+    def clock_anew(self) -> bool:
+        """Whether the clock can be known by its last reading alone, which makes other times of the frames."""
+        return self.belief.doubted == 0 and self.clock.start_anew(self._train.tolerance_ns)
+
+    def contradict(self, record: Record) -> None:
+        """Refuse a frame whose time is contradicted, and doubt the camera from now on."""
+        self.belief.doubted += 1
+        self.refuse(record)
 
     def waits(self, record: Record) -> None:
         """Note that a whole frame has come that is not to be believed yet: the camera is neither silent nor overdue."""
@@ -226,6 +253,7 @@ class CameraTrack:
             gap.overruns = overruns_between(last, record, taken + 1) if gap.anchored else 0
             self.counters.overruns += gap.overruns
             self._gaps.append(gap)
+        self.belief.doubted = 0
         self._last = record, time
         self._first = self._first or time
         self._known_until = self.alive = time
@@ -345,7 +373,7 @@ class CameraTrack:
         self._late_run = self._late_run + 1 if decided else 0
         if not decided:
             self._matcher.whole(host - time)
-            self._witness.saw(host - time)
+            self.belief.saw(host - time)
 
     def _stirs(self) -> None:
         """Note that the camera sends something."""

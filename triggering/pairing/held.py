@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from rig.clocks import NS_PER_S, ClockLatch, HostNs
-from rig.frame import Record
+from rig.clocks import NS_PER_S, HostNs
+from rig.frame import Record, RecordKind
 from triggering.pairing.outcomes import OpenPulse
 
 #: The clock is read right after a frame that comes out of turn, and four times a second; a camera that does not answer
@@ -46,6 +46,10 @@ class HeldFrames:
         queue = self._queues[camera]
         return queue[0] if queue else None
 
+    def frames(self, camera: int) -> list[Record]:
+        """The whole frames of a camera that wait, in order."""
+        return [record for record in self._queues[camera] if record.kind is RecordKind.FRAME]
+
     def ended(self, now: HostNs) -> list[int]:
         """The cameras whose frames have waited for as long as they may."""
         return [camera for camera, end in self._ends() if now >= end]
@@ -59,15 +63,10 @@ class HeldFrames:
             if queue:
                 yield camera, HostNs(queue[0].host_time + _LONGEST_NS)
 
-    def is_read(self, camera: int, latch: ClockLatch) -> bool:
-        """Whether a camera's first frame that waits came before its clock was read."""
-        queue = self._queues[camera]
-        return bool(queue) and queue[0].host_time <= latch.host and queue[0].device_time <= latch.device
-
     def has(self, camera: int, record: Record) -> bool:
-        """Whether a frame is the last one of its camera that waits."""
+        """Whether a frame is the last one of its camera that waits, or has waited and will be told by `released`."""
         queue = self._queues[camera]
-        return bool(queue) and queue[-1] is record
+        return (bool(queue) and queue[-1] is record) or any(each.record is record for each in self._released)
 
     def next_end(self) -> HostNs | None:
         """When the first of all has waited for as long as it may; None: none waits."""

@@ -7,6 +7,7 @@ been read again. The class is pure: records and times go in, decisions come out.
 """
 
 from bisect import bisect_left, insort
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from operator import attrgetter
 from typing import Final
@@ -16,9 +17,11 @@ from rig.errors import BadInputError
 from rig.frame import FrameStatus, Record, RecordKind
 from rig.health import CameraCounters, PairingHealth
 from rig.pulse import RigPulse
+from triggering.pairing.belief import Verdict
 from triggering.pairing.camera_health import camera_health, is_recent, source_health
 from triggering.pairing.camera_track import CameraTrack
 from triggering.pairing.held import HeldFrames, Released
+from triggering.pairing.other_cameras import OtherCameras
 from triggering.pairing.outcomes import ClosedPulse, OpenPulse, Outcome
 from triggering.pairing.silence import SILENT_PERIODS, Silence
 from triggering.pairing.unseen import UnseenPulses
@@ -31,6 +34,8 @@ __all__ = ["ClosedPulse", "OpenPulse", "Outcome", "Pairer"]
 _PATIENCE_NS: Final = 30 * NS_PER_S
 #: Pulses this much slower than the rig file says get more time, so that later ones can still tell of their frames.
 _SLOWER: Final = 1.25
+#: Times of decided pulses that are remembered.
+_REMEMBERED: Final = 256
 _TIME: Final = attrgetter("time")
 
 
@@ -87,6 +92,11 @@ class Pairer:
         self._unseen = UnseenPulses(
             self._open, self._tracks, self._held, self._train, self._fired, self._deadline, self._hold_ns
         )
+        self._decided: deque[HostNs] = deque(maxlen=_REMEMBERED)
+        self._others = [
+            OtherCameras(camera, self._tracks, self._open, self._decided, self._held, self._train)
+            for camera in range(len(self._tracks))
+        ]
         self._hurry_until = HostNs(0)
         self._open_most = max(SILENT_PERIODS, hold_ns // period_ns)
         self._closed = 0
@@ -107,18 +117,22 @@ class Pairer:
         time = track.anchor(record)
         if time is None:
             return None
-        if len(self._tracks) > 1 and not self._believes(camera, record, time):
-            if track.connected:
-                track.waits(record)
-                self._held.hold(camera, record)
-            else:
-                track.counters.stale += 1
+        if len(self._tracks) == 1 or not track.belief.warm:
+            return self._place(camera, record, time)
+        if self._held.first(camera) is None and track.judge((record,), self._others[camera]) is Verdict.BELIEVED:
+            return self._place(camera, record, time)
+        if not track.connected:
+            track.counters.stale += 1
             return None
-        return self._place(camera, record, time)
+        track.waits(record)
+        self._held.hold(camera, record)
+        for each in range(len(self._tracks)):  # it may bear out what waits of another one
+            self._settle_held(each)
+        return None
 
     def holds(self, camera: int, record: Record) -> bool:
         """Whether a frame for which `frame` has returned no pulse waits; `released` will tell what became of it."""
-        return self._held.count > 0 and self._held.has(camera, record)
+        return self._held.has(camera, record)
 
     def released(self) -> list[Released]:
         """The frames that no longer wait, since the last call: to be asked before every `advance`, and after it."""
@@ -143,8 +157,8 @@ class Pairer:
         agrees = track.latch(latch)
         if track.clock.steps != steps:
             self._refuse_held(camera)
-        while agrees and self._held.is_read(camera, latch):
-            self._release(camera)
+        if agrees:
+            self._settle_held(camera)
 
     def fired(self, number: int, time: HostNs, uncertainty_ns: int) -> None:
         """Enter a pulse that the source says it has fired: it gets a tag even if no camera saw it.
@@ -181,7 +195,7 @@ class Pairer:
         closed: list[ClosedPulse] = []
         if self._held.count:
             for camera in self._held.ended(now):
-                self._refuse_held(camera)
+                self._settle_first(camera)
         while True:
             due = bool(self._open) and self._is_due(self._open[0], now)
             if not self._unseen.insert(now, due=due):
@@ -265,21 +279,49 @@ class Pairer:
         times = self._train.period_ns / self._nominal_ns
         return round(self._least_hold_ns * times) if times > _SLOWER else self._least_hold_ns
 
-    def _believes(self, camera: int, record: Record, time: HostNs) -> bool:
-        """Whether a frame goes on from the last believed one, and so do those before it that wait."""
-        track = self._tracks[camera]
-        if self._held.count:
-            while (first := self._held.first(camera)) is not None:
-                if not track.believes(first, track.trigger_time(first.device_time)):
-                    return False
+    def _settle_held(self, camera: int) -> None:
+        """Place or refuse the frames of a camera that wait, as far as the evidence goes."""
+        track, others = self._tracks[camera], self._others[camera]
+        while waiting := self._held.frames(camera):
+            verdict = track.judge(waiting, others)
+            if verdict is Verdict.CONTRADICTED and track.clock_anew():
+                verdict = track.judge(waiting, others)
+            if verdict is Verdict.WAITS:
+                return
+            if verdict is Verdict.BELIEVED:
                 self._release(camera)
-        return track.believes(record, time)
+            else:
+                track.belief.doubted += 1
+                self._refuse_first(camera)
+
+    def _settle_first(self, camera: int) -> None:
+        """Place or refuse the first frame of a camera that waits, which has waited for as long as it may."""
+        waiting = self._held.frames(camera)
+        if waiting:
+            track = self._tracks[camera]
+            if track.judge(waiting, self._others[camera], now_or_never=True) is Verdict.BELIEVED:
+                self._release(camera)
+            else:
+                self._refuse_first(camera)
+        self._settle_held(camera)
+
+    def _refuse_first(self, camera: int) -> None:
+        """Refuse the first frame of a camera that waits."""
+        track, record = self._tracks[camera], self._held.take(camera)
+        track.refuse(record)
+        self._held.release(camera, record, None)
+        self._note_damage_behind(camera)
 
     def _release(self, camera: int) -> None:
-        """Place the first frame of a camera that waits, and enter the damaged arrivals behind it."""
+        """Place the first frame of a camera that waits."""
         track, record = self._tracks[camera], self._held.take(camera)
         time = track.trigger_time(record.device_time)
         self._held.release(camera, record, self._place(camera, record, time))
+        self._note_damage_behind(camera)
+
+    def _note_damage_behind(self, camera: int) -> None:
+        """Enter the damaged arrivals behind a frame that no longer waits."""
+        track = self._tracks[camera]
         while (behind := self._held.first(camera)) is not None and behind.kind is RecordKind.DAMAGED:
             track.note_damage(self._held.take(camera))
 
@@ -385,6 +427,7 @@ class Pairer:
         missed = pulse.fired and any(outcome.status is FrameStatus.MISSED for outcome in outcomes)
         self._fired.decided(pulse.time, inserted=pulse.fired, seen=pulse.delivered > 0, missed=missed)
         self._closed += 1
+        self._decided.append(pulse.time)
         self._proven_by_ids += pulse.proven_by_ids
         self._unwatched += pulse.unwatched
         return ClosedPulse(RigPulse(self._closed), pulse.time, tuple(outcomes), pulse.cargo, pulse.unwatched)

@@ -46,6 +46,7 @@ class DeviceClock:
         self._best: deque[ClockLatch] = deque(maxlen=_BURSTS)
         self._burst_start = HostNs(0)
         self._stray: ClockLatch | None = None
+        self._newest: ClockLatch | None = None  # of those that agree
         self._reference = DeviceNs(0)
         self._slope = 0.0  # host minus device, ns per s of device time
         self._slope_uncertainty = _DRIFT_LIMIT
@@ -96,6 +97,24 @@ class DeviceClock:
         self._limit_trim(latch.device)
         return True
 
+    def start_anew(self, longest_ns: float) -> bool:
+        """Forget all readings but the newest one: frames show that the clock was set by less than a stray reading.
+
+        Args:
+            longest_ns: a reading that took longer is not exact enough for that.
+
+        Returns:
+            Whether there was anything to forget.
+        """
+        newest = self._newest
+        if newest is None or newest.round_trip_ns > longest_ns or list(self._best) == [newest]:
+            return False
+        self._best.clear()
+        self._keep(newest)
+        self._trim = 0.0
+        self._fit()
+        return True
+
     def correct(self, device: DeviceNs, error_ns: int) -> None:
         """Correct the line by a set of frames of one pulse.
 
@@ -132,6 +151,7 @@ class DeviceClock:
 
     def _keep(self, latch: ClockLatch) -> None:
         """Keep the shortest round trip of each burst."""
+        self._newest = latch
         if not self._best or latch.host - self._burst_start >= _BURST_NS:
             self._burst_start = latch.host
             self._best.append(latch)

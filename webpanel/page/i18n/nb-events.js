@@ -177,6 +177,7 @@ export const events = {
   why_writing_broke: ["{path}: skrivingen tok slutt med {kind}: {error}; det som er skrevet hittil, kan leses; meld fra om dette"],
 
   pairing_rate: ["pulsene kommer med {measured} Hz, riggfilen sier rate_hz = {rate_hz}", "rett [trigger] rate_hz i riggfilen"],
+  pairing_doubt: ["nummer, tider og ankomst av bildene fra {camera} motsier hverandre, og bildene brukes ikke", "frakoble, start kameraet på nytt og gjør klar igjen"],
   pairing_clock: ["klokken i {camera} ble stilt mens pulsene kom, og noen av bildene brukes ikke", "la PTP låse før opptak"],
   pairing_spread: ["bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "sjekk triggerkabler og forsinkelser i kameraene"],
   pairing_double: ["to pulser kom med {apart_ms} ms mellomrom, og ingen av kameraene har begge", "sjekk om triggersignalet preller"],

@@ -43,7 +43,6 @@ class Case:
         spikes_ms: by how much the time of a single frame is off, in turns; then it goes on as before.
         stalls_ms: for how long the computer takes no frames; then it takes all at once.
         skipped_ids: by how much the numbers of frames go on without any frame, in turns.
-        tick_ppm: how much faster a camera's clock runs than it should, beside `drift_ppm`: its rate was read wrongly.
         doubled: probability of a second pulse, `double_ms` later; half of them hide the first from some cameras.
     """
 
@@ -57,7 +56,6 @@ class Case:
     spikes_ms: tuple[float, ...] = ()
     stalls_ms: tuple[float, ...] = ()
     skipped_ids: tuple[int, ...] = ()
-    tick_ppm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     every_s: float = 20.0
     reboots: bool = False
     suspended: bool = False
@@ -119,8 +117,7 @@ class _Camera:
         """The clock at a true time."""
         phase = 2 * math.pi * time / (_WANDER_S * NS_PER_S) + self.number
         wander = self.case.wander_ppm * 1e-6 * _WANDER_S * NS_PER_S / (2 * math.pi) * math.sin(phase)
-        ppm = self.case.drift_ppm[self.number] + self.case.tick_ppm[self.number]
-        return DeviceNs(self.offset + round(time * (1 + ppm * 1e-6) + wander))
+        return DeviceNs(self.offset + round(time * (1 + self.case.drift_ppm[self.number] * 1e-6) + wander))
 
 
 class Hill:

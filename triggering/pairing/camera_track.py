@@ -135,7 +135,7 @@ class CameraTrack:
         agrees = self.clock.latch(latch)
         self._readings += 1
         self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
-        if agrees and latch.round_trip_ns < self._train.shortest_ns:
+        if confirms := agrees and latch.round_trip_ns < self._train.shortest_ns:
             self._confirmed = latch
         if stepped := self.clock.steps != steps:
             self._confirmed, self.belief.doubted = None, 0
@@ -144,7 +144,7 @@ class CameraTrack:
         if self.stamping.confirmed(agrees=agrees) or stepped:
             # Times before and after it cannot be compared: the next frame counts as a first one.
             self._last, self._broken = None, True
-        return agrees and latch.round_trip_ns < self._train.shortest_ns
+        return confirms
 
     def damaged(self, host: HostNs, device: DeviceNs | None = None) -> None:
         """Enter a damaged arrival.

@@ -59,7 +59,7 @@ class OtherCameras:
 
     def pulses(self, since: HostNs, until: HostNs) -> int | None:
         """How many pulses are known after one time, until another; None: that is too long ago."""
-        if self._decided and len(self._decided) > 1 and since < self._decided[0]:
+        if len(self._decided) > 1 and since < self._decided[0]:
             return None
         tolerance = self._train.tolerance_ns
         known = [*self._decided, *(pulse.time for pulse in self._open)]

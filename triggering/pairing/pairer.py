@@ -291,8 +291,7 @@ class Pairer:
             if verdict is Verdict.BELIEVED:
                 self._release(camera)
             else:
-                track.belief.doubted += 1
-                self._refuse_first(camera)
+                self._refuse_first(camera, contradicted=True)
 
     def _settle_first(self, camera: int) -> None:
         """Place or refuse the first frame of a camera that waits, which has waited for as long as it may."""
@@ -305,10 +304,10 @@ class Pairer:
                 self._refuse_first(camera)
         self._settle_held(camera)
 
-    def _refuse_first(self, camera: int) -> None:
+    def _refuse_first(self, camera: int, *, contradicted: bool = False) -> None:
         """Refuse the first frame of a camera that waits."""
         track, record = self._tracks[camera], self._held.take(camera)
-        track.refuse(record)
+        (track.contradict if contradicted else track.refuse)(record)
         self._held.release(camera, record, None)
         self._note_damage_behind(camera)
 
@@ -327,14 +326,9 @@ class Pairer:
 
     def _refuse_held(self, camera: int) -> None:
         """Refuse all frames of a camera that wait: they cannot be believed."""
-        track = self._tracks[camera]
+        self._note_damage_behind(camera)
         while self._held.first(camera) is not None:
-            record = self._held.take(camera)
-            if record.kind is RecordKind.FRAME:
-                track.refuse(record)
-                self._held.release(camera, record, None)
-            else:
-                track.note_damage(record)
+            self._refuse_first(camera)
 
     def _place(self, camera: int, record: Record, time: HostNs) -> OpenPulse | None:
         """Assign a frame, triggered at `time`, to its pulse; None if there is no open one."""

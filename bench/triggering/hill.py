@@ -155,7 +155,7 @@ class Hill:
             self._trouble(time)
             self._expose(pulse, time)
         self._deliver(until=math.inf)
-        self._check(self._pairer.advance(HostNs(1 << 62)))
+        self._decide(HostNs(1 << 62))
         self.result.pulses = self._pulses
         return self.result
 
@@ -252,12 +252,15 @@ class Hill:
             self._pairer.frame(number, record)
             if camera.reading.is_due(record.host_time, record.device_time):
                 self._latch(camera, arrival)
-            self._pairer.released()
-            self._check(self._pairer.advance(record.host_time))
+            self._decide(record.host_time)
 
     def _advance(self, until: HostNs) -> None:
         while (deadline := self._pairer.next_deadline()) is not None and deadline < until:
-            self._check(self._pairer.advance(deadline))
+            self._decide(deadline)
+
+    def _decide(self, now: HostNs) -> None:
+        self._pairer.released(now)
+        self._check(self._pairer.advance(now))
 
     def _latch(self, camera: _Camera, time: float) -> None:
         rng = self._rng

@@ -152,12 +152,12 @@ class Assembler:
         self._serve_waiting()
         for camera in range(len(self._rings)):
             self._read(camera)
-        self._place_released()
         # A camera whose frame waits for a buffer has unread records. The pairer must not see a later time than that
         # frame's, or it would take the unread frames for missing ones.
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
-        self._decided.extend(self.pairer.advance(min(waiting, default=now)))
-        self._place_released()
+        until = min(waiting, default=now)
+        self._place_released(until)
+        self._decided.extend(self.pairer.advance(until))
         self._ask_silent_cameras(now)
         self._tell_slow_cameras(now)
         self._free_stranded_slots(now)
@@ -253,9 +253,9 @@ class Assembler:
             elif not self.pairer.holds(camera, record):
                 ring.release(record.slot)
 
-    def _place_released(self) -> None:
+    def _place_released(self, now: HostNs) -> None:
         """Copy or drop the frames that have waited in their rings until their trigger times could be believed."""
-        for camera, record, pulse in self.pairer.released():
+        for camera, record, pulse in self.pairer.released(now):
             if pulse is None:
                 self._rings[camera].release(record.slot)
             else:

@@ -50,7 +50,7 @@ class Feed:
         if reading is not None and reading.is_due(record.host_time, record.device_time):
             self.latch(camera, record.host_time, clock)
             reading.done(record.host_time)
-        return placed or any(frame.record is record and frame.pulse for frame in self.pairer.released())
+        return placed or any(frame.record is record and frame.pulse for frame in self.pairer.released(record.host_time))
 
     def all_cameras(self, pulse: float, ids: list[int | None], triggers: list[int] | None = None) -> None:
         for camera, frame_id in enumerate(ids):
@@ -59,4 +59,5 @@ class Feed:
         self.advance(self.time_of(pulse) + 6 * MS)
 
     def advance(self, now: int) -> None:
+        self.pairer.released(HostNs(now))
         self.closed += self.pairer.advance(HostNs(now))

@@ -179,10 +179,13 @@ class _Camera:
             self.put(time, Record(RecordKind.LATCH, self.epoch, time, device_time=device, value=round_trip))
 
     def see(self, pulse: int, time: HostNs, outage: Outage | None) -> None:
-        fates = self.hill.fates[pulse]
+        scenario, fates = self.scenario, self.hill.fates[pulse]
         if outage is not None:
             fates[self.camera] = FrameStatus.MISSED if outage.told_after_s is None else FrameStatus.ABSENT
             return
+        if scenario.latch_every_s is not None and time > (idle := HostNs(self.last_arrival + NS_PER_S // 4)):
+            self.latch_burst(idle, 1, self.link_rng)  # a grabber reads the clock while no pulses come
+            self.reading.done(idle)
         while time > self.next_burst:
             self.latch_burst(HostNs(round(self.next_burst)), 8, self.rng)
             self.next_burst += (self.scenario.latch_every_s or 1e9) * NS_PER_S
@@ -291,8 +294,8 @@ class Run:
         else:
             _load(pulse, record)
 
-    def place_released(self) -> None:
-        for frame in self.pairer.released():
+    def place_released(self, now: HostNs) -> None:
+        for frame in self.pairer.released(now):
             self.place(frame.record, frame.pulse)
 
     def pass_deadlines(self, until: HostNs | None) -> None:
@@ -300,9 +303,8 @@ class Run:
             self.advance(deadline)
 
     def advance(self, now: HostNs) -> None:
-        self.place_released()
+        self.place_released(now)
         self.closed += self.pairer.advance(now)
-        self.place_released()
         self.silent |= set(self.pairer.silent())
         self.overdue |= set(self.pairer.overdue(now))
 

@@ -39,7 +39,7 @@ _ANYWHERE_NS: Final = 1e9
 _FOR: Final = 3.0
 _AGAINST: Final = 14.0
 #: Arrivals whose standard deviation is a smaller share of the period tell one pulse from the next.
-_TELLING: Final = 3
+_TELLING: Final = 4
 #: Shifts by so many periods are told from none.
 _SHIFTS: Final = 8
 #: Frames in a row that end a doubt, and that end the wait where nothing contradicts them.
@@ -224,9 +224,9 @@ class Belief:
         beside = last is not None and any(self._follows(last, later) for later in _since_last(waiting))
         if near or skips or beside:
             return Verdict.BELIEVED
-        if len(evidence.group) < _FEW:
-            return Verdict.WAITS if len(waiting) < _FEW else Verdict.CONTRADICTED
-        return Verdict.BELIEVED if near is None else Verdict.CONTRADICTED
+        if near is None:  # alone: there is no frame beside which it could be set wrongly
+            return Verdict.BELIEVED if evidence.final or len(evidence.group) >= _FEW else Verdict.WAITS
+        return Verdict.WAITS if len(waiting) < _FEW else Verdict.CONTRADICTED
 
     def _has_room(self, evidence: _Evidence) -> bool:
         """Whether there were as many pulses since the last frame that was believed as the camera took frames."""

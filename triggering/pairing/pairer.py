@@ -42,7 +42,8 @@ _TIME: Final = attrgetter("time")
 class Pairer:
     """Pairs the frames of all cameras by pulse.
 
-    Pass it every record that has come, in each camera's own order, and only then call `advance`.
+    Pass it every record that has come, in each camera's own order, then use the frames that `released` returns, and
+    only then call `advance`.
 
     Args:
         cameras: how many cameras there are.
@@ -127,15 +128,26 @@ class Pairer:
         track.waits(record)
         self._held.hold(camera, record)
         for each in range(len(self._tracks)):  # it may bear out what waits of another one
-            self._settle_held(each)
+            self._place_held(each)
         return None
 
     def holds(self, camera: int, record: Record) -> bool:
         """Whether a frame for which `frame` has returned no pulse waits; `released` will tell what became of it."""
         return self._held.has(camera, record)
 
-    def released(self) -> list[Released]:
-        """The frames that no longer wait, since the last call: to be asked before every `advance`, and after it."""
+    def released(self, now: HostNs) -> list[Released]:
+        """Place or refuse the frames that wait, as far as can be told at host time `now`.
+
+        To be called before every `advance`, which may decide the pulses of these frames.
+
+        Returns:
+            The frames that no longer wait, since the last call.
+        """
+        if self._held.count:
+            for camera in range(len(self._tracks)):
+                self._settle_held(camera)
+            for camera in self._held.ended(now):
+                self._settle_first(camera)
         return self._held.released()
 
     def damaged(self, camera: int, record: Record) -> None:
@@ -158,7 +170,7 @@ class Pairer:
         if track.clock.steps != steps:
             self._refuse_held(camera)
         if agrees:
-            self._settle_held(camera)
+            self._place_held(camera)
 
     def fired(self, number: int, time: HostNs, uncertainty_ns: int) -> None:
         """Enter a pulse that the source says it has fired: it gets a tag even if no camera saw it.
@@ -193,9 +205,6 @@ class Pairer:
             The pulses decided now, in the order of time.
         """
         closed: list[ClosedPulse] = []
-        if self._held.count:
-            for camera in self._held.ended(now):
-                self._settle_first(camera)
         while True:
             due = bool(self._open) and self._is_due(self._open[0], now)
             if not self._unseen.insert(now, due=due):
@@ -278,6 +287,15 @@ class Pairer:
         """How long after a pulse its frames may come; longer where the pulses are far slower than the rig file says."""
         times = self._train.period_ns / self._nominal_ns
         return round(self._least_hold_ns * times) if times > _SLOWER else self._least_hold_ns
+
+    def _place_held(self, camera: int) -> None:
+        """Place the frames of a camera that wait, as far as the evidence goes.
+
+        None is refused before `released` is called: until then frames of other cameras may come that bear it out.
+        """
+        track, others = self._tracks[camera], self._others[camera]
+        while (waiting := self._held.frames(camera)) and track.judge(waiting, others) is Verdict.BELIEVED:
+            self._release(camera)
 
     def _settle_held(self, camera: int) -> None:
         """Place or refuse the frames of a camera that wait, as far as the evidence goes."""

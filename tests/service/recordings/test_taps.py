@@ -98,7 +98,9 @@ def test_a_forgotten_recording_ends_and_says_so(tmp_path: Path, loopback: Loopba
         service.arm()
         made = service.post("/api/recordings", {"bib": "5"})
         status = service.await_state("armed")
-        assert status["statement"]["code"] == status["notice"]["code"] == "recording_forgotten"
+        assert status["notice"]["code"] == "recording_forgotten"
+        # A camera that fails meanwhile, as on a busy computer, is told first.
+        assert status["statement"]["code"] in ("recording_forgotten", "state_armed_partly")
         assert "1.5 s" in status["notice"]["text"]
         verdict = service.get(f"/api/recordings/{made['id']}")["verdict"]
         assert (verdict["code"], verdict["level"]) == ("verdict_forgotten", "warning")

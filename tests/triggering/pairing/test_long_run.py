@@ -39,7 +39,7 @@ class Hours:
             if pulse == 0:
                 self.latch(camera, time - 7 * MS)
             self.see(camera, pulse, time)
-        self.pairer.released()
+        self.pairer.released(HostNs(time + 35 * MS))
         for tag in self.pairer.advance(HostNs(time + 35 * MS)):
             self.check(tag)
 

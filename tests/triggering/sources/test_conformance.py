@@ -158,10 +158,10 @@ class _Feed:
         if self._readings[camera].is_due(host, device):
             self._latch(camera, host)
             self._readings[camera].done(host)
-        self._pairer.released()
 
     def advance(self, now: int) -> None:
         """Decide what can be decided."""
+        self._pairer.released(HostNs(now))
         self.closed += self._pairer.advance(HostNs(now))
 
     def end(self, now: int) -> None:

@@ -159,9 +159,9 @@ def test_the_command_refuses_a_rig_without_firewire() -> None:
 
 
 def test_a_bus_that_hangs_does_not_hang_the_doctor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(firewire, "LOOK_S", 0.05)
+    monkeypatch.setattr(firewire, "LOOK_S", 0.0)
     ((level, what, remedy),) = worst(list(firewire._ask(one_camera(), {}, trial=False)))
-    assert (level, what) == (Level.FAIL, "the FireWire bus did not answer within 0.05 s")
+    assert (level, what) == (Level.FAIL, "the FireWire bus did not answer within 0 s")
     assert "cables out and in" in remedy
 
 

@@ -27,7 +27,8 @@ class LogState(StrEnum):
     """The state of a log, as far as its tags and lengths tell; `verify` checks more."""
 
     CLOSED = "closed"  #: closed properly
-    UNFINISHED = "unfinished"  #: still being written, or never closed; readable up to its last second
+    WRITING = "writing"  #: a program is writing it now
+    UNFINISHED = "unfinished"  #: never closed; readable up to its last second
     DAMAGED = "damaged"  #: part of it cannot be read, or pulses have no tag
 
 
@@ -65,6 +66,7 @@ class Entry:
         session: the session's fields, with later changes applied.
         disk: frames that were lost because of the disk, in one line; empty if none.
         forgotten_s: after so many seconds it ended by itself, because nobody had stopped it; 0: otherwise.
+        ended_early: why it ends before the recording was to end, or that this is not known; empty: as was wanted.
         trouble: what could not be read, and what to do, in one line; empty if all could be read.
         kind: of the trouble.
     """
@@ -87,6 +89,7 @@ class Entry:
     session: Mapping[str, str] = field(default_factory=dict)
     disk: str = ""
     forgotten_s: float = 0.0
+    ended_early: str = ""
     trouble: str = ""
     kind: Trouble = Trouble.NONE
 
@@ -125,7 +128,7 @@ def read_entry(path: Path) -> Entry:
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session,
-        disk=found.trouble, forgotten_s=found.forgotten_s,
+        disk=found.trouble, forgotten_s=found.forgotten_s, ended_early=found.ended_early,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ it, when they are old, or when the disk needs their room.
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -30,10 +30,11 @@ from recorder.catalogue.trash import (
 )
 from recorder.catalogue.voice_notes import StoredVoice, add_voice_note, check_voice, voice_notes
 from recorder.log.session_changes import session_changes, write_session_changes
+from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
-from rig.errors import BadInputError, LogDamagedError, StorageError, UnknownRecordingError
+from rig.errors import BadInputError, LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
 from rig.images.picture import shown
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
@@ -182,10 +183,13 @@ class Catalogue:
 
         Raises:
             UnknownRecordingError: no recording has this id.
+            StillRecordingError: a program is writing it.
             StorageError: the disk refuses.
         """
         with self._change():
             path = self._path(recording)
+            if is_being_written(path):
+                raise StillRecordingError(f"recording {recording} is still being written: stop it first")
             if path.parent != self._trash:
                 self._trash.mkdir(exist_ok=True)
                 log, path = path, self._free_path(path, self._trash)
@@ -258,7 +262,7 @@ class Catalogue:
         with self._change():
             before = time.time() - older_than_s
             logs = [log for log in trashed_logs(self.directory) if log.since <= before]
-            return _remove(list(oldest_until(logs, wanted_bytes)))
+            return _remove(oldest_until(logs, wanted_bytes))
 
     @contextmanager
     def _change(self) -> Iterator[None]:
@@ -312,7 +316,9 @@ class Catalogue:
         return target / name
 
 
-def _remove(logs: Sequence[TrashedLog]) -> TrashContents:
+def _remove(logs: Iterable[TrashedLog]) -> TrashContents:
+    """Remove logs for good, but none that a program is writing: it was moved into the trash by another one."""
+    logs = [log for log in logs if not is_being_written(log.path)]
     for log in logs:
         remove_for_good(log)
     return TrashContents(len(logs), sum(log.bytes for log in logs))

@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -13,6 +13,7 @@ from typing import Final
 from recorder.catalogue.entry import LOG_ID, SUFFIX, Entry, LogState, read_entry, with_changes
 from recorder.catalogue.index_file import FileKey, KeptEntry, file_key, keep, load_kept
 from recorder.log.session_changes import session_name, session_path
+from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets
 from rig.errors import BadInputError
@@ -117,6 +118,8 @@ class LogCache:
             FileNotFoundError: the file is no longer there.
         """
         plain = self._plain(name, look)
+        if plain.state is LogState.UNFINISHED and is_being_written(self._directory / name):
+            plain = replace(plain, state=LogState.WRITING)
         key, deleted = None, "/" in name
         if look_beside is not None:
             with suppress(OSError):

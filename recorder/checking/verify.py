@@ -1,6 +1,6 @@
 """Checks a log from the first to the last byte and says, pulse by pulse, what is missing."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -8,7 +8,8 @@ from typing import Any
 
 from recorder.checking.pulse_check import PulseCheck
 from recorder.checking.structure_check import StructureCheck
-from recorder.log.extent import apply_extent
+from recorder.log.extent import apply_extent, ended_early, part_before
+from recorder.log.write_lock import is_being_written
 from recorder.reading.info import known_lost
 from recorder.reading.items import Chunk, Item, printable
 from recorder.reading.log_reader import LogReader
@@ -73,6 +74,8 @@ class VerifyReport:
         every_byte: the log holds checksums over every byte of it; logs of earlier versions hold them over images, tags
             and messages, but not over metadata and what stands between chunks.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
+        ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
+        part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
     """
 
     path: Path
@@ -85,18 +88,30 @@ class VerifyReport:
     events: tuple[Event, ...]
     every_byte: bool
     known_lost: tuple[tuple[int, int], ...] = ()
+    ended_early: str = ""
+    part_before: str = ""
 
     @property
     def verdict(self) -> Verdict:
-        """DAMAGED if the log is not sound, otherwise CLEAN if nothing is missing, no time either, otherwise PARTIAL."""
+        """DAMAGED if the log is not sound, otherwise CLEAN if nothing is missing, no time either, otherwise PARTIAL.
+
+        What a log misses at its end, or before its beginning in another one, counts as missing too.
+        """
         if self.findings or not self.closed or not set(self.ledger.missing) <= set(self.known_lost):
             return Verdict.DAMAGED
-        return Verdict.CLEAN if self.ledger.whole else Verdict.PARTIAL
+        return Verdict.CLEAN if self.ledger.whole and not list(self.parts_in_words()) else Verdict.PARTIAL
 
     @property
     def damaged(self) -> bool:
         """Whether the log is not sound."""
         return self.verdict is Verdict.DAMAGED
+
+    def parts_in_words(self) -> Iterator[str]:
+        """What of the recording is not in this log, as far as the log says, one sentence each."""
+        if self.part_before:
+            yield f"goes on from {self.part_before}, which does not lie beside it: its pulses are not in this log"
+        if self.ended_early:
+            yield f"ended early: {self.ended_early}"
 
     def to_json(self) -> dict[str, Any]:
         """The report as one JSON object."""
@@ -111,6 +126,8 @@ class VerifyReport:
             "missing_pulses": numbers(self.ledger.missing, _PULSES_MAX),
             "incomplete_pulses": self.ledger.incomplete_pulses(_PULSES_MAX),
             "pauses": [wire.to_builtins(pause) for pause in self.ledger.pauses()],
+            "ended_early": self.ended_early,
+            "part_before": self.part_before,
             "findings": list(self.findings),
             "events": [wire.to_builtins(event) for event in self.events],
         }
@@ -141,12 +158,16 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         structure.finish()
         apply_extent(reader.metadata, pulses.ledger)
         if not reader.closed:
-            findings.add("the log was not closed: the recorder was stopped short, or is still writing it")
+            findings.add(
+                "the log is still being written: verify it when the recording has ended"
+                if is_being_written(path)
+                else "the log was not closed: the recorder was stopped short"
+            )
         return VerifyReport(
             path, reader.size, reader.closed, reader.truncated, pulses.ledger,
             pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
-            known_lost(reader),
+            known_lost(reader), ended_early(reader.metadata), part_before(reader.metadata, path),
         )  # fmt: skip
 
 

@@ -11,14 +11,14 @@ import msgspec
 from recorder.live.assembler import Assembler
 from recorder.live.opening import discard, in_background, open_log
 from recorder.live.preroll import Held
-from recorder.log.extent import CONTINUES, CONTINUES_AFTER, FORGOTTEN, extent
+from recorder.log.extent import CONTINUES, CONTINUES_AFTER, ENDED_EARLY, FORGOTTEN, extent
 from recorder.log.tag_room import check_tag_fits
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
 from rig.errors import FileVanishedError, StorageError
 from rig.events import Event
 from rig.health import WritingHealth
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
@@ -57,7 +57,8 @@ class Recording:
         begin: time of the first pulse that may belong to the recording; may be before `commanded`.
         ledger: what became of the pulses that are in the file.
         log: writes the log; None until it is open.
-        failure: why the log ended before its time, None if it did not.
+        failure: the error that ended the log before its time, None if there was none.
+        early: why the log ends before the recording was to end, for the log; None: it does not.
         trouble: what went wrong with the disk without ending the log, empty if nothing.
         continues: id of the recording that this one continues, empty if none.
         mishap: whether it was stopped as soon as it had begun: its pulses belong to the next recording too.
@@ -69,6 +70,7 @@ class Recording:
         self._order, self._assembler = order, assembler
         self._anchor = UtcAnchor.take()
         self.failure: StorageError | None = None
+        self.early: Phrase | None = None
         self.trouble = self.continues = ""
         self.ledger = Ledger()
         self._handed = 0
@@ -180,9 +182,9 @@ class Recording:
         now = host_now()
         self._end, self._stopped = now if self._end is None else min(self._end, now), True
 
-    def end_now(self) -> None:
-        """End with the last pulse that was handed to the log."""
-        self._ended = True
+    def end_early(self, why: Phrase) -> None:
+        """End with the last pulse that was handed to the log, before the recording was to end."""
+        self._ended, self.early = True, why
 
     def is_over(self, pulse: ClosedPulse) -> bool:
         """Whether a pulse comes after the recording's last one. Pulses come in order: the first such pulse ends it."""
@@ -339,7 +341,9 @@ class Recording:
             self.end_account()
         if self._account_until is not None:
             fields = extent(self.utc(self._account_from), self.utc(self._account_until))
-            if self._order.nobody_stops and not (self._stopped or self.failure is not None):
+            if self.early is not None:
+                fields |= {ENDED_EARLY: str(self.early)}
+            elif self._order.nobody_stops and not self._stopped:
                 fields |= {FORGOTTEN: f"{self._order.seconds or 0:.3f}"}
             self._writer.set_metadata(RECORDING_METADATA, fields)
         if self.trouble:

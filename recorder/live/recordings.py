@@ -201,7 +201,7 @@ class Recordings:
                 self.happened(Event.now(Level.ERROR, "recorder", said))
                 self._decide_now()
                 self._write_slice(recording, until=None)
-                recording.end_now()
+                recording.end_early(why)
             time.sleep(_PAUSE_S)
         if recording is not None:
             self._give_up(recording, wording.not_taken(recording.path, patience_s), may_continue=False)
@@ -299,6 +299,7 @@ class Recordings:
             patience_ns: how long to wait until the log is closed.
         """
         recording.failure = error if isinstance(error, StorageError) else None
+        recording.early = error.said
         recording.mishap = False
         recording.forget()
         self._publisher.event(Event.now(Level.FATAL, "recorder", error.said))
@@ -307,7 +308,8 @@ class Recordings:
             self._preroll.put_back(recording.take_back())
         path = self._parts.next_path(recording, error) if may_continue else None
         if path is not None:
-            event = Event.now(Level.ERROR, "disk", wording.goes_on_in(path, error))
+            recording.early = wording.goes_on_in(path, error)
+            event = Event.now(Level.ERROR, "disk", recording.early)
             self._report(RecorderEvent(event=event))
             self._parts.earlier.append(recording)
             recording.begin_close()

@@ -1,16 +1,25 @@
-"""The metadata record of when a recording began and ended: a log may have no pulses for a while before its end."""
+"""The metadata record of when a recording began and ended: a log may have no pulses for a while before its end.
 
+It also says whether the log ends before its recording was to end, and why.
+"""
+
+import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Final
 
 from rig.clocks import NS_PER_S, UtcNs
 from rig.pulse import PulseNumber
-from rig.topics import RECORDING_METADATA, RIG_METADATA, SESSION_METADATA
+from rig.topics import RECORDING_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA
 from triggering.ledger.account import Ledger
 
 #: Field of the record: after so many seconds the recording ended by itself, because nobody had stopped it.
 FORGOTTEN: Final = "forgotten_s"
+#: Field of the record: why the log ends before the recording was to end.
+ENDED_EARLY: Final = "ended_early"
+#: Field of the record of a recovery: what is not known of the end of the log that was recovered.
+END_UNKNOWN: Final = "end"
 #: Fields of the session: id of the log that this one continues, and the number of the last pulse in it.
 CONTINUES: Final = "continues"
 CONTINUES_AFTER: Final = "continues_after"
@@ -51,6 +60,30 @@ def forgotten_s(metadata: Mapping[str, Mapping[str, str]]) -> float:
     """
     text = metadata.get(RECORDING_METADATA, {}).get(FORGOTTEN, "")
     return float(text) if re.fullmatch(r"\d{1,5}(\.\d{1,3})?", text, re.ASCII) else 0.0
+
+
+def ended_early(metadata: Mapping[str, Mapping[str, str]]) -> str:
+    """Why a log ends before its recording was to end, or that this is not known; empty: it ended as was wanted.
+
+    Args:
+        metadata: fields of the metadata records by name.
+    """
+    told = (
+        metadata.get(RECORDING_METADATA, {}).get(ENDED_EARLY, ""),
+        metadata.get(RECOVERY_METADATA, {}).get(END_UNKNOWN, ""),
+    )
+    return "; ".join(text for text in told if text)
+
+
+def part_before(metadata: Mapping[str, Mapping[str, str]], log: Path) -> str:
+    """Id of the log that this one continues, if it does not lie beside this one; empty otherwise.
+
+    Args:
+        metadata: fields of the metadata records by name.
+        log: path of this one.
+    """
+    before = metadata.get(SESSION_METADATA, {}).get(CONTINUES, "")
+    return "" if not before or os.path.lexists(log.with_name(f"{Path(before).name}{log.suffix}")) else before
 
 
 def last_before(metadata: Mapping[str, Mapping[str, str]]) -> PulseNumber:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from recorder.log.extent import apply_extent, forgotten_s
+from recorder.log.extent import apply_extent, ended_early, forgotten_s, part_before
 from recorder.log.session_changes import session_changes
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
@@ -46,6 +46,8 @@ class LogInfo:
         merged: of a log that was made of two: fields that say which, and how their clocks differed; empty otherwise.
         trouble: what went wrong with the disk while the log was written, in one line; empty if nothing.
         forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
+        ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
+        part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
         messages: number of messages per topic.
         library: the program that wrote the log.
         source: what the source of the pulses told of them, beside the tags; None: it tells nothing, the log does not
@@ -66,6 +68,8 @@ class LogInfo:
     merged: dict[str, str]
     trouble: str
     forgotten_s: float
+    ended_early: str
+    part_before: str
     messages: dict[str, int]
     library: str
     source: SourceAccount | None = None
@@ -121,6 +125,8 @@ class LogInfo:
             "utc": None if self.utc is None else asdict(self.utc),
             "merged": self.merged,
             "trouble": self.trouble,
+            "ended_early": self.ended_early,
+            "part_before": self.part_before,
             "messages": self.messages,
             "library": self.library,
         }
@@ -166,8 +172,9 @@ def info(path: Path, *, original: bool = False, source: bool = False) -> LogInfo
         return LogInfo(
             path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
-            "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata), messages,
-            reader.library, None if told is None else told.finish(),
+            "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata),
+            ended_early(reader.metadata), part_before(reader.metadata, path), messages, reader.library,
+            None if told is None else told.finish(),
         )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from recorder.log.extent import last_before
+from recorder.log.extent import END_UNKNOWN, last_before
 from recorder.log.session_changes import session_changes
 from recorder.reading.items import Message
 from recorder.reading.log_reader import LogReader
@@ -74,6 +74,11 @@ class RecoverReport:
         """What was lost, in one line."""
         return _loss(self.ledger, self.lost_pixels, self.findings) or "nothing"
 
+    @property
+    def end_unknown(self) -> str:
+        """What is not known of the end of the recording; empty: the source had been closed."""
+        return "" if self.was_closed else _end_unknown(self.ledger)
+
     def to_json(self) -> dict[str, Any]:
         """The report as one JSON object."""
         return {
@@ -81,6 +86,7 @@ class RecoverReport:
             "log": str(self.path),
             "bytes": self.bytes,
             "was_closed": self.was_closed,
+            "end_unknown": self.end_unknown,
             "lossless": self.lossless,
             **self.ledger.counts().model_dump(),
             "lost_pulses": numbers(self.ledger.missing, _PULSES_MAX),
@@ -191,12 +197,17 @@ class _Recovery:
         lost = {"lost_pulses": runs_to_text(self.ledger.missing), "lost_pixels": runs_to_text(self.lost_pixels)}
         name, time = self._reader.path.name, datetime.now(UTC).isoformat(timespec="seconds")
         words = _loss(self.ledger, self.lost_pixels, self.findings.lines())
-        said = f"recovered from {name}: {f'this is lost: {words}' if words else 'no pulse is lost'}"
-        event = Event.now(Level.WARNING if words else Level.INFO, "recover", plain(said))
+        end = {} if self._reader.closed else {END_UNKNOWN: _end_unknown(self.ledger)}
+        kept = "no pulse up to the last one is lost" if end else "no pulse is lost"
+        told = "; ".join([f"this is lost: {words}" if words else kept, *end.values()])
+        event = Event.now(
+            Level.WARNING if words or end else Level.INFO, "recover", plain(f"recovered from {name}: {told}")
+        )
         others = {
             key: each for key, each in self._reader.metadata.items() if key not in (SESSION_METADATA, RIG_METADATA)
         }
-        return self._rebuilt.close({**others, RECOVERY_METADATA: {"source": name, "time": time, **lost}}, event)
+        recovery = {"source": name, "time": time, **lost, **end}
+        return self._rebuilt.close({**others, RECOVERY_METADATA: recovery}, event)
 
     def _pulse(self, sighting: Sighting) -> None:
         tag, picture, message = self._read(sighting)
@@ -240,6 +251,11 @@ class _Recovery:
                     sequence = message.sequence if message.topic in RESULTS else None
                     self._rebuilt.other(message.topic, data, message.publish_time, message.log_time, sequence)
             self._next_other = next(self._others, None)
+
+
+def _end_unknown(ledger: Ledger) -> str:
+    """Says of a log that was never closed that pulses may be missing at its end."""
+    return f"it was never closed: nobody knows whether pulses came after pulse {ledger.last_pulse or 0}"
 
 
 def _loss(ledger: Ledger, lost_pixels: Sequence[tuple[int, int]], findings: Sequence[str]) -> str:

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from recorder.log.mcap_layout import PAGE
+from recorder.log.write_lock import mark_as_written
 from rig.errors import BadInputError, FileVanishedError, StorageError
 from rig.host.disk import ask_free_bytes, set_direct
 from rig.phrase import phrase
@@ -33,7 +34,7 @@ def storage_error(path: Path, error: OSError) -> StorageError:
 
 
 class AppendFile:
-    """A new file that only grows, written in whole pages from page-aligned memory.
+    """A new file that only grows, written in whole pages from page-aligned memory, and marked as being written.
 
     Attributes:
         path: the file.
@@ -62,6 +63,11 @@ class AppendFile:
                 f"{path}: cannot be made ({error.strerror}); choose a directory you may write to"
             ) from None
         except OSError as error:
+            raise storage_error(path, error) from error
+        try:
+            mark_as_written(self._fd)
+        except OSError as error:
+            self.close()
             raise storage_error(path, error) from error
         self.direct = set_direct(self._fd, wanted=True)
 

@@ -1,8 +1,8 @@
 """Reads the recordings in the service's folder and describes them for the panel, each with its verdict."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from rig.api.recordings import (
 from rig.api.statement import Level, Statement
 from rig.api.status import Status
 from rig.clocks import NS_PER_S
-from rig.errors import StateForbidsError, StillRecordingError
+from rig.errors import StateForbidsError, StillRecordingError, UnknownRecordingError
 from rig.pulse import Pause
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
@@ -41,6 +41,7 @@ from triggering.ledger.account import pauses_in_words
 
 _STATES = {
     LogState.CLOSED: RecordingState.FINISHED,
+    LogState.WRITING: RecordingState.RECORDING,
     LogState.UNFINISHED: RecordingState.UNFINISHED,
     LogState.DAMAGED: RecordingState.DAMAGED,
 }
@@ -84,8 +85,8 @@ class Archive(ABC):
         current = self.status().recording
         entries = self._catalogue.entries(deleted=query.deleted)
         found = find(entries, query, lambda entry: self._described(entry).verdict.level)
-        following = _following(entries)
-        shown = [_pointing_on(self._described(entry), following) for entry in found.entries]
+        chain = _Chain(self._catalogue, entries)
+        shown = [chain.pointing_on(self._described(entry)) for entry in found.entries]
         return FoundRecordings(found.total, [current if current and each.id == current.id else each for each in shown])
 
     def recording(self, recording_id: str) -> Recording:
@@ -97,7 +98,8 @@ class Archive(ABC):
 
     def _with_next_part(self, entry: Entry) -> Recording:
         """Describe an entry, with the id of the recording that goes on with it."""
-        return _pointing_on(as_recording(entry), _following(self._catalogue.entries(deleted=entry.deleted)))
+        chain = _Chain(self._catalogue, self._catalogue.entries(deleted=entry.deleted))
+        return chain.pointing_on(as_recording(entry))
 
     def _described(self, entry: Entry) -> Recording:
         """Describe an entry for the panel, unless that was done before: the catalogue gives the same object then."""
@@ -147,7 +149,8 @@ class Archive(ABC):
 
     def _check_ended(self, recording_id: str) -> None:
         current = self.status().recording
-        if current and current.id == recording_id:
+        here = current is not None and current.id == recording_id
+        if here or self._catalogue.entry(recording_id).state is LogState.WRITING:
             raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
 
     def checksum(self, recording_id: str) -> str:
@@ -257,15 +260,51 @@ def as_recording(entry: Entry) -> Recording:
     )
 
 
-def _following(entries: Sequence[Entry]) -> dict[str, str]:
-    """Id of the next part by the id of a recording: only the later log says what it continues."""
-    return {entry.session[CONTINUES]: entry.id for entry in entries if CONTINUES in entry.session}
+class _Chain:
+    """Which recordings go on with which; only the later log says what it continues.
+
+    Args:
+        catalogue: of the folder.
+        entries: those of it, or those of its trash.
+    """
+
+    def __init__(self, catalogue: Catalogue, entries: Sequence[Entry]) -> None:
+        self._catalogue = catalogue
+        self._ids = {entry.id for entry in entries}
+        self._following = {entry.session[CONTINUES]: entry.id for entry in entries if CONTINUES in entry.session}
+
+    def pointing_on(self, recording: Recording) -> Recording:
+        """A recording with the id of its next part, if it has one; its verdict says if the part before is gone."""
+        update: dict[str, Any] = {}
+        if (by := self._following.get(recording.id)) is not None:
+            update["continued_by"] = by
+        if self._lacks_part_before(recording):
+            update["verdict"] = _without_part_before(recording)
+        return recording.model_copy(update=update) if update else recording
+
+    def _lacks_part_before(self, recording: Recording) -> bool:
+        """Whether the part before lies neither in the folder nor in its trash."""
+        if not recording.continues or recording.continues in self._ids:
+            return False
+        try:
+            self._catalogue.entry(recording.continues)
+        except UnknownRecordingError:
+            return True
+        return False
 
 
-def _pointing_on(recording: Recording, following: Mapping[str, str]) -> Recording:
-    """A recording with the id of its next part, if it has one."""
-    by = following.get(recording.id)
-    return recording if by is None else recording.model_copy(update={"continued_by": by})
+def _without_part_before(recording: Recording) -> Statement:
+    """The verdict on a recording whose part before is gone, unless something graver is said of it."""
+    told = recording.verdict
+    if told.level is Level.ERROR:
+        return told
+    return Statement(
+        level=Level.WARNING,
+        code="verdict_part_gone",
+        text=f"Goes on from {recording.continues}, which is not here: the beginning is missing. {told.text}",
+        advice="Look for the first part on the other disk, or in a copy",
+        values={"before": recording.continues, "rest": told.said},
+    )
 
 
 def _as_trash(contents: TrashContents) -> Trash:
@@ -282,7 +321,8 @@ def verdict(entry: Entry) -> Statement:
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
         "failures": _failures(entry), "pauses": len(entry.pauses),
         "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1), "disk": entry.disk,
-        "longest_s": entry.forgotten_s, "before": entry.session.get(CONTINUES, "")[:_LONGEST_SHOWN],
+        "longest_s": entry.forgotten_s, "why": entry.ended_early[:_LONGEST_SHOWN],
+        "before": entry.session.get(CONTINUES, "")[:_LONGEST_SHOWN],
         "unrecorded": sum(pause.pulses for pause in entry.pauses if pause.between_logs),
     }  # fmt: skip
     return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
@@ -296,12 +336,21 @@ def _judge(entry: Entry) -> tuple[Level, str, str, str]:
         text = f"Parts cannot be read or are not there; {entry.pulses} pulses are readable"
         advice = "svev recover makes a proper log of what can be read; svev verify says what is damaged"
         return Level.ERROR, "damaged", text, advice
+    if entry.state is LogState.WRITING:
+        return Level.INFO, "being_written", f"Another svev is recording it: {entry.pulses} pulses until now", ""
     if entry.state is LogState.UNFINISHED:
         text, advice = f"Never closed; its {entry.pulses} pulses are readable", "svev recover makes a proper log of it"
         return Level.WARNING, "unfinished", text, advice
-    if not entry.pulses:
+    return _judge_end(entry)
+
+
+def _judge_end(entry: Entry) -> tuple[Level, str, str, str]:
+    """Judge a sound log: by how it ended, and by its pulses."""
+    if not entry.pulses and not entry.ended_early:
         return Level.WARNING, "empty", "No pulse came", "Look at the trigger"
     level, code, text, advice = _judge_account(entry)
+    if entry.ended_early:
+        return Level.WARNING, "ended_early", f"Ended early: {entry.ended_early}. {text}", advice
     if entry.forgotten_s:
         text = f"Ended by itself after {entry.forgotten_s:g} s, because nobody had stopped it. {text}"
         return Level.WARNING, "forgotten", text, advice

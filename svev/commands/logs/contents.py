@@ -154,6 +154,8 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
     told = (
         ("merged", merged_in_words(found.merged).removeprefix("merged ") if found.merged else ""),
         ("trouble", found.trouble),
+        ("ended early", found.ended_early),
+        ("goes on from", f"{found.part_before}, which does not lie beside it" if found.part_before else ""),
     )
     yield from ((name, text) for name, text in told if text)
     for pause in ledger.pauses()[:_LINES_MAX]:
@@ -178,7 +180,7 @@ def _print_verified(report: VerifyReport) -> None:
     console.say(f"{ledger.summary_line()}; {report.bytes / 1e6:.1f} MB; {'' if report.closed else 'not '}closed")
     if report.closed and not report.every_byte:
         console.say("  no checksum over the whole log: what stands outside of images, tags and messages is not checked")
-    lines = [*ledger.in_words(), *report.findings]
+    lines = [*report.parts_in_words(), *ledger.in_words(), *report.findings]
     for line in lines[:_LINES_MAX]:
         console.say(f"  {line}")
     if len(lines) > _LINES_MAX:
@@ -203,7 +205,7 @@ def _print_recounted(recounted: Recounted) -> None:
 
 def _first_flaw(report: VerifyReport) -> str:
     if not report.closed:
-        return "it was not closed, or is still being written"
+        return report.findings[-1]
     if report.findings:
         more = len(report.findings) - 1
         return report.findings[0] + (f" (and {more} more)" if more else "")
@@ -213,7 +215,7 @@ def _first_flaw(report: VerifyReport) -> str:
 def _print_recovered(report: RecoverReport) -> None:
     console.say(f"{report.path}: {report.ledger.summary_line()}; {report.bytes / 1e6:.1f} MB")
     if not report.was_closed:
-        console.say(f"the recording was not closed; its last pulse is {report.ledger.last_pulse}")
+        console.say(report.end_unknown)
     for finding in report.findings:
         console.say(f"  {finding}")
     console.say(f"check it: svev verify {report.path}")

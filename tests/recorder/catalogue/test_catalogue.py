@@ -141,7 +141,7 @@ def test_a_log_that_is_being_written_grows_and_then_is_closed(folder: Path) -> N
     with open_writer(folder / "now.mcap", buffers) as log:
         write_pulse(log, buffers, make_tag(1))
         wait_until(lambda: catalogue.entry("now").pulses == 1, "the first pulse is seen")
-        assert catalogue.entry("now").state is LogState.UNFINISHED
+        assert catalogue.entry("now").state is LogState.WRITING
         assert catalogue.image("now", 1).shape == SHAPE
         write_pulse(log, buffers, make_tag(2))
         wait_until(lambda: catalogue.entry("now").pulses == 2, "the second pulse is seen")

@@ -90,7 +90,7 @@ def test_a_log_that_grew_after_it_was_kept_is_read_again(tmp_path: Path) -> None
     buffers = TripletBuffers(SHAPE, 4)
     with open_writer(tmp_path / "now.mcap", buffers) as log:
         write_pulse(log, buffers, make_tag(1))
-        assert Catalogue(tmp_path).entry("now").state is LogState.UNFINISHED
+        assert Catalogue(tmp_path).entry("now").state is LogState.WRITING
         Catalogue(tmp_path).entries()
         write_pulse(log, buffers, make_tag(2))
     buffers.close()

@@ -77,7 +77,7 @@ def _wrong(original: Original, path: Path, new: Path, intact: set[int], counts: 
     wrong += [f"recovered: {finding}" for finding in found.findings]
     if found.damaged:
         wrong.append("what was recovered is damaged")
-    if not report.lossless and "no pulse is lost" in found.events[-1].message:
+    if not report.lossless and "is lost: " not in found.events[-1].message:
         wrong.append(f"the new log says that nothing was lost, the report: {report.in_words()}")
     read: _Read = {tag.pulse: (tag, image.copy()) for tag, image in triplets(new)}
     for pulse in sorted(intact):

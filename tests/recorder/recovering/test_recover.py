@@ -288,7 +288,8 @@ def test_what_a_torn_end_held_is_said_in_the_new_log(whole: tuple[Path, list[Wri
     report = recover(cut, tmp_path / "out.mcap")
     assert not report.lossless
     assert report.in_words().startswith("the last ")
-    assert verify(report.path).events[-1].message == f"recovered from cut.mcap: this is lost: {report.in_words()}"
+    told = f"recovered from cut.mcap: this is lost: {report.in_words()}; {report.end_unknown}"
+    assert verify(report.path).events[-1].message == told
     assert verify(report.path).events[-1].level == "warning"
 
 

@@ -29,8 +29,10 @@ def test_an_unfinished_log_without_loss_is_no_error(log: Path, capsys: pytest.Ca
     out, err = capsys.readouterr()
     assert err == ""
     assert "5 pulses, 5 complete" in out
-    assert "was not closed; its last pulse is 5" in out
-    assert verify(log.with_name("new.mcap")).verdict == "clean"
+    assert "never closed: nobody knows whether pulses came after pulse 5" in out
+    found = verify(log.with_name("new.mcap"))
+    assert (found.verdict, found.ledger.complete) == ("partial", 5)
+    assert found.ended_early == "it was never closed: nobody knows whether pulses came after pulse 5"
     assert log.read_bytes() == before
 
 

@@ -134,6 +134,23 @@ def test_after_a_failed_write_the_service_says_so_and_the_next_recording_is_whol
     fault_table.tell(DISK, "ENOSPC on a write of an event, under the service", lost=lost, said=statement["text"])
 
 
+def test_a_failure_that_passes_is_known_after_a_restart(tmp_path: Path, loopback: Loopback, disk: FaultyDisk) -> None:
+    """The log is closed and sound; that the recording was to go on stands in the log itself."""
+    recording = Record(_rig(tmp_path, loopback), tmp_path / "logs", 60, disk)
+    recording.await_bytes(20_000_000)
+    disk.fail(errno.EIO, least=SMALL)
+    code, result, err = recording.result()
+    assert code == 4, err
+    log = Path(result["log"])
+    report = verify(log)
+    assert (report.closed, report.verdict) == (True, "partial")
+    assert "the disk fails: look at `dmesg`" in report.ended_early == info(log).ended_early
+    with serving(tmp_path, _rig(tmp_path, loopback), loopback, data=log.parent) as service:
+        (listed,) = service.get("/api/recordings")
+        assert listed["verdict"]["code"] == "verdict_ended_early"
+        assert "the disk fails" in listed["verdict"]["text"]
+
+
 def _tells_the_truth(service: Serving, recording: str, told: dict[str, Any]) -> None:
     ledger = verify(service.data / f"{recording}.mcap").ledger
     assert (told[recording]["pulses"], told[recording]["complete"]) == (ledger.pulses, ledger.complete)
@@ -303,7 +320,10 @@ def test_on_a_second_disk_the_recording_goes_on_without_a_gap(
     reports = verify(first), verify(second)
     assert result["pulses"] == result["complete"] == 210, err
     assert sum(report.ledger.pulses for report in reports) >= 210
-    assert reports[1].verdict == "clean"
+    assert (reports[1].verdict, reports[1].part_before) == ("partial", first.stem)
+    assert list(reports[1].parts_in_words()) == [
+        f"goes on from {first.stem}, which does not lie beside it: its pulses are not in this log"
+    ]
     assert code == 0, err
     assert f"the recording goes on in {second}" in err
     assert len(json.loads(second.with_suffix(".truth.json").read_text())["hill_pulse_of_recording"]) > 100

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from recorder.catalogue.entry import read_entry
-from recorder.log.extent import extent
+from recorder.log.extent import ENDED_EARLY, extent
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.frame import FrameStatus
 from service.recordings.archive import verdict
@@ -33,3 +33,16 @@ def test_a_recording_with_a_pause_is_never_called_complete(
     said = verdict(read_entry(tmp_path / "log.mcap"))
     assert (said.code, said.text) == (code, words)
     assert (said.level.value == "good") == (code == "verdict_complete")
+
+
+def test_a_recording_that_ended_early_is_never_called_complete(tmp_path: Path) -> None:
+    why = "the disk fails: look at `dmesg` and its cable, and record to another disk"
+    buffers = TripletBuffers(SHAPE, 4)
+    with open_writer(tmp_path / "log.mcap", buffers) as log:
+        write_pulse(log, buffers, make_tag(1))
+        log.set_metadata("svev.recording", extent(make_tag(1).time, make_tag(1).time) | {ENDED_EARLY: why})
+    buffers.close()
+    said = verdict(read_entry(tmp_path / "log.mcap"))
+    assert (said.code, said.level.value) == ("verdict_ended_early", "warning")
+    assert said.text == f"Ended early: {why}. Complete: all 1 pulses"
+    assert said.values["why"] == why

@@ -48,7 +48,12 @@ class Event(msgspec.Struct, frozen=True, omit_defaults=True, rename={"time": "ti
     @classmethod
     def now(cls, level: Level, name: str, said: Phrase) -> "Event":
         """An event of the present moment."""
-        return cls(UtcNs(time.time_ns()), level, name, said.text, said.code, said.values)
+        return cls.at(UtcNs(time.time_ns()), level, name, said)
+
+    @classmethod
+    def at(cls, moment: UtcNs, level: Level, name: str, said: Phrase) -> "Event":
+        """An event of another moment."""
+        return cls(moment, level, name, said.text, said.code, said.values)
 
     def to_protobuf(self) -> bytes:
         """The event as it stands in the log: a serialized `foxglove.Log`."""

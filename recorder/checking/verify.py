@@ -8,6 +8,7 @@ from typing import Any
 
 from recorder.checking.pulse_check import PulseCheck
 from recorder.checking.structure_check import StructureCheck
+from recorder.checking.time_line import TimeLine
 from recorder.log.extent import apply_extent, ended_early, part_before
 from recorder.log.write_lock import is_being_written
 from recorder.reading.info import known_lost
@@ -76,6 +77,7 @@ class VerifyReport:
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
         part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
+        off_time: messages far outside of the pulses, one sentence each; nothing is wrong with the pulses.
     """
 
     path: Path
@@ -90,6 +92,7 @@ class VerifyReport:
     known_lost: tuple[tuple[int, int], ...] = ()
     ended_early: str = ""
     part_before: str = ""
+    off_time: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -128,6 +131,7 @@ class VerifyReport:
             "pauses": [wire.to_builtins(pause) for pause in self.ledger.pauses()],
             "ended_early": self.ended_early,
             "part_before": self.part_before,
+            "off_time": list(self.off_time),
             "findings": list(self.findings),
             "events": [wire.to_builtins(event) for event in self.events],
         }
@@ -145,12 +149,13 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
     """
     findings = Findings()
     with LogReader(path) as reader:
-        pulses, structure = PulseCheck(findings.add), StructureCheck(reader, findings.add)
+        pulses, structure, times = PulseCheck(findings.add), StructureCheck(reader, findings.add), TimeLine()
         for item in reader.items():
             if text := _flaw(item):
                 findings.add(text)
             elif isinstance(item, Chunk):
                 pulses.take(item)
+                times.take(item)
             structure.take(item)
             if progress is not None:
                 progress(item.offset + item.length)
@@ -168,6 +173,7 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
             pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
             known_lost(reader), ended_early(reader.metadata), part_before(reader.metadata, path),
+            tuple(times.in_words()),
         )  # fmt: skip
 
 

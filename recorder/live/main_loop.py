@@ -22,6 +22,7 @@ from rig.clocks import NS_PER_S, DecimalNs, HostNs, host_now
 from rig.errors import SvevError
 from rig.events import TRIGGER, Event, Level
 from rig.health import PulsesMade, ToldPulses
+from rig.host.utc_clock import SetClock
 from rig.phrase import Phrase, phrase
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
@@ -95,6 +96,7 @@ class RecorderLoop:
         self._times: deque[HostNs] = deque(maxlen=_RATE_PULSES)
         self._source = trigger_source(rig.trigger)
         self._spread = SpreadTeller(self._source)
+        self._set_clock = SetClock()
         self._actions: tuple[ActionCounts, ...] | None = None
         self._made: PulsesMade | None = None
         self._fired: deque[ToldPulses] | None = None
@@ -219,6 +221,9 @@ class RecorderLoop:
         if (said := self._spread.tell(health.pairing)) is not None:
             self._warn(TRIGGER, said)
         self._own_up()
+        if moved_s := self._set_clock.moved_s():
+            text = "the computer's clock was set by {seconds:+.3f} s, or it was suspended; the times in the log go on"
+            self._warn("computer", phrase("event_clock_set", text, seconds=moved_s))
         self._recordings.health(wire.encode(health))
 
     def _own_up(self) -> None:

@@ -90,6 +90,7 @@ class Recording:
             rig_toml=order.rig_toml.encode(),
             calibration_json=None if order.calibration is None else order.calibration.json,
             calibrations={} if order.calibration is None else order.calibration.cameras,
+            begin=self._anchor.utc(host_now()),
         )
         self.log: LogWriter | None = None
         self._opening = in_background(partial(open_log, order.path, description, assembler.buffers))
@@ -287,13 +288,13 @@ class Recording:
         text = "{path}: the disk did not take the end of the log; what is written so far stays readable: svev recover"
         return self.log.error or StorageError(phrase("why_not_closed", text, path=str(self.path)))
 
-    def event(self, event: Event) -> None:
-        """Write one event.
+    def event(self, event: Event, time: HostNs) -> None:
+        """Write an event that happened at `time`, on the time scale of the tags, whatever the computer's clock says.
 
         Raises:
             StorageError: writing has ended.
         """
-        self._writer.write_event(event)
+        self._writer.write_event(msgspec.structs.replace(event, time=self._anchor.utc(time)))
 
     def health(self, health: bytes, time: HostNs) -> None:
         """Write the encoded health record of the second that ended at `time`.

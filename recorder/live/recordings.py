@@ -369,7 +369,7 @@ class Recordings:
             return
         try:
             if isinstance(note, Event):
-                recording.event(note)
+                recording.event(note, time_)
             else:
                 recording.health(note, time_)
         except StorageError as error:

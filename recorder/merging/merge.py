@@ -208,6 +208,7 @@ class _Merging:
             rig_toml=joined_rig_toml(*(stream.attachments.get(RIG_ATTACHMENT, b"") for stream in streams)),
             calibration_json=joined_calibration(calibrations),
             calibrations={**streams[1].calibrations, **streams[0].calibrations},
+            begin=self._parts[0].first.time,
         )
 
     def _metadata(self) -> dict[str, dict[str, str]]:

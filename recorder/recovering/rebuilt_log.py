@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, Self
 
+from msgspec.structs import replace
+
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.items import Message
 from recorder.writing.log_writer import LogDescription, LogWriter
@@ -12,9 +14,12 @@ from rig.errors import StorageError
 from rig.events import Event
 from rig.images.pixels import MONO8, Pixels, Stored
 from rig.tag import TripletTag
+from rig.topics import HEALTH
 
 _SLOTS: Final = 4
 _DISK_S: Final = 60.0
+#: Messages that come by the clock of the pulses; events of earlier versions have that of the computer.
+_ON_TIME: Final = frozenset({HEALTH.name})
 
 
 class RebuiltLog:
@@ -43,6 +48,7 @@ class RebuiltLog:
         """
         self._path = path
         self._closed = False
+        self._last = description.time
         self._buffers = TripletBuffers(shape, _SLOTS, own_topics, kind)
         try:
             self._writer = LogWriter(path, description, self._buffers)
@@ -72,6 +78,7 @@ class RebuiltLog:
             ValueError: the tag is too long.
         """
         ready = tag.time if message is None else message.log_time
+        self._last = max(self._last, ready)
         encoded = None if message is None or message.data is None else bytes(message.data)
         if picture is None:
             self._writer.write_pulse(tag, None, ready, encoded)
@@ -88,6 +95,7 @@ class RebuiltLog:
         Raises:
             StorageError: the disk refuses.
         """
+        self._last = max(self._last, log_time) if topic in _ON_TIME else self._last
         self._writer.write_message(topic, data, publish_time, log_time, sequence)
 
     def close(self, metadata: Mapping[str, Mapping[str, str]], event: Event) -> int:
@@ -95,7 +103,7 @@ class RebuiltLog:
 
         Args:
             metadata: fields of more metadata records, by name.
-            event: last event of the log.
+            event: last event of the log; it gets the log's last time, so that the log ends with its recording.
 
         Returns:
             Its size in bytes.
@@ -103,7 +111,7 @@ class RebuiltLog:
         Raises:
             StorageError: the disk refuses.
         """
-        self._writer.write_event(event)
+        self._writer.write_event(replace(event, time=self._last))
         for name, fields in metadata.items():
             self._writer.set_metadata(name, fields)
         size = self._writer.close().bytes

@@ -126,6 +126,7 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
             rig_toml=attachments.get(RIG_ATTACHMENT, b""),
             calibration_json=attachments.get(CALIBRATION_ATTACHMENT),
             calibrations=scan.calibrations,
+            begin=chain.pulses[0].time,
         )
         found = chain.constants
         own_topics = [(camera.name, camera.columns) for camera in found.cameras] if reader.has_camera_topics else ()
@@ -201,7 +202,7 @@ class _Recovery:
         kept = "no pulse up to the last one is lost" if end else "no pulse is lost"
         told = "; ".join([f"this is lost: {words}" if words else kept, *end.values()])
         event = Event.now(
-            Level.WARNING if words or end else Level.INFO, "recover", plain(f"recovered from {name}: {told}")
+            Level.WARNING if words or end else Level.INFO, "recover", plain(f"recovered from {name} on {time}: {told}")
         )
         others = {
             key: each for key, each in self._reader.metadata.items() if key not in (SESSION_METADATA, RIG_METADATA)

@@ -65,6 +65,7 @@ class LogDescription:
         rig_toml: the rig file.
         calibration_json: the calibration file, where known.
         calibrations: serialized `foxglove.CameraCalibration` by camera name, where known.
+        begin: time of what stands before the first message that is handed over, UTC; None: the computer's.
     """
 
     session: Mapping[str, str]
@@ -72,6 +73,12 @@ class LogDescription:
     rig_toml: bytes
     calibration_json: bytes | None = None
     calibrations: Mapping[str, bytes] = field(default_factory=dict)
+    begin: UtcNs | None = None
+
+    @property
+    def time(self) -> UtcNs:
+        """Time of what stands before the first message that is handed over, UTC."""
+        return UtcNs(time.time_ns()) if self.begin is None else self.begin
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +133,7 @@ class LogWriter:
             if isinstance(error, OSError):
                 raise storage_error(path, error) from error
             raise
-        self._write_first_messages(description.calibrations)
+        self._write_first_messages(description)
 
     def __enter__(self) -> "LogWriter":
         return self
@@ -287,7 +294,7 @@ class LogWriter:
 
     def _write_opening(self, declarations: bytes, description: LogDescription) -> None:
         """Write everything before the first message at once, and make it durable."""
-        now = time.time_ns()
+        now = description.time
         out = MAGIC + records(Header(PROFILE, _library())) + declarations
         out += self._changed_metadata(len(out))
         attachments = [Attachment(now, now, RIG_ATTACHMENT, "application/toml", description.rig_toml)]
@@ -312,13 +319,13 @@ class LogWriter:
                 out += record
         return out
 
-    def _write_first_messages(self, calibrations: Mapping[str, bytes]) -> None:
-        now = UtcNs(time.time_ns())
-        for channel, data in enumerate(calibrations.values(), FIRST_CALIBRATION_CHANNEL):
+    def _write_first_messages(self, description: LogDescription) -> None:
+        now = description.time
+        for channel, data in enumerate(description.calibrations.values(), FIRST_CALIBRATION_CHANNEL):
             self._write_small(channel, 1, data, now, now)
         if not self._file.direct:
             said = phrase("event_no_direct_io", "the file system takes no direct I/O: writing costs more")
-            self.write_event(Event.now(Level.WARNING, "recorder", said))
+            self.write_event(Event.at(now, Level.WARNING, "recorder", said))
 
     def _closing_bytes(self) -> bytes:
         metadata = self._changed_metadata(self._file.size)

@@ -7,11 +7,15 @@ from those of others: a timing system, a camera of the television, a second comp
 import ctypes
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from rig.clocks import NS_PER_S, UtcAnchor
+
+#: Readings of the two clocks differ by far less, even on a busy computer.
+_SET_NS: Final = NS_PER_S // 100
 _UNSYNCHRONIZED: Final = 0x0040  # STA_UNSYNC, sys/timex.h
 _NANO: Final = 0x2000  # STA_NANO: the offset is in ns, not us
 #: Programs that set a computer's clock, by the name that the kernel has for their process (15 characters).
@@ -88,6 +92,23 @@ class UtcState:
         keeper = f" by {self.keeper}" if self.keeper else ""
         estimated, most, correcting = map(_time, (self.estimated_us, self.at_most_us, self.offset_us))
         return f"synchronized{keeper}, off by {estimated} (estimated), {most} at most; {correcting} being corrected"
+
+
+class SetClock:
+    """Notices that the computer's clock is set; a program that only lets it go faster or slower moves no time.
+
+    Args:
+        take: reads how far UTC is ahead of the clock that never jumps.
+    """
+
+    def __init__(self, take: Callable[[], UtcAnchor] = UtcAnchor.take) -> None:
+        self._take, self._known = take, take()
+
+    def moved_s(self) -> float:
+        """By how many seconds it was set since the last call; 0: it was not."""
+        before, self._known = self._known, self._take()
+        moved = self._known.offset_ns - before.offset_ns
+        return moved / NS_PER_S if abs(moved) >= _SET_NS else 0.0
 
 
 def utc_fields() -> dict[str, str]:

@@ -180,7 +180,7 @@ def _print_verified(report: VerifyReport) -> None:
     console.say(f"{ledger.summary_line()}; {report.bytes / 1e6:.1f} MB; {'' if report.closed else 'not '}closed")
     if report.closed and not report.every_byte:
         console.say("  no checksum over the whole log: what stands outside of images, tags and messages is not checked")
-    lines = [*report.parts_in_words(), *ledger.in_words(), *report.findings]
+    lines = [*report.parts_in_words(), *ledger.in_words(), *report.findings, *report.off_time]
     for line in lines[:_LINES_MAX]:
         console.say(f"  {line}")
     if len(lines) > _LINES_MAX:

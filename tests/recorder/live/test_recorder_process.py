@@ -16,8 +16,9 @@ import zmq
 from recorder.checking.verify import verify
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
-from rig.clocks import host_now
+from rig.clocks import NS_PER_S, UtcAnchor, UtcNs, host_now
 from rig.errors import BadInputError, ProcessDiedError
+from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.health import HEALTH_SCHEMA, Health
 from rig.jumper import JumperState
@@ -26,7 +27,7 @@ from rig.settings.model import RigSettings
 from rig.topics import JUMPER
 from rig.transport.analysis_messages import JumpMeasured
 from rig.transport.preview import PreviewSlot
-from rig.transport.recorder_commands import RecorderOptions, StartRecording, TellResult
+from rig.transport.recorder_commands import RecorderOptions, StartRecording, TellEvent, TellResult
 from rig.transport.recorder_reports import (
     CameraChanged,
     CameraNews,
@@ -232,6 +233,24 @@ def test_results_reach_the_log_of_their_recording_and_subscribers(tmp_path: Path
     with LogReader(path) as reader:
         kept = [JumperState.decode(message.data or b"") for message in reader.messages("/jumper")]
     assert kept == [jumper_state(7, "jump")]
+
+
+def test_an_event_stands_at_its_moment_whatever_the_clock_of_the_computer_says(
+    tmp_path: Path, loopback: Loopback
+) -> None:
+    with _running(tmp_path, loopback) as running:
+        path = running.start("jump", pulses=45)
+        running.until("the log is open", lambda: running.last(RecordingStarted) is not None)
+        week_ago = UtcNs(UtcAnchor.take().utc(host_now()) - 7 * 86400 * NS_PER_S)
+        running.processes.tell(TellEvent(event=Event(week_ago, Level.INFO, "service", "by a clock that was set back")))
+        running.finished(path)
+    report = verify(path)
+    assert [event.message for event in report.events].count("by a clock that was set back") == 1
+    first, last = report.ledger.first_time, report.ledger.last_time
+    assert first is not None
+    assert last is not None
+    assert all(first - 60 * NS_PER_S < event.time < last + 60 * NS_PER_S for event in report.events)
+    assert report.off_time == ()
 
 
 def test_health_says_everything_and_keeps_its_schema(tmp_path: Path, loopback: Loopback) -> None:

@@ -1,5 +1,6 @@
 """Recovering logs: whatever was cut off or destroyed, what comes out is whole, and what is lost is said."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -25,7 +26,7 @@ from recorder.reading.info import info
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from recorder.recovering.recover import RecoverReport, recover
-from rig.clocks import UtcNs
+from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
@@ -41,6 +42,7 @@ from tests.recorder.logs import (
     RIG_TOML,
     SESSION,
     SHAPE,
+    START,
     Written,
     jumper_state,
     make_tag,
@@ -108,7 +110,19 @@ def test_a_whole_log_comes_out_as_it_went_in(whole: tuple[Path, list[Written]], 
         assert new.metadata[RECOVERY_METADATA] | {"time": ""} == {
             "source": "log.mcap", "time": "", "lost_pulses": "", "lost_pixels": "",
         }  # fmt: skip
-    assert verify(report.path).events[-1].message == "recovered from log.mcap: no pulse is lost"
+    message = verify(report.path).events[-1].message
+    assert re.fullmatch(r"recovered from log\.mcap on 20[-0-9T:+]+: no pulse is lost", message)
+
+
+def test_a_recovered_log_lasts_as_long_as_its_recording(tmp_path: Path) -> None:
+    """Its first and its last message are of the recording, whenever it is repaired."""
+    times = tuple(UtcNs(START + pulse * NS_PER_S) for pulse in (0, 5))
+    write_log(tmp_path / "log.mcap", (ALL_OK,) * 4, health=(b'{"free_triplets":4}', times[1]))
+    report = recover(tmp_path / "log.mcap", tmp_path / "out.mcap")
+    with LogReader(report.path) as reader:
+        logged = [message.log_time for topic in ("/health", "/triplet/tag") for message in reader.messages(topic)]
+        *_, said = reader.messages("/events")
+    assert said.log_time == max(logged) == times[1]
 
 
 def test_the_session_is_the_one_that_was_corrected(whole: tuple[Path, list[Written]], tmp_path: Path) -> None:
@@ -288,8 +302,8 @@ def test_what_a_torn_end_held_is_said_in_the_new_log(whole: tuple[Path, list[Wri
     report = recover(cut, tmp_path / "out.mcap")
     assert not report.lossless
     assert report.in_words().startswith("the last ")
-    told = f"recovered from cut.mcap: this is lost: {report.in_words()}; {report.end_unknown}"
-    assert verify(report.path).events[-1].message == told
+    told = f": this is lost: {report.in_words()}; {report.end_unknown}"
+    assert verify(report.path).events[-1].message.endswith(told)
     assert verify(report.path).events[-1].level == "warning"
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from rig.host.utc_clock import UtcState, utc_fields, utc_state
+from rig.clocks import UtcAnchor
+from rig.host.utc_clock import SetClock, UtcState, utc_fields, utc_state
 
 STATE = UtcState(True, "chrony", -12.5, 20.0, 812.0)
 
@@ -39,3 +40,14 @@ def test_it_is_said_in_one_line() -> None:
 )
 def test_what_makes_no_sense_is_nothing(fields: dict[str, str]) -> None:
     assert UtcState.from_fields(fields) is None
+
+
+def test_a_clock_that_is_set_is_noticed_once() -> None:
+    offsets = iter([10**18, 10**18 + 500_000, 10**18 + 2_500_500_000, 10**18 + 2_500_500_000, 10**18])
+    clock = SetClock(lambda: UtcAnchor(next(offsets)))
+    assert [clock.moved_s() for _ in range(4)] == [0.0, 2.5, 0.0, -2.5005]
+
+
+def test_the_clock_of_this_computer_is_not_set() -> None:
+    clock = SetClock()
+    assert [clock.moved_s() for _ in range(20)] == [0.0] * 20

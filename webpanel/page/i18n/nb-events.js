@@ -34,6 +34,7 @@ export const events = {
   event_goes_on_in: ["{why}; opptaket fortsetter i {path}"],
   event_there_neither: ["ikke der heller: {why}"],
   event_no_direct_io: ["filsystemet har ikke direkte I/O: det koster mer å skrive"],
+  event_clock_set: ["datamaskinens klokke ble stilt {seconds} s, eller den sov; tidene i loggen går videre"],
   event_reports_dropped: ["{count} meldinger er kastet: tjenesten leser dem ikke; se om den er stoppet"],
   event_commands_dropped: ["leser ikke kommandoene sine, og noen er kastet; startes på nytt hvis det fortsetter"],
   event_subscribers_refused: ["{count} forbindelser er brutt, med et program som gjorde dette: {fault}; avslutt det, eller publiser på en annen adresse"],

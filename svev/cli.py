@@ -23,6 +23,7 @@ import typer
 from typer._completion_classes import completion_init
 
 from rig.errors import BadInputError, SvevError
+from rig.host.file_names import NAME_MAX
 from svev import console
 from svev.commands.computer.completion import COMPLETE_VARIABLE
 
@@ -207,4 +208,9 @@ def _one_line(error: SvevError | OSError) -> str:
     if error.errno in {errno.EMFILE, errno.ENFILE}:
         limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         return f"too many files are open ({limit} are allowed here): run `ulimit -n 4096` and call again"
-    return f"{error.filename or 'system call'}: {error.strerror}; check the path and its permissions"
+    remedy = (
+        f"choose a name of at most {NAME_MAX} bytes"
+        if error.errno == errno.ENAMETOOLONG
+        else "check the path and its permissions"
+    )
+    return f"{error.filename or 'system call'}: {error.strerror}; {remedy}"

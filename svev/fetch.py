@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from rig.errors import BadInputError, ProcessDiedError, SvevError
+from rig.host.file_names import give_name
 from svev.rest_client import RestClient
 
 if TYPE_CHECKING:
@@ -93,7 +94,16 @@ class _Coming:
             self._part.unlink()
             text = f"{self._target.name}: what came is not what the service has; it was corrected meanwhile? try again"
             raise SvevError(text)
-        return self._part.rename(self._target)
+        try:
+            give_name(self._part, self._target)
+        except FileExistsError:
+            raise BadInputError(_taken(self._target)) from None
+        except OSError as error:
+            text = (
+                f"{self._target}: cannot be written ({error.strerror}); what came is whole, and stays in {self._part}"
+            )
+            raise BadInputError(text) from None
+        return self._target
 
     def _begin(self, answer: "httpx.Response") -> None:
         self.have, self._tag = 0, answer.headers.get("etag", "")
@@ -101,7 +111,11 @@ class _Coming:
         self._target = self._folder / _name_in(answer.headers.get("content-disposition", ""))
         self._part = self._target.with_name(f"{self._target.name}.part")
         if self._target.exists():
-            raise BadInputError(f"{self._target}: exists already and is never overwritten; remove it first")
+            raise BadInputError(_taken(self._target))
+
+
+def _taken(target: Path) -> str:
+    return f"{target}: exists already and is never overwritten; remove it first"
 
 
 def _name_in(disposition: str) -> str:

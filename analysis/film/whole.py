@@ -11,6 +11,7 @@ from typing import Final
 from av.error import FFmpegError
 
 from rig.errors import BadInputError, StorageError
+from rig.host.file_names import unfinished_path
 
 #: What the disk refuses although the place is right: full, quota used up, file too large, hardware error.
 _DISK: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
@@ -25,7 +26,7 @@ def whole_file(out: Path) -> Iterator[Path]:
         StorageError: the disk is full or fails.
         BadInputError: `out` cannot be written.
     """
-    part = out.with_name(f".{out.name}{_UNFINISHED}")
+    part = unfinished_path(out, _UNFINISHED)
     try:
         with _in_one_line(out):
             yield part
@@ -47,7 +48,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
     """
     if out.is_dir() and any(out.iterdir()):
         raise BadInputError(f"{out}: holds files already; name a new folder")
-    part = out.with_name(f".{out.name}{_UNFINISHED}")
+    part = unfinished_path(out, _UNFINISHED)
     try:
         with _in_one_line(out):
             shutil.rmtree(part, ignore_errors=True)  # of a program that was killed

@@ -31,6 +31,7 @@ from analysis.result.model import (
 )
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.host.file_names import unfinished_path
 
 #: Name of the file in a folder of results.
 NAME: Final = "jumper.json"
@@ -52,7 +53,7 @@ def write_json(content: Mapping[str, Any], path: Path) -> None:
     Raises:
         OSError: the disk refuses.
     """
-    half_done = path.with_name(f".{path.name}.new")
+    half_done = unfinished_path(path, ".new")
     half_done.write_text(json.dumps(content, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
     half_done.replace(path)
 

@@ -35,6 +35,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.errors import BadInputError, LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
+from rig.host.file_names import give_name
 from rig.images.picture import shown
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
@@ -193,7 +194,7 @@ class Catalogue:
             if path.parent != self._trash:
                 self._trash.mkdir(exist_ok=True)
                 log, path = path, self._free_path(path, self._trash)
-                log.rename(path)  # after a crash here the files beside it are where `restore` leaves them
+                give_name(log, path)  # after a crash here the files beside it are where `restore` leaves them
                 _move_beside(log, path)
         return self.entry(path.stem)
 
@@ -209,7 +210,7 @@ class Catalogue:
             if path.parent == self._trash:
                 log, path = path, self._free_path(path, self.directory)
                 _move_beside(log, path)
-                log.rename(path)
+                give_name(log, path)
         return self.entry(path.stem)
 
     def trash(self) -> TrashContents:

@@ -14,6 +14,7 @@ from typing import Final
 import msgspec
 
 from rig.errors import BadInputError
+from rig.host.file_names import unfinished_path
 
 #: A request to the service has at most so many bytes; more text than that was not written by svev.
 _BYTES_MAX: Final = 64 << 10
@@ -41,6 +42,8 @@ def session_changes(log: Path) -> dict[str, str]:
     except FileNotFoundError:
         return {}
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:  # nobody can have written changes of a log with so long a name
+            return {}
         if error.errno == errno.ELOOP:
             raise BadInputError(f"{path}: is a link, and links are not followed; remove it") from None
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
@@ -59,7 +62,7 @@ def write_session_changes(log: Path, changes: Mapping[str, str]) -> None:
         OSError: the disk refuses.
     """
     path = session_path(log)
-    half_done = path.with_name(f".{path.name}.new")
+    half_done = unfinished_path(path, ".new")
     half_done.unlink(missing_ok=True)
     with half_done.open("x", encoding="utf-8") as file:
         json.dump(dict(changes), file, ensure_ascii=False, indent=1)

@@ -6,6 +6,7 @@ of the logs. The new log is there under its name only when it is complete.
 """
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,12 +22,14 @@ from recorder.merging.rig_file import joined_rig_toml
 from recorder.merging.source import LogStream, Note, Part, look_at
 from recorder.reading.info import merged_in_words
 from recorder.reading.items import Message
+from recorder.reading.records import FileWindow, is_closed
 from recorder.reading.triplets import event_of
 from recorder.recovering.rebuilt_log import RebuiltLog
 from recorder.writing.log_writer import LogDescription
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError, StorageError
 from rig.events import Event, Level
+from rig.host.file_names import give_name, unfinished_path
 from rig.phrase import plain
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -40,8 +43,9 @@ from rig.topics import (
 from triggering.alignment import Alignment, align
 from triggering.ledger.account import Ledger, span
 
-#: Name of a log in the making, with the number of its process in it.
-_UNFINISHED: Final = ".{name}.{pid}.part"
+#: Ending of a log in the making, with the number of its process in it.
+_UNFINISHED: Final = ".{pid}.part"
+_PROCESS: Final = re.compile(r"\.([0-9]+)\.part$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,33 +253,54 @@ class _Merging:
 
 @contextmanager
 def _unfinished(target: Path) -> Iterator[Path]:
-    """A name beside the target for the log in the making, which gets its own name at the end, all at once."""
-    _clear_away(target)
-    path = target.with_name(_UNFINISHED.format(name=target.name, pid=os.getpid()))
+    """A name beside the target for the log in the making, which gets its own name at the end, all at once.
+
+    Once the log is whole, nothing deletes it: if it cannot get its name, it stays under the one that it has.
+    """
+    path = unfinished_path(target, _UNFINISHED.format(pid=os.getpid()))
     try:
+        _clear_away(target)
         yield path
-        try:
-            os.link(path, target)  # unlike a renaming, this never replaces a file
-        except FileExistsError:
-            raise BadInputError(f"{target}: exists already and is never overwritten; choose another name") from None
-        except PermissionError:  # a file system without links
-            if target.exists():
-                raise BadInputError(f"{target}: exists already and is never overwritten; choose another name") from None
-            path.rename(target)
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise StorageError(f"{target}: {error.strerror}; look at `dmesg`, write to another disk") from error
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+    kept = f"the merged log is whole, and stays in {path}: give it another name by mv"
+    try:
+        give_name(path, target)
+    except FileExistsError:
+        raise BadInputError(f"{target}: exists already and is never overwritten; {kept}") from None
+    except OSError as error:
+        raise StorageError(f"{target}: cannot be made ({error.strerror}); {kept}") from error
+    try:
         _sync(target.parent)
     except OSError as error:
-        raise StorageError(f"{target}: {error.strerror}; look at `dmesg`, write to another disk") from error
-    finally:
-        path.unlink(missing_ok=True)
+        text = f"{target}: may not survive a loss of power ({error.strerror}); look at `dmesg`, copy it to another disk"
+        raise StorageError(text) from error
 
 
 def _clear_away(target: Path) -> None:
-    """Remove what a merging left whose process was killed."""
-    before, after = _UNFINISHED.format(name=target.name, pid="\0").split("\0")
+    """Remove what a merging left whose process was killed; a log that is whole stays."""
     for left in target.parent.iterdir():
-        pid = left.name.removeprefix(before).removesuffix(after)
-        if left.name == f"{before}{pid}{after}" and pid.isdecimal() and not Path("/proc", pid).exists():
+        pid = _PROCESS.search(left.name)
+        if pid is None or left != unfinished_path(target, _UNFINISHED.format(pid=pid[1])):
+            continue
+        if not Path("/proc", pid[1]).exists() and not _is_whole(left):
             left.unlink(missing_ok=True)
+
+
+def _is_whole(log: Path) -> bool:
+    """Whether a log was closed. What cannot be read may be."""
+    try:
+        window = FileWindow(log, direct=False)
+    except BadInputError:
+        return True
+    try:
+        return is_closed(window)
+    finally:
+        window.close()
 
 
 def _sync(directory: Path) -> None:

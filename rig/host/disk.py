@@ -6,6 +6,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from rig.host.file_names import unfinished_path
+
 
 def ask_free_bytes(place: Path | int) -> int:
     """Bytes that we may still write on the disk of a directory or an open file.
@@ -43,7 +45,7 @@ def replace_file(path: Path, content: bytes) -> None:
         OSError: it cannot be written; then it is as it was.
     """
     path = path.resolve()
-    new = path.with_name(f".{path.name}.new")
+    new = unfinished_path(path, ".new")
     try:
         new.unlink(missing_ok=True)
         with new.open("xb") as file:

@@ -7,6 +7,7 @@ from typing import BinaryIO, Final
 import msgspec
 
 from rig.clocks import HostNs
+from rig.host.file_names import unfinished_path
 from rig.pulse import HillPulse, PulseNumber
 from rig.settings.camera import CameraSettings, Region
 from rig.settings.model import RigSettings
@@ -52,7 +53,7 @@ class RecordingTruth:
         Raises:
             OSError: the disk refuses.
         """
-        unfinished = path.with_name(f".{path.name}.unfinished")
+        unfinished = unfinished_path(path, ".unfinished")
         try:
             with unfinished.open("wb") as file:
                 self._write(file, pulses)

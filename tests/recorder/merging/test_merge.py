@@ -1,10 +1,12 @@
 """`svev merge`: logs of two computers with clocks of their own become one, sound to every check, or none at all."""
 
+import errno
 import json
+import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,8 @@ KNOWN = UtcState(True, "chrony", 0.0, 100.0, 3000.0)
 #: What the second computer's clock shows too much, ns, and how much too fast it runs.
 OFFSET_NS, DRIFT = 2_345_678, 20e-6
 WIDTH = 30
+#: No process has this number: it is larger than Linux gives.
+DEAD_PID = 4_194_305
 
 
 def write_part(
@@ -204,13 +208,71 @@ def test_what_cannot_be_decided_or_does_not_fit_is_refused_and_leaves_nothing(
 
 
 def test_a_full_disk_leaves_nothing(parts: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuses(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("recorder.merging.merge.os.link", refuses)
-    with pytest.raises(StorageError, match="No space left"):
+    monkeypatch.setattr("os.pwrite", refusing(errno.ENOSPC))
+    with pytest.raises(StorageError, match="the disk is full"):
         merge(*parts, tmp_path / "out.mcap")
     assert {path.name for path in tmp_path.iterdir()} == {"left.mcap", "right.mcap"}
+
+
+@pytest.mark.parametrize("error", [errno.ENOTSUP, errno.ENOSYS, errno.EMLINK, errno.EPERM, errno.EINVAL])
+def test_a_file_system_without_links_gets_the_log(
+    error: int, parts: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.host.file_names._rename_exclusively", refusing(error))
+    monkeypatch.setattr("os.link", refusing(error))
+    report = merge(*parts, tmp_path / "out.mcap")
+    assert verify(report.path).findings == ()
+    assert {path.name for path in tmp_path.iterdir()} == {"left.mcap", "right.mcap", "out.mcap"}
+
+
+def test_a_whole_log_that_cannot_get_its_name_is_kept(
+    parts: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, kept = tmp_path / "out.mcap", tmp_path / f".out.mcap.{os.getpid()}.part"
+    monkeypatch.setattr("recorder.merging.merge.give_name", refusing(errno.EIO))
+    with pytest.raises(StorageError, match=f"the merged log is whole, and stays in {kept}"):
+        merge(*parts, out)
+    assert not out.exists()
+    assert verify(kept).findings == ()
+
+
+def test_a_log_of_the_same_name_made_meanwhile_stays_and_so_does_the_merged_one(
+    parts: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out, kept = tmp_path / "out.mcap", tmp_path / f".out.mcap.{os.getpid()}.part"
+
+    def intrude(_: int) -> None:
+        out.write_text("precious")
+
+    with pytest.raises(BadInputError, match=f"never overwritten; the merged log is whole, and stays in {kept}"):
+        merge(*parts, out, progress=intrude)
+    assert out.read_text() == "precious"
+    assert verify(kept).findings == ()
+
+
+def test_a_whole_log_that_a_dead_process_left_is_not_cleared_away(parts: tuple[Path, Path], tmp_path: Path) -> None:
+    left, torn = tmp_path / f".out.mcap.{DEAD_PID}.part", tmp_path / f".out.mcap.{DEAD_PID + 1}.part"
+    left.write_bytes(parts[0].read_bytes())
+    torn.write_bytes(parts[0].read_bytes()[:-1])
+    merge(*parts, tmp_path / "out.mcap")
+    assert {path.name for path in tmp_path.iterdir()} == {"left.mcap", "right.mcap", "out.mcap", left.name}
+
+
+def test_names_as_long_as_a_file_system_takes_them(parts: tuple[Path, Path], tmp_path: Path) -> None:
+    first = parts[0].rename(tmp_path / f"{'ø' * 125}.mcap")
+    out = tmp_path / f"{'å' * 125}.mcap"
+    merge(first, parts[1], out)
+    assert verify(out).findings == ()
+    assert {path.name for path in tmp_path.iterdir()} == {first.name, parts[1].name, out.name}
+
+
+def refusing(error: int) -> Callable[..., None]:
+    """A function that fails as a system call does."""
+
+    def refuses(*_: object, **__: object) -> None:
+        raise OSError(error, os.strerror(error))
+
+    return refuses
 
 
 def test_one_that_is_killed_leaves_no_log_and_the_next_one_clears_away(

@@ -32,6 +32,7 @@ from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.tag import TripletTag
 from rig.topics import JUMPER, RECORDING_METADATA, RECOVERY_METADATA, RIG_ATTACHMENT, RIG_METADATA
+from svev.cli import main
 from tests.recorder.logs import (
     ABSENT,
     ALL_OK,
@@ -227,6 +228,23 @@ def test_nothing_is_overwritten(whole: tuple[Path, list[Written]], tmp_path: Pat
     assert path.read_bytes() == before
     with pytest.raises(BadInputError, match="no such directory"):
         recover(path, tmp_path / "none" / "out.mcap")
+
+
+def test_names_as_long_as_a_file_system_takes_them(whole: tuple[Path, list[Written]], tmp_path: Path) -> None:
+    log, out = tmp_path / f"{'å' * 125}.mcap", tmp_path / f"{'b' * 250}.mcap"
+    shutil.copy(whole[0], log)
+    assert main(["recover", str(log), "-o", str(out)]) == 0
+    assert main(["verify", str(out)]) == 0
+    assert main(["info", str(out)]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {log.name, out.name}
+
+
+def test_a_name_that_no_file_system_takes_is_refused_in_one_line(
+    whole: tuple[Path, list[Written]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["recover", str(whole[0]), "-o", str(tmp_path / f"{'b' * 251}.mcap")]) == 2
+    assert capsys.readouterr().err.endswith("File name too long; choose a name of at most 255 bytes\n")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_half_a_result_is_removed(whole: tuple[Path, list[Written]], tmp_path: Path) -> None:

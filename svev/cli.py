@@ -127,6 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     argv = [argument for argument in argv if argument != "--debug"]
     as_json = argv[:1] == ["ctl"] and "--json" in argv
     try:
+        _open_standard_streams()
         _allow_open_files()
         if COMPLETE_VARIABLE in os.environ:
             command = _completed(os.environ)
@@ -165,6 +166,24 @@ def _completed(environment: Mapping[str, str]) -> typer.Typer:
     if len(words) > 2 and words[1] in _COMMANDS:
         return command_line(words[1:2])
     return _overview()
+
+
+def _open_standard_streams() -> None:
+    """Let a standard stream that the caller has closed (`>&-`) swallow everything: he wants the exit code alone.
+
+    Otherwise the next file that is opened, a log perhaps, would take its number, and libraries would write into it.
+    """
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        try:
+            os.fstat(number)
+        except OSError:
+            nothing = os.open(os.devnull, os.O_RDWR)
+            if nothing != number:
+                os.dup2(nothing, number)
+                os.close(nothing)
+            os.set_inheritable(number, True)  # our children would open their files under the number otherwise
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
 def _allow_open_files() -> None:

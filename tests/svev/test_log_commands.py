@@ -241,3 +241,17 @@ def test_help_shows_an_example_and_the_exit_codes(command: str, svev: Svev) -> N
     text = " ".join(svev(command, "--help").stdout.split())
     assert f"Example: svev {command} recordings/jump.mcap" in text
     assert "Exit codes: 0" in text
+
+
+@pytest.mark.parametrize("closed", [">&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("command", ["verify LOG", "verify LOG --json", "info LOG --json", "schema"])
+def test_without_standard_output_the_exit_code_tells(command: str, closed: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    write_log(path, [ALL_OK] * 3)
+    program = f"{sys.executable} -m svev {command.replace('LOG', str(path))} {closed}"
+    done = subprocess.run(["/bin/sh", "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    path.write_bytes(path.read_bytes()[:-1])
+    done = subprocess.run(["/bin/sh", "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == (0 if command == "schema" else 3)
+    assert "Traceback" not in done.stderr

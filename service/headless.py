@@ -11,12 +11,11 @@ Unlike the service it does not start again what failed, except a grabber: the pr
 result.
 """
 
-import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -33,6 +32,7 @@ from rig.errors import (
     UnknownRecordingError,
 )
 from rig.events import PAIRING, Event, Level
+from rig.host.endings import Asks, heed, nobody_asks
 from rig.settings.model import RigSettings
 from rig.transport import wire
 from rig.transport.recorder_commands import RecorderOptions, StartRecording
@@ -112,13 +112,17 @@ class HeadlessRig:
         """What has been wrong with clocks, trigger or rate, in words, since the cameras were first connected."""
         return list(self._alarms.values())
 
-    def wait_until_warm(self) -> None:
+    def wait_until_warm(self, asks: Asks = nobody_asks) -> None:
         """Wait until all cameras together have delivered a few complete triplets.
 
         A camera that failed to answer gets `trigger.settle_s`, and so do the pulses once all cameras are connected.
         Then it goes on without those that are missing, if `trigger.min_cameras` allows it.
 
+        Args:
+            asks: tells how often a person has asked to end.
+
         Raises:
+            KeyboardInterrupt: a person has.
             CameraNotFoundError: too few cameras answer in time.
             CameraError: all cameras are connected, but no complete triplet came.
             BadInputError: pulses come at another rate than the rig file names.
@@ -127,6 +131,7 @@ class HeadlessRig:
         began = complete_since = time.monotonic()
         settle_s = self._rig.trigger.settle_s
         while True:
+            heed(asks)
             seen = self._ask(at_once(self._supervisor.look))
             if seen.warm and seen.state is State.ARMED:
                 return
@@ -182,7 +187,7 @@ class HeadlessRig:
         with suppress(UnknownRecordingError):
             self._ask(at_once(partial(self._supervisor.recordings.stop, at_once=not wait_for_disk)))
 
-    def wait_until_finished(self, on_progress: Callable[[Counts], None], stop: Callable[[], int]) -> RecordingFinished:
+    def wait_until_finished(self, on_progress: Callable[[Counts], None], stop: Asks) -> RecordingFinished:
         """Wait for the end of the recording.
 
         Args:
@@ -246,8 +251,9 @@ def record(
     *,
     session: Mapping[str, str],
     progress: Progress,
+    asks: Asks,
 ) -> tuple[dict[str, Any], StorageError | None]:
-    """Record once: wait until the rig is warm, record, wait for the end. Ctrl-C and SIGTERM end the recording early.
+    """Record once: wait until the rig is warm, record, wait for the end.
 
     Args:
         running: the rig's processes.
@@ -256,21 +262,23 @@ def record(
         seconds: length of the recording.
         session: session fields for the log.
         progress: shows how many pulses are recorded.
+        asks: tells how often a person has asked to end; the recording ends early then, and is closed properly.
 
     Returns:
         The result as `svev record --json` prints it, and why images are missing because of the disk; None if the disk
         did its work.
 
     Raises:
+        KeyboardInterrupt: a person asked to end before the recording began.
         SvevError: the disk has no room, a camera does not answer, the log cannot be made, the recorder died.
     """
     check_room_for(rig, path.parent, seconds)
-    running.wait_until_warm()
+    running.wait_until_warm(asks)
     pulses = max(1, round(seconds * rig.trigger.rate_hz))
-    with _stop_signals() as stop, progress(f"recording {path.name}", pulses) as advance:
+    with progress(f"recording {path.name}", pulses) as advance:
         running.start_recording(path, session=session, pulses=pulses, seconds=seconds)
-        report = running.wait_until_finished(lambda counts: advance(counts.pulses), stop)
-        early = stop() > 0
+        report = running.wait_until_finished(lambda counts: advance(counts.pulses), asks)
+        early = asks() > 0
     logs = [*(part.path for part in report.earlier), report.path]
     result = {
         "log": str(report.path),
@@ -291,17 +299,3 @@ def _disk_error(report: RecordingFinished) -> StorageError | None:
         error = report.failure.error()
         return error if isinstance(error, StorageError) else StorageError(str(error))
     return StorageError(f"{report.path}: {report.trouble}") if report.trouble else None
-
-
-@contextmanager
-def _stop_signals() -> Iterator[Callable[[], int]]:
-    """Within, Ctrl-C and SIGTERM are only counted, so that the log can be closed properly."""
-    caught: list[int] = []
-    before = {
-        number: signal.signal(number, lambda n, _: caught.append(n)) for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield lambda: len(caught)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

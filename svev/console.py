@@ -8,15 +8,32 @@ import json
 import sys
 import unicodedata
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, Final
+from contextlib import contextmanager, suppress
+from typing import IO, Any, Final, cast
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+
+class _Stderr:
+    """Standard error as it is now. That its reader is gone, or its disk is full, never ends what is being done."""
+
+    def write(self, text: str) -> int:
+        with suppress(OSError):
+            sys.stderr.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            sys.stderr.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(sys.stderr, name)
+
+
 #: For people; with `--json` only the JSON object goes to standard output.
-_stderr = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+_stderr = Console(file=cast("IO[str]", _Stderr()), stderr=True, highlight=False, soft_wrap=True, emoji=False)
 _stdout = Console(highlight=False, soft_wrap=True, emoji=False)
 
 #: Categories of characters that a terminal obeys or that change how others look: controls, formats, line ends; and

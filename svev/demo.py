@@ -10,6 +10,7 @@ from recorder.checking.verify import verify
 from recorder.log.truth_path import truth_path
 from recorder.publishing.subscriber import free_address, subscriber
 from rig.errors import BadInputError
+from rig.host.endings import counted_endings
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from service.headless import HeadlessRig, record
@@ -52,11 +53,13 @@ def run_demo(
     rig = _on_free_addresses(load_rig(rig_file))
     path = new_log_path(out)
     say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
-    with HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running:
-        running.wait_until_warm()
+    with counted_endings() as asks, HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running:
+        running.wait_until_warm(asks)
         with subscriber(rig.network.publish) as count_received:
             session = {"session": "demo", "athlete": "simulated jumper"}
-            result, disk_error = record(running, rig, path, seconds, session=session, progress=console.progress)
+            result, disk_error = record(
+                running, rig, path, seconds, session=session, progress=console.progress, asks=asks
+            )
             counted = count_received()
     if disk_error is not None:
         raise disk_error

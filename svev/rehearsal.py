@@ -21,6 +21,7 @@ from recorder.reading.triplets import tag_of
 from rig.clocks import NS_PER_US
 from rig.frame import FrameStatus
 from rig.host.disk import free_bytes
+from rig.host.endings import Asks, heed
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.tag import TripletTag
@@ -91,7 +92,13 @@ class Rehearsed:
 
 
 def rehearse(
-    rig: RigSettings, rig_toml: str, directory: Path, seconds: float, say: Callable[[str], None], progress: Progress
+    rig: RigSettings,
+    rig_toml: str,
+    directory: Path,
+    seconds: float,
+    say: Callable[[str], None],
+    progress: Progress,
+    asks: Asks,
 ) -> Rehearsed:
     """Record into `directory`, read back, judge, delete.
 
@@ -102,10 +109,11 @@ def rehearse(
         seconds: how much is recorded.
         say: prints a line about cameras that come or go.
         progress: shows how many pulses are recorded.
+        asks: tells how often it was told to end.
 
     Raises:
         SvevError: a camera does not answer, no pulses come, the disk has no room, is too slow or fails, a process died.
-        KeyboardInterrupt: Ctrl-C or SIGTERM has ended the recording before its time; it is deleted.
+        KeyboardInterrupt: it was to end before its time; what was recorded is deleted.
     """
     name = new_log_path(directory).name
     # What fails here is to be seen, so nothing goes on elsewhere.
@@ -116,12 +124,14 @@ def rehearse(
     with tempfile.TemporaryDirectory(prefix=f"{_FOLDER}{os.getpid()}-", dir=directory) as folder:
         log = Path(folder) / name
         with HeadlessRig(rig, rig_toml, say) as running:
-            result, disk_error = record(running, rig, log, seconds, session={"session": "rehearsal"}, progress=progress)
+            result, disk_error = record(
+                running, rig, log, seconds, session={"session": "rehearsal"}, progress=progress, asks=asks
+            )
         if disk_error is not None:
             raise disk_error
         if result["stopped_early"]:
             raise KeyboardInterrupt  # what was recorded until then bears no verdict
-        report, timing = verify(log), _Timing.of(log)
+        report, timing = verify(log, lambda _: heed(asks)), _Timing.of(log)
     findings += judge_pulses(rig, result["alarms"], report)
     findings += judge_source(rig)
     findings += _judge_timing(rig, timing)

@@ -1,1 +1,1 @@
-"""What this computer has: its disk, and how well it knows UTC."""
+"""What this computer has: its disk, how well it knows UTC; and the signals that end a program."""

@@ -14,6 +14,7 @@ from typing import Any, Final, Generic, TypeVar
 
 import msgspec
 
+from rig.host.endings import leave_terminal_to_parent
 from rig.transport.channel import ControlChannel
 from rig.transport.message import Quit
 
@@ -113,8 +114,7 @@ def begin(
         raise SystemExit(f"{name}: no configuration came; this program is started by svev")
     atexit.register(control.drain, _LAST_REPORTS_S)
     context = ChildContext(name, control, first, grace_s)
-    for of_the_terminal in (signal.SIGINT, signal.SIGTSTP):
-        signal.signal(of_the_terminal, signal.SIG_IGN)
+    leave_terminal_to_parent()
     if grace_s > 0:
         signal.signal(signal.SIGTERM, context.ask_to_stop)
     threading.Thread(target=_lifeline, args=(fd, grace_s), daemon=True, name="lifeline").start()

@@ -4,7 +4,6 @@ import ctypes
 import gc
 import importlib
 import os
-import signal
 import socket
 import sys
 from contextlib import suppress
@@ -13,6 +12,7 @@ from typing import Final
 
 import msgspec
 
+from rig.host.endings import heed_terminal_again, leave_terminal_to_parent
 from rig.transport.launcher import Import, Launch, Launched, Launcher, connection, take_over
 
 _REQUEST_BYTES: Final = 1 << 16
@@ -26,8 +26,7 @@ def main() -> None:
     asking: socket.socket | None = socket.socket(fileno=int(sys.argv[1]))
     command, launch = tuple(sys.orig_argv[:-1]), None
     while asking is not None:
-        for number in (signal.SIGINT, signal.SIGTSTP):  # of the terminal; whoever asks decides
-            signal.signal(number, signal.SIG_IGN)
+        leave_terminal_to_parent()
         _show_as(command)
         with asking:
             launch = _serve(asking)
@@ -121,8 +120,7 @@ def _fork_for_who_asks(*, own_group: bool) -> int:
 
 def _become(launch: Launch, descriptors: list[int]) -> None:
     """Have the place, the descriptors and the name that a program has which was started by its command line."""
-    for of_the_terminal in (signal.SIGINT, signal.SIGTSTP):
-        signal.signal(of_the_terminal, signal.SIG_DFL)
+    heed_terminal_again()
     numbers = (1, 2, *launch.numbers)
     moved = list(descriptors)
     for place in range(len(moved)):

@@ -15,6 +15,7 @@ from recorder.publishing.keys import check_publication
 from rig.api.status import ArmOrder
 from rig.events import Event, Level
 from rig.host.disk import free_bytes
+from rig.host.endings import ENDINGS
 from rig.phrase import phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
@@ -51,7 +52,6 @@ _STOP_S: Final = 15.0
 #: The program that makes a rehearsal.
 REHEARSE: Final = (sys.executable, "-m", "svev.serving.rehearsal_program")
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
-_ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,10 +212,10 @@ def _signals(server: PanelServer, supervisor: Supervisor, notify: Notify) -> Ite
         notify.stopping()
         supervisor.begin_stop()
 
-    for number in _ENDINGS:
+    for number in ENDINGS:
         signal.signal(number, end)
     try:
         yield
     finally:
-        for number in _ENDINGS:
+        for number in ENDINGS:
             signal.signal(number, signal.SIG_IGN)

@@ -13,43 +13,36 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from types import FrameType
-from typing import Any, Final
+from typing import Any
 
 from recorder.publishing.keys import check_publication
 from rig.api.status import RehearsalStage
 from rig.errors import SvevError
+from rig.host.endings import counted_endings, leave_terminal_to_parent
 from rig.phrase import plain
 from rig.settings.model import RigSettings
 from svev.rehearsal import rehearse
 
-#: What a terminal sends to all programs of its window; the service says what they mean.
-_OF_THE_TERMINAL: Final = (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP)
-
 
 def main() -> None:
     """Rehearse once."""
-    for number in _OF_THE_TERMINAL:
-        signal.signal(number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _interrupt)
+    leave_terminal_to_parent()
     asked = json.loads(sys.stdin.readline())
-    threading.Thread(target=_await_end, daemon=True).start()
-    with suppress(KeyboardInterrupt):  # it is not wanted any more
+    # A rehearsal that is interrupted is not wanted any more.
+    with counted_endings((signal.SIGTERM,)) as asks, suppress(KeyboardInterrupt):
+        threading.Thread(target=_await_end, daemon=True).start()
         try:
             rig = RigSettings.model_validate(asked["rig"])
             check_publication(rig.network)
-            done = rehearse(rig, asked["toml"], Path(asked["directory"]), asked["seconds"], lambda _: None, _progress)
+            done = rehearse(
+                rig, asked["toml"], Path(asked["directory"]), asked["seconds"], lambda _: None, _progress, asks
+            )
         except SvevError as error:
             _say({"problem": asdict(error.said)})
         except OSError as error:
             _say({"problem": asdict(plain(f"{error.filename or 'system call'}: {error.strerror}"))})
         else:
             _say({"rehearsed": done.to_json()})
-
-
-def _interrupt(number: int, _: FrameType | None) -> None:
-    signal.signal(number, signal.SIG_IGN)  # once: what it has to tidy up is not to be interrupted
-    raise KeyboardInterrupt
 
 
 def _await_end() -> None:

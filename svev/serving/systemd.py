@@ -10,6 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Final
 
@@ -37,9 +38,10 @@ def log_line(event: Event, *, journal: bool) -> str:
 
 
 def write_line(event: Event) -> None:
-    """Write an event to standard error as one line."""
-    sys.stderr.write(log_line(event, journal="JOURNAL_STREAM" in os.environ) + "\n")
-    sys.stderr.flush()
+    """Write an event to standard error as one line. That nobody can read it ends nothing: the log has it too."""
+    with suppress(OSError):
+        sys.stderr.write(log_line(event, journal="JOURNAL_STREAM" in os.environ) + "\n")
+        sys.stderr.flush()
 
 
 class JournalHandler(logging.Handler):

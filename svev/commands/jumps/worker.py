@@ -1,8 +1,6 @@
 """`svev worker`: measures the jumper from published triplets, live or replayed."""
 
 import json
-import signal
-import threading
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -18,6 +16,7 @@ from recorder.publishing.publisher import bind, live_topic
 from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Level
+from rig.host.endings import counted_endings
 from rig.jumper import JumperState
 from rig.phrase import Phrase
 from rig.pulse import PulseNumber
@@ -82,22 +81,16 @@ def worker_command(
 
 def _work(analysis: LiveAnalysis, source: Source, idle_s: float | None) -> None:
     """Take triplets until told to end, or until nothing has come for so long."""
-    ended = threading.Event()
-    before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with connected(source) as stream:
-            quiet_s = 0.0
-            while not ended.is_set() and (idle_s is None or quiet_s < idle_s):
-                received = stream.next(_POLL_S)
-                if received is not None:
-                    quiet_s = 0.0
-                    analysis.take(received)
-                else:
-                    quiet_s += _POLL_S
-                    analysis.idle(quiet_s)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with counted_endings() as asks, connected(source) as stream:
+        quiet_s = 0.0
+        while not asks() and (idle_s is None or quiet_s < idle_s):
+            received = stream.next(_POLL_S)
+            if received is not None:
+                quiet_s = 0.0
+                analysis.take(received)
+            else:
+                quiet_s += _POLL_S
+                analysis.idle(quiet_s)
 
 
 class _Published:

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from recorder.publishing.keys import check_publication
 from rig.api.fields import LONGEST_LINE, Line
 from rig.errors import BadInputError, PairingAlarmError, PulsesPausedError
+from rig.host.endings import counted_endings
 from rig.pulse import Pause
 from rig.settings.file import load_rig
 from service.headless import HeadlessRig
@@ -46,10 +47,10 @@ def record(
     _check_session(session)
     check_publication(settings.network)
     path = new_log_path(out)
-    with HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running:
+    with counted_endings() as asks, HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running:
         result, disk_error = record_with(
             running, settings, path, seconds, session={"session": session},
-            progress=console.progress,
+            progress=console.progress, asks=asks,
         )  # fmt: skip
     if as_json:
         console.print_json(result)

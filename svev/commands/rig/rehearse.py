@@ -1,14 +1,12 @@
 """`svev rehearse`: some seconds through the whole chain to the real disk, judged and deleted."""
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
 from recorder.publishing.keys import check_publication
+from rig.host.endings import counted_endings
 from rig.settings.file import load_rig
 from svev import console
 from svev.commands.rig.record import aside
@@ -43,21 +41,11 @@ def rehearse_command(
     settings = load_rig(rig)
     check_publication(settings.network)
     folder = out or settings.recorder.directory
-    with _terminated_as_interrupted():
-        done = rehearse(settings, rig.read_text(encoding="utf-8"), folder, seconds, aside, console.progress)
+    with counted_endings() as asks:
+        done = rehearse(settings, rig.read_text(encoding="utf-8"), folder, seconds, aside, console.progress, asks)
     if as_json:
         console.print_json(done.to_json() | {"counts": counts_of(done.findings)})
     else:
         print_findings(sorted(done.findings, key=lambda finding: _TOPICS.index(finding.topic)))
         console.say(done.verdict)
     end_with(done.findings)
-
-
-@contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """Within, SIGTERM ends what is done as Ctrl-C does, at any time, so that what was recorded is cleared away."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

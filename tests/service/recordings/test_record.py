@@ -197,6 +197,31 @@ def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback, 
     fault_table.tell(PROCESSES, "Ctrl-C during `svev record`", lost=0, said='"stopped_early": true', code=code)
 
 
+def test_a_terminal_that_is_closed_ends_the_recording_properly(
+    tmp_path: Path, loopback: Loopback, fault_table: FaultTable
+) -> None:
+    """It sends SIGHUP to all processes of its window, and takes standard error away."""
+    rig = write_rig(tmp_path, "sim", loopback)
+    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "60", "--json"]
+    process = subprocess.Popen(
+        [*command, "--out", str(tmp_path / "logs")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stderr is not None
+    with process.stdout:
+        assert process.stderr.readline()
+        process.stderr.close()
+        wait_until(_recording(tmp_path / "logs"), "recording", 20)
+        os.killpg(process.pid, signal.SIGHUP)
+        result = json.loads(process.stdout.read())
+    code = process.wait(60)
+    assert (code, result["stopped_early"]) == (0, True)
+    assert verify(Path(result["log"])).verdict == "clean"
+    what = "the terminal of `svev record` is closed (SIGHUP), nobody reads standard error"
+    fault_table.tell(PROCESSES, what, lost=0, said='"stopped_early": true', code=code)
+
+
 @pytest.mark.parametrize("backend", repeats(["sim", "aravis"]))
 def test_a_killed_grabber_costs_its_own_frames_only(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str

@@ -1,0 +1,61 @@
+"""Signals by which a program is told to end, and those that a terminal sends to every program of its window.
+
+A signal that raises an exception may do so at any place, also where nothing clears up behind it. Programs with
+processes of their own count the signals instead, and look at the count where they wait.
+"""
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+#: Ctrl-C, `kill` and systemd, and a terminal that is closed or an `ssh` that is dropped.
+ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_OF_THE_TERMINAL: Final = (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP)
+
+#: Tells how often somebody has asked the program to end.
+Asks = Callable[[], int]
+
+
+@contextmanager
+def counted_endings(signals: tuple[signal.Signals, ...] = ENDINGS) -> Iterator[Asks]:
+    """Within, signals that end a program are counted only. One that `nohup` has switched off stays so.
+
+    Yields:
+        A function that tells how many have come.
+    """
+    caught: list[int] = []
+    wanted = [each for each in signals if each is not signal.SIGHUP or signal.getsignal(each) != signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda n, _: caught.append(n)) for number in wanted}
+    try:
+        yield lambda: len(caught)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def nobody_asks() -> int:
+    """Nobody asks the program to end."""
+    return 0
+
+
+def heed(asks: Asks) -> None:
+    """End what is being done if somebody has asked for it.
+
+    Raises:
+        KeyboardInterrupt: somebody has.
+    """
+    if asks():
+        raise KeyboardInterrupt
+
+
+def leave_terminal_to_parent() -> None:
+    """Ignore what a terminal sends to all programs of its window: the parent says what it means."""
+    for number in _OF_THE_TERMINAL:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def heed_terminal_again() -> None:
+    """Undo `leave_terminal_to_parent`."""
+    for number in _OF_THE_TERMINAL:
+        signal.signal(number, signal.SIG_DFL)

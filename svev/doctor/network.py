@@ -15,7 +15,8 @@ from rig.phrase import phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
-from svev.gige.interfaces import Interface, interface_to
+from svev.gige.gvcp import find_cameras
+from svev.gige.interfaces import Interface, Way, filters_strictly, sharing_subnet, way_to
 
 _CAP_NET_RAW = 13  # linux/capability.h
 _FULL = 0.9  # share of a link's speed above which packets cannot be sent again
@@ -76,23 +77,87 @@ def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
 
 
 def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:
-    """Does the network port of each camera suit it: packet size, subnet, speed for all cameras behind it?"""
+    """Does the network port of each camera suit it: packet size, subnet of its own, speed for all cameras behind it?"""
     behind: dict[Interface, list[CameraSettings]] = defaultdict(list)
     for camera in gige_cameras(rig):
         try:
-            interface = interface_to(str(IPv4Address(camera.address)))
+            way = way_to(str(IPv4Address(camera.address)))
         except ValueError:
             what, remedy = "{camera}: {address} is no IPv4 address", "correct its address in the rig file"
             yield failure(Topic.NETWORK, "check_no_ipv4", what, remedy, camera=camera.name, address=camera.address)
             continue
-        if interface is None:
+        if way is None:
             remedy = "give a network port an address in the camera's subnet"
             what = "{camera}: no network leads to {address}"
             yield failure(Topic.NETWORK, "check_no_way", what, remedy, camera=camera.name, address=camera.address)
-        else:
-            behind[interface].append(camera)
+            continue
+        behind[way.interface].append(camera)
+        if way.mtu < rig.network.packet_size <= way.interface.mtu:
+            yield _judge_way(rig, camera, way)
     for interface, cameras in behind.items():
-        yield judge_interface(rig, interface, cameras)
+        if len(sharing := sharing_subnet(interface)) > 1:
+            yield from _judge_shared(interface, sharing, cameras)
+        else:
+            yield judge_interface(rig, interface, cameras)
+
+
+def _judge_way(rig: RigSettings, camera: CameraSettings, way: Way) -> Finding:
+    """The port takes packets as large as are asked for, and the way behind it does not."""
+    return failure(
+        Topic.NETWORK,
+        "check_way_narrow",
+        "{camera}: the way to {address} by {port} takes packets of {mtu} bytes, and {size} are asked for: frames may "
+        "not arrive",
+        "connect the camera to {port} without a router, look at: ip route get {address}; or set network.packet_size = "
+        "{mtu} in the rig file",
+        camera=camera.name,
+        address=camera.address,
+        port=way.interface.name,
+        mtu=str(way.mtu),
+        size=str(rig.network.packet_size),
+    )
+
+
+def _judge_shared(interface: Interface, sharing: list[Interface], cameras: list[CameraSettings]) -> Iterator[Finding]:
+    """Judge ports whose subnets overlap: the computer sends to all addresses in them through one of these ports.
+
+    Args:
+        interface: that port.
+        sharing: all of them.
+        cameras: those that have such an address.
+    """
+    found = {each.camera.address: each.interface.name for each in find_cameras()}
+    elsewhere = [camera for camera in cameras if found.get(camera.address) != interface.name]
+    said = phrase(
+        "check_shared",
+        "the ports {ports} share the subnet {subnet}, and the computer sends to {cameras} by {port} alone",
+        ports=", ".join(each.name for each in sharing),
+        subnet=str(interface.network),
+        cameras=", ".join(camera.name for camera in cameras),
+        port=interface.name,
+    )
+    remedy = (
+        "give each port a subnet of its own (192.168.11.1/24, 192.168.12.1/24, ...), and each camera an address in "
+        "that of its port: svev cameras set-ip"
+    )
+    if elsewhere:
+        what = "{said}; {elsewhere} cannot be found there"
+        names = ", ".join(camera.name for camera in elsewhere)
+        yield failure(Topic.NETWORK, "check_shared_elsewhere", what, remedy, said=said, elsewhere=names)
+    else:
+        yield warning(Topic.NETWORK, "check_shared_there", "{said}; all of them are there", remedy, said=said)
+    strict = [each.name for each in sharing if each != interface and filters_strictly(each)]
+    if strict:
+        yield failure(
+            Topic.NETWORK,
+            "check_rp_filter",
+            "{ports}: what comes in here from addresses to which the computer sends by {port} is dropped "
+            "(rp_filter = 1)",
+            "give each port a subnet of its own, or run: {commands}",
+            ports=", ".join(strict),
+            port=interface.name,
+            commands="; ".join(f"sudo sysctl -w net.ipv4.conf.{name}.rp_filter=2" for name in strict),
+        )
 
 
 def judge_interface(rig: RigSettings, interface: Interface, cameras: list[CameraSettings]) -> Finding:

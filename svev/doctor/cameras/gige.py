@@ -11,6 +11,7 @@ from rig.settings.model import RigSettings
 from service.processes.replayed_log import check_replay
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras
+from svev.gige.interfaces import sharing_subnet, way_to
 
 _ANSWER_S = 1.5
 _GVCP_PORT = 3956
@@ -72,6 +73,17 @@ def judge_found(found: FoundCamera, names: dict[str, str]) -> Finding:
             serial=camera.serial,
             port=port.name,
         )
+    way = way_to(camera.address)
+    if way is not None and way.interface != port and way.interface.network.overlaps(port.network):
+        return warning(
+            Topic.CAMERAS,
+            "check_found_elsewhere",
+            "{said}, but the computer sends to this address by {way}",
+            "give each port a subnet of its own, then: svev cameras set-ip {serial} ADDRESS",
+            said=said,
+            way=way.interface.name,
+            serial=camera.serial,
+        )
     if name := names.get(camera.address):
         return passed(Topic.CAMERAS, "check_found", "{said}, {camera} of the rig file", said=said, camera=name)
     return passed(Topic.CAMERAS, "check_found_other", "{said}, not in the rig file", said=said)
@@ -96,6 +108,13 @@ def _look_at_gige(camera: CameraSettings) -> Finding:
         what = "{camera} at {address} cannot be asked: {why}"
         return failure(Topic.CAMERAS, "check_not_asked", what, remedy, camera=name, address=address, why=str(error))
     if answer is None:
+        way = way_to(address)
+        if way is not None and len(sharing := sharing_subnet(way.interface)) > 1:
+            ports = ", ".join(each.name for each in sharing)
+            what = "{camera} at {address} does not answer by {port}, the one port by which the computer asks it"
+            remedy = "give each of {ports} a subnet of its own, or plug the camera in at {port}; see the network above"
+            values = {"camera": name, "address": address, "port": way.interface.name, "ports": ports}
+            return failure(Topic.CAMERAS, "check_no_answer_shared", what, remedy, **values)
         what = "{camera} at {address} does not answer"
         return failure(Topic.CAMERAS, "check_no_answer", what, remedy, camera=name, address=address)
     there, in_use = answer

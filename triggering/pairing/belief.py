@@ -13,6 +13,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from enum import Enum
+from itertools import islice
 from typing import Final, NamedTuple, Protocol
 
 from rig.clocks import HostNs
@@ -34,16 +35,19 @@ _LEAST_NS: Final = 1e6
 #: So many arrivals in a thousand say nothing: the computer was busy. They are anywhere within `_ANYWHERE_NS`.
 _IDLE: Final = 0.01
 _ANYWHERE_NS: Final = 1e9
-#: Logarithm of the odds at which arrivals bear times out, and at which they contradict them: two frames that came as
-#: usual after another pulse.
+#: Logarithm of the odds at which arrivals bear times out, speak against them, and contradict them: two frames that
+#: came as usual after another pulse.
 _FOR: Final = 3.0
+_SPEAKS: Final = 6.0
 _AGAINST: Final = 14.0
-#: Arrivals whose standard deviation is a smaller share of the period tell one pulse from the next.
-_TELLING: Final = 4
+#: Arrivals whose standard deviation is a smaller share of the period tell one pulse from the next, if not one by one.
+_TELLING: Final = 2
 #: Shifts by so many periods are told from none.
 _SHIFTS: Final = 8
 #: Frames in a row that end a doubt, and that end the wait where nothing contradicts them.
 _SEVERAL: Final = 8
+#: So many frames of a group are enough to judge it by.
+_MOST: Final = 32
 #: Frames beside the rhythm of which nothing else is known, and that go on so.
 _FEW: Final = 3
 #: A camera that is contradicted goes on from the frame before within so many frames, or not at all: a single odd time.
@@ -64,11 +68,30 @@ class Timed(NamedTuple):
 
 
 class _Arrivals(NamedTuple):
-    """What the arrivals of frames say of their times."""
+    """What the arrivals of frames say of their times.
 
-    bear_out: bool
-    tell_nothing: bool
-    contradict: bool
+    Attributes:
+        favour: logarithm of the odds that they came as usual.
+        against: the same of that their times are off by periods.
+    """
+
+    favour: float
+    against: float
+
+    @property
+    def bear_out(self) -> bool:
+        """They bear the times out."""
+        return self.favour >= _FOR
+
+    @property
+    def speak_against(self) -> bool:
+        """They speak against the times, but a few frames may have come so by chance."""
+        return self.against >= _SPEAKS
+
+    @property
+    def contradict(self) -> bool:
+        """They contradict the times."""
+        return self.against >= _AGAINST
 
 
 class Others(Protocol):
@@ -173,12 +196,19 @@ class Belief:
         goes_on = last is not None and self._follows(last, first)
         if goes_on and self.doubted <= _SINGLE and self._comes_as_usual(first):
             return Verdict.BELIEVED
-        group = list(self._group(waiting, gaps=not goes_on))
+        group = list(islice(self._group(waiting, gaps=not goes_on), _MOST))
         arrivals = self._arrivals(group)
         if arrivals.contradict:
             return Verdict.CONTRADICTED
         evidence = _Evidence(
-            last, waiting, group, arrivals, others, read, closed=len(group) < len(waiting), final=now_or_never
+            last,
+            waiting,
+            group,
+            arrivals,
+            others,
+            read,
+            closed=len(group) < min(len(waiting), _MOST),
+            final=now_or_never,
         )
         if self.doubted:
             return self._judge_in_doubt(evidence)
@@ -189,19 +219,20 @@ class Belief:
         first, several = evidence.waiting[0], len(evidence.group) >= _SEVERAL
         if self._scatter:
             sound = self._has_room(evidence)
-        else:
-            sound = evidence.arrivals.bear_out and self._comes_as_usual(first)
+        else:  # the first one too: it may be the last whose time was off
+            sound = evidence.arrivals.bear_out and self._arrivals([first]).against < _FOR
         if several and sound and evidence.read and evidence.others.coincide(first.time) is not False:
             return Verdict.BELIEVED
         return Verdict.CONTRADICTED if evidence.closed or several else Verdict.WAITS
 
     def _judge_in_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that goes on from the last one in number and time, but did not come as usual."""
-        arrivals = evidence.arrivals
-        if arrivals.bear_out or (arrivals.tell_nothing and evidence.read):
+        arrivals, ended = evidence.arrivals, evidence.final or evidence.closed
+        if arrivals.bear_out or (arrivals.against < 0 and evidence.read):
             return Verdict.BELIEVED
-        ended = evidence.final or (evidence.closed and not arrivals.tell_nothing)
-        return Verdict.CONTRADICTED if ended else Verdict.WAITS
+        if ended and arrivals.speak_against:
+            return Verdict.CONTRADICTED
+        return Verdict.BELIEVED if evidence.final or (evidence.closed and evidence.read) else Verdict.WAITS
 
     def _judge_out_of_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that does not go on in number and time: of a pulse after missed ones, or beside the rhythm."""
@@ -209,9 +240,10 @@ class Belief:
         if not arrivals.bear_out:
             if not self._has_room(evidence) and (evidence.closed or several or evidence.final):
                 return Verdict.CONTRADICTED
-            if evidence.closed and not arrivals.tell_nothing:
+            if evidence.closed and arrivals.speak_against:
                 return Verdict.CONTRADICTED
-            enough = arrivals.tell_nothing and (evidence.final or self._scatter) and self._has_room(evidence)
+            told = evidence.final or self._scatter
+            enough = told and not arrivals.speak_against and self._has_room(evidence)
         else:
             enough = True
         return self._judge_place(evidence) if enough and evidence.read else Verdict.WAITS
@@ -281,7 +313,7 @@ class Belief:
         of periods, and they came as usual after other pulses.
         """
         if self._scatter:
-            return _Arrivals(bear_out=False, tell_nothing=True, contradict=False)
+            return _Arrivals(favour=0.0, against=-_FOR)
         late, sigma = [self._late(frame) for frame in group], self._sigma_ns
         usual, slow = (
             sum(_likelihood(each, sigma) for each in late),
@@ -293,11 +325,7 @@ class Belief:
             for shift in range(-_SHIFTS, _SHIFTS + 1)
             if shift != 0
         )
-        return _Arrivals(
-            bear_out=usual - max(slow, shifted) >= _FOR,
-            tell_nothing=max(slow, usual) >= shifted,
-            contradict=shifted - max(usual, slow) >= _AGAINST,
-        )
+        return _Arrivals(favour=usual - max(slow, shifted), against=shifted - max(usual, slow))
 
     def _late(self, frame: Timed) -> float:
         return frame.arrival - frame.time - self._usual_ns

@@ -146,8 +146,9 @@ class Pairer:
         if self._held.count:
             for camera in range(len(self._tracks)):
                 self._settle_held(camera)
-            for camera in self._held.ended(now):
-                self._settle_first(camera)
+            while ended := self._held.ended(now):
+                for camera in ended:
+                    self._settle_first(camera)
         return self._held.released()
 
     def damaged(self, camera: int, record: Record) -> None:
@@ -188,12 +189,12 @@ class Pairer:
 
     def connected(self, camera: int, epoch: int, host: HostNs) -> None:
         """Begin an epoch of a camera: pulses from now on wait for its frames."""
-        self._refuse_held(camera)
+        self._settle_all(camera)
         self._tracks[camera].connect(epoch, host)
 
     def disconnected(self, camera: int, host: HostNs) -> None:
         """End the epoch of a camera: no pulse waits for it any more."""
-        self._refuse_held(camera)
+        self._settle_all(camera)
         self._tracks[camera].disconnect(host)
 
     # -- decisions out -------------------------------------------------------------------------------------------
@@ -321,6 +322,12 @@ class Pairer:
             else:
                 self._refuse_first(camera)
         self._settle_held(camera)
+
+    def _settle_all(self, camera: int) -> None:
+        """Place or refuse all frames of a camera that wait: no more evidence will come."""
+        self._note_damage_behind(camera)
+        while self._held.first(camera) is not None:
+            self._settle_first(camera)
 
     def _refuse_first(self, camera: int, *, contradicted: bool = False) -> None:
         """Refuse the first frame of a camera that waits."""

@@ -22,7 +22,7 @@ Progress = Callable[[int, int], None]
 
 #: x264's measure of quality.
 _CRF: Final = {Quality.SMALL: 28, Quality.GOOD: 21, Quality.BEST: 14}
-#: Decoders of phones take no wider pictures; wider ones are made smaller.
+#: Decoders of phones take no wider pictures; wider ones of several cameras are made smaller, one camera never is.
 _WIDEST_PX: Final = 4096
 _US_PER_NS: Final = 1e-3
 TABLE: Final = "tags.csv"
@@ -97,7 +97,7 @@ def _write_video(recording: Recording, order: ExportOrder, out: Path, tell: Prog
 def _picture(recording: Recording, shot: Shot, order: ExportOrder) -> Stored:
     """The picture of a pulse; without loss, only pulses that the log does not know have words, unless asked for."""
     picture, columns = shot.image, recording.columns
-    if order.kind is not Kind.FFV1 and picture.shape[1] > _WIDEST_PX:
+    if order.kind is not Kind.FFV1 and len(columns) > 1 and picture.shape[1] > _WIDEST_PX:
         scale = _WIDEST_PX / picture.shape[1]
         size = (_WIDEST_PX, max(2, round(picture.shape[0] * scale)))
         picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), picture.dtype)

@@ -56,6 +56,7 @@ def export_command(
     """Export a recording: a video for people or without loss, pictures of each camera, a table, a contact sheet.
 
     A video has one picture for each pulse, at the time of the pulse; where a frame is missing it is black and says why.
+    In H.264 several cameras side by side are at most 4096 px wide, made smaller if need be; one alone never is.
     Without loss, every pixel is that of the log. A folder gets a picture of each frame that came, and tags.csv.
     A file or folder is there under its name only when it is complete.
 

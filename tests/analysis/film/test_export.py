@@ -127,6 +127,18 @@ def test_worse_quality_is_smaller(gap: Path, tmp_path: Path) -> None:
     assert sizes[0] < sizes[2] / 2
 
 
+@pytest.mark.parametrize("extra", [["--separate"], ["--camera", "K1"]])
+def test_one_camera_alone_keeps_its_size_and_several_are_made_smaller(extra: list[str], tmp_path: Path) -> None:
+    log = tmp_path / "log.mcap"
+    write_log(log, (ALL_OK,) * 2, shape=(64, 3 * 4400))
+    assert main(["export", str(log), "--out", str(tmp_path / "all.mp4")]) == 0
+    assert main(["export", str(log), "--out", str(tmp_path / "one.mp4"), *extra]) == 0
+    shapes = {path.stem: next(_decoded(path))[1].shape for path in tmp_path.glob("*.mp4")}
+    assert shapes.pop("all")[1] == 4096
+    assert set(shapes.values()) == {(64, 4400)}
+    assert len(shapes) == (3 if extra == ["--separate"] else 1)
+
+
 @pytest.mark.parametrize(("kind", "ending"), [(Kind.PNG, "png"), (Kind.TIFF, "tif")])
 def test_a_folder_has_each_frame_that_came_and_the_table(gap: Path, tmp_path: Path, kind: Kind, ending: str) -> None:
     folder = tmp_path / "jump"

@@ -80,6 +80,9 @@ class CameraPairing(CameraCounters, kw_only=True):
     clock_uncertainty_us: float | None
     latency_ms: Annotated[float, Meta(description="from the trigger to the frame in memory")]
     clock_set: Annotated[bool, Meta(description="the device clock was set in the last ten seconds")] = False
+    clock_from_zero: Annotated[
+        bool, Meta(description="it began at zero then: it ran over, or the camera restarted")
+    ] = False
     doubted: Annotated[
         int,
         Meta(description="frames not used since its numbers, times and arrivals contradict each other; 0: they agree"),

@@ -26,7 +26,13 @@ def alarms(health: PairingHealth, names: Sequence[str], rate_hz: float, *, one_e
         text = "pulses come at {measured} Hz, the rig file says rate_hz = {rate_hz:g}: correct [trigger] rate_hz"
         yield phrase("pairing_rate", text, measured=round(measured, 1), rate_hz=rate_hz)
     for name, camera in zip(names, health.cameras, strict=True):
-        if camera.clock_set:
+        if camera.clock_set and camera.clock_from_zero:
+            text = (
+                "the clock of {camera} began again at zero while pulses came, some of its frames are not used: it ran "
+                "over, or the camera restarted: check its power, and look for newer firmware"
+            )
+            yield phrase("pairing_clock_zero", text, camera=name)
+        elif camera.clock_set:
             text = (
                 "the clock of {camera} was set while pulses came, some of its frames are not used: let PTP lock first"
             )

@@ -35,6 +35,7 @@ def camera_health(track: CameraTrack, last: HostNs | None) -> CameraPairing:
         clock_uncertainty_us=round(clock.uncertainty_ns / 1000, 3) if clock.known else None,
         latency_ms=round(track.latency_ns / 1e6, 3),
         clock_set=track.set_at is not None and is_recent(track.set_at, last),
+        clock_from_zero=clock.from_zero,
         doubted=track.belief.doubted,
         exposure_subtracted_us=track.stamping.late_ns / 1000,
         **msgspec.structs.asdict(track.counters),

@@ -37,12 +37,14 @@ class DeviceClock:
         uncertainty_ns: limit of the error of the line at the newest latch; infinite while the clock is not known.
             With the trim, which has the same limit, the error may be twice that.
         steps: how often the clock was found to have been set anew.
+        from_zero: whether it began at zero the last time: it ran over, or the camera restarted.
     """
 
     def __init__(self) -> None:
         self.offset_ns = 0
         self.uncertainty_ns = math.inf
         self.steps = 0
+        self.from_zero = False
         self._best: deque[ClockLatch] = deque(maxlen=_BURSTS)
         self._burst_start = HostNs(0)
         self._stray: ClockLatch | None = None
@@ -142,12 +144,20 @@ class DeviceClock:
         drift = _DRIFT_LIMIT * abs(latch.device - previous.device) / NS_PER_S
         if abs(apart) > (latch.round_trip_ns + previous.round_trip_ns) / 2 + drift + _STRAY_NS:
             return
+        self.from_zero = self._begins_at_zero(previous)
         self._best.clear()
         self._keep(previous)
         self._keep(latch)
         self._stray, self._trim = None, 0.0
         self.steps += 1
         self._fit()
+
+    def _begins_at_zero(self, latch: ClockLatch) -> bool:
+        """Whether a clock that went back shows no more than the time since the last reading that agreed."""
+        before = self._newest
+        if before is None or not 0 <= latch.device < before.device:
+            return False
+        return latch.device <= latch.host - before.host + before.round_trip_ns + latch.round_trip_ns
 
     def _keep(self, latch: ClockLatch) -> None:
         """Keep the shortest round trip of each burst."""

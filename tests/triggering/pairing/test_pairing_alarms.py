@@ -4,7 +4,7 @@ import pytest
 
 from rig.clocks import NS_PER_S
 from rig.phrase import Phrase
-from tests.triggering.feed import Feed
+from tests.triggering.feed import START, Feed
 from tests.triggering.simulation import MS
 from triggering.pairing.alarms import alarms
 
@@ -49,6 +49,29 @@ def test_a_clock_that_was_set_is_said_for_ten_seconds() -> None:
         feed.all_cameras(pulse, [pulse + 1, None, pulse + 1])
         assert pulse > 310 or [phrase.code for phrase in said(feed)] == ["pairing_clock"]
     assert said(feed) == []
+
+
+@pytest.mark.parametrize(
+    ("before_s", "after_s", "code"), [(4.29, 0.0, "zero"), (34.36, 0.0, "zero"), (34.36, 20.0, "")]
+)
+def test_a_clock_that_runs_over_is_not_told_to_lock(before_s: float, after_s: float, code: str) -> None:
+    feed = Feed(reads=True, latches=False)
+    start, over = round(before_s * NS_PER_S), feed.time_of(19.5)
+    begin = start - (over - START)
+    feed.latch(1, clock=begin)
+    for camera in (0, 2):
+        feed.latch(camera)
+    for pulse in range(20):
+        feed.frame(1, pulse, pulse + 1, clock=begin)
+        feed.all_cameras(pulse, [pulse + 1, None, pulse + 1])
+    anew = round(after_s * NS_PER_S) - (over - START)
+    for pulse in range(20, 40):
+        feed.frame(1, pulse, pulse + 1, clock=anew)
+        feed.latch(1, feed.time_of(pulse) + 6 * MS, clock=anew)
+        feed.all_cameras(pulse, [pulse + 1, None, pulse + 1])
+    (only,) = said(feed)
+    assert only.code == ("pairing_clock_zero" if code else "pairing_clock")
+    assert ("let PTP lock" in only.text) is not bool(code)
 
 
 def test_two_pulses_of_which_no_camera_has_both() -> None:

@@ -179,6 +179,7 @@ export const events = {
 
   pairing_rate: ["pulsene kommer med {measured} Hz, riggfilen sier rate_hz = {rate_hz}", "rett [trigger] rate_hz i riggfilen"],
   pairing_doubt: ["nummer, tider og ankomst av bildene fra {camera} motsier hverandre, og bildene brukes ikke", "frakoble, start kameraet på nytt og gjør klar igjen"],
+  pairing_clock_zero: ["klokken i {camera} begynte på null igjen mens pulsene kom, og noen av bildene brukes ikke", "den løp over, eller kameraet startet på nytt: sjekk strømmen, og se etter nyere fastvare"],
   pairing_clock: ["klokken i {camera} ble stilt mens pulsene kom, og noen av bildene brukes ikke", "la PTP låse før opptak"],
   pairing_spread: ["bildene fra samme puls ligger opptil {spread_ms} ms fra hverandre", "sjekk triggerkabler og forsinkelser i kameraene"],
   pairing_double: ["to pulser kom med {apart_ms} ms mellomrom, og ingen av kameraene har begge", "sjekk om triggersignalet preller"],

@@ -26,6 +26,10 @@ class BadInputError(SvevError):
     exit_code = 2
 
 
+class NameTakenError(BadInputError):
+    """A file cannot be made because there is something of its name: choose another one."""
+
+
 class CameraNotFoundError(BadInputError):
     """A camera that the rig file names does not answer."""
 

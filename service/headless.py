@@ -176,7 +176,9 @@ class HeadlessRig:
         def start(opened: "Future[Recording]") -> None:
             self._supervisor.recordings.begin(order, SessionFields(), opened, self._ended)
 
-        self._ask(start)
+        self._path = path.with_name(
+            f"{self._ask(start).id}{path.suffix}"
+        )  # another one if the name was taken meanwhile
 
     def stop_recording(self, *, wait_for_disk: bool = True) -> None:
         """End the recording with the pulses that have fired until now; one that has just ended stays as it is.

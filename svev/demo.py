@@ -63,6 +63,7 @@ def run_demo(
             counted = count_received()
     if disk_error is not None:
         raise disk_error
+    path = Path(result["log"])
     say("checking the log")
     report = verify(path)
     sheet = path.with_suffix(".png")

@@ -27,7 +27,7 @@ from recorder.live.pulse_writer import PulseWriter, overruns
 from recorder.live.recording import Recording
 from recorder.publishing.publisher import Publisher
 from rig.clocks import NS_PER_S, HostNs, host_now
-from rig.errors import BadInputError, StorageError, SvevError
+from rig.errors import BadInputError, NameTakenError, StorageError, SvevError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.health import WritingHealth
@@ -302,7 +302,8 @@ class Recordings:
         recording.early = error.said
         recording.mishap = False
         recording.forget()
-        self._publisher.event(Event.now(Level.FATAL, "recorder", error.said))
+        taken = isinstance(error, NameTakenError)  # the service orders the recording again under another name
+        self._publisher.event(Event.now(Level.WARNING if taken else Level.FATAL, "recorder", error.said))
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
         if not whole:
             self._preroll.put_back(recording.take_back())

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from recorder.log.mcap_layout import PAGE
 from recorder.log.write_lock import mark_as_written
-from rig.errors import BadInputError, FileVanishedError, StorageError
+from rig.errors import BadInputError, FileVanishedError, NameTakenError, StorageError
 from rig.host.disk import ask_free_bytes, set_direct
 from rig.phrase import phrase
 
@@ -46,7 +46,8 @@ class AppendFile:
         """Create the file.
 
         Raises:
-            BadInputError: the file exists already, or its directory is missing or not writable.
+            NameTakenError: the file exists already.
+            BadInputError: its directory is missing or not writable.
             StorageError: the disk refuses.
         """
         self.path = path
@@ -55,7 +56,7 @@ class AppendFile:
         try:
             self._fd = os.open(path, flags, 0o644)
         except FileExistsError:
-            raise BadInputError(f"{path}: exists already and is never overwritten; choose another name") from None
+            raise NameTakenError(f"{path}: exists already and is never overwritten; choose another name") from None
         except FileNotFoundError:
             raise BadInputError(f"{path.parent}: no such directory; make it, or choose another one") from None
         except (PermissionError, NotADirectoryError, IsADirectoryError) as error:

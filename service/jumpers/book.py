@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from rig.api.recordings import NextJumper, RecordingOrder, SessionFields
@@ -106,6 +106,14 @@ class JumperBook:
             said = _statement("undo_back", f"{who(taken.jumper.session)} is to jump again", taken.jumper.session)
             self._put(changed, said)
         self._tell()
+
+    def rename(self, recording: str, name: str) -> None:
+        """Note that a recording that has just been taken has another id."""
+        with self._lock:
+            if self._taken is not None and self._taken.recording == recording:
+                self._taken, before = replace(self._taken, recording=name), self.shown
+                self._put(moves.renamed(self._list, recording, name))
+                self.shown = before
 
     def change_next(self, change: JumperChange) -> StartList:
         """Change session fields of the next jumper.

@@ -81,6 +81,15 @@ def not_taken(start_list: StartList, recording: str) -> StartList:
     return start_list
 
 
+def renamed(start_list: StartList, recording: str, name: str) -> StartList:
+    """The list with another id of a recording."""
+    for each in start_list.lines:
+        if recording in each.jumps:
+            jumps = tuple(name if jump == recording else jump for jump in each.jumps)
+            return with_line(start_list, each.model_copy(update={"jumps": jumps}))
+    return start_list
+
+
 def skipped(start_list: StartList) -> StartList:
     """The list after the next jumper was passed over; one who has jumped in this round has jumped."""
     line = start_list.next.line

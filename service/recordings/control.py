@@ -15,6 +15,7 @@ from rig.api.status import State
 from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import (
     BadInputError,
+    NameTakenError,
     ProcessDiedError,
     StateForbidsError,
     StorageError,
@@ -44,7 +45,7 @@ from service.recordings.interruption import (
     died_too_often,
     going_on,
 )
-from service.recordings.storage import check_room_for, new_log_path
+from service.recordings.storage import check_room_for, free_path, new_log_path
 from service.recordings.truth import TruthWriter
 from service.status.forbidden import FORBIDDEN
 from service.status.statements import (
@@ -263,8 +264,19 @@ class RecordingControl:
             case RecordingProgress():
                 current.progress(report)
                 self._tell_gap(current, report)
+            case RecorderFailed() if current.opening and isinstance(report.error(), NameTakenError):
+                self._order_again(current)
             case RecorderFailed():
                 self.fail(report.error(), State.ARMED if current.interruption is None else self._machine.state)
+
+    def _order_again(self, current: RecordingInProgress) -> None:
+        """Order a recording under the next number: another program has made a log of its name meanwhile."""
+        before, processes = current.id, self._session.processes
+        if processes is None:
+            return
+        current.rename(free_path(current.wanted))
+        self._jumpers.rename(before, current.id)
+        processes.tell(current.order)
 
     def _finished(self, current: RecordingInProgress, report: RecordingFinished) -> None:
         current.progress(report)

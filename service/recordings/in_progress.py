@@ -5,6 +5,8 @@ from concurrent.futures import Future
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
+
 from rig.api.recordings import Counts, Recording, RecordingState, SessionChange, SessionFields
 from rig.api.statement import Level, Statement
 from rig.clocks import NS_PER_S, host_now
@@ -31,6 +33,7 @@ class RecordingInProgress:
         longest_s: it ends after so many seconds, because nobody said how long it is to be; None: somebody did.
         commanded: when it was ordered.
         ids: ids of its logs; there are several if logs failed.
+        wanted: path of the log as it was ordered first.
         path: the log, the last one if there are several.
         session: the session fields, later changes included.
         stopping: whether the recorder was told to stop.
@@ -45,6 +48,7 @@ class RecordingInProgress:
         self.order, self.session = order, session
         self.longest_s = order.seconds if order.nobody_stops else None
         self.commanded = host_now()
+        self.wanted = order.path
         self.ids, self.path = [order.path.stem], order.path
         self.interruption: Interruption | None = None
         self.deaths: list[float] = []
@@ -77,6 +81,11 @@ class RecordingInProgress:
         self._note_first(report)
         opened, self._opened = self._opened, None
         return lambda: opened.set_result(self.view()) if opened is not None else None
+
+    def rename(self, path: Path) -> None:
+        """Note that the log, which is not open yet, is ordered under another name."""
+        self.order = msgspec.structs.replace(self.order, path=path)
+        self.ids, self.path = [path.stem], path
 
     def refuse(self, error: Exception) -> None:
         """Answer the thread that waits for the log to be opened with an error."""

@@ -1,5 +1,6 @@
 """The folder of the recordings: path of a new log, how much more fits on the disk, and what makes room there."""
 
+import os
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,11 +29,16 @@ def new_log_path(directory: Path) -> Path:
         raise BadInputError(
             f"{directory}: cannot be written ({error.strerror}); choose another --out or correct its permissions"
         ) from None
-    path, again = directory / f"{name}.mcap", 1
-    while path.exists():
+    return free_path(directory / f"{name}.mcap")
+
+
+def free_path(path: Path) -> Path:
+    """The path, or if there is something of this name, with the first number behind its name that is free."""
+    free, again = path, 1
+    while os.path.lexists(free):
         again += 1
-        path = directory / f"{name}-{again}.mcap"
-    return path
+        free = path.with_name(f"{path.stem}-{again}{path.suffix}")
+    return free
 
 
 _GB: Final = 1e9

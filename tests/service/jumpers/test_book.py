@@ -105,6 +105,15 @@ def test_a_mishap_gives_its_jumper_back_unless_the_list_was_changed(book: Jumper
     assert (next_bib(book), marks(book)) == ("2", "wwww"), "somebody has edited the second one"
 
 
+def test_a_recording_that_gets_another_name_keeps_its_jumper(book: JumperBook) -> None:
+    jump(book, "a")
+    shown = book.shown
+    book.rename("a", "a-2")
+    assert (book.view().lines[0].jumps, next_bib(book), book.shown) == (("a-2",), "2", shown)
+    book.give_back("a-2")
+    assert (next_bib(book), marks(book), book.view().lines[0].jumps) == ("1", "wwww", ())
+
+
 def test_edits_are_about_the_jumper_that_was_seen(book: JumperBook) -> None:
     seen = book.view().next.number
     jump(book, "a")

@@ -1,14 +1,18 @@
 """What one file of another program holds, in the words of `svev-network/1`, and how several become one network."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from photogrammetry.network.model import ImageFrame
 from rig.arrays import Floats
 from rig.errors import BadInputError
+
+#: Numbers as programs write them: no grouping ("1_000"), no other digits than ours, of which Python reads both.
+_WRITTEN: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +45,10 @@ def joined(parts: Sequence[Part], length_unit: str) -> dict[str, Any]:
         BadInputError: the parts do not fit together; the message says what to do.
     """
     frame = _frame(parts)
-    cameras = _apart(parts, "cameras")
-    images: dict[str, dict[str, Any]] = {}
-    points: dict[str, dict[str, Any]] = {}
+    cameras = _together(parts, "cameras", "camera")
+    images = _together(parts, "images", "image")
+    points = _together(parts, "points", "point")
     observations = [row for part in parts for row in part.observations]
-    for part in parts:
-        for name, entry in part.images.items():
-            images[name] = images.get(name, {}) | {key: value for key, value in entry.items() if value is not None}
-        for name, entry in part.points.items():
-            if name not in points or entry["role"] != "tie":
-                points[name] = entry
     for row in observations:
         images.setdefault(row[0], {})
         points.setdefault(row[1], {"role": "tie"})
@@ -85,10 +83,9 @@ def numbers(words: Iterable[str], place: str) -> list[float]:
     """
     found = []
     for word in words:
-        try:
-            number = float(word)
-        except ValueError:
-            raise BadInputError(f"{place}: {word!r} is no number; correct it there") from None
+        if not _WRITTEN.fullmatch(word):
+            raise BadInputError(f"{place}: {word!r} is no number; correct it there")
+        number = float(word)
         if not np.isfinite(number):
             raise BadInputError(f"{place}: {word!r} is no finite number; correct it there")
         found.append(number)
@@ -106,16 +103,42 @@ def _frame(parts: Sequence[Part]) -> ImageFrame:
     return next(iter(known), ImageFrame.PIXEL)
 
 
-def _apart(parts: Sequence[Part], kind: str) -> dict[str, dict[str, Any]]:
-    """The cameras of all parts, which must have different names."""
+def _together(parts: Sequence[Part], kind: str, word: str) -> dict[str, dict[str, Any]]:
+    """The entries of all parts; several files may say of one thing what the others leave open.
+
+    Surveyed points replace start values of the same name.
+
+    Raises:
+        BadInputError: two files say different things of one, or both have the same camera or surveyed point.
+    """
     found: dict[str, dict[str, Any]] = {}
     origin: dict[str, str] = {}
     for part in parts:
-        for name, entry in getattr(part, kind).items():
-            if name in found:
-                raise BadInputError(f"{part.source}: camera {name!r} is in {origin[name]} too; rename one of the files")
-            found[name], origin[name] = entry, part.source
+        for name, given in getattr(part, kind).items():
+            entry = {key: value for key, value in given.items() if value is not None}
+            before = found.get(name)
+            if before is None or (before.get("role") == "tie" != entry.get("role")):
+                found[name], origin[name] = entry, part.source
+            elif not (entry.get("role") == "tie" != before.get("role")):
+                if kind == "cameras" or entry.get("role", "tie") != "tie" or _contradict(before, entry):
+                    raise BadInputError(
+                        f"{part.source}: {word} {name!r} is in {origin[name]} too{_apart(before, entry)}; "
+                        f"{'rename one of the files' if kind == 'cameras' else 'keep one of them, or rename one'}"
+                    )
+                found[name] = before | entry
     return found
+
+
+def _contradict(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    return any(one[key] != other[key] for key in set(one) & set(other))
+
+
+def _apart(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+    """By how much the coordinates of two entries differ, in words."""
+    for key in ("X", "X0"):
+        if key in one and key in other:
+            return f", {np.linalg.norm(np.subtract(one[key], other[key])):.4g} apart"
+    return ""
 
 
 def _name_cameras(images: Mapping[str, dict[str, Any]], cameras: Mapping[str, Any]) -> None:

@@ -45,13 +45,28 @@ def read_text(path: Path, format_name: str, existing: str) -> str:
         BadInputError: missing, unreadable or not UTF-8.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        text = read_bytes(path, existing).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise BadInputError(f"{path}: is no text file; name a {format_name} file") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: Path, existing: str) -> bytes:
+    """Read a file.
+
+    Args:
+        path: of the file.
+        existing: what the message for a missing file asks for.
+
+    Raises:
+        BadInputError: missing or unreadable.
+    """
+    try:
+        return path.read_bytes()
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; name {existing}") from None
     except IsADirectoryError:
         raise BadInputError(f"{path}: is a directory; name the file in it") from None
-    except UnicodeDecodeError:
-        raise BadInputError(f"{path}: is no text file; name a {format_name} file") from None
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
 

@@ -299,12 +299,12 @@ def test_what_does_not_fit_together_is_refused(tmp_path: Path) -> None:
     two = AICON["cams.ior"] + "8 -20 0 0\n"
     _refused(lambda: _aicon(tmp_path, **{"cams.ior": two})[::2], "which of 2 cameras took image '1'")
     _refused(lambda: [*_aicon(tmp_path), _opencv(tmp_path / "K1.yml", K, D)], "counts in pixels and .* in millimetres")
-    _refused(lambda: _aicon(tmp_path, **{"points.obc": "T1 1 x -8\n"}), "line 1: 'x' is no number")
+    _refused(lambda: _aicon(tmp_path, **{"points.obc": "T1 1 x -8\n"}), "line 1, column y: 'x' is no number")
     wide = "1 7 1 2 3 0.1 0.2 0.3\n"
     _refused(
         lambda: _aicon(tmp_path, **{"poses.eor": wide}), "8 columns, but only image, camera.* name them in the first"
     )
-    (tmp_path / "a.csv").write_text("B1,1,2,3\n")
+    (tmp_path / "a.csv").write_text("B1,1.0,2,3\n")
     _refused(lambda: [tmp_path / "a.csv"], "line 1: sigma is missing")
     (tmp_path / "b.csv").write_text("B1,1,2,3,0.1\nB1,1,2,4,0.1\n")
     _refused(lambda: [tmp_path / "b.csv"], "line 2: 'B1' is there twice")

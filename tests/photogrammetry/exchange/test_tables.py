@@ -1,0 +1,209 @@
+"""Tables of surveys: read as they stand or refused, in whatever dialect, encoding and order; never read otherwise."""
+
+import csv
+import io
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photogrammetry.exchange.importing import import_network
+from rig.errors import BadInputError
+
+BALLS: Final = {"B1": ([10.5, 20.25, 3.5], [0.01, 0.01, 0.02]), "B2": ([11.5, 21.25, 4.5], [0.01, 0.01, 0.02])}
+_HEAD: Final = ("name", "X", "Y", "Z", "sX", "sY", "sZ")
+
+
+def _points(path: Path) -> dict[str, tuple[list[float], list[float]]]:
+    network = import_network([path]).network
+    return {point.name: (np.asarray(point.xyz).tolist(), np.asarray(point.sigma).tolist()) for point in network.points}
+
+
+def _file(folder: Path, text: str | bytes, name: str = "balls.csv") -> Path:
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+SEMICOLONS: Final = "Name;X;Y;Z;sX;sY;sZ\r\nB1;10,5;20,25;3,5;0,01;0,01;0,02\r\nB2;11,5;21,25;4,5;0,01;0,01;0,02\r\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SEMICOLONS,
+        SEMICOLONS.replace("\r\n", "\r"),
+        "sep=;\r\n" + SEMICOLONS,
+        SEMICOLONS.replace("B1", '"B1"').replace(";X;", ';"X";').replace("20,25", '"20,25"'),
+        SEMICOLONS.replace("\r\n", ";;\r\n") + ";;;;;;;;\r\n",
+        SEMICOLONS.replace(";", "\t"),
+        SEMICOLONS.replace(";", " "),
+        SEMICOLONS.replace(";", "   "),
+        SEMICOLONS.replace(",", ".").replace(";", ", "),
+        SEMICOLONS.replace(",", ".").replace(";", ",").split("\r\n", 1)[1],
+        SEMICOLONS.replace(";", "\t").split("\r\n", 1)[1],
+        SEMICOLONS.encode("utf-16"),
+        SEMICOLONS.encode("utf-8-sig"),
+        "# point x y z sx sy sz\n" + SEMICOLONS.split("\r\n", 1)[1],
+        "Z;Name;X;Y;sigma_z;sx;sy\n3.5;B1;10.5;20.25;0.02;0.01;0.01\n4.5;B2;11.5;21.25;0.02;0.01;0.01\n",
+    ],
+)
+def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None:
+    assert _points(_file(tmp_path, text)) == BALLS
+
+
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("name;X;Y;Z;sX;sY;sZ\nB1;10,5;20,25;;0,01;0,01;0,02\n", "line 2, column z: the cell is empty"),
+        ("B1;10,5;20,25;;0,01;0,01;0,02\n", "line 1, column z: the cell is empty"),
+        ("B1 10,5 20,5 3,5\nB2 11,5 21,5 4,5\n", "blanks separate the cells, so an empty one is not seen"),
+        ("B1 0 0  0.005 0.005\n", "blanks separate the cells, so an empty one is not seen"),
+        ("B1,10,5,20,5,3,5\nB2,11,5,21,5,4,5\n", "no decimal point, so commas may"),
+        ("name,X,Y,Z,s\nB1,10,5,20,5,3,5,0,01\n", "line 2: 9 columns, but only"),
+        ('name,X,Y,Z,s\nB1,"10,5","20,5","3,5","0,01"\n', "'10,5' in a file that commas separate"),
+        ("name;X;Y;Z;s\nB1;1,234;20.5;3.5;0.01\n", "'1,234' beside '20.5' is a decimal comma or none"),
+        ("name X Y Z s\nBall 1 10.5 20.5 3.5 0.01\n", "line 2: 6 columns, but only name"),
+        ("Left 1 10.5 20.5 3.5\nRight 2 11.5 21.5 4.5\n", "line 1: 'Left 1' may be one name"),
+        ("L,1,10.5,20.5,3.5\nR,2,11.5,21.5,4.5\n", "line 1: 'L,1' may be one name"),
+        ("name X Y Z s\nBall 1 10.5 20.5 0.01\n", "line 2: 'Ball 1' may be one name"),
+        ("L1,1,10.5,20.5,3.5,0.01\n", "line 1: sigmas sx, sy: give one for all"),
+        ("name X Y Z s\nB1 10.5 20.5 0.01\n", "line 2: 4 cells instead of 5"),
+        ("name;X;Y;Z;sX;sZ\nB1;1;2;3;0.1;0.2\n", "line 2: sigmas sx, sz: give one for all"),
+        ("name;X;Y;Z;s;sZ\nB1;1;2;3;0.1;0.2\n", "line 2: sigmas s, sz: give one for all"),
+        ("name;X;Y;Z;sX;sY;sZ\nB1;1;2;3;0.1;;0.2\n", "line 2: a sigma is empty beside others"),
+        ("B1;1;2;3;0.1;\n", "line 1: a sigma is empty beside others"),
+        ("name;X;Y;Z;s\nB1;1;2;3;-0.1\n", "line 2: a sigma of -0.1 is none"),
+        ("name;X;X;Y;Z;s\nB1;1;1;2;3;0.1\n", "columns 'X' and 'X' are the same, x"),
+        ("Id;Name;X;Y;Z;s\n7;B1;1;2;3;0.1\n", "columns 'Id' and 'Name' are the same, name"),
+        ("name;X;Y;Z;code;s\nB1;1;2;3;4;0.1\n", "column 'code' is not known"),
+        ("Name;Y;X;H\nB1;1;2;3\n", "column 'H': in a surveyor's system X may point north"),
+        ("X;Y;Z;s\n1;2;3;0.1\n", "column 'name' is missing"),
+        ("name;X;Y;Z;s\n;1;2;3;0.1\n", "line 2: '' is no name"),
+        ("name;X;Y;Z;s\n'B1';1;2;3;0.1\n", "line 2: \"'B1'\" is no name"),
+        ('name;X;Y;Z;s\n"B1;1;2;3;0.1\n', "line 2: a double quote is not closed"),
+        ('name;X;Y;Z;s\n"B"1;1;2;3;0.1\n', "line 2: a double quote is not closed, or text follows"),
+        ("name;X;Y;Z;s\nB1;1_000;2;3;0.1\n", "line 2, column x: '1_000' is no number"),
+        ("name;X;Y;Z;s\nB1;1.234,5;2;3;0,1\n", r"line 2, column x: '1\.234,5' is no number"),
+        ("name;X;Y;Z;s\nB1;1;2;3;0.1\nB1;1;2;4;0.1\n", "line 3: 'B1' is there twice"),
+        ("sep=x\nB1x1x2x3x0.1\n", "line 1: sep=x: the separator must be one of"),
+        (SEMICOLONS.encode("utf-16")[2:], "is no text file, or UTF-16 without its mark"),
+        (b"\x81\xe5;1;2;3;0.1\n", "is text of an unknown encoding; save it as UTF-8"),
+    ],
+)
+def test_what_could_be_read_otherwise_is_refused(text: str | bytes, pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=pattern) as refused:
+        import_network([_file(tmp_path, text)])
+    assert "\n" not in str(refused.value)
+
+
+def test_assumed_encodings_and_hidden_lines_are_said(tmp_path: Path) -> None:
+    path = _file(tmp_path, "Hoppkant-Ø;1;2;3;0,1\n#7;1;2;3;0,1\n# Tuesday\n".encode("latin-1"))
+    imported = import_network([path])
+    assert [point.name for point in imported.network.points] == ["Hoppkant-Ø"]
+    assert imported.notes == (
+        "balls.csv: is no UTF-8, taken as Windows-1252 (Latin-1): look whether 'Hoppkant-Ø' is right",
+        "balls.csv: 1 lines of numbers are comments (# or !) and left out",
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("dup.obc", "1 10 20 3 0.001\n1 10 20 9 0.001\n2 11 21 4 0.001\n"),
+        ("dup.ior", "1 20 0 0\n1 21 0 0\n"),
+        ("dup.eor", "1 7 0 0 0\n1 7 0 0 1\n"),
+    ],
+)
+def test_a_name_twice_in_a_file_is_refused(name: str, text: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="line 2: '1' is there twice"):
+        import_network([_file(tmp_path, text, name)])
+
+
+def test_a_ball_in_two_surveys_is_refused_with_the_difference(tmp_path: Path) -> None:
+    first = _file(tmp_path, "B1,10.5,20.5,3.5,0.005\nB2,11,21,4,0.005\n", "day1.csv")
+    second = _file(tmp_path, "B1,10.5,20.5,4.5,0.005\nB3,12,22,5,0.005\n", "day2.csv")
+    with pytest.raises(BadInputError, match=r"day2.csv: point 'B1' is in .*day1.csv too, 1 apart; keep one of them"):
+        import_network([first, second])
+
+
+def test_a_pose_in_two_files_is_refused_unless_they_agree(tmp_path: Path) -> None:
+    camera, points = _file(tmp_path, "7 20 0 0\n", "a.ior"), _file(tmp_path, "1 T1 0 0 0.1 0.1\n", "a.phc")
+    poses, other = _file(tmp_path, "1 7 0 0 0\n", "a.eor"), _file(tmp_path, "1 7 0 0 3\n", "b.eor")
+    without = _file(tmp_path, "1 7\n", "c.eor")
+    with pytest.raises(BadInputError, match=r"b.eor: image '1' is in .*a.eor too, 3 apart"):
+        import_network([camera, points, poses, other])
+    (image,) = import_network([camera, points, poses, without]).network.images
+    assert np.asarray(image.position).tolist() == [0.0, 0.0, 0.0]
+
+
+#: How a program writes a table: separator, decimal mark, quoting, head, and what stands before it.
+_DIALECTS: Final = st.fixed_dictionaries(
+    {
+        "separator": st.sampled_from((";", "\t", ",", " ")),
+        "decimal": st.sampled_from((".", ",")),
+        "quoting": st.sampled_from((csv.QUOTE_MINIMAL, csv.QUOTE_ALL, None)),  # None: plainly, without quotes,
+        "head": st.booleans(),
+        "sep": st.booleans(),
+        "encoding": st.sampled_from(("utf-8", "utf-8-sig", "utf-16", "latin-1")),
+        "end": st.sampled_from(("\n", "\r\n")),
+    }
+)
+_MEASURED: Final = st.decimals(-200, 200, places=3).map(lambda value: f"{value:.3f}")
+_WHOLE: Final = st.integers(-200, 200).map(str)
+_VALUES: Final = st.sampled_from((*[_MEASURED] * 12, *[_WHOLE] * 3, st.just(""))).flatmap(lambda cells: cells)
+_SIGMA_CELLS: Final = st.sampled_from((*("0.005", "0.01", "0.012") * 4, "1", ""))
+_ROWS: Final = st.integers(0, 3).flatmap(
+    lambda sigmas: st.lists(
+        st.tuples(
+            st.one_of(
+                st.sampled_from(("B1", "Ball 1", "7", "kant Ø", 'B"1', "0317", "1,5", "a;b", "North", "#1")),
+                st.text("aB1 ,;.Ø\"'#", min_size=1, max_size=5),
+            ),
+            *[_VALUES] * 3,
+            *[_SIGMA_CELLS] * sigmas,
+        ),
+        min_size=1,
+        max_size=4,
+    )
+)
+
+
+def _written(rows: list[tuple[str, ...]], dialect: dict[str, Any]) -> bytes:
+    """The table as a program writes it with Python's csv, or plainly, without any quotes."""
+    out = io.StringIO()
+    sigmas = {0: (), 1: ("sigma",), 2: ("sX", "sY"), 3: ("sX", "sY", "sZ")}[len(rows[0]) - 4]
+    if dialect["sep"]:
+        out.write(f"sep={dialect['separator']}{dialect['end']}")
+    head = [("name", "X", "Y", "Z", *sigmas)] if dialect["head"] else []
+    body = [(name, *(cell.replace(".", dialect["decimal"]) for cell in cells)) for name, *cells in rows]
+    if dialect["quoting"] is None:
+        out.writelines(dialect["separator"].join(row) + dialect["end"] for row in (*head, *body))
+    else:
+        form = {"delimiter": dialect["separator"], "quoting": dialect["quoting"], "lineterminator": dialect["end"]}
+        csv.writer(out, **form).writerows([*head, *body])
+    return out.getvalue().encode(dialect["encoding"])
+
+
+@given(rows=_ROWS, dialect=_DIALECTS)
+def test_a_table_in_any_dialect_is_read_right_or_refused(
+    rows: list[tuple[str, ...]], dialect: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = _file(tmp_path_factory.getbasetemp(), _written(rows, dialect), "any.csv")
+    try:
+        imported = import_network([path])
+    except BadInputError:
+        return
+    lines = path.read_bytes().decode(dialect["encoding"]).splitlines()[-len(rows) :]
+    hidden = [row for row, line in zip(rows, lines, strict=True) if line.lstrip().startswith(("#", "!"))]
+    expected = {}
+    for name, *cells in rows:
+        if (name, *cells) not in hidden:
+            values = [float(cell) for cell in cells]  # an empty cell is never read
+            expected[name.strip()] = (values[:3], values[3:] if len(values) == 6 else values[3:] * 3)
+    assert _points(path) == expected
+    if any(all(row[1:]) for row in hidden):
+        assert any("are comments" in note for note in imported.notes)

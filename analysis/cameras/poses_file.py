@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from analysis.scene.survey import require_metres
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
 from photogrammetry.geometry.rotation import nearest_rotation
 from photogrammetry.network.entries import Finite, Rotation, Triple
@@ -161,12 +162,19 @@ def read_poses(path: Path) -> Calibration:
 
     Raises:
         BadInputError: no result file, one without poses or without a result, several images of a camera, a metric
-            image frame, or a covariance that does not fit; one line that says what to do.
+            image frame, another unit than the metre or none, or a covariance that does not fit; one line that says
+            what to do.
     """
     interior = read_calibration(path)
     result = validate(_Result, read_json(path), path)
     if result.image_frame != "pixel":
         raise BadInputError(f'{path}: "image_frame" is "{result.image_frame}"; cameras of a log need c, x0, y0 in px')
+    require_metres(result.length_unit, str(path))
+    if not result.length_unit and not result.control:
+        raise BadInputError(
+            f'{path}: says no "length_unit", and nothing surveyed gives its scale; adjust a network with surveyed '
+            'balls or distances, and with "length_unit": "m"'
+        )
     images = {name: validate(_Image, body, f"{path}: images.{name}") for name, body in result.images.items()}
     if not images:
         raise BadInputError(f"{path}: has no images, so no poses; name the result of svev orient")

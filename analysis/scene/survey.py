@@ -18,6 +18,7 @@ _FEWEST = 4  # surveyed balls
 #: Radius of a ball, m: smaller ones no camera resolves from where a jump fits into its image, larger ones hide the
 #: jumper. Coordinates in mm or cm make a ball hundreds of times as large, those in km as small.
 _RADII_M: Final = (0.005, 2.0)
+_METRES: Final = ("", "m", "metre", "metres", "meter", "meters")  # as a label; the file need not have one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +95,7 @@ def read_survey(path: Path) -> Survey:
 
     Raises:
         BadInputError: no network file, observations in it, metric image frame, several images of a camera, or fewer
-            than four surveyed balls.
+            than four surveyed balls, or a unit that is not the metre.
     """
     data = read_object(path, "survey")
     if data.get("observations"):
@@ -105,6 +106,7 @@ def read_survey(path: Path) -> Survey:
     network = network_from_json({"images": {}, "observations": [], **data}, str(path))
     if network.image_frame is not ImageFrame.PIXEL:
         raise BadInputError(f'{path}: "image_frame" is "metric"; a survey for a log needs c, x0, y0 in px: "pixel"')
+    require_metres(network.length_unit, str(path))
     cameras = [image.camera for image in network.images]
     for camera in cameras:
         if cameras.count(camera) > 1:
@@ -119,6 +121,23 @@ def read_survey(path: Path) -> Survey:
     survey = Survey(network, str(path))
     _check_apart(survey.surveyed(), survey.source)
     return survey
+
+
+def require_metres(unit: str, source: str) -> None:
+    """Refuse an object system whose unit is another than the metre, in which speeds and lengths of a jump are told.
+
+    Args:
+        unit: `length_unit` of the file.
+        source: the file, for messages.
+
+    Raises:
+        BadInputError: it is another unit.
+    """
+    if unit.strip().lower() not in _METRES:
+        raise BadInputError(
+            f'{source}: "length_unit" is "{unit}", but jumps are measured in metres; write coordinates and sigmas in '
+            'metres, and "length_unit": "m"'
+        )
 
 
 def check_lengths(radius: float | None, source: str) -> None:

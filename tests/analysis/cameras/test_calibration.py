@@ -149,9 +149,19 @@ def _torn(data: dict[str, Any]) -> None:
     data["calibration"]["covariance"].pop()
 
 
+def _in_feet(data: dict[str, Any]) -> None:
+    data |= {"length_unit": "ft"}
+
+
+def _without_scale(data: dict[str, Any]) -> None:
+    data |= {"length_unit": "", "control": []}
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
+        (_in_feet, '"length_unit" is "ft", but jumps are measured in metres; write coordinates and sigmas in metres'),
+        (_without_scale, 'says no "length_unit", and nothing surveyed gives its scale; adjust a network with surveyed'),
         (_without("K2"), r"camera K2 of the log is missing \(there: K1, K3\); name the result of svev orient"),
         (_twice, "camera K2 has several images, so where it stands is open; name the result of svev orient"),
         (_resized, "camera K3 was oriented with images of 1936 x 1216 px, those of the log have 640 x 480 px; orient"),
@@ -159,7 +169,7 @@ def _torn(data: dict[str, Any]) -> None:
         (_failed, "this calibration has no result"),
         (_torn, "calibration.covariance is not 21 x 21"),
     ],
-    ids=["camera missing", "two images", "image size", "other hill", "not converged", "covariance"],
+    ids=["feet", "no scale", "camera missing", "two images", "image size", "other hill", "not converged", "covariance"],
 )
 def test_a_calibration_that_does_not_belong_to_the_log_is_refused(
     read: Read, spoil: Callable[[dict[str, Any]], None], message: str

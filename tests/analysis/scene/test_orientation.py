@@ -293,6 +293,7 @@ def _same_place(data: dict[str, Any]) -> dict[str, Any]:
         (_renamed, r"camera K2 of the log is missing \(there: K1, K3, Cam2\); name the cameras as in the log"),
         (_few, "has 3 surveyed balls .* at least 4"),
         (_metric, '"image_frame" is "metric"; a survey for a log needs c, x0, y0 in px'),
+        (lambda data: data | {"length_unit": "ft"}, '"length_unit" is "ft", but jumps are measured in metres'),
     ],
     ids=[
         "millimetres",
@@ -304,6 +305,7 @@ def _same_place(data: dict[str, Any]) -> dict[str, Any]:
         "camera's name",
         "few balls",
         "metric",
+        "feet",
     ],
 )
 def test_what_does_not_belong_to_the_log_is_refused_in_one_line(tmp_path: Path, spoil: Any, message: str) -> None:

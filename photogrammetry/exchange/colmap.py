@@ -44,9 +44,9 @@ def read_colmap(files: Mapping[str, Path], sigma: float) -> Part:
     notes: list[str] = []
     if "cameras.txt" in files:
         for place, words in _lines(files["cameras.txt"]):
-            cameras[words[0]], rest = _camera(words, place)
-            if rest:
-                notes.append(f"camera {words[0]}: image points differ from COLMAP's by up to {rest:.2g} px")
+            _require_new(words[0], cameras, place)
+            cameras[words[0]], said = _camera(words, place)
+            notes += [f"camera {words[0]}: {note}" for note in said]
     images, observations = _images(files["images.txt"], sigma, notes) if "images.txt" in files else ({}, [])
     points = _points(files["points3D.txt"]) if "points3D.txt" in files else {}
     if observations:
@@ -63,7 +63,13 @@ def _lines(path: Path) -> Iterator[tuple[str, list[str]]]:
             yield f"{path}: line {number}", line.split()
 
 
-def _camera(words: list[str], place: str) -> tuple[dict[str, Any], float]:
+def _require_new(name: str, there: Mapping[str, Any], place: str) -> None:
+    """Refuse a name that stands in the file already."""
+    if name in there:
+        raise BadInputError(f"{place}: {name!r} is there twice; keep one of them, or export the model again")
+
+
+def _camera(words: list[str], place: str) -> tuple[dict[str, Any], list[str]]:
     if len(words) < 5:
         raise BadInputError(f"{place}: is no camera; COLMAP writes CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS")
     model = words[1]
@@ -85,7 +91,7 @@ def _camera(words: list[str], place: str) -> tuple[dict[str, Any], float]:
         (k1, k2, k3, k4, k5, k6),
         (p1, p2),
     )
-    return camera_entry(pinhole, place)
+    return camera_entry(pinhole, place, "COLMAP")
 
 
 def _images(path: Path, sigma: float, notes: list[str]) -> tuple[dict[str, dict[str, Any]], list[list[Any]]]:
@@ -105,6 +111,7 @@ def _images(path: Path, sigma: float, notes: list[str]) -> tuple[dict[str, dict[
         pose = numbers(words[1:8], place)
         if not any(pose[:4]):
             raise BadInputError(f"{place}: a quaternion of zeros is no rotation; export the model again")
+        _require_new(words[9], images, place)
         images[words[9]] = {"camera": words[8], **pose_entry(_rotation(np.array(pose[:4])), np.array(pose[4:]))}
         found = _observations(next(lines, (0, ""))[1].split(), f"{path}: line {number + 1}")
         once = {point: (x, y) for x, y, point in reversed(found)}
@@ -128,10 +135,11 @@ def _observations(words: list[str], place: str) -> list[tuple[float, float, str]
 
 
 def _points(path: Path) -> dict[str, dict[str, Any]]:
-    points = {}
+    points: dict[str, dict[str, Any]] = {}
     for place, words in _lines(path):
         if len(words) < 4:
             raise BadInputError(f"{place}: is no point; COLMAP writes POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK")
+        _require_new(words[0], points, place)
         points[words[0]] = {"role": "tie", "X": numbers(words[1:4], place)}
     return points
 

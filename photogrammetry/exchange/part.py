@@ -83,13 +83,18 @@ def numbers(words: Iterable[str], place: str) -> list[float]:
     """
     found = []
     for word in words:
-        if not _WRITTEN.fullmatch(word):
+        if not is_written_number(word):
             raise BadInputError(f"{place}: {word!r} is no number; correct it there")
         number = float(word)
         if not np.isfinite(number):
             raise BadInputError(f"{place}: {word!r} is no finite number; correct it there")
         found.append(number)
     return found
+
+
+def is_written_number(word: str) -> bool:
+    """Whether a word is a number as programs write it, with a decimal point."""
+    return _WRITTEN.fullmatch(word) is not None
 
 
 def _frame(parts: Sequence[Part]) -> ImageFrame:

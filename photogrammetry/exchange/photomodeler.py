@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from photogrammetry.exchange.part import Part, numbers, rotation_of
+from photogrammetry.exchange.pinhole import doubts
 from photogrammetry.network.model import ImageFrame
 from rig.errors import BadInputError
 from rig.settings.strict_toml import read_text
@@ -49,14 +50,14 @@ class _Lines:
             raise BadInputError(f"{self.place}: {len(found)} numbers instead of {count}: {what}; export again")
         return found
 
-    def block(self, count: int, what: str) -> list[tuple[str, list[float]]]:
-        """Lines until an empty one: the first word, and `count` numbers behind it."""
+    def block(self, count: int, what: str) -> list[tuple[list[str], list[float]]]:
+        """Lines until an empty one: the words, and the `count` numbers behind the first."""
         found = []
         while words := self.take():
             row = numbers(words[1:], self.place)
             if len(row) != count:
                 raise BadInputError(f"{self.place}: {len(row)} numbers instead of {count}: {what}; export again")
-            found.append((words[0], row))
+            found.append((words, row))
         return found
 
 
@@ -76,6 +77,7 @@ def read_photomodeler(path: Path, sigma: float) -> Part:
     images: dict[str, dict[str, Any]] = {}
     order: dict[str, str] = {}
     formats: dict[str, tuple[float, float]] = {}
+    doubted: dict[str, str] = {}
     while words := lines.take():
         if len(words) < 2:
             raise BadInputError(f"{lines.place}: no photo's number and name; name a text export of PhotoModeler")
@@ -83,18 +85,23 @@ def read_photomodeler(path: Path, sigma: float) -> Part:
         if name in images:
             raise BadInputError(f"{lines.place}: two photos are called {name!r}; rename one")
         images[name], interior = _photo(lines)
+        if words[0] in order:
+            raise BadInputError(f"{lines.place}: two photos have the number {words[0]}; export again")
         order[words[0]] = name
         entry = _camera(interior, size)
         camera = next((known for known, other in cameras.items() if other == entry), f"camera-{len(cameras) + 1}")
         cameras[camera] = entry
         images[name]["camera"] = camera
         formats[name] = (interior[3], interior[4])
+        if (said := doubts(formats[name], (entry["x0"], entry["y0"]), "mm")) and camera not in doubted:
+            doubted[camera] = f"camera {camera}: {said[0]}"
     points = _points(lines)
     observations = _marks(lines, order, formats, size, sigma)
     constant = 'interior orientations are constant: name the unknown ones in "estimate"'
     notes = (
         "image coordinates are in mm now, from the middle of the image, y up",
         f"{constant}; the sigmas of PhotoModeler's results (poses, object points) are left out",
+        *doubted.values(),
     )
     return Part(str(path), ImageFrame.METRIC, cameras, images, points, observations, notes)
 
@@ -144,12 +151,18 @@ def _camera(interior: list[float], size: tuple[float, float]) -> dict[str, Any]:
 def _points(lines: _Lines) -> dict[str, dict[str, Any]]:
     """Control points, surveyed or (without sigma) fixed, then object points, whose coordinates are start values."""
     points: dict[str, dict[str, Any]] = {}
-    for name, row in lines.block(6, "X, Y, Z and their sigmas of a control point"):
+    for (name, *_), row in lines.block(6, "X, Y, Z and their sigmas of a control point"):
+        if name in points:
+            raise BadInputError(f"{lines.place}: control point {name!r} is there twice; keep one of them")
         surveyed = min(row[3:]) > 0.0
         points[name] = {"role": "control" if surveyed else "fixed", "X": row[:3]} | (
             {"sigma": row[3:]} if surveyed else {}
         )
-    for name, row in lines.block(6, "X, Y, Z and their sigmas of an object point"):
+    objects: set[str] = set()
+    for (name, *_), row in lines.block(6, "X, Y, Z and their sigmas of an object point"):
+        if name in objects:
+            raise BadInputError(f"{lines.place}: object point {name!r} is there twice; export again")
+        objects.add(name)
         points.setdefault(name, {"role": "tie", "X": row[:3]})
     return points
 
@@ -163,12 +176,12 @@ def _marks(
 ) -> list[list[Any]]:
     """Observations in mm."""
     rows = []
-    for photo, row in lines.block(5, "point, x, y and their sigmas of a mark"):
+    for (photo, point, *_), row in lines.block(5, "point, x, y and their sigmas of a mark"):
         if photo not in order:
             raise BadInputError(f"{lines.place}: photo {photo} is not listed above; export again")
         name = order[photo]
         pixel = np.array(formats[name]) / size
         x, y = np.array((row[1] - size[0] / 2.0, size[1] / 2.0 - row[2])) * pixel
         sigmas = np.array([each if each > 0.0 else sigma for each in row[3:]]) * pixel
-        rows.append([name, f"{row[0]:.0f}", float(x), float(y), *sigmas.tolist()])
+        rows.append([name, point, float(x), float(y), *sigmas.tolist()])
     return rows

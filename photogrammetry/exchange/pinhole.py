@@ -7,7 +7,8 @@ u = fx x'' + skew y'' + cx, v = fy y'' + cy with
     y'' = y (...) / (...) + p1 (r^2 + 2 y^2) + 2 p2 x y.
 
 With one focal length f and k4 = k5 = k6 = 0 that is exactly the "projected" distortion of the network:
-a1 = k1/f^2, a2 = k2/f^4, a3 = k3/f^6, b1 = p2/f, b2 = -p1/f. Else the nearest parameters are fitted over the picture.
+a1 = k1/f^2, a2 = k2/f^4, a3 = k3/f^6, b1 = p2/f, b2 = -p1/f. Else the nearest parameters are fitted over the pixels of
+the picture; a lens that they do not meet within a pixel is refused.
 """
 
 from dataclasses import dataclass
@@ -17,12 +18,21 @@ import numpy as np
 
 from photogrammetry.geometry.camera_model import INTERIOR, Lens, distort, linearise
 from photogrammetry.geometry.rotation import nearest_rotation
+from photogrammetry.network.entries import LARGEST
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
 _GRID: Final = 25  # places along each side of the picture at which models are compared
 _STEPS: Final = 10  # Gauss-Newton; the model is nearly linear
 _EXACT_PX: Final = 1e-6
+_MOST_PX: Final = 1.0  # more differs by more than points are measured
+_ANGLES: Final = np.radians(np.linspace(0.0, 89.5, 4000))  # off the axis, at which a lens is sampled
+_SLOPE: Final = 1e-6  # step of a numerical derivative, relative
+_NEWTON: Final = 8  # steps from a sampled lens, which is right to a thousandth, to the last digit
+_NEAR: Final = 1e-9  # of a direction, relative to 1: much less than a pixel
+_FAR_OFF: Final = 0.25  # of the picture's width or height: no camera's principal point is so far from the middle
+_NOT_MIDDLE: Final = 0.05  # of the diagonal: what tells a turned picture from a principal point that is a little off
+_OBLONG: Final = 1.25  # fx / fy of pixels that are no square
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,42 +55,83 @@ class Pinhole:
     tangential: tuple[float, float] = (0.0, 0.0)
     skew: float = 0.0
 
-    def project(self, xy: Floats) -> Floats:
-        """Metric image coordinates (n, 2) of x = X/Z, y = Y/Z (n, 2)."""
+    def distorted(self, xy: Floats) -> Floats:
+        """x'', y'' (n, 2) of x = X/Z, y = Y/Z (n, 2)."""
         x, y = xy[:, 0], xy[:, 1]
         r2 = x * x + y * y
-        k1, k2, k3, k4, k5, k6 = self.radial
         p1, p2 = self.tangential
-        factor = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        factor = self.factor(r2)
         across = x * factor + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
         down = y * factor + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return np.column_stack((across, down))
+
+    def factor(self, r2: Floats) -> Floats:
+        """By how much radial distortion stretches directions at squared distances r2 from the axis."""
+        k1, k2, k3, k4, k5, k6 = self.radial
+        return (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+
+    def project(self, xy: Floats) -> Floats:
+        """Metric image coordinates (n, 2) of x = X/Z, y = Y/Z (n, 2)."""
+        across, down = self.distorted(xy).T
         u = self.focal[0] * across + self.skew * down + self.principal[0]
         v = self.focal[1] * down + self.principal[1]
         return np.column_stack((u - (self.size[0] - 1) / 2.0, (self.size[1] - 1) / 2.0 - v))
 
 
-def camera_entry(pinhole: Pinhole, place: str) -> tuple[dict[str, Any], float]:
+def doubts(size: tuple[float, float], principal: tuple[float, float], unit: str) -> list[str]:
+    """What speaks against a camera: a picture that is turned, or of another size.
+
+    Args:
+        size: width and height of the picture.
+        principal: point, from the middle of the picture; all in the same unit.
+        unit: its name.
+    """
+    (width, height), (x, y) = size, principal
+    turned = np.hypot(x + (width - height) / 2.0, y + (width - height) / 2.0)  # from the middle of height x width
+    where = f"the principal point is {x:.4g}, {y:.4g} {unit} from the middle of the picture"
+    if 2.0 * turned < np.hypot(x, y) > _NOT_MIDDLE * np.hypot(width, height):
+        return [f"{where}: look whether its width and height are exchanged"]
+    if abs(x) > _FAR_OFF * width or abs(y) > _FAR_OFF * height:
+        return [f"{where}: look whether image size and calibration belong to the same pictures"]
+    return []
+
+
+def camera_entry(pinhole: Pinhole, place: str, program: str) -> tuple[dict[str, Any], list[str]]:
     """The camera as an entry of the network file.
 
     Args:
         pinhole: the camera.
         place: where it stands, for messages.
+        program: that wrote it.
 
     Returns:
-        The entry, and by how much its image points differ from those of the other program, at most (px); 0: not at all.
+        The entry, and what to know about it: by how much its image points differ from those of the other program, where
+        the lens folds, and what speaks against the camera.
 
     Raises:
-        BadInputError: the numbers are those of no camera.
+        BadInputError: the numbers are those of no camera, or the network's distortion does not come near it.
     """
     if min(*pinhole.size, *pinhole.focal) <= 0.0:
         raise BadInputError(f"{place}: image size and focal lengths must be positive; correct them there")
     with np.errstate(all="ignore"):
-        interior, rest = _nearest(pinhole)
-    if not rest < max(pinhole.size):  # also where it is no number
-        raise BadInputError(f"{place}: the distortion cannot be carried over; calibrate again (svev calibrate)")
+        xy, reached = _over_the_picture(pinhole)
+        interior, rest = _nearest(pinhole, xy)
+    if not rest <= _MOST_PX or np.abs(interior).max() > LARGEST:  # also where it is no number
+        by = f": image points would differ by up to {rest:.2g} px" if _MOST_PX < rest < np.inf else ""
+        raise BadInputError(f"{place}: the distortion cannot be carried over{by}; calibrate again (svev calibrate)")
+    notes = [f"image points differ from {program}'s by up to {rest:.2g} px"] if rest > _EXACT_PX else []
+    if reached < 1.0:
+        notes.append(
+            f"the distortion folds inside the picture: {1.0 - reached:.0%} of it shows no direction, and points near "
+            "there are wrong; calibrate with points up to the corners"
+        )
+    (width, height), (cx, cy) = pinhole.size, pinhole.principal
+    notes += doubts(pinhole.size, (cx - (width - 1) / 2.0, (height - 1) / 2.0 - cy), "px")
+    if not 1.0 / _OBLONG < pinhole.focal[0] / pinhole.focal[1] < _OBLONG:
+        notes.append("fx and fy differ as those of no usual camera; look whether they are right")
     entry: dict[str, Any] = {"size": list(pinhole.size)}
     entry |= {name: float(value) for name, value in zip(INTERIOR, interior, strict=True)}
-    return entry | {"distortion": "projected"}, rest if rest > _EXACT_PX else 0.0
+    return entry | {"distortion": "projected"}, notes
 
 
 def pose_entry(rotation: Floats, translation: Floats) -> dict[str, Any]:
@@ -95,9 +146,16 @@ def pose_entry(rotation: Floats, translation: Floats) -> dict[str, Any]:
     return {"X0": (-turned.T @ np.asarray(translation, dtype=float)).tolist(), "R": axes.tolist()}
 
 
-def _nearest(pinhole: Pinhole) -> tuple[Floats, float]:
-    """The interior orientation (10,), and the largest difference of image points (px), infinite without a solution."""
-    interior, xy = _direct(pinhole), _over_the_picture(pinhole)
+def _nearest(pinhole: Pinhole, xy: Floats) -> tuple[Floats, float]:
+    """The interior orientation (10,), and the largest difference of image points (px), infinite without a solution.
+
+    Args:
+        pinhole: the camera.
+        xy: (n, 2) directions at which models are compared.
+    """
+    interior = _direct(pinhole)
+    if not len(xy):
+        return interior, np.inf
     target = pinhole.project(xy)
     if np.abs(_ours(interior, xy) - target).max() > _EXACT_PX:
         try:
@@ -117,11 +175,37 @@ def _direct(pinhole: Pinhole) -> Floats:
     return np.array([fy, *principal, *radial, p2 / fy, -p1 / fy, fx / fy - 1.0, -pinhole.skew / fy])
 
 
-def _over_the_picture(pinhole: Pinhole) -> Floats:
-    """Directions x = X/Z, y = Y/Z, (n, 2), that an undistorted camera would see in the picture."""
+def _over_the_picture(pinhole: Pinhole) -> tuple[Floats, float]:
+    """Directions x = X/Z, y = Y/Z, (n, 2), that places all over the picture show, and the share of places that do.
+
+    A lens folds where points farther from the axis come nearer to it in the picture again; beyond, no place shows any.
+    """
     (fx, fy), (cx, cy), (width, height) = pinhole.focal, pinhole.principal, pinhole.size
     u, v = np.meshgrid(np.linspace(0.0, width - 1.0, _GRID), np.linspace(0.0, height - 1.0, _GRID))
-    return np.column_stack(((u.ravel() - cx) / fx, (v.ravel() - cy) / fy))
+    down = (v.ravel() - cy) / fy
+    wanted = np.column_stack(((u.ravel() - cx - pinhole.skew * down) / fx, down))
+    r = np.tan(_ANGLES)
+    seen = r * pinhole.factor(r * r)
+    falls = ~(np.diff(seen) > 0.0)
+    count = int(falls.argmax()) + 1 if falls.any() else len(r)
+    far = np.linalg.norm(wanted, axis=1)
+    start = np.interp(far, seen[:count], r[:count])
+    xy = wanted * np.where(far > 0.0, start / np.where(far > 0.0, far, 1.0), 1.0)[:, None]
+    for _ in range(_NEWTON):
+        xy = xy - _newton_step(pinhole, xy, wanted)
+    off = np.linalg.norm(pinhole.distorted(xy) - wanted, axis=1)
+    shows = (off < _NEAR * (1.0 + far)) & (np.linalg.norm(xy, axis=1) <= r[count - 1])
+    return xy[shows], float(shows.mean())
+
+
+def _newton_step(pinhole: Pinhole, xy: Floats, wanted: Floats) -> Floats:
+    """(n, 2) the step of Newton's method towards the directions that the lens shows at `wanted` (n, 2)."""
+    h = _SLOPE * (1.0 + np.linalg.norm(xy, axis=1, keepdims=True))
+    by = [(pinhole.distorted(xy + h * axis) - pinhole.distorted(xy - h * axis)) / (2.0 * h) for axis in np.eye(2)]
+    (a, c), (b, d) = by[0].T, by[1].T
+    off = pinhole.distorted(xy) - wanted
+    step = np.column_stack((d * off[:, 0] - b * off[:, 1], a * off[:, 1] - c * off[:, 0])) / (a * d - b * c)[:, None]
+    return np.asarray(step)
 
 
 def _ours(interior: Floats, xy: Floats) -> Floats:

@@ -14,6 +14,7 @@ from photogrammetry.exchange.part import Part
 from photogrammetry.exchange.pinhole import Pinhole, camera_entry, pose_entry
 from photogrammetry.exchange.values import read_values
 from photogrammetry.geometry.rotation import rotation_from_vector
+from photogrammetry.network.entries import LARGEST
 from photogrammetry.network.model import ImageFrame
 from rig.arrays import Floats
 from rig.errors import BadInputError
@@ -159,18 +160,15 @@ def _numbers(value: Any, key: str, path: Path) -> Floats:
         values = np.array(shape["data"], dtype=float)
     except ValueError:  # rows of different lengths
         raise refused from None
-    if not np.isfinite(values).all():
-        raise refused
+    if not np.isfinite(values).all() or np.abs(values).max(initial=0.0) > LARGEST:
+        raise BadInputError(f'{path}: key "{key}" holds a number that no camera has, or none; correct it there')
     rows, cols = shape.get("rows"), shape.get("cols")
     if rows is None or cols is None:
         return values
-    if not isinstance(rows, int | float) or not isinstance(cols, int | float):
+    if rows not in range(1, values.size + 1) or cols not in range(1, values.size + 1) or values.size % (rows * cols):
         raise refused
-    count = int(rows) * int(cols)
-    if count != rows * cols or count <= 0 or values.size % count:
-        raise refused
-    channels = values.size // count
-    return values.reshape((int(rows), int(cols)) if channels == 1 else (int(rows), int(cols), channels))
+    shaped = values.reshape((int(rows), int(cols), -1))
+    return shaped[:, :, 0] if shaped.shape[2] == 1 else shaped
 
 
 def _flat(data: Any) -> list[Any] | None:

@@ -25,7 +25,7 @@ from rig.errors import BadInputError
 _GRID: Final = 25  # places along each side of the picture at which models are compared
 _STEPS: Final = 10  # Gauss-Newton; the model is nearly linear
 _EXACT_PX: Final = 1e-6
-_MOST_PX: Final = 1.0  # more differs by more than points are measured
+_MOST_PX: Final = 1.0  # a lens that differs by more is another one
 _ANGLES: Final = np.radians(np.linspace(0.0, 89.5, 4000))  # off the axis, at which a lens is sampled
 _SLOPE: Final = 1e-6  # step of a numerical derivative, relative
 _NEWTON: Final = 8  # steps from a sampled lens, which is right to a thousandth, to the last digit
@@ -111,8 +111,12 @@ def camera_entry(pinhole: Pinhole, place: str, program: str) -> tuple[dict[str, 
     Raises:
         BadInputError: the numbers are those of no camera, or the network's distortion does not come near it.
     """
-    if min(*pinhole.size, *pinhole.focal) <= 0.0:
-        raise BadInputError(f"{place}: image size and focal lengths must be positive; correct them there")
+    lengths = (*pinhole.size, *pinhole.focal)
+    if min(lengths) <= 0.0 or max(*lengths, *map(abs, pinhole.principal)) > LARGEST:
+        raise BadInputError(
+            f"{place}: image size and focal lengths must be positive, and no larger than a picture is; "
+            "correct them there"
+        )
     with np.errstate(all="ignore"):
         xy, reached = _over_the_picture(pinhole)
         interior, rest = _nearest(pinhole, xy)

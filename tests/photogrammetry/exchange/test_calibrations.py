@@ -106,6 +106,12 @@ def test_the_distortion_is_read_however_it_is_written(write: Callable[[Path], Pa
         ({"dist_coeffs": {"values": LENS}}, 'key "dist_coeffs" is not understood; write its numbers'),
         ({"dist_coeffs": [True, 0, 0, 0]}, 'key "dist_coeffs" is not understood'),
         ({"dist_coeffs": {"rows": 2, "cols": 3, "data": LENS}}, 'key "dist_coeffs" is not understood'),
+        ({"dist_coeffs": [1e300, 0, 0, 0]}, 'key "dist_coeffs" holds a number that no camera has, or none'),
+        (
+            {"camera_matrix": [1e11, 0, 0, 0, 1e200, 0, 0, 0, 1]},
+            'key "camera_matrix" holds a number that no camera has',
+        ),
+        ({"extrinsic_parameters": [[1e200] * 6]}, 'key "extrinsic_parameters" holds a number that no camera has'),
         ({"D": [0.0] * 5}, 'keys "dist_coeffs" and "D" say the same; remove one'),
         ({"Camera_Matrix": MATRIX}, 'key "Camera_Matrix" stands twice, written differently'),
         ({"binning_x": 2}, 'key "binning_x": a part of the picture'),

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
-from photogrammetry.network.entries import Finite, Positive
+from photogrammetry.network.entries import Finite, Pixels, Positive
 from photogrammetry.network.model import Network
 from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
@@ -31,6 +31,7 @@ class CalibratedCamera(BaseModel):
     c2: Finite
     r0: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
     distortion: Literal["projected", "measured"]
+    size: Annotated[list[Pixels], Field(min_length=2, max_length=2)] | None = None
 
 
 class _GlobalTest(BaseModel):
@@ -74,13 +75,19 @@ def with_calibration(network: Network, cameras: Mapping[str, CalibratedCamera]) 
     """The network with calibrated cameras, which are constant.
 
     Raises:
-        BadInputError: a camera was not calibrated.
+        BadInputError: a camera was not calibrated, or with images of another size.
     """
     for camera in network.cameras:
         if camera.name not in cameras:
             raise BadInputError(
                 f"cameras.{camera.name}: the calibration lacks it (it has {', '.join(cameras) or 'none'}); "
                 "calibrate it too or correct the name"
+            )
+        size = cameras[camera.name].size
+        if size is not None and camera.size is not None and tuple(size) != camera.size:
+            raise BadInputError(
+                f"cameras.{camera.name}: was calibrated with images of {size[0]} x {size[1]} px, those of the network "
+                f"have {camera.size[0]} x {camera.size[1]} px; calibrate it with images of this size"
             )
     calibrated = tuple(
         replace(

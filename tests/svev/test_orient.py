@@ -29,11 +29,13 @@ def run(tmp_path: Path) -> Run:
     return orient
 
 
+_NAMES = ("x0", "y0", "a1", "a2", "a3", "b1", "b2", "c1", "c2", "r0")
+_LENS: dict[str, Any] = dict.fromkeys(_NAMES, 0.0) | {"distortion": "projected", "sigma": {"c": 1.9}}
+
+
 def _calibration(path: Path, **changes: Any) -> Path:
     """A calibration's result: the true cameras of the hill."""
-    names = ("x0", "y0", "a1", "a2", "a3", "b1", "b2", "c1", "c2", "r0")
-    other = dict.fromkeys(names, 0.0) | {"distortion": "projected", "sigma": {"c": 1.9}}
-    cameras = {name: other | {"c": c} for name, c in (("K1", 1419.7), ("K2", 1421.7), ("K3", 2493.3))}
+    cameras = {name: _LENS | {"c": c} for name, c in (("K1", 1419.7), ("K2", 1421.7), ("K3", 2493.3))}
     content = {"format": "svev-adjustment/1", "converged": True, "cameras": cameras} | changes
     path.write_text(json.dumps(content))
     return path
@@ -112,6 +114,10 @@ def test_paper_weights(run: Run) -> None:
     [
         ({"converged": False}, "has no result"),
         ({"cameras": {}}, "cameras.K1: the calibration lacks it"),
+        (
+            {"cameras": {"K1": _LENS | {"c": 1419.7, "size": [1936, 1216]}}},
+            "cameras.K1: was calibrated with images of 1936 x 1216 px, those of the network have 640 x 480 px",
+        ),
         ({"cameras": {"K1": 3}}, "cameras.K1: is no object"),
         ({"cameras": {"K1": {"c": -1.0}}}, "cameras.K1"),
         ({"format": "svev-network/1"}, "format"),

@@ -204,6 +204,7 @@ def _lines(path: Path) -> tuple[list[_Line], tuple[str, ...]]:
         _check_names(file.separator, body)
     if head is None:
         _check_unnamed(file.separator, words, path)
+        _check_ids(cells, path)
     lines = [_line(row, each, points, ending) for row, each in zip(body, cells, strict=True)]
     hidden = sum(row.comment and sum(is_number(word) for word in row.cells) >= _FEWEST_NAMED for row in file.rows)
     left_out = (f"{path.name}: {hidden} lines of numbers are comments (# or !) and left out",) if hidden else ()
@@ -213,7 +214,7 @@ def _lines(path: Path) -> tuple[list[_Line], tuple[str, ...]]:
 def _head(file: Rows, ending: str) -> tuple[Row | None, list[Row]]:
     """The line that names the columns, None if there is none; and the lines with numbers."""
     body = [row for row in file.rows if not row.comment]
-    if body and _is_head(body[0].cells, ending, fewest=1):
+    if body and _is_head(body[0].cells, ending, fewest=0 if len(body[0].cells) >= _FEWEST_NAMED else 1):
         return body[0], body[1:]
     before = [row for row in file.rows[: file.rows.index(body[0])] if row.comment] if body else []
     fewest = min(_FEWEST_NAMED, len(_USUAL[ending]) - 1)
@@ -292,6 +293,27 @@ def _check_unnamed(separator: str, words: Sequence[str], path: Path) -> None:
             f"{path}: blanks separate the cells, so an empty one is not seen; name the columns in the first line, or "
             "separate them by semicolons"
         )
+
+
+def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:
+    """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates with decimals.
+
+    Raises:
+        BadInputError: X is whole in all lines, Y and Z are in none.
+    """
+    coordinates = [[each.get(column, "") for column in ("x", "y", "z")] for each in cells]
+    if all(
+        x.isdecimal() and is_number(y) and is_number(z) and not _is_whole(y) and not _is_whole(z)
+        for x, y, z in coordinates
+    ):
+        raise BadInputError(
+            f"{path}: the second column holds whole numbers alone and may be no coordinate; name the columns "
+            "in the first line"
+        )
+
+
+def _is_whole(word: str) -> bool:
+    return word.lstrip("+-").isdecimal()
 
 
 def _check_names(separator: str, body: Sequence[Row]) -> None:

@@ -70,7 +70,7 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
         ("Left 1 10.5 20.5 3.5\nRight 2 11.5 21.5 4.5\n", "line 1: 'Left 1' may be one name"),
         ("L,1,10.5,20.5,3.5\nR,2,11.5,21.5,4.5\n", "line 1: 'L,1' may be one name"),
         ("name X Y Z s\nBall 1 10.5 20.5 0.01\n", "line 2: 'Ball 1' may be one name"),
-        ("L1,1,10.5,20.5,3.5,0.01\n", "line 1: sigmas sx, sy: give one for all"),
+        ("L1,1.5,10.5,20.5,3.5,0.01\n", "line 1: sigmas sx, sy: give one for all"),
         ("name X Y Z s\nB1 10.5 20.5 0.01\n", "line 2: 4 cells instead of 5"),
         ("name;X;Y;Z;sX;sZ\nB1;1;2;3;0.1;0.2\n", "line 2: sigmas sx, sz: give one for all"),
         ("name;X;Y;Z;s;sZ\nB1;1;2;3;0.1;0.2\n", "line 2: sigmas s, sz: give one for all"),
@@ -79,6 +79,11 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
         ("name;X;Y;Z;s\nB1;1;2;3;-0.1\n", "line 2: a sigma of -0.1 is none"),
         ("name;X;X;Y;Z;s\nB1;1;1;2;3;0.1\n", "columns 'X' and 'X' are the same, x"),
         ("Id;Name;X;Y;Z;s\n7;B1;1;2;3;0.1\n", "columns 'Id' and 'Name' are the same, name"),
+        (
+            "1;17;10.5;20.5;3.5\n2;18;11.5;21.5;4.5\n",
+            "the second column holds whole numbers alone and may be no coordinate",
+        ),
+        ("Punkt;Rechts;Hoch;Oben\nB1;1;2;3\n", "line 1: column 'Punkt' is not known"),
         ("name;X;Y;Z;code;s\nB1;1;2;3;4;0.1\n", "column 'code' is not known"),
         ("Name;Y;X;H\nB1;1;2;3\n", "column 'H': in a surveyor's system X may point north"),
         ("X;Y;Z;s\n1;2;3;0.1\n", "column 'name' is missing"),
@@ -114,6 +119,7 @@ def test_assumed_encodings_and_hidden_lines_are_said(tmp_path: Path) -> None:
     ("name", "text"),
     [
         ("dup.obc", "1 10 20 3 0.001\n1 10 20 9 0.001\n2 11 21 4 0.001\n"),
+        ("dup.obc", "1 10 20 3\n1 10 20 3\n"),
         ("dup.ior", "1 20 0 0\n1 21 0 0\n"),
         ("dup.eor", "1 7 0 0 0\n1 7 0 0 1\n"),
     ],

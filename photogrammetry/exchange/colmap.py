@@ -79,6 +79,8 @@ def _camera(words: list[str], place: str) -> tuple[dict[str, Any], list[str]]:
     focal_lengths, names = _MODELS[model]
     values = numbers(words[2:], place)
     width, height, *rest = values
+    if width % 1.0 or height % 1.0:
+        raise BadInputError(f"{place}: an image size of {width:g} x {height:g} px is none; export the model again")
     if len(rest) != focal_lengths + 2 + len(names):
         raise BadInputError(f"{place}: {model} has {len(rest)} parameters instead of {focal_lengths + 2 + len(names)}")
     given = dict(zip(names, rest[focal_lengths + 2 :], strict=True))

@@ -116,8 +116,8 @@ def _size(lines: _Lines, path: Path) -> tuple[float, float]:
     if len(head[1]) < 4:
         raise BadInputError(f"{path}: line 2: the image size is missing; add width and height (px) at its end")
     width, height = numbers(head[1][2:4], f"{path}: line 2")
-    if min(width, height) < 1.0:
-        raise BadInputError(f"{path}: line 2: width and height of the image must be positive (px); correct them")
+    if min(width, height) < 1.0 or width % 1.0 or height % 1.0:
+        raise BadInputError(f"{path}: line 2: width and height of the image must be positive, whole (px); correct them")
     return width, height
 
 

@@ -1,5 +1,6 @@
 """Reads TOML files strictly: an unknown, missing or impossible key is an error that names file, key and remedy."""
 
+import codecs
 import difflib
 import reprlib
 import tomllib
@@ -44,10 +45,13 @@ def read_text(path: Path, format_name: str, existing: str) -> str:
     Raises:
         BadInputError: missing, unreadable or not UTF-8.
     """
+    data = read_bytes(path, existing)
     try:
-        text = read_bytes(path, existing).decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise BadInputError(f"{path}: is no text file; name a {format_name} file") from None
+        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise BadInputError(f"{path}: is text in UTF-16; save it as UTF-8") from None
+        raise BadInputError(f"{path}: is no text file in UTF-8; save it so, or name a {format_name} file") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

@@ -313,7 +313,7 @@ def test_an_endless_file_is_no_rig_file() -> None:
 
 def test_a_picture_is_no_rig_file(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_bytes(b"\x89PNG\xff")
-    with pytest.raises(BadInputError, match="is no text file; name a TOML file"):
+    with pytest.raises(BadInputError, match="is no text file in UTF-8; save it so, or name a TOML file"):
         load_rig(tmp_path / "rig.toml")
 
 

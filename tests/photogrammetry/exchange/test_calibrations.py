@@ -219,6 +219,15 @@ def test_colmap_with_a_name_twice_is_refused(name: str, text: str, tmp_path: Pat
         import_network([tmp_path])
 
 
+def test_a_size_that_is_not_whole_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "cameras.txt").write_text("1 SIMPLE_PINHOLE 640.5 480 800 320 240\n")
+    with pytest.raises(BadInputError, match=r"an image size of 640\.5 x 480 px is none"):
+        import_network([tmp_path])
+    (tmp_path / "a.txt").write_text(PHOTOMODELER.replace("640 480", "640.5 480", 1))
+    with pytest.raises(BadInputError, match="line 2: width and height of the image must be positive"):
+        import_network([tmp_path / "a.txt"])
+
+
 PHOTOMODELER = (
     "Bundle Soln\n0.0005 20 640 480\n1\n7.5 3.6 2.7 7.2 5.4 0 0 0 0 0\n0\n"
     f"0 P1.JPG\n0 1 2 3 0 0 0\n0 0 0 0 0 0 0\n\n0 9 3.6 2.7 7.2 5.4 0 0 0 0 0\n0 {'0 ' * 10}\n"

@@ -226,6 +226,9 @@ def test_missing_unreadable_and_binary_files(tmp_path: Path) -> None:
         read_network(tmp_path / "nowhere.json")
     with pytest.raises(BadInputError, match="is a directory; name the file in it"):
         read_network(tmp_path)
-    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(BadInputError, match="is no text file; name a JSON file"):
+    (tmp_path / "binary").write_bytes(b"\xff\x00\x01")
+    with pytest.raises(BadInputError, match="is no text file in UTF-8; save it so, or name a JSON file"):
         read_network(tmp_path / "binary")
+    (tmp_path / "windows").write_text("{}", encoding="utf-16")
+    with pytest.raises(BadInputError, match="is text in UTF-16; save it as UTF-8"):
+        read_network(tmp_path / "windows")

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Final
 
 from photogrammetry.exchange.colmap import FILES, read_colmap
-from photogrammetry.exchange.columns import ENDINGS, read_aicon, read_survey_csv
+from photogrammetry.exchange.columns import read_aicon, read_survey_csv
 from photogrammetry.exchange.opencv import read_opencv
 from photogrammetry.exchange.part import Part, joined
 from photogrammetry.exchange.photomodeler import read_photomodeler
+from photogrammetry.exchange.table import ENDINGS
 from photogrammetry.network.file import network_from_json
 from photogrammetry.network.model import Network
 from rig.errors import BadInputError

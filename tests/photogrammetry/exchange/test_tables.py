@@ -84,6 +84,8 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
             "the second column holds whole numbers alone and may be no coordinate",
         ),
         ("Punkt;Rechts;Hoch;Oben\nB1;1;2;3\n", "line 1: column 'Punkt' is not known"),
+        ("name;X [ft];Y [ft];Z [ft];s\nB1;1;2;3;0.1\n", r"column 'X \[ft\]': all lengths of a file have one unit"),
+        ("name;X;Y;Z;s(mm)\nB1;1;2;3;5\n", r"column 's\(mm\)': all lengths of a file have one unit"),
         ("name;X;Y;Z;code;s\nB1;1;2;3;4;0.1\n", "column 'code' is not known"),
         ("Name;Y;X;H\nB1;1;2;3\n", "column 'H': in a surveyor's system X may point north"),
         ("X;Y;Z;s\n1;2;3;0.1\n", "column 'name' is missing"),
@@ -127,6 +129,25 @@ def test_assumed_encodings_and_hidden_lines_are_said(tmp_path: Path) -> None:
 def test_a_name_twice_in_a_file_is_refused(name: str, text: str, tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="line 2: '1' is there twice"):
         import_network([_file(tmp_path, text, name)])
+
+
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("1 7 1.0 2.0\n", "line 1: has x0, y0 alone; write x0, y0, z0, or none of them"),
+        (
+            "image camera omega_deg phi_deg\n1 7 10 20\n",
+            "line 2: has omega_deg, phi_deg alone; write omega_deg, phi_deg",
+        ),
+        (
+            "image omega_deg phi_deg kappa_deg omega_gon phi_gon kappa_gon\n1 1 2 3 1 2 3\n",
+            "line 2: has angles in two units; remove one",
+        ),
+    ],
+)
+def test_half_a_pose_is_refused(text: str, pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=pattern):
+        import_network([_file(tmp_path, text, "a.eor")])
 
 
 def test_a_ball_in_two_surveys_is_refused_with_the_difference(tmp_path: Path) -> None:

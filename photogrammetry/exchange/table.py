@@ -1,0 +1,250 @@
+"""Reads files in columns as lines of named numbers, by the columns that the file names or else the usual ones.
+
+A line of words before the numbers, or a comment with them, names the columns. Then each line has as many cells; a
+line of .ior may end early. `dialect` decides about separators, decimal marks and encodings.
+"""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from photogrammetry.exchange.dialect import Row, Rows, is_number, read_rows, with_points
+from photogrammetry.exchange.part import numbers
+from rig.errors import BadInputError
+
+#: Usual columns by the file's ending; a line may end early.
+_USUAL: Final[Mapping[str, tuple[str, ...]]] = {
+    ".csv": ("name", "x", "y", "z", "sx", "sy", "sz"),
+    ".obc": ("name", "x", "y", "z", "sx", "sy", "sz"),
+    ".phc": ("image", "name", "x", "y", "sx", "sy"),
+    ".ior": ("camera", "c", "x0", "y0", "a1", "a2", "r0", "a3", "b1", "b2", "c1", "c2"),
+    ".eor": ("image", "camera", "x0", "y0", "z0"),
+}
+ENDINGS: Final = tuple(_USUAL)
+#: Other names of columns.
+_SAME: Final = {
+    **dict.fromkeys(("point", "id", "nr", "ball", "target"), "name"),
+    **{f"sigma{gap}{axis}": f"s{axis}" for gap in ("", "_") for axis in "xyz"},
+    "sigma": "s",
+    "xh": "x0",
+    "yh": "y0",
+    "ck": "c",
+}
+_LABELS: Final = ("name", "image", "camera")
+ANGLES: Final = ("omega", "phi", "kappa")
+ANGLE_UNITS: Final = {"deg": math.pi / 180.0, "gon": math.pi / 200.0, "rad": 1.0}
+SIGMAS: Final = ("s", "sx", "sy", "sz")
+#: Columns beside the usual ones.
+_MORE: Final[Mapping[str, frozenset[str]]] = {
+    ".csv": frozenset({"s"}),
+    ".obc": frozenset({"s"}),
+    ".phc": frozenset({"s"}),
+    ".ior": frozenset(),
+    ".eor": frozenset(f"{angle}_{unit}" for angle in ANGLES for unit in ANGLE_UNITS),
+}
+_FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
+_WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
+_HEIGHTS: Final = frozenset({"h", "height", "n", "e", "north", "east"})
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line by the names of its columns; lacking ones, and empty cells, are not in it."""
+
+    place: str
+    labels: Mapping[str, str]
+    values: Mapping[str, float]
+
+    def triple(self, names: Sequence[str]) -> list[float] | None:
+        """Three numbers, None if all of them lack.
+
+        Raises:
+            BadInputError: one or two of them lack.
+        """
+        there = [name for name in names if name in self.values]
+        if there and len(there) < len(names):
+            raise BadInputError(
+                f"{self.place}: has {', '.join(there)} alone; write {', '.join(names)}, or none of them"
+            )
+        return [self.values[name] for name in names] if there else None
+
+
+def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
+    """All lines of a file with their columns named, and what was assumed.
+
+    Raises:
+        BadInputError: no line, an unknown column or one twice, or a line with too many or too few cells.
+    """
+    ending = path.suffix.lower()
+    file = read_rows(path)
+    head, body = _head(file, ending)
+    columns = _USUAL[ending] if head is None else _named(head, ending)
+    if not body:
+        raise BadInputError(f"{path}: is empty; name a file with lines {', '.join(columns)}")
+    for row in body:
+        _check_count(row, columns, all_given=head is not None and ending != ".ior")
+    cells = [dict(zip(columns, row.cells, strict=False)) for row in body]
+    words = [word for each in cells for column, word in each.items() if column not in _LABELS]
+    points = with_points(words, file.separator, path)
+    if file.separator == " " or (file.separator == "," and head is None):
+        _check_names(file.separator, body)
+    if head is None:
+        _check_unnamed(file.separator, words, path)
+        _check_ids(cells, path)
+    lines = [_line(row, each, points, ending) for row, each in zip(body, cells, strict=True)]
+    hidden = sum(row.comment and sum(is_number(word) for word in row.cells) >= _FEWEST_NAMED for row in file.rows)
+    left_out = (f"{path.name}: {hidden} lines of numbers are comments (# or !) and left out",) if hidden else ()
+    return lines, (*file.notes, *left_out)
+
+
+def _head(file: Rows, ending: str) -> tuple[Row | None, list[Row]]:
+    """The line that names the columns, None if there is none; and the lines with numbers."""
+    body = [row for row in file.rows if not row.comment]
+    if body and _is_head(body[0].cells, ending, fewest=0 if len(body[0].cells) >= _FEWEST_NAMED else 1):
+        return body[0], body[1:]
+    before = [row for row in file.rows[: file.rows.index(body[0])] if row.comment] if body else []
+    fewest = min(_FEWEST_NAMED, len(_USUAL[ending]) - 1)
+    return next((row for row in reversed(before) if _is_head(row.cells, ending, fewest=fewest)), None), body
+
+
+def _is_head(words: Sequence[str], ending: str, fewest: int) -> bool:
+    """Whether a line names columns: no word of it is a number, and so many are known columns."""
+    columns = [_column(word) for word in words]
+    known = set(_USUAL[ending]) | _MORE[ending]
+    return not any(is_number(word) for word in words) and sum(column in known for column in columns) >= fewest
+
+
+def _column(word: str) -> str:
+    return _SAME.get(word.lower(), word.lower())
+
+
+def _named(head: Row, ending: str) -> tuple[str, ...]:
+    """The columns that a line names.
+
+    Raises:
+        BadInputError: one is not known, or there twice.
+    """
+    words = list(head.cells)
+    while not words[-1]:
+        words.pop()
+    columns = tuple(_column(word) for word in words)
+    known = (*_USUAL[ending], *sorted(_MORE[ending]))
+    for word, column in zip(words, columns, strict=True):
+        if column not in known and (named := _WITH_UNIT.fullmatch(column)) and _column(named[1]) in known:
+            raise BadInputError(
+                f"{head.place}: column {word!r}: all lengths of a file have one unit, which --length-unit says; name "
+                f"the column {named[1]!r}"
+            )
+        if column not in known and _HEIGHTS & set(columns):
+            raise BadInputError(
+                f"{head.place}: column {word!r}: in a surveyor's system X may point north and Y east, which is "
+                "left-handed; name the columns X, Y, Z of a right-handed system, as east X, north Y, height Z"
+            )
+        if column not in known:
+            raise BadInputError(
+                f"{head.place}: column {word!r} is not known (known: {', '.join(known)}); remove it or correct its name"
+            )
+        if columns.count(column) > 1:
+            both = " and ".join(repr(other) for other, same in zip(words, columns, strict=True) if same == column)
+            raise BadInputError(f"{head.place}: columns {both} are the same, {column}; remove all but one")
+    label = _USUAL[ending][0]
+    if label not in columns:
+        raise BadInputError(f"{head.place}: column {label!r} is missing; name it")
+    return columns
+
+
+def _check_count(row: Row, columns: Sequence[str], *, all_given: bool) -> None:
+    """Refuse a line with other cells than the columns."""
+    count = len(row.cells)
+    if any(row.cells[len(columns) :]):
+        raise BadInputError(
+            f"{row.place}: {count} columns, but only {', '.join(columns)} are known; name them in the first line, and "
+            'write "..." around names with blanks or commas'
+        )
+    if all_given and count < len(columns):
+        raise BadInputError(
+            f"{row.place}: {count} cells instead of {len(columns)} ({', '.join(columns)}); separate them by "
+            "semicolons, and leave empty ones empty"
+        )
+
+
+def _check_unnamed(separator: str, words: Sequence[str], path: Path) -> None:
+    """Refuse lines without named columns whose commas may be decimal ones, or where an empty cell would not be seen.
+
+    Raises:
+        BadInputError: the file can be read in two ways.
+    """
+    if separator == "," and not any("." in word for word in words):
+        raise BadInputError(
+            f"{path}: there is no decimal point, so commas may separate cells or be decimal ones; "
+            "name the columns in the first line"
+        )
+    if separator == " " and path.suffix.lower() == ".csv":
+        raise BadInputError(
+            f"{path}: blanks separate the cells, so an empty one is not seen; name the columns in the first line, or "
+            "separate them by semicolons"
+        )
+
+
+def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:
+    """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates with decimals.
+
+    Raises:
+        BadInputError: X is whole in all lines, Y and Z are in none.
+    """
+    coordinates = [[each.get(column, "") for column in ("x", "y", "z")] for each in cells]
+    if all(
+        x.isdecimal() and is_number(y) and is_number(z) and not _is_whole(y) and not _is_whole(z)
+        for x, y, z in coordinates
+    ):
+        raise BadInputError(
+            f"{path}: the second column holds whole numbers alone and may be no coordinate; name the columns "
+            "in the first line"
+        )
+
+
+def _is_whole(word: str) -> bool:
+    return word.lstrip("+-").isdecimal()
+
+
+def _check_names(separator: str, body: Sequence[Row]) -> None:
+    """Refuse names that may go on in the next cell: "Ball 1" separated by blanks, "B,1" by commas.
+
+    Raises:
+        BadInputError: a name has letters alone, and the next cell digits alone.
+    """
+    for row in body:
+        if len(row.cells) > 1 and row.cells[0].isalpha() and row.cells[1].isdecimal():
+            one = separator.join(row.cells[:2])
+            raise BadInputError(
+                f'{row.place}: {one!r} may be one name; separate the cells by semicolons, or write "..." around it'
+            )
+
+
+def _line(row: Row, cells: Mapping[str, str], points: Mapping[str, str], ending: str) -> Line:
+    labels = {column: _label(word, row.place) for column, word in cells.items() if column in _LABELS}
+    if _USUAL[ending][0] not in labels:
+        raise BadInputError(f"{row.place}: the name is missing; write {', '.join(_USUAL[ending])}")
+    values = {}
+    for column, word in cells.items():
+        if column not in _LABELS and (word or column not in SIGMAS):
+            place = f"{row.place}, column {column}"
+            if not word:
+                raise BadInputError(f"{place}: the cell is empty; write a number")
+            (values[column],) = numbers((points[word],), place)
+    sigmas = [cells[column] for column in SIGMAS if column in cells]
+    if any(sigmas) and not all(sigmas):
+        raise BadInputError(f"{row.place}: a sigma is empty beside others; write it, or one column of sigmas for all")
+    return Line(row.place, labels, values)
+
+
+def _label(word: str, place: str) -> str:
+    """A name as it stands in a cell."""
+    if not word or not word.isprintable() or (word[0] in "'\u2018\u201c\u201e\u00ab`" and len(word) > 1):
+        raise BadInputError(
+            f'{place}: {word!r} is no name; write one, without quotes or with double ones ("...") around it'
+        )
+    return word

@@ -23,6 +23,7 @@ from rig.api.status import Finding, RehearsalProgress, RehearsalStage
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 
@@ -173,7 +174,7 @@ class Rehearser:
         good = found.verdict in {RehearsalVerdict.READY, RehearsalVerdict.WARNED}
         self._tell(Event.now(EventLevel.INFO if good else EventLevel.WARNING, "rehearsal", said))
         try:
-            replace_file(self._folder / NAME, found.model_dump_json(indent=1).encode())
+            replace_file(self._folder / NAME, found.model_dump_json(indent=1).encode(), links=False)
         except OSError as error:
             text = "{path}: the verdict cannot be kept ({why}); a restart of the service loses it"
             why = error.strerror or str(error)
@@ -246,6 +247,6 @@ def _judged(rehearsed: dict[str, Any], seconds: float) -> Rehearsal:
 def _load(path: Path) -> Rehearsal | None:
     """The verdict that was kept; None if there is none, or if another version of the service has kept it."""
     try:
-        return Rehearsal.model_validate_json(path.read_bytes())
+        return Rehearsal.model_validate_json(read_whole(path, TEXT_MAX, links=False))
     except (OSError, ValidationError):
         return None

@@ -26,6 +26,6 @@ def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phras
     try:
         # Renewing a file asks for rights to its folder alone. Here those of the file decide, as its owner expects.
         os.close(os.open(path, os.O_WRONLY | os.O_CLOEXEC))
-        replace_file(path, text.encode())
+        replace_file(path, text.encode(), links=True)
     except OSError as error:
         raise StorageError(not_kept(error.strerror or str(error))) from error

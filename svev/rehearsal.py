@@ -151,7 +151,7 @@ def _clear_away(directory: Path) -> None:
     """Remove what rehearsals left whose process was killed."""
     for left in directory.glob(f"{_FOLDER}*"):
         pid = left.name.removeprefix(_FOLDER).partition("-")[0]
-        if pid.isdecimal() and not _runs(int(pid)):
+        if pid.isdecimal() and not _runs(int(pid)) and left.is_dir() and not left.is_symlink():
             shutil.rmtree(left)
 
 

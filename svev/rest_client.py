@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rig.errors import BadInputError, ProcessDiedError, StorageError, SvevError
+from rig.host.files import read_whole
 from webpanel.door.tokens import TOKEN_VARIABLE
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 #: The variable that names the file of a CA of one's own, beside which no other one counts.
 _CA_VARIABLE: Final = "SVEV_CA"
 _TIMEOUT_S: Final = 75.0  # closing a log may wait for the disk for a minute
+_TOKEN_FILE_MAX: Final = 16_000
 _TOKEN_NEEDED: Final = frozenset({HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN})
 _BAD_INPUT: Final = _TOKEN_NEEDED | {
     HTTPStatus.BAD_REQUEST, HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY, HTTPStatus.METHOD_NOT_ALLOWED,
@@ -116,9 +118,11 @@ def read_token(file: Path | None, environment: Mapping[str, str] = os.environ) -
     if file is None:
         return environment.get(TOKEN_VARIABLE, "").strip()
     try:
-        return file.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInputError(f"{file}: token cannot be read ({error}); check path and permissions") from None
+        return read_whole(file, _TOKEN_FILE_MAX, links=True).decode("utf-8").strip()
+    except OSError as error:
+        raise BadInputError(f"{file}: token cannot be read ({error.strerror}); check path and permissions") from None
+    except UnicodeDecodeError:
+        raise BadInputError(f"{file}: token cannot be read (no text); check path and permissions") from None
 
 
 def _trusted(environment: Mapping[str, str]) -> ssl.SSLContext:

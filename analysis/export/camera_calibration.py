@@ -30,6 +30,7 @@ from scipy.optimize import least_squares
 from photogrammetry.geometry.camera_model import INTERIOR, Lens, undistort
 from photogrammetry.procedures.calibrated_cameras import CalibratedCamera, read_calibration
 from rig.errors import BadInputError
+from rig.host.files import TEXT_MAX, read_whole
 from rig.settings.camera import CameraSettings
 from rig.transport.recorder_commands import Calibration
 
@@ -70,7 +71,7 @@ def calibration_for_log(path: Path, cameras: Sequence[CameraSettings]) -> Calibr
         except ValueError as error:
             raise BadInputError(f"{path}: cameras.{camera.name}: {error}") from None
         encoded[camera.name] = _encoded(camera.name, parameters, size, path.stat().st_mtime_ns)
-    return Calibration(json=path.read_bytes(), cameras=encoded)
+    return Calibration(json=read_whole(path, TEXT_MAX, links=True), cameras=encoded)
 
 
 def plumb_bob(camera: CalibratedCamera, size: tuple[int, int]) -> Floats:

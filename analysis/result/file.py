@@ -31,7 +31,8 @@ from analysis.result.model import (
 )
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.host.file_names import unfinished_path
+from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, read_whole
 
 #: Name of the file in a folder of results.
 NAME: Final = "jumper.json"
@@ -53,20 +54,18 @@ def write_json(content: Mapping[str, Any], path: Path) -> None:
     Raises:
         OSError: the disk refuses.
     """
-    half_done = unfinished_path(path, ".new")
-    half_done.write_text(json.dumps(content, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
-    half_done.replace(path)
+    replace_file(path, (json.dumps(content, allow_nan=False, ensure_ascii=False) + "\n").encode(), links=False)
 
 
 def read(path: Path) -> MeasuredRecording:
     """Read the file, or the one in a folder of results.
 
     Raises:
-        BadInputError: it is missing, unreadable, or holds something else.
+        BadInputError: it is missing, unreadable, too large, or holds something else.
     """
     path = path / NAME if path.is_dir() else path
     try:
-        content = path.read_bytes()
+        content = read_whole(path, TEXT_MAX, links=True)
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; name a folder that svev analyze wrote") from None
     except OSError as error:

@@ -105,7 +105,7 @@ def with_points(words: Sequence[str], separator: str, path: Path) -> dict[str, s
 
 def _text(path: Path) -> tuple[str, tuple[str, ...]]:
     """The text of a file, and a note where its encoding was assumed."""
-    data, notes = read_bytes(path, "an existing file"), ()
+    data, notes = read_bytes(path, "text", "an existing file"), ()
     try:
         text = data.decode("utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig")
     except UnicodeDecodeError:

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from rig.errors import BadInputError
+from rig.host.files import TEXT_MAX
 from rig.settings.strict_toml import read_text, read_toml
 
 _DIGITS: Final = 30  # of a whole number, at most
-_MOST_BYTES: Final = 100_000_000  # of a TOML file
 
 
 def read_object(path: Path, kind: str = "network file") -> dict[str, Any]:
@@ -22,7 +22,7 @@ def read_object(path: Path, kind: str = "network file") -> dict[str, Any]:
         BadInputError: missing, unreadable, or no object of its format.
     """
     if path.suffix.lower() == ".toml":
-        return read_toml(path, kind=kind, most_bytes=_MOST_BYTES)
+        return read_toml(path, kind=kind, most_bytes=TEXT_MAX)
     return read_json(path, kind)
 
 

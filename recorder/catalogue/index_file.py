@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from stat import S_ISREG
 from typing import Final
 
 from isal.isal_zlib import crc32
 
 from recorder.catalogue.entry import SUFFIX, Entry
+from rig.host.files import read_own
 from rig.transport import wire
 
 NAME: Final = ".svev-catalogue"
@@ -46,7 +46,7 @@ def file_key(stat: os.stat_result) -> FileKey:
 def load_kept(directory: Path) -> dict[str, KeptEntry]:
     """The entries that were kept in a directory, by path below it; none if the file is missing, or not believed."""
     try:
-        text = _read_own(directory / NAME)
+        text = read_own(directory / NAME, _BYTES_MAX)
     except OSError:
         return {}
     head, _, rows = text.partition(b"\n")
@@ -80,21 +80,6 @@ def keep(directory: Path, entries: Mapping[str, KeptEntry]) -> None:
 
 def _head(rows: bytes) -> bytes:
     return f"svev catalogue, version {version('svev')}.{_FORMAT}, checksum {crc32(rows):08x}".encode()
-
-
-def _read_own(path: Path) -> bytes:
-    """The file's content, empty if others than this process's user could have written it.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
-    try:
-        stat = os.fstat(fd)
-        own = S_ISREG(stat.st_mode) and stat.st_uid == os.geteuid() and not stat.st_mode & 0o022
-        return os.read(fd, stat.st_size) if own and stat.st_size <= _BYTES_MAX else b""
-    finally:
-        os.close(fd)
 
 
 #: Counts up when entries of the same log become different ones.

@@ -85,4 +85,4 @@ def add_voice_note(log: Path, pulse: int, data: bytes) -> None:
     folder.mkdir(exist_ok=True)
     number = max((note.number for note in voice_notes(log)), default=0) + 1
     path = folder / f"{number}_pulse-{pulse}.webm"
-    replace_file(path, data)
+    replace_file(path, data, links=False)

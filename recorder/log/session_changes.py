@@ -6,7 +6,6 @@ changed field by name.
 
 import errno
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -14,7 +13,8 @@ from typing import Final
 import msgspec
 
 from rig.errors import BadInputError
-from rig.host.file_names import unfinished_path
+from rig.host.disk import replace_file
+from rig.host.files import UntrustedFileError, read_whole
 
 #: A request to the service has at most so many bytes; more text than that was not written by svev.
 _BYTES_MAX: Final = 64 << 10
@@ -38,17 +38,17 @@ def session_changes(log: Path) -> dict[str, str]:
     """
     path = session_path(log)
     try:
-        text = _read(path)
+        text = read_whole(path, _BYTES_MAX, links=False)
     except FileNotFoundError:
         return {}
+    except UntrustedFileError as error:
+        if error.errno == errno.EFBIG:
+            raise BadInputError(f"{path}: is larger than {_BYTES_MAX >> 10} KiB; shorten it, or remove it") from None
+        raise BadInputError(f"{path}: {error.strerror}: remove it") from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:  # nobody can have written changes of a log with so long a name
             return {}
-        if error.errno == errno.ELOOP:
-            raise BadInputError(f"{path}: is a link, and links are not followed; remove it") from None
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
-    if len(text) > _BYTES_MAX:
-        raise BadInputError(f"{path}: is larger than {_BYTES_MAX >> 10} KiB; shorten it, or remove it")
     try:
         return msgspec.json.decode(text, type=dict[str, str])
     except ValueError:
@@ -62,19 +62,4 @@ def write_session_changes(log: Path, changes: Mapping[str, str]) -> None:
         OSError: the disk refuses.
     """
     path = session_path(log)
-    half_done = unfinished_path(path, ".new")
-    half_done.unlink(missing_ok=True)
-    with half_done.open("x", encoding="utf-8") as file:
-        json.dump(dict(changes), file, ensure_ascii=False, indent=1)
-        file.flush()
-        os.fsync(file.fileno())
-    half_done.replace(path)
-
-
-def _read(path: Path) -> bytes:
-    """The file, no more of it than a byte above the limit. A pipe of this name is empty: nobody waits for it."""
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOFOLLOW)
-    try:
-        return os.read(fd, _BYTES_MAX + 1)
-    finally:
-        os.close(fd)
+    replace_file(path, json.dumps(dict(changes), ensure_ascii=False, indent=1).encode(), links=False)

@@ -25,6 +25,7 @@ from recorder.log.mcap_layout import MAGIC, PADDING_OPCODE, PAGE, RECORD, paddin
 from recorder.reading.log_reader import UNREADABLE, stream
 from recorder.reading.records import Damage, FileWindow, is_closed, walk
 from rig.errors import BadInputError
+from rig.host.files import open_regular
 from rig.topics import SESSION_METADATA
 
 if TYPE_CHECKING:
@@ -266,7 +267,7 @@ class _CorrectedFile(io.RawIOBase):
         self._log = log
         self._begins = [piece.begin for piece in log.pieces]
         self._place = 0
-        self._fd = os.open(log.path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+        self._fd = open_regular(log.path, links=False)
 
     def readable(self) -> bool:
         """It is."""

@@ -18,6 +18,7 @@ from mcap.opcode import Opcode
 from recorder.log.mcap_layout import CHUNK_MAX, MAGIC, PADDING_OPCODE, PAGE, RECORD, round_up
 from rig.errors import BadInputError
 from rig.host.disk import set_direct
+from rig.host.files import UntrustedFileError, open_regular
 
 #: The window reads so much more than it was asked for, so that it holds the head of the next record too.
 _READ_ON = 4 * PAGE
@@ -90,14 +91,13 @@ class FileWindow:
             BadInputError: the file is missing, may not be read, or is not a regular file.
         """
         try:
-            self._fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+            self._fd = open_regular(path, links=True)
         except FileNotFoundError:
             raise BadInputError(f"{path}: no such file; name an existing log") from None
+        except UntrustedFileError:
+            raise BadInputError(f"{path}: is no file; name a log") from None
         except OSError as error:
             raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
-        if not os.path.isfile(self._fd):  # noqa: PTH113  # asks about the open file, not about its name
-            os.close(self._fd)
-            raise BadInputError(f"{path}: is no file; name a log")
         self.path = path
         self.size = os.fstat(self._fd).st_size
         self._begin = self._end = 0

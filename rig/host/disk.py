@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+import stat
 from contextlib import suppress
 from pathlib import Path
 
@@ -32,25 +33,28 @@ def free_bytes(place: Path | int) -> int | None:
         return None
 
 
-def replace_file(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes, *, links: bool) -> None:
     """Write a file, or renew it: whoever reads it, also after a power cut, finds the old content or the new one.
 
     A file that was there keeps its permissions, and its owner and group as far as this user may give files to them.
 
     Args:
-        path: of the file; what a link points to is renewed.
+        path: of the file.
         content: of the file.
+        links: whether the file that a link points to is renewed; otherwise the file takes the place of the link.
 
     Raises:
         OSError: it cannot be written; then it is as it was.
     """
-    path = path.resolve()
+    if links:
+        path = path.resolve()
     new = unfinished_path(path, ".new")
     try:
         new.unlink(missing_ok=True)
         with new.open("xb") as file:
-            if path.exists():
-                _take_rights(file.fileno(), path.stat())
+            with suppress(FileNotFoundError):
+                if stat.S_ISREG((before := path.lstat()).st_mode):
+                    _take_rights(file.fileno(), before)
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

@@ -2,6 +2,7 @@
 
 import codecs
 import difflib
+import errno
 import reprlib
 import tomllib
 import unicodedata
@@ -13,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from rig.errors import BadInputError
+from rig.host.files import TEXT_MAX, UntrustedFileError, read_whole
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -34,18 +36,19 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-def read_text(path: Path, format_name: str, existing: str) -> str:
+def read_text(path: Path, format_name: str, existing: str, most_bytes: int = TEXT_MAX) -> str:
     """Read a text file (UTF-8, with or without the mark of byte order that programs on Windows put before it).
 
     Args:
         path: of the file.
         format_name: what the message for a binary file asks for, for instance "TOML".
         existing: what the message for a missing file asks for.
+        most_bytes: a larger file is refused.
 
     Raises:
-        BadInputError: missing, unreadable or not UTF-8.
+        BadInputError: missing, unreadable, too large, no regular file or not UTF-8.
     """
-    data = read_bytes(path, existing)
+    data = read_bytes(path, format_name, existing, most_bytes)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -55,22 +58,29 @@ def read_text(path: Path, format_name: str, existing: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def read_bytes(path: Path, existing: str) -> bytes:
-    """Read a file.
+def read_bytes(path: Path, format_name: str, existing: str, most_bytes: int = TEXT_MAX) -> bytes:
+    """Read a file whole.
 
     Args:
         path: of the file.
+        format_name: what the message for another kind of file asks for, for instance "TOML".
         existing: what the message for a missing file asks for.
+        most_bytes: a larger file is refused.
 
     Raises:
-        BadInputError: missing or unreadable.
+        BadInputError: missing, unreadable, too large or no regular file.
     """
     try:
-        return path.read_bytes()
+        return read_whole(path, most_bytes, links=True)
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; name {existing}") from None
-    except IsADirectoryError:
-        raise BadInputError(f"{path}: is a directory; name the file in it") from None
+    except UntrustedFileError as error:
+        if error.errno == errno.EISDIR:
+            raise BadInputError(f"{path}: is a directory; name the file in it") from None
+        if error.errno == errno.EFBIG:
+            text = f"{path}: {error.strerror}, which no {format_name} file of svev is; name another file"
+            raise BadInputError(text) from None
+        raise BadInputError(f"{path}: {error.strerror}; name a {format_name} file") from None
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
 
@@ -87,14 +97,9 @@ def read_toml(path: Path, *, kind: str = _RIG_FILE, most_bytes: int = _MOST_BYTE
         BadInputError: the file is missing, unreadable, not UTF-8, too large or not TOML, and then the message names
             line and column; or a text in it is too long or holds a character that cannot be seen.
     """
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise BadInputError(f"{path}: is no file, but a device or a pipe; name a TOML file")
-    if path.is_file() and path.stat().st_size > most_bytes:
-        most = most_bytes // 1_000_000
-        raise BadInputError(f"{path}: is larger than {most} MB, which no {kind} is; name another file")
     existing = "an existing one, e.g. config/rigs/sim.toml" if kind == _RIG_FILE else f"an existing {kind}"
     try:
-        data = tomllib.loads(read_text(path, "TOML", existing))
+        data = tomllib.loads(read_text(path, "TOML", existing, most_bytes))
     except RecursionError:
         raise BadInputError(f"{path}: not valid TOML: nested too deeply; correct it there") from None
     except ValueError as error:  # TOMLDecodeError, or a number with too many digits

@@ -17,6 +17,7 @@ from rig.api.fields import Model
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import StorageError
 from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
@@ -78,7 +79,7 @@ def keep(scene: OrientedScene, recording: str, time: UtcNs, rig: RigSettings, fo
     }
     path = folder / ORIENTATION
     try:
-        replace_file(path, _Kept(cameras={**kept_in(folder), **found}).model_dump_json().encode())
+        replace_file(path, _Kept(cameras={**kept_in(folder), **found}).model_dump_json().encode(), links=False)
     except OSError as error:
         text = "{path}: cannot be written ({why}); make room on the disk, or the page shows old places of the balls"
         raise StorageError(
@@ -89,6 +90,6 @@ def keep(scene: OrientedScene, recording: str, time: UtcNs, rig: RigSettings, fo
 def kept_in(folder: Path) -> Mapping[str, KeptCamera]:
     """What is kept, by camera; nothing if there is no such file, or one that cannot be read: the next one is whole."""
     try:
-        return _Kept.model_validate_json((folder / ORIENTATION).read_bytes()).cameras
+        return _Kept.model_validate_json(read_whole(folder / ORIENTATION, TEXT_MAX, links=False)).cameras
     except (OSError, ValidationError):
         return {}

@@ -14,6 +14,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from rig.errors import BadInputError
+from rig.host.files import open_to_read
 from rig.phrase import Phrase, phrase
 from rig.settings.webhook import WebhookSettings, checked_url
 
@@ -72,7 +73,7 @@ def read_target(webhook: WebhookSettings) -> Target:
 
 def _line(file: Path, what: str) -> str:
     try:
-        with file.open("rb") as opened:
+        with open_to_read(file, links=True) as opened:
             text = opened.read(_FILE_MAX).decode("ascii").strip()
     except OSError as error:
         raise BadInputError(f"{file}: cannot be read ({error.strerror}); check path and permissions") from None

@@ -19,6 +19,8 @@ from typing import Any, Final
 
 from rig.api.export import ENDINGS, ExportJob, ExportOrder, ExportState
 from rig.errors import StateForbidsError, StorageError, UnknownExportError
+from rig.host.files import make_folder
+from rig.phrase import Phrase, phrase
 
 FOLDER: Final = ".exports"
 #: A file is kept for so long, unless its room is needed.
@@ -38,11 +40,14 @@ class Exports:
         directory: folder of the recordings.
         busy: whether a recording runs.
         room: bytes that may still be used on the disk, beside the reserve.
+
+    Attributes:
+        refused: why there can be no exports, and what to do; None if there can.
     """
 
     def __init__(self, directory: Path, busy: Callable[[], bool], room: Callable[[], float]) -> None:
         self._folder, self._busy, self._room = directory / FOLDER, busy, room
-        shutil.rmtree(self._folder, ignore_errors=True)  # nobody knows any more what they were
+        self.refused = _cleared(self._folder)
         self._jobs: dict[str, ExportJob] = {}
         self._logs: dict[str, Path] = {}
         self._ended: dict[str, float] = {}
@@ -62,8 +67,10 @@ class Exports:
 
         Raises:
             StateForbidsError: too many are waiting, or the service ends.
-            StorageError: there is not room enough.
+            StorageError: there is not room enough, or exports have no folder.
         """
+        if self.refused is not None:
+            raise StorageError(self.refused)
         needed = log.stat().st_size  # no export is larger, but for those of noise
         self.tidy(needed)
         if self._room() < needed:
@@ -161,7 +168,8 @@ class Exports:
     def _make(self, job: ExportJob, log: Path) -> None:
         place = self._place(job)
         try:
-            place.parent.mkdir(parents=True)
+            make_folder(self._folder)
+            place.parent.mkdir()
             command = [sys.executable, "-m", "service.exports.program"]
             with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
                 try:
@@ -211,6 +219,23 @@ class Exports:
         with self._lock:
             if job_id in self._jobs:
                 self._jobs[job_id] = self._jobs[job_id].model_copy(update=what)
+
+
+def _cleared(folder: Path) -> Phrase | None:
+    """Remove the exports of an earlier service: nobody knows any more what they were.
+
+    Returns:
+        Why the folder cannot be used.
+    """
+    try:
+        make_folder(folder)
+        shutil.rmtree(folder)
+    except FileNotFoundError:  # the recordings have no folder yet
+        return None
+    except OSError as error:
+        text = "{path}: exports cannot be kept there ({why}): remove it, and start the service again"
+        return phrase("event_no_exports", text, path=str(folder), why=error.strerror or str(error))
+    return None
 
 
 def _write(child: "subprocess.Popen[bytes]", line: str) -> None:

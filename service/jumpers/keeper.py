@@ -17,6 +17,7 @@ from rig.api.start_list import StartList
 from rig.api.statement import Statement
 from rig.events import Event, Level
 from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import phrase, plain
 
 NAME: Final = ".svev-start-list.json"
@@ -59,7 +60,7 @@ class Keeper:
         A file that cannot be read is put aside.
         """
         try:
-            found = StartList.model_validate_json(self._path.read_bytes())
+            found = StartList.model_validate_json(read_whole(self._path, TEXT_MAX, links=False))
         except FileNotFoundError:
             return StartList(), ()
         except (OSError, ValidationError) as error:
@@ -70,7 +71,7 @@ class Keeper:
     def _load_changes(self, version: int) -> tuple[Change, ...]:
         """The changes that led to this version; none if another version of the service has changed the list since."""
         try:
-            found = _Changes.model_validate_json(self._undo_path.read_bytes())
+            found = _Changes.model_validate_json(read_whole(self._undo_path, TEXT_MAX, links=False))
         except (OSError, ValidationError):  # the list itself is what matters
             return ()
         return found.changes if found.version == version else ()
@@ -102,9 +103,9 @@ class Keeper:
             try:
                 start_list, changes = found
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                replace_file(self._path, start_list.model_dump_json(indent=1).encode())
+                replace_file(self._path, start_list.model_dump_json(indent=1).encode(), links=False)
                 kept = _Changes(version=start_list.version, changes=changes)
-                replace_file(self._undo_path, kept.model_dump_json().encode())
+                replace_file(self._undo_path, kept.model_dump_json().encode(), links=False)
             except OSError as error:
                 self._lament(error)
             else:

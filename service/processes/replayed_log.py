@@ -15,6 +15,7 @@ from recorder.reading.log_reader import UNREADABLE, LogReader
 from recorder.reading.triplets import images_of, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError, CameraError
+from rig.host.files import open_regular
 from rig.images.pixels import FORMATS, Stored
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
@@ -55,7 +56,7 @@ class ReplayedLog:
                 self.tags.append(_camera_of(tag, camera))
                 self._offsets.append(chunk.offset)
                 self._lengths.append(chunk.length)
-            self._fd = os.open(camera.address, os.O_RDONLY | os.O_CLOEXEC)
+            self._fd = open_regular(Path(camera.address), links=True)
         except BaseException:
             self.close()
             raise

@@ -6,11 +6,13 @@
 import json
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump
+from rig.host.files import TEXT_MAX, read_whole
 
 
 def summaries(log: Path) -> list[LastJump]:
@@ -21,7 +23,7 @@ def summaries(log: Path) -> list[LastJump]:
 def takeoff_pulse(log: Path) -> int | None:
     """The pulse of the take-off in the first jump of a log that was measured live; None if there is none."""
     try:
-        pulse: float = json.loads(jumper_path(log).read_bytes())["jumps"][0]["takeoff"]["pulse"]
+        pulse: float = _content(jumper_path(log))["jumps"][0]["takeoff"]["pulse"]
         return round(pulse)
     except (OSError, ValueError, KeyError, IndexError, TypeError, OverflowError):
         return None
@@ -39,6 +41,10 @@ def latest(folder: Path) -> LastJump | None:
 
 def _read(path: Path) -> list[LastJump]:
     try:
-        return [LastJump.model_validate(each) for each in json.loads(path.read_bytes())["summaries"]]
+        return [LastJump.model_validate(each) for each in _content(path)["summaries"]]
     except (OSError, ValueError, ValidationError, KeyError, TypeError):
         return []
+
+
+def _content(path: Path) -> Any:
+    return json.loads(read_whole(path, TEXT_MAX, links=False))

@@ -7,6 +7,7 @@ from typing import Final
 from recorder.catalogue.voice_notes import StoredVoice
 from rig.api.looking import VOICES_MAX, Note, VoiceNote
 from rig.errors import StateForbidsError, UnknownRecordingError
+from rig.host.files import open_to_read
 from service.seam.archive import Download
 
 #: How the names of fields with notes begin.
@@ -76,4 +77,4 @@ def voice_file(stored: Iterable[StoredVoice], number: int, name: str) -> Downloa
         raise UnknownRecordingError(f"the recording has no spoken note {number}: see the list of its notes")
     file, path = f"{name}_note-{number}_pulse-{note.pulse}.webm", note.path
     tag = f"{note.recorded}-{note.bytes}-{number}"
-    return Download(file, note.bytes, note.recorded, tag, corrected=False, open=lambda: path.open("rb"))
+    return Download(file, note.bytes, note.recorded, tag, corrected=False, open=lambda: open_to_read(path, links=False))

@@ -1,8 +1,10 @@
 """Claims what only one running service can have: a folder of recordings, and an address to listen on."""
 
+import errno
 import fcntl
 import os
 import socket
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,8 +22,13 @@ def data_lock(directory: Path) -> Iterator[None]:
     path = directory / ".svev.lock"
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
+        if not stat.S_ISREG(os.fstat(file).st_mode):
+            os.close(file)
+            raise BadInputError(f"{path}: is no regular file: remove it")
     except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise BadInputError(f"{path}: is a link, and links are not followed: remove it") from None
         raise BadInputError(
             f"{directory}: cannot be written ({error.strerror}); choose another --data or correct its permissions"
         ) from None

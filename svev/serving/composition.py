@@ -126,7 +126,7 @@ def serve(settings: ServiceSettings) -> None:
         with _signals(server, supervisor, notify):
             supervisor.start()
             try:
-                _tell_of_another_folder(settings, rig, hub)
+                _tell_of_folders(settings, rig, hub, exports)
                 if settings.access.tokens.warning:
                     hub.tell(Event.now(Level.WARNING, "access", plain(settings.access.tokens.warning)))
                 service.watch()
@@ -162,8 +162,10 @@ def _telling(
     return turn
 
 
-def _tell_of_another_folder(settings: ServiceSettings, rig: RigSettings, hub: EventHub) -> None:
-    """Warn if the command line overrides a folder that the rig file names."""
+def _tell_of_folders(settings: ServiceSettings, rig: RigSettings, hub: EventHub, exports: Exports) -> None:
+    """Say if exports have no folder, and warn if the command line overrides a folder that the rig file names."""
+    if exports.refused is not None:
+        hub.tell(Event.now(Level.ERROR, "exports", exports.refused))
     named = rig.recorder.directory
     given = settings.data
     if given is None or "directory" not in rig.recorder.model_fields_set or given.resolve() == named.resolve():

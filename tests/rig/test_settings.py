@@ -251,7 +251,7 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(
             HEAD + "x = '" + "x" * 2_000_000 + "'\n" + CAMERA,
-            "is larger than 1 MB, which no rig file is; name another file",
+            "is larger than 1 MB, which no TOML file of svev is; name another file",
             id="a large file",
         ),
         pytest.param(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from rig.errors import BadInputError
+from rig.host.files import open_to_read
 from webpanel.door.roles import Role
 
 TOKEN_VARIABLE = "SVEV_TOKEN"  # noqa: S105 - the name of the variable
@@ -54,7 +55,7 @@ def read_tokens(file: Path | None, environment: Mapping[str, str] = os.environ) 
         given = environment.get(TOKEN_VARIABLE)
         return Tokens() if given is None else Tokens({_token(given.encode().strip(), TOKEN_VARIABLE): Role.ADMINISTER})
     try:
-        with file.open("rb") as opened:
+        with open_to_read(file, links=True) as opened:
             content, status = opened.read(_FILE_MAX + 1), os.fstat(opened.fileno())
     except OSError as error:
         raise BadInputError(f"{file}: token cannot be read ({error.strerror}); check path and permissions") from None
@@ -97,7 +98,7 @@ def _malformed(where: str) -> BadInputError:
 
 def _readable_by_all(file: Path, status: os.stat_result) -> str:
     """A warning if every user of this computer can read the file; its group may, the service may run in it."""
-    if not status.st_mode & stat.S_IRWXO or not stat.S_ISREG(status.st_mode):
+    if not status.st_mode & stat.S_IRWXO:
         return ""
     # A file that another user owns is read as a member of its group.
     mode = "600" if status.st_uid == os.geteuid() else "640"

@@ -10,6 +10,7 @@ from typing import Any
 
 from photogrammetry.reports.document import Section, Table
 from photogrammetry.reports.result_file import result_text
+from rig.host.files import open_to_read
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,5 @@ def signature() -> Section:
 
 
 def _checksum(path: Path) -> str:
-    if not path.is_file():
-        return "not a file: it cannot be read again"
-    with path.open("rb") as file:
+    with open_to_read(path, links=True) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from rig.errors import BadInputError, CameraError, SvevError
+from rig.host.files import TEXT_MAX, read_whole
 from svev import console
 from svev.answers import jumper_lines, recording_lines, recordings_lines, start_list_lines, status_lines
 from svev.calling import AnywhereGroup, Json, call, client_of, path_of, show
@@ -248,7 +249,7 @@ def load_start_list(
     Example: svev ctl startlist load list.csv
     """
     try:
-        content = table.read_bytes()
+        content = read_whole(table, TEXT_MAX, links=True)
     except OSError as error:
         raise BadInputError(f"{table}: cannot be read ({error.strerror}); correct the path") from None
     show(call(context, "PUT", "/api/start-list", content), start_list_lines, as_json)

@@ -28,7 +28,7 @@ def test_a_renewed_file_keeps_its_rights(tmp_path: Path) -> None:
     owner = 12345 if os.geteuid() == 0 else os.geteuid()
     os.chown(path, owner, group)
     path.chmod(0o664)
-    replace_file(path, b"new")
+    replace_file(path, b"new", links=True)
     status = path.stat()
     assert (path.read_bytes(), status.st_uid, status.st_gid, status.st_mode & 0o777) == (b"new", owner, group, 0o664)
     assert list(tmp_path.iterdir()) == [path]

@@ -66,6 +66,7 @@ export const events = {
   why_too_old: ["de var eldre enn {days} dager"],
   event_no_truth: ["det de simulerte kameraene så, er ikke skrevet ved siden av {log}: {why}"],
   event_list_not_kept: ["{path}: startlisten kan ikke lagres ({why}); den er borte når tjenesten startes på nytt"],
+  event_no_exports: ["{path}: eksporter kan ikke lagres der ({why}): fjern den, og start tjenesten på nytt"],
   event_list_put_aside: ["{path}: kan ikke leses ({why}) og er lagt til side som {aside}; les inn startlisten på nytt"],
   event_list_unreadable: ["{path}: kan verken leses ({why}) eller legges til side ({refusal}); sjekk tilgangen"],
   why_other_version: ["den er ikke fra denne versjonen av svev"],

@@ -36,6 +36,7 @@ from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.errors import BadInputError, LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
 from rig.host.file_names import give_name
+from rig.host.files import make_folder, opened_folder
 from rig.images.picture import shown
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
@@ -67,6 +68,8 @@ class Catalogue:
         """
         folder = self._folder(deleted=deleted)
         try:
+            if deleted:
+                self._check_trash()
             found = self._logs.entries(folder)
         except FileNotFoundError:
             return []
@@ -192,7 +195,7 @@ class Catalogue:
             if is_being_written(path):
                 raise StillRecordingError(f"recording {recording} is still being written: stop it first")
             if path.parent != self._trash:
-                self._trash.mkdir(exist_ok=True)
+                make_folder(self._trash)
                 log, path = path, self._free_path(path, self._trash)
                 give_name(log, path)  # after a crash here the files beside it are where `restore` leaves them
                 _move_beside(log, path)
@@ -280,10 +283,21 @@ class Catalogue:
     def _folder(self, *, deleted: bool) -> Path:
         return self._trash if deleted else self.directory
 
+    def _check_trash(self) -> None:
+        """Check that the trash is no link.
+
+        Raises:
+            OSError: it is one, or it is not there.
+        """
+        with opened_folder(self._trash):
+            return
+
     def _path(self, recording: str, *, prefer_deleted: bool = False) -> Path:
         """The log of a recording, looked for in the folder first or, if `prefer_deleted`, in the trash first."""
         if LOG_ID.fullmatch(recording):
             for deleted in (prefer_deleted, not prefer_deleted):
+                if deleted and self._trash.is_symlink():  # whatever it leads to does not lie in this folder
+                    continue
                 path = self._folder(deleted=deleted) / f"{recording}{SUFFIX}"
                 if os.path.lexists(path):
                     return path

@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from stat import S_ISDIR
@@ -13,6 +14,7 @@ from recorder.catalogue.voice_notes import voice_folder
 from recorder.log.jumper_path import jumper_path
 from recorder.log.session_changes import session_path
 from recorder.log.truth_path import truth_path
+from rig.host.files import opened_folder
 
 _NAME: Final = ".trash"
 _BLOCK: Final = 512  # unit of st_blocks, whatever the file system (stat(2))
@@ -57,11 +59,12 @@ def trashed_logs(directory: Path) -> list[TrashedLog]:
     Folders of such a name are left out: svev makes none, so nobody knows what is in them.
 
     Raises:
-        OSError: the trash is there and cannot be read.
+        OSError: the trash is there and cannot be read, or is a link.
     """
+    trash = trash_of(directory)
     try:
-        with os.scandir(trash_of(directory)) as found:
-            logs = [log for each in found if each.name.endswith(SUFFIX) and (log := _trashed(Path(each.path)))]
+        with opened_folder(trash) as folder, os.scandir(folder) as found:
+            logs = [log for each in found if each.name.endswith(SUFFIX) and (log := _trashed(trash / each.name))]
     except FileNotFoundError:
         return []
     return sorted(logs, key=lambda log: (log.since, log.path.name))
@@ -80,14 +83,15 @@ def remove_for_good(log: TrashedLog) -> None:
     """Remove a log of the trash and the files beside it.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the disk refuses, or the trash has become a link.
     """
-    log.path.unlink(missing_ok=True)
-    for path in beside(log.path):
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
+    with opened_folder(log.path.parent) as trash:
+        for path in (log.path, *beside(log.path)):
+            with suppress(FileNotFoundError):
+                if S_ISDIR(os.lstat(path.name, dir_fd=trash).st_mode):
+                    shutil.rmtree(path.name, dir_fd=trash)
+                else:
+                    os.unlink(path.name, dir_fd=trash)
 
 
 def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[TrashedLog]:

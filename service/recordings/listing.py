@@ -47,7 +47,9 @@ def find(entries: Iterable[Entry], query: RecordingQuery, level: Callable[[Entry
         query: what is wanted.
         level: how grave the verdict of a recording is.
     """
-    fitting = [entry for entry in entries if _fits(entry, query) and query.verdict in {None, level(entry)}]
+    fitting = [
+        entry for entry in entries if _fits(entry, query) and (query.verdict is None or query.verdict == level(entry))
+    ]
     if query.sort is not Sorting.NEWEST:
         fitting.sort(key=_ORDERS[query.sort])
     end = None if query.limit is None else query.offset + query.limit

@@ -8,8 +8,8 @@ import pytest
 
 from recorder.catalogue.entry import LogState
 from recorder.catalogue.folder import Catalogue
-from recorder.catalogue.trash import trashed_logs
-from rig.errors import BadInputError, UnknownRecordingError
+from recorder.catalogue.trash import remove_for_good, trashed_logs
+from rig.errors import BadInputError, StorageError, UnknownRecordingError
 from tests.recorder.logs import ALL_OK, write_log
 from tests.support.waiting import wait_until
 
@@ -96,3 +96,38 @@ def test_links_are_listed_and_never_followed(tmp_path: Path) -> None:
     assert catalogue.purge().recordings == 2
     assert elsewhere.exists()
     assert (tmp_path / "private.json").exists()
+
+
+def test_a_link_as_trash_is_refused_and_what_it_leads_to_stays(tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "recordings", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.mkdir()
+    write_log(elsewhere / "dear.mcap", (ALL_OK,))
+    write_log(folder / "jump.mcap", (ALL_OK,))
+    (folder / ".trash").symlink_to(elsewhere)
+    catalogue = Catalogue(folder)
+    for change in (catalogue.purge, lambda: catalogue.remove("dear"), lambda: catalogue.make_room(1e15)):
+        with pytest.raises(StorageError, match="is a link, and links are not followed"):
+            change()
+    with pytest.raises(StorageError, match="is a link, and links are not followed"):
+        catalogue.entries(deleted=True)
+    with pytest.raises(StorageError, match="is a link, and links are not followed"):
+        catalogue.delete("jump")
+    with pytest.raises(UnknownRecordingError):
+        catalogue.restore("dear")
+    with pytest.raises(UnknownRecordingError):
+        catalogue.change_session("dear", {"bib": "1"})
+    assert catalogue.trash().recordings == 0
+    assert [path.name for path in elsewhere.iterdir()] == ["dear.mcap"]
+    assert not catalogue.entry("jump").deleted
+
+
+def test_a_trash_that_becomes_a_link_while_it_is_emptied_loses_nothing_elsewhere(tmp_path: Path) -> None:
+    catalogue = Catalogue(tmp_path)
+    _delete(catalogue, "jump")
+    (log,) = trashed_logs(tmp_path)
+    (tmp_path / ".trash").rename(tmp_path / "elsewhere")
+    (tmp_path / ".trash").symlink_to("elsewhere")
+    with pytest.raises(OSError, match="links are not followed"):
+        remove_for_good(log)
+    assert (tmp_path / "elsewhere" / "jump.mcap").exists()

@@ -237,8 +237,12 @@ class Catalogue:
                 raise UnknownRecordingError(text)
             return _remove(logs)
 
-    def purge(self, *, older_than_s: float = 0.0) -> TrashContents:
+    def purge(self, *, older_than_s: float = 0.0, most: int | None = None) -> TrashContents:
         """Remove for good what has been in the trash for more than `older_than_s`; folders stay there.
+
+        Args:
+            older_than_s: so long, by the computer's clock.
+            most: no more recordings than so many, those that were deleted first; None: all.
 
         Returns:
             What was removed.
@@ -248,7 +252,7 @@ class Catalogue:
         """
         with self._change():
             before = time.time() - older_than_s
-            return _remove([log for log in trashed_logs(self.directory) if log.since <= before])
+            return _remove([log for log in trashed_logs(self.directory) if log.since <= before][:most])
 
     def make_room(self, wanted_bytes: float, *, older_than_s: float = 0.0) -> TrashContents:
         """Remove for good what has been in the trash for longest, until so much room is won or nothing is left to go.

@@ -1,6 +1,7 @@
 """Removes what is old from the trash, and what has been there for longest when the disk's room runs short."""
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Final
 
@@ -12,11 +13,14 @@ from rig.events import Event, Level
 from rig.host.disk import free_bytes
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
+from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import bytes_per_s, room_for, usable_bytes
 
 #: What was deleted is kept for so long, unless its room is needed.
 KEPT_DAYS: Final = 30
 _DAY_S: Final = 86400.0
+#: What is too old goes one at a time, with so long between: should the clock be wrong after all, people see it in time.
+_ONE_EVERY_S: Final = 3600.0
 #: Room is made before less than so much can be recorded, or two jumps.
 _SPARE_S: Final = 120.0
 _SPARE_JUMPS: Final = 2
@@ -37,10 +41,21 @@ class TrashKeeper:
         in_use: gives the rig in use, which says how much room a recording takes.
         catalogue: of the folder.
         tell: takes an event whenever something was removed, or could not be; any thread may call it.
+        clock: whether the clock may say what is too old.
+        running_s: a clock that nobody sets, s.
     """
 
-    def __init__(self, in_use: Callable[[], RigSettings], catalogue: Catalogue, tell: Callable[[Event], None]) -> None:
+    def __init__(
+        self,
+        in_use: Callable[[], RigSettings],
+        catalogue: Catalogue,
+        tell: Callable[[Event], None],
+        clock: SteadyClock | None = None,
+        running_s: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._in_use, self._catalogue, self._tell = in_use, catalogue, tell
+        self._clock, self._running_s = clock or SteadyClock(), running_s
+        self._next_old = running_s()
         self._contents = TrashContents(0, 0)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="trash keeper", daemon=True)
@@ -90,13 +105,17 @@ class TrashKeeper:
             self._say(gone, phrase("why_room_needed", "room was needed"))
 
     def look(self) -> None:
-        """Remove what is too old, make room if it runs short, and measure what is left.
+        """Remove what has been too old for longest, make room if it runs short, and measure what is left.
 
         Raises:
             StorageError: the disk refuses.
         """
-        old = phrase("why_too_old", "it was older than {days} days", days=KEPT_DAYS)
-        self._say(self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S), old)
+        if self._clock.trusted() and self._running_s() >= self._next_old:
+            old = phrase("why_too_old", "it was older than {days} days", days=KEPT_DAYS)
+            gone = self._catalogue.purge(older_than_s=KEPT_DAYS * _DAY_S, most=1)
+            if gone.recordings:
+                self._next_old = self._running_s() + _ONE_EVERY_S
+            self._say(gone, old)
         self.make_room(max(_SPARE_S, _SPARE_JUMPS * self._in_use().recorder.jump_s), spare_fresh=True)
         self.make_room(_LAST_S)
         self._contents = self._catalogue.trash()

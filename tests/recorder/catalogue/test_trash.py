@@ -106,9 +106,12 @@ def test_a_link_as_trash_is_refused_and_what_it_leads_to_stays(tmp_path: Path) -
     write_log(folder / "jump.mcap", (ALL_OK,))
     (folder / ".trash").symlink_to(elsewhere)
     catalogue = Catalogue(folder)
-    for change in (catalogue.purge, lambda: catalogue.remove("dear"), lambda: catalogue.make_room(1e15)):
-        with pytest.raises(StorageError, match="is a link, and links are not followed"):
-            change()
+    with pytest.raises(StorageError, match="is a link, and links are not followed"):
+        catalogue.purge()
+    with pytest.raises(StorageError, match="is a link, and links are not followed"):
+        catalogue.remove("dear")
+    with pytest.raises(StorageError, match="is a link, and links are not followed"):
+        catalogue.make_room(1e15)
     with pytest.raises(StorageError, match="is a link, and links are not followed"):
         catalogue.entries(deleted=True)
     with pytest.raises(StorageError, match="is a link, and links are not followed"):

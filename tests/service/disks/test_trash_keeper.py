@@ -1,7 +1,9 @@
 """The keeper of the trash, and what a full disk is said to need."""
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from rig.events import Event
 from rig.host.disk import ask_free_bytes
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
+from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import bytes_per_s, check_room_for
 from service.recordings.trash_keeper import TrashKeeper
 from tests.recorder.logs import ALL_OK, write_log
@@ -63,3 +66,62 @@ def test_a_full_disk_is_said_to_need_what_really_helps(tmp_path: Path) -> None:
     with _without_room(tmp_path) as rig, pytest.raises(StorageError, match=r"empty the trash, which frees 0\.1 GB$"):
         check_room_for(rig, tmp_path, 0.5)
     assert catalogue.purge().bytes >= 60_000_000
+
+
+@dataclass
+class _Times:
+    """The clocks of a computer: the one that people set, and the one that only goes on."""
+
+    utc_s: float = 0.0
+    running_s: float = 0.0
+
+    def go_on(self, seconds: float) -> None:
+        self.utc_s += seconds
+        self.running_s += seconds
+
+
+def test_a_clock_is_trusted_when_it_is_kept_right_and_was_not_set_for_an_hour() -> None:
+    times, kept = _Times(), [True]
+    clock = SteadyClock(lambda: times.utc_s, lambda: times.running_s, lambda: kept[0])
+    assert not clock.trusted(), "nobody has watched it yet"
+    times.go_on(3601)
+    assert clock.trusted()
+    kept[0] = False
+    assert not clock.trusted()
+    kept[0] = True
+    for step in (32 * 86400, -32 * 86400):
+        times.utc_s += step
+        assert not clock.trusted()
+        times.go_on(3599)
+        assert not clock.trusted()
+        times.go_on(2)
+        assert clock.trusted()
+
+
+def test_what_is_old_goes_one_an_hour_and_never_by_a_clock_that_was_just_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    catalogue = _deleted(tmp_path, "a", "b")
+    times = _Times(time.time(), 0.0)
+    monkeypatch.setattr("recorder.catalogue.folder.time.time", lambda: times.utc_s)
+    plenty = SIM.model_copy(update={"recorder": SIM.recorder.model_copy(update={"reserve_gb": 0.0, "jump_s": 0.01})})
+    clock = SteadyClock(lambda: times.utc_s, lambda: times.running_s, lambda: True)
+    events: list[Event] = []
+    keeper = TrashKeeper(lambda: plenty, catalogue, events.append, clock, lambda: times.running_s)
+
+    def left() -> int:
+        keeper.look()
+        return catalogue.trash().recordings
+
+    times.go_on(4000)
+    assert left() == 2, "they are an hour old"
+    times.utc_s += 32 * 86400
+    assert left() == 2
+    times.utc_s -= 32 * 86400
+    times.go_on(5000)
+    assert left() == 2
+    times.go_on(31 * 86400)
+    assert [left(), left()] == [1, 1]
+    times.go_on(3601)
+    assert left() == 0
+    assert all("it was older than 30 days" in event.message for event in events)

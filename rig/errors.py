@@ -5,13 +5,16 @@ without a traceback and exits with `exit_code`. Errors that the panel shows are 
 text, so that it can translate them.
 """
 
-from rig.phrase import Phrase, plain
+from rig.phrase import Phrase, escaped, plain
 
 
 class SvevError(Exception):
     """Base of all errors that a person can act on."""
 
     exit_code = 1
+
+    def __init__(self, *said: object) -> None:
+        super().__init__(*(escaped(each) if isinstance(each, str) else each for each in said))
 
     @property
     def said(self) -> Phrase:

@@ -15,6 +15,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from rig.phrase import escaped
+
 
 class _Stderr:
     """Standard error as it is now. That its reader is gone, or its disk is full, never ends what is being done."""
@@ -36,13 +38,13 @@ class _Stderr:
 _stderr = Console(file=cast("IO[str]", _Stderr()), stderr=True, highlight=False, soft_wrap=True, emoji=False)
 _stdout = Console(highlight=False, soft_wrap=True, emoji=False)
 
-#: Categories of characters that a terminal obeys or that change how others look: controls, formats, line ends; and
-#: half characters, which stand for bytes of file names that are no UTF-8.
-_OBEYED: Final = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+#: Categories of characters that a terminal obeys or that change how others look: controls, formats, line ends.
+_OBEYED: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 
 
 def visible(text: str) -> str:
     """The text as one line; characters that a terminal would obey are written out, as Python does in literals."""
+    text = escaped(text)
     if text.isprintable():
         return text
     return "".join(

@@ -8,6 +8,7 @@ child of it, with its exit code, its name in `ps` and its descriptors. Nothing w
 
 import atexit
 import ctypes
+import json
 import os
 import select
 import signal
@@ -195,7 +196,9 @@ class Launcher:
 
     def _send(self, request: Launch | Import, descriptors: tuple[int, ...]) -> None:
         with suppress(OSError):  # it has ended: what it should do is done otherwise, and the next call starts another
-            socket.send_fds(self._socket, [msgspec.json.encode(request)], descriptors)
+            # By Python's own module: it writes what no UTF-8 can hold, the bytes of a file's name for instance.
+            data = json.dumps(msgspec.to_builtins(request)).encode("ascii")
+            socket.send_fds(self._socket, [data], descriptors)
 
     def _ask(self, request: Launch, descriptors: tuple[int, ...]) -> bytes:
         """The number of the process that was launched; nothing if none was."""

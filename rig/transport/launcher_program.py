@@ -3,6 +3,7 @@
 import ctypes
 import gc
 import importlib
+import json
 import os
 import socket
 import sys
@@ -54,12 +55,11 @@ def _fork_launcher(launch: Launch) -> socket.socket | None:
 
 def _serve(asking: socket.socket) -> Launch | None:
     """Do what is asked; returns None at the end, and in each child what it shall run."""
-    decode = msgspec.json.Decoder(Launch | Import).decode
     while True:
         data, descriptors, _, _ = socket.recv_fds(asking, _REQUEST_BYTES, _MOST_DESCRIPTORS)
         if not data:
             return None
-        match decode(data):
+        match msgspec.convert(json.loads(data), Launch | Import):
             case Import(modules):
                 for module in modules:
                     _load(module)
@@ -144,7 +144,7 @@ def _show_as(command: tuple[str, ...]) -> None:
     """Let `ps` show this command line. It has the room of the one that the launcher was started with."""
     fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
     start, end = int(fields[_ARG_START]), int(fields[_ARG_END])
-    text = b"".join(word.encode() + b"\0" for word in command)[: end - start - 1]
+    text = b"".join(os.fsencode(word) + b"\0" for word in command)[: end - start - 1]
     if start:
         ctypes.memmove(start, text.ljust(end - start, b"\0"), end - start)
 

@@ -4,6 +4,7 @@ For logs, ZeroMQ, and messages between our processes. Values of `rig.clocks.Deci
 because JavaScript would round numbers.
 """
 
+import os
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,17 +13,36 @@ from pydantic import BaseModel
 
 from rig.clocks import DecimalNs
 
+#: Under this key stand the bytes of a path that is no UTF-8.
+_BYTES: Final = "path_bytes"
 _DECIMAL: Final = {"type": "string", "pattern": "^-?[0-9]+$"}
 _DIGITS_MAX: Final = 20  #: of a 64-bit number
 
 
 def _to_plain(value: object) -> object:
     """Convert a value that msgspec cannot encode into one that it can."""
-    if isinstance(value, DecimalNs | Path):
+    if isinstance(value, DecimalNs):
         return str(value)
+    if isinstance(value, Path):
+        return _path_to_plain(value)
     if isinstance(value, BaseModel):
         return value.model_dump(mode="json", exclude_unset=True)
     raise NotImplementedError(f"{type(value).__name__} has no form in JSON")
+
+
+def _path_to_plain(path: Path) -> str | dict[str, str]:
+    """A path as its text; one that is no UTF-8, which JSON cannot hold, as its bytes in hexadecimal."""
+    name = os.fsencode(path)
+    try:
+        return name.decode("utf-8")
+    except UnicodeDecodeError:
+        return {_BYTES: name.hex()}
+
+
+def _path_from_plain(value: Any) -> Path:
+    if isinstance(value, dict) and isinstance(value.get(_BYTES), str):
+        return Path(os.fsdecode(bytes.fromhex(value[_BYTES])))
+    return Path(value)
 
 
 def _from_plain(kind: type, value: Any) -> object:
@@ -33,7 +53,7 @@ def _from_plain(kind: type, value: Any) -> object:
             raise ValueError("a time must be a string of at most 20 decimal digits")
         return kind(value)
     if issubclass(kind, Path):
-        return Path(value)
+        return _path_from_plain(value)
     if issubclass(kind, BaseModel):
         return kind.model_validate(value)
     raise NotImplementedError(f"{kind.__name__} has no form in JSON")

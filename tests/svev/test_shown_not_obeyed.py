@@ -30,7 +30,7 @@ EVIL = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202eabc\u2028\r\nnext\x7f"
         ("a\nb\tc\r", "a\\nb\\tc\\r"),
         ("\x9b\x7f\x00", "\\x9b\\x7f\\x00"),
         ("\u202e\u2066\u200b\u2028\ufeff", "\\u202e\\u2066\\u200b\\u2028\\ufeff"),
-        ("caf\udce9", "caf\\udce9"),
+        ("caf\udce9", "caf\\xe9"),
     ],
 )
 def test_what_a_terminal_would_obey_is_written_out(text: str, shown: str) -> None:

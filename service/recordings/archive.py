@@ -1,7 +1,7 @@
 """Reads the recordings in the service's folder and describes them for the panel, each with its verdict."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -153,12 +153,16 @@ class Archive(ABC):
         if here or self._catalogue.entry(recording_id).state is LogState.WRITING:
             raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
 
-    def checksum(self, recording_id: str) -> str:
-        """SHA-256 of that file, in hexadecimal."""
+    def checksum(self, recording_id: str, wanted: Callable[[], bool]) -> str:
+        """SHA-256 of that file, in hexadecimal.
+
+        Raises:
+            StateForbidsError: it is not `wanted` any more.
+        """
         download = self.download(recording_id)
         known = self.known_checksum(download)
         if not known:
-            known = self._checksums[download.tag] = sha256_of(download)
+            known = self._checksums[download.tag] = sha256_of(download, wanted)
         return known
 
     def known_checksum(self, download: Download) -> str:

@@ -4,7 +4,7 @@ import hashlib
 import re
 import unicodedata
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -12,7 +12,7 @@ from typing import Final
 from recorder.catalogue.entry import Entry
 from recorder.log.session_changes import session_changes
 from recorder.reading.corrected_log import corrected_log
-from rig.errors import BadInputError
+from rig.errors import BadInputError, StateForbidsError
 from service.seam.archive import Download
 
 #: What a part of a file's name may hold on every system; letters are those of any language.
@@ -52,16 +52,23 @@ def file_name(recording: str, session: Mapping[str, str], ending: str = ".mcap")
     return "_".join([*filter(None, parts), recording]) + ending
 
 
-def sha256_of(download: Download) -> str:
+def sha256_of(download: Download, wanted: Callable[[], bool]) -> str:
     """SHA-256 of a file to take away, as it is handed out; reads all of it.
 
+    Args:
+        download: the file.
+        wanted: whether somebody still waits; asked at every piece.
+
     Raises:
+        StateForbidsError: nobody does.
         BadInputError: the log has become shorter.
         OSError: it cannot be read.
     """
     digest = hashlib.sha256()
     with download.open() as file:
         while piece := file.read(_PIECE):
+            if not wanted():
+                raise StateForbidsError("nobody waits for the checksum any more: ask for it again")
             digest.update(piece)
     return digest.hexdigest()
 

@@ -90,8 +90,8 @@ class Archive(Protocol):
         """A recording as a file, with its session as it was corrected. StateForbidsError: it is still being written."""
         ...
 
-    def checksum(self, recording_id: str) -> str:
-        """SHA-256 of that file, in hexadecimal; reads all of it, unless it was asked for before."""
+    def checksum(self, recording_id: str, wanted: Callable[[], bool]) -> str:
+        """SHA-256 of that file, in hexadecimal; reads all of it while it is `wanted`, unless it was asked before."""
         ...
 
     def known_checksum(self, download: Download) -> str:

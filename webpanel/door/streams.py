@@ -68,6 +68,7 @@ class OpenStreams:
     downloads: Streams = field(default_factory=lambda: Streams(_DOWNLOADS_MAX))
 
     def end(self) -> None:
-        """Tell event streams and previews to end; a download and a wait for a picture end by themselves."""
+        """Tell event streams, previews and checksums to end; a download and a wait for a picture end by themselves."""
         self.events.end()
         self.previews.end()
+        self.downloads.end()

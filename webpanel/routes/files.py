@@ -1,10 +1,12 @@
 """Routes that hand out recordings as files: one, whole or in parts, its checksum, and several as one archive."""
 
+import asyncio
 import os
 import re
+import threading
 import unicodedata
 from base64 import b64encode
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from email.utils import formatdate
 from http import HTTPStatus
@@ -13,7 +15,7 @@ from urllib.parse import quote
 
 import anyio
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse, StreamingResponse
 from starlette.datastructures import Headers
 from starlette.types import Receive, Scope, Send
@@ -52,10 +54,30 @@ Ids = Annotated[
 ]
 #: Checksums read whole logs: one at a time, so that they never slow down recording.
 _SUMMERS: Final = 1
+#: So often the work for a client looks whether it is still there, s.
+_LOOK_S: Final = 0.2
 #: Letters without an accent that could be taken off.
 _PLAIN: Final = str.maketrans(
     {"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "đ": "d", "Đ": "D", "ł": "l", "Ł": "L", "ß": "ss", "ð": "d", "þ": "th"}
 )
+
+
+@asynccontextmanager
+async def _still_wanted(request: Request, downloads: Streams) -> AsyncIterator[Callable[[], bool]]:
+    """What long work in a thread asks: whether the client still waits, and the service goes on."""
+    over = threading.Event()
+
+    async def watch() -> None:
+        while not await request.is_disconnected() and not await downloads.ended_within(_LOOK_S):
+            pass
+        over.set()
+
+    watching = asyncio.create_task(watch())
+    try:
+        yield lambda: not over.is_set()
+    finally:
+        over.set()
+        watching.cancel()
 
 
 def files_router(service: RigService, downloads: Streams) -> APIRouter:
@@ -91,12 +113,13 @@ def files_router(service: RigService, downloads: Streams) -> APIRouter:
         dependencies=[Depends(downloads.place)],
         responses=_SUM | refusals(404, 409, 503),
     )
-    async def get_checksum(recording_id: RecordingId) -> PlainTextResponse:
+    async def get_checksum(recording_id: RecordingId, request: Request) -> PlainTextResponse:
         """SHA-256 of the file as it is handed out, corrected session and all.
 
         The first call reads the whole log; from then on the file carries it as `Repr-Digest` (RFC 9530).
         """
-        checksum = await run_sync(service.checksum, recording_id, limiter=summers)
+        async with _still_wanted(request, downloads) as wanted:
+            checksum = await run_sync(service.checksum, recording_id, wanted, limiter=summers)
         name = (await run_sync(service.download, recording_id)).name
         return PlainTextResponse(f"{checksum}  {name}\n")
 

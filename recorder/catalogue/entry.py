@@ -19,8 +19,9 @@ from rig.pulse import Pause
 from rig.topics import TAG
 
 SUFFIX: Final = ".mcap"
-#: What the id of a recording looks like: the name of its log without the suffix.
-LOG_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", re.ASCII)
+#: What the id of a recording looks like: the name of its log without the suffix. A browser
+#: names a second copy `jump (1)`.
+LOG_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. ()-]{0,99}", re.ASCII)
 
 
 class LogState(StrEnum):

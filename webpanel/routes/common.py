@@ -17,7 +17,7 @@ class Nothing(Model):
 
 
 #: What an id of a recording looks like.
-ID_PATTERN: Final = r"[A-Za-z0-9][A-Za-z0-9_.\-]{0,99}"
+ID_PATTERN: Final = r"[A-Za-z0-9][A-Za-z0-9_. ()\-]{0,99}"
 RecordingId = Annotated[
     str,
     Path(pattern=f"^{ID_PATTERN}$", description="id of a recording", examples=["20260214-101530"]),

@@ -87,11 +87,11 @@ def test_a_missing_folder_holds_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["", ".", "..", "../secret", "..%2fsecret", "a/b", "/etc/passwd", ".hidden", "-rf", "a\0", "a\n", "å", "a b",
+    ["", ".", "..", "../secret", "..%2fsecret", "a/b", "/etc/passwd", ".hidden", "-rf", "a\0", "a\n", "å", "a,b",
      "x" * 101, ".trash/jump", "secret.mcap/../secret"],
 )  # fmt: skip
 def test_an_id_never_leaves_the_folder(folder: Path, name: str) -> None:
-    for place in (folder.parent / "secret.mcap", folder / ".hidden.mcap", folder / "a b.mcap"):
+    for place in (folder.parent / "secret.mcap", folder / ".hidden.mcap", folder / "a,b.mcap"):
         write_log(place, (ALL_OK,))
     catalogue = Catalogue(folder)
     for ask in (catalogue.entry, catalogue.tags, catalogue.delete, catalogue.restore):
@@ -305,3 +305,13 @@ def test_the_changes_are_plain_json(folder: Path) -> None:
     write_log(folder / "jump.mcap", (ALL_OK,))
     Catalogue(folder).change_session("jump", {"bib": "3"})
     assert json.loads((folder / "jump.session.json").read_text()) == {"bib": "3"}
+
+
+def test_a_copy_as_browsers_name_it_is_listed_and_goes_to_the_trash_and_back(tmp_path: Path) -> None:
+    for name in ("jump", "jump (1)"):
+        write_log(tmp_path / f"{name}.mcap", (ALL_OK,))
+    catalogue = Catalogue(tmp_path)
+    assert {entry.id for entry in catalogue.entries()} == {"jump", "jump (1)"}
+    catalogue.change_session("jump (1)", {"bib": "17"})
+    assert catalogue.delete("jump (1)").deleted
+    assert catalogue.restore("jump (1)").session["bib"] == "17"

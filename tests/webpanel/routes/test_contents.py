@@ -292,3 +292,12 @@ def test_a_broken_log_is_a_problem_not_a_crash(client: httpx.Client, service: Me
         for path in ("", "/pulses", "/pulses/1.jpg", "/thumbnail.jpg", "/file"):
             answer = client.get(f"/api/recordings/{name}{path}")
             assert answer.status_code in {200, 404, 422, 503}, answer.text
+
+
+def test_a_copy_as_browsers_name_it_is_handed_out(service: MemoryService, client: httpx.Client, log: bytes) -> None:
+    (service.catalogue.directory / "jump (1).mcap").write_bytes(log)
+    answer = client.get("/api/recordings/jump%20(1)/file")
+    assert answer.content == log
+    assert answer.headers["content-disposition"] == 'attachment; filename="jump (1).mcap"'
+    with zipfile.ZipFile(io.BytesIO(client.get("/api/recordings.zip?ids=jump,jump%20(1)").content)) as archive:
+        assert archive.namelist() == ["jump.mcap", "jump (1).mcap", "SHA256SUMS"]

@@ -51,7 +51,18 @@ def compute_jump(
         troubles = [untold] if not told or not motion.message else [untold, motion.message]
     pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion))
     frames = [pulse.images.keys() for pulse in jump.pulses]
-    verdict = judge(pulses, frames, system, motion.takeoff, raw.tests, motion.offsets, moved, troubles, motion.scale)
+    verdict = judge(
+        pulses,
+        frames,
+        system,
+        motion.takeoff,
+        raw.tests,
+        motion.offsets,
+        moved,
+        troubles,
+        motion.scale,
+        measurements.cameras,
+    )
     return ComputedJump(
         Jump(jump.number, motion.takeoff, verdict, pulses, raw.tests),
         motion.offsets,

@@ -13,8 +13,10 @@ from analysis.result.model import (
     CameraOffset,
     JumperState,
     Phase,
+    PointState,
     PulseState,
     RayTest,
+    SkiState,
     SmoothedState,
     TakeOff,
     Verdict,
@@ -24,6 +26,8 @@ from rig.arrays import Flags, Floats
 
 #: Share of the pulses in flight in which all points, and both skis, must be measured.
 _MEASURED: Final = 0.5
+#: Share of the pulses in sight in which a third camera must control all points.
+_CONTROLLED: Final = 0.8
 #: Share of the pulses at the edge and in flight in which a point may be less accurate than required.
 _COARSE: Final = 0.25
 #: More gross errors among the rays than this say that something is wrong with the whole recording.
@@ -48,6 +52,7 @@ def judge(
     moved: Iterable[CameraMove] = (),
     troubles: Iterable[str] = (),
     scale: Mapping[str, float] | None = None,
+    cameras: Iterable[str] = (),
 ) -> Verdict:
     """The verdict on a jump.
 
@@ -61,6 +66,7 @@ def judge(
         moved: cameras that moved and whose pose was not corrected for it.
         troubles: what else speaks against the jump, one line each.
         scale: by what factors the sigmas of points and skis in the images were too small; they were enlarged.
+        cameras: all of the recording, those that are not oriented among them.
     """
     found = [*troubles]
     delivered = [(pulse, there) for pulse, there in zip(pulses, frames, strict=True) if in_sight(pulse, system)]
@@ -77,6 +83,11 @@ def judge(
     flight, where = (everything, "") if takeoff is None else (phases[Phase.FLIGHT], " in flight")
     found += _too_few(flight, "points", f"all points{where}")
     found += _too_few(flight, "skis", f"both skis{where}")
+    if everything["points_controlled"] < _CONTROLLED * len(seen):
+        found.append(
+            f"only in {everything['points_controlled']} of {len(seen)} pulses in sight do three cameras or more see "
+            "each point: elsewhere nothing controls what two see"
+        )
     around = [] if takeoff is None else [(phases[Phase.EDGE], " around the edge")]
     for of_phase, words in (*around, (flight, where)):
         coarse, count = of_phase["coarse"], of_phase["pulses"]
@@ -88,21 +99,28 @@ def judge(
     if not seen:
         found.append("the jumper is never in sight of two cameras")
     counted = f"all points in {everything['points']} of {len(seen)} pulses in sight"
+    if everything["points_controlled"]:
+        counted += f", controlled by a third camera in {everything['points_controlled']}"
     contradicted = told(pulses)
     if contradicted is not None:
         counted += f"; {contradicted}"
     enlarged = [f"{what} {factor:.1f} times" for what, factor in (scale or {}).items() if factor > _ENLARGED]
     if enlarged:
         counted += f"; sigmas in the images were too small and are enlarged: {', '.join(enlarged)}"
-    message = f"{'; '.join(found)} ({counted})" if found else f"measured well: {counted}"
+    unused = _unused(cameras, system, delivered)
+    if found:
+        message = f"{'; '.join((*unused, *found))} ({counted})"
+    else:
+        message = "; ".join((f"measured well: {counted}", *unused))
     return Verdict(not found, message, phases)
 
 
 def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
     """The figures of some pulses, ready for JSON.
 
-    `points` counts pulses in which all points were measured, `skis` those in which both skis were, `solved` those in
-    which all of it was; `controlled` those of the last in which each was seen by three cameras or more.
+    `points` counts pulses in which all points were measured, `points_controlled` those in which three cameras or more
+    saw each of them, `skis` those in which both skis were measured, `solved` those in which all of it was;
+    `controlled` those of the last in which each was seen by three cameras or more.
     `median_sigma_m` is that of the coordinates of all smoothed points (raw ones where there are none), `coarse` the
     number of pulses in which one is larger than 0.02 m.
     """
@@ -115,12 +133,17 @@ def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
     points = [all(point is not None for point in pulse.raw.points.values()) for pulse in pulses]
     skis = [all(ski is not None for ski in pulse.raw.skis.values()) for pulse in pulses]
     both = [one and other for one, other in zip(points, skis, strict=True)]
+    controlled = [whole and _controlled(pulse.raw.points) for whole, pulse in zip(points, pulses, strict=True)]
     return {
         "pulses": len(pulses),
         "points": sum(points),
+        "points_controlled": sum(controlled),
         "skis": sum(skis),
         "solved": sum(both),
-        "controlled": sum(solved and _controlled(pulse.raw) for solved, pulse in zip(both, pulses, strict=True)),
+        "controlled": sum(
+            solved and sure and _controlled(pulse.raw.skis)
+            for solved, sure, pulse in zip(both, controlled, pulses, strict=True)
+        ),
         "median_sigma_m": float(np.median(everything)) if everything else None,
         "coarse": sum(any((sigma > REQUIRED_SIGMA_M).any() for sigma in of_pulse) for of_pulse in sigmas),
     }
@@ -180,6 +203,27 @@ def _too_few(of_phase: Mapping[str, Any], what: str, words: str) -> list[str]:
     return [f"only {of_phase[what]} of {of_phase['pulses']} pulses show {words}"]
 
 
-def _controlled(state: JumperState) -> bool:
-    parts = [part for part in (*state.points.values(), *state.skis.values()) if part is not None]
-    return all(len(part.cameras) > _CAMERAS for part in parts)
+def _controlled(parts: Mapping[str, PointState | None] | Mapping[str, SkiState | None]) -> bool:
+    """Whether three cameras or more saw each of the points, or skis, that were measured."""
+    return all(len(part.cameras) > _CAMERAS for part in parts.values() if part is not None)
+
+
+def _unused(
+    cameras: Iterable[str], system: CameraSystem, delivered: Sequence[tuple[PulseState, Collection[str]]]
+) -> list[str]:
+    """A line for each camera that has no part in the jump.
+
+    Args:
+        cameras: all of the recording.
+        system: those that are oriented.
+        delivered: pulses in sight with the cameras that delivered a frame.
+    """
+    lines = [
+        f"camera {name} is left out: it has no frames in this recording, or is not oriented; see the protocol"
+        for name in cameras
+        if name not in system.cameras
+    ]
+    there = {name for _, frames in delivered for name in frames}
+    return lines + [
+        f"camera {name} has no frame of this jump" for name in system.names if delivered and name not in there
+    ]

@@ -138,3 +138,43 @@ def _marked(jump: Jump) -> list[tuple[int, str]]:
     """Pulse and name of the raw points that the motion contradicts."""
     points = [(pulse.pulse, name, point) for pulse in jump.pulses for name, point in pulse.raw.points.items()]
     return [(pulse, name) for pulse, name, point in points if point is not None and point.contradicted]
+
+
+def _without(
+    camera: str, from_pulse: int, until: int | None = None
+) -> Callable[[int, PulseMeasurements], PulseMeasurements]:
+    """Measurements in which a camera has frames, but shows nothing, in pulses of a jump counted from 0."""
+
+    def changed(k: int, pulse: PulseMeasurements) -> PulseMeasurements:
+        if k < from_pulse or (until is not None and k >= until):
+            return pulse
+        return replace(pulse, images={**pulse.images, camera: ImageMeasurements({}, {})})
+
+    return changed
+
+
+def test_measured_well_wants_all_points_controlled_in_four_of_five_pulses_in_sight() -> None:
+    whole = _computed(lambda _, pulse: pulse)
+    assert whole.verdict.ok
+    assert "controlled by a third camera in" in whole.verdict.message
+    half = len(whole.pulses) // 2
+    controlled = _computed(_without("K2", half, half + 1))
+    assert controlled.verdict.ok, controlled.verdict.message
+    uncontrolled = _computed(_without("K2", half))
+    assert "pulses show all points" not in uncontrolled.verdict.message, "two cameras measure them"
+    assert not uncontrolled.verdict.ok
+    assert "do three cameras or more see each point" in uncontrolled.verdict.message
+
+
+def test_a_camera_that_is_not_oriented_is_named_and_two_cameras_are_not_relied_on() -> None:
+    measured, system = _measured(), true_cameras()
+    jump = compute_jump(measured.jumps[0], measured, system.only(("K1", "K3"))).jump
+    assert not jump.verdict.ok
+    assert jump.verdict.message.startswith("camera K2 is left out: it has no frames in this recording, or is not")
+    assert "only in 0 of" in jump.verdict.message
+
+
+def test_a_camera_without_a_frame_of_the_jump_is_named() -> None:
+    jump = _computed(lambda _, pulse: replace(pulse, images={n: i for n, i in pulse.images.items() if n != "K2"}))
+    assert not jump.verdict.ok
+    assert jump.verdict.message.startswith("camera K2 has no frame of this jump; ")

@@ -99,6 +99,16 @@ def _look_at_log(rig: RigSettings) -> Finding:
     return passed(Topic.CAMERAS, "check_replay", what, cameras=names, log=rig.cameras[0].address)
 
 
+def _no_answer_by(port: str, ports: str, camera: CameraSettings) -> Finding:
+    """A camera does not answer by the one of several ports of a subnet by which the computer asks it."""
+    what = "{camera} at {address} does not answer by {port}, the one port by which the computer asks it"
+    remedy = "give each of {ports} a subnet of its own, or plug the camera in at {port}; see the network above"
+    return failure(
+        Topic.CAMERAS, "check_no_answer_shared", what, remedy,
+        camera=camera.name, address=camera.address, port=port, ports=ports,
+    )  # fmt: skip
+
+
 def _look_at_gige(camera: CameraSettings) -> Finding:
     name, address = camera.name, camera.address
     remedy = "check its power and cable, and that a network port of this machine has an address in its subnet"
@@ -110,11 +120,7 @@ def _look_at_gige(camera: CameraSettings) -> Finding:
     if answer is None:
         way = way_to(address)
         if way is not None and len(sharing := sharing_subnet(way.interface)) > 1:
-            ports = ", ".join(each.name for each in sharing)
-            what = "{camera} at {address} does not answer by {port}, the one port by which the computer asks it"
-            remedy = "give each of {ports} a subnet of its own, or plug the camera in at {port}; see the network above"
-            values = {"camera": name, "address": address, "port": way.interface.name, "ports": ports}
-            return failure(Topic.CAMERAS, "check_no_answer_shared", what, remedy, **values)
+            return _no_answer_by(way.interface.name, ", ".join(each.name for each in sharing), camera)
         what = "{camera} at {address} does not answer"
         return failure(Topic.CAMERAS, "check_no_answer", what, remedy, camera=name, address=address)
     there, in_use = answer

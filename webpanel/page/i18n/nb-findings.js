@@ -78,6 +78,8 @@ export const findings = {
   check_not_published: ["tripletter kan ikke publiseres: {why}", "avslutt programmet som bruker adressen (en annen svev?), eller rett network.publish"],
   check_keys_wrong: ["tripletter kan ikke publiseres: {why}", "rett network.curve_key_file"],
 
+  check_survey_wrong: ["hopp kan ikke måles: {why}", "rett [analysis] i riggfilen, eller filen; før det måles ingen hopp"],
+  check_survey: ["hopp måles med {file}"],
   check_sim_camera: ["{camera} simuleres i selve programmet"],
   check_simulated: ["{camera} simuleres på {address}"],
   check_simulated_taken: ["{said}, men adressen er ikke å få: {why}", "avslutt programmet som bruker den (en annen svev?), eller rett adressen"],

@@ -176,9 +176,8 @@ class HeadlessRig:
         def start(opened: "Future[Recording]") -> None:
             self._supervisor.recordings.begin(order, SessionFields(), opened, self._ended)
 
-        self._path = path.with_name(
-            f"{self._ask(start).id}{path.suffix}"
-        )  # another one if the name was taken meanwhile
+        begun = self._ask(start)  # under another name, if another program has taken this one meanwhile
+        self._path = path.with_name(f"{begun.id}{path.suffix}")
 
     def stop_recording(self, *, wait_for_disk: bool = True) -> None:
         """End the recording with the pulses that have fired until now; one that has just ended stays as it is.

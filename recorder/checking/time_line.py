@@ -10,6 +10,7 @@ from rig.topics import HEALTH, TAG, TRIPLET
 #: Topics whose messages come by the clock of the pulses.
 _ON_TIME: Final = frozenset({TAG.name, TRIPLET.name, HEALTH.name})
 _FAR_NS: Final = 60 * NS_PER_S
+_WHY: Final = "the computer's clock was set, or the log was repaired later; other programs take the log for that long"
 _UNITS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
 
 
@@ -38,9 +39,6 @@ class TimeLine:
                 yield f"messages on {topic} stand {_length(first - earliest)} before the first pulse: {_WHY}"
             if latest > last + _FAR_NS:
                 yield f"messages on {topic} stand {_length(latest - last)} after the last pulse: {_WHY}"
-
-
-_WHY: Final = "the computer's clock was set, or the log was repaired later; other programs take the log for that long"
 
 
 def _wider(span: tuple[UtcNs, UtcNs] | None, message: Message) -> tuple[UtcNs, UtcNs]:

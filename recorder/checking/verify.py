@@ -78,6 +78,7 @@ class VerifyReport:
         ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
         part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
         off_time: messages far outside of the pulses, one sentence each; nothing is wrong with the pulses.
+        unclosed: the finding that the log is not closed; empty: it is.
     """
 
     path: Path
@@ -93,6 +94,7 @@ class VerifyReport:
     ended_early: str = ""
     part_before: str = ""
     off_time: tuple[str, ...] = ()
+    unclosed: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -102,7 +104,8 @@ class VerifyReport:
         """
         if self.findings or not self.closed or not set(self.ledger.missing) <= set(self.known_lost):
             return Verdict.DAMAGED
-        return Verdict.CLEAN if self.ledger.whole and not list(self.parts_in_words()) else Verdict.PARTIAL
+        whole = self.ledger.whole and not (self.part_before or self.ended_early)
+        return Verdict.CLEAN if whole else Verdict.PARTIAL
 
     @property
     def damaged(self) -> bool:
@@ -162,19 +165,22 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         pulses.finish()
         structure.finish()
         apply_extent(reader.metadata, pulses.ledger)
-        if not reader.closed:
-            findings.add(
-                "the log is still being written: verify it when the recording has ended"
-                if is_being_written(path)
-                else "the log was not closed: the recorder was stopped short"
-            )
+        if unclosed := "" if reader.closed else _unclosed(path):
+            findings.add(unclosed)
         return VerifyReport(
             path, reader.size, reader.closed, reader.truncated, pulses.ledger,
             pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
             known_lost(reader), ended_early(reader.metadata), part_before(reader.metadata, path),
-            tuple(times.in_words()),
+            tuple(times.in_words()), unclosed,
         )  # fmt: skip
+
+
+def _unclosed(log: Path) -> str:
+    """Why a log is not closed."""
+    if is_being_written(log):
+        return "the log is still being written: verify it when the recording has ended"
+    return "the log was not closed: the recorder was stopped short"
 
 
 def _flaw(item: Item) -> str:

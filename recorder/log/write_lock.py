@@ -11,6 +11,8 @@ import struct
 from pathlib import Path
 from typing import Final
 
+from rig.host.files import open_regular
+
 #: `struct flock` of a 64-bit Linux: type, whence, start, length (0: to the end), process.
 _FLOCK: Final = struct.Struct("hhqqi4x")
 _UNKNOWN: Final = frozenset({errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL})
@@ -32,7 +34,7 @@ def mark_as_written(fd: int) -> None:
 def is_being_written(log: Path) -> bool:
     """Whether a program is writing a log now. Links are not followed; what cannot be opened is not being written."""
     try:
-        fd = os.open(log, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOFOLLOW)
+        fd = open_regular(log, links=False)
     except OSError:
         return False
     try:

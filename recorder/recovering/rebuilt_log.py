@@ -18,8 +18,6 @@ from rig.topics import HEALTH
 
 _SLOTS: Final = 4
 _DISK_S: Final = 60.0
-#: Messages that come by the clock of the pulses; events of earlier versions have that of the computer.
-_ON_TIME: Final = frozenset({HEALTH.name})
 
 
 class RebuiltLog:
@@ -95,7 +93,8 @@ class RebuiltLog:
         Raises:
             StorageError: the disk refuses.
         """
-        self._last = max(self._last, log_time) if topic in _ON_TIME else self._last
+        if topic == HEALTH.name:  # by the clock of the pulses; events of earlier versions have that of the computer
+            self._last = max(self._last, log_time)
         self._writer.write_message(topic, data, publish_time, log_time, sequence)
 
     def close(self, metadata: Mapping[str, Mapping[str, str]], event: Event) -> int:

@@ -68,7 +68,7 @@ class AppendFile:
         try:
             mark_as_written(self._fd)
         except OSError as error:
-            self.close()
+            self.discard()
             raise storage_error(path, error) from error
         self.direct = set_direct(self._fd, wanted=True)
 

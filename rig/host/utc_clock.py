@@ -98,17 +98,18 @@ class SetClock:
     """Notices that the computer's clock is set; a program that only lets it go faster or slower moves no time.
 
     Args:
-        take: reads how far UTC is ahead of the clock that never jumps.
+        take: reads how far UTC is ahead of a clock that never jumps.
+        least_ns: smaller moves are none, ns.
     """
 
-    def __init__(self, take: Callable[[], UtcAnchor] = UtcAnchor.take) -> None:
-        self._take, self._known = take, take()
+    def __init__(self, take: Callable[[], UtcAnchor] = UtcAnchor.take, least_ns: int = _SET_NS) -> None:
+        self._take, self._known, self._least_ns = take, take(), least_ns
 
     def moved_s(self) -> float:
         """By how many seconds it was set since the last call; 0: it was not."""
         before, self._known = self._known, self._take()
         moved = self._known.offset_ns - before.offset_ns
-        return moved / NS_PER_S if abs(moved) >= _SET_NS else 0.0
+        return moved / NS_PER_S if abs(moved) >= self._least_ns else 0.0
 
 
 def utc_fields() -> dict[str, str]:

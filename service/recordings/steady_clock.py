@@ -4,10 +4,11 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from rig.host.utc_clock import utc_state
+from rig.clocks import NS_PER_S, UtcAnchor
+from rig.host.utc_clock import SetClock, utc_state
 
 #: Programs that keep a clock right move it by less than 5 ms between two looks (500 ppm, adjtimex(2)); a step is more.
-_STEP_S: Final = 1.0
+_STEP_NS: Final = NS_PER_S
 #: For so long after a step, and after the service has begun to look, nothing is old.
 QUIET_S: Final = 3600.0
 
@@ -34,15 +35,13 @@ class SteadyClock:
         running_s: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_BOOTTIME),
         synchronized: Callable[[], bool] = _synchronized,
     ) -> None:
-        self._utc_s, self._running_s, self._synchronized = utc_s, running_s, synchronized
-        self._ahead = utc_s() - running_s()
+        self._running_s, self._synchronized = running_s, synchronized
+        self._set = SetClock(lambda: UtcAnchor(round((utc_s() - running_s()) * NS_PER_S)), _STEP_NS)
         self._since = running_s()
 
     def trusted(self) -> bool:
         """Whether the clock is kept right, and has not been set for an hour."""
         running = self._running_s()
-        ahead = self._utc_s() - running
-        if abs(ahead - self._ahead) > _STEP_S:
+        if self._set.moved_s():
             self._since = running
-        self._ahead = ahead
         return running - self._since >= QUIET_S and self._synchronized()

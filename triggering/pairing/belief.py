@@ -217,13 +217,16 @@ class Belief:
     def _judge_in_doubt(self, evidence: _Evidence) -> Verdict:
         """Judge a frame of a camera that was contradicted: several in a row have to agree in everything."""
         first, several = evidence.waiting[0], len(evidence.group) >= _SEVERAL
-        if self._scatter:
-            sound = self._has_room(evidence)
-        else:  # the first one too: it may be the last whose time was off
-            sound = evidence.arrivals.bear_out and self._arrivals([first]).against < _FOR
-        if several and sound and evidence.read and evidence.others.coincide(first.time) is not False:
+        sound = several and evidence.read and self._is_sound(evidence)
+        if sound and evidence.others.coincide(first.time) is not False:
             return Verdict.BELIEVED
         return Verdict.CONTRADICTED if evidence.closed or several else Verdict.WAITS
+
+    def _is_sound(self, evidence: _Evidence) -> bool:
+        """Whether arrivals bear a group out, its first frame too, which may be the last whose time was off."""
+        if self._scatter:
+            return self._has_room(evidence)
+        return evidence.arrivals.bear_out and self._arrivals(evidence.waiting[:1]).against < _FOR
 
     def _judge_in_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that goes on from the last one in number and time, but did not come as usual."""

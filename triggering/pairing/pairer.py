@@ -169,7 +169,7 @@ class Pairer:
         steps = track.clock.steps
         agrees = track.latch(latch)
         if track.clock.steps != steps:
-            self._refuse_held(camera)
+            self._end_waiting(camera, self._refuse_first)  # their times are of a clock that is no more
         if agrees:
             self._place_held(camera)
 
@@ -189,12 +189,12 @@ class Pairer:
 
     def connected(self, camera: int, epoch: int, host: HostNs) -> None:
         """Begin an epoch of a camera: pulses from now on wait for its frames."""
-        self._settle_all(camera)
+        self._end_waiting(camera, self._settle_first)
         self._tracks[camera].connect(epoch, host)
 
     def disconnected(self, camera: int, host: HostNs) -> None:
         """End the epoch of a camera: no pulse waits for it any more."""
-        self._settle_all(camera)
+        self._end_waiting(camera, self._settle_first)
         self._tracks[camera].disconnect(host)
 
     # -- decisions out -------------------------------------------------------------------------------------------
@@ -323,11 +323,11 @@ class Pairer:
                 self._refuse_first(camera)
         self._settle_held(camera)
 
-    def _settle_all(self, camera: int) -> None:
-        """Place or refuse all frames of a camera that wait: no more evidence will come."""
+    def _end_waiting(self, camera: int, end_first: Callable[[int], None]) -> None:
+        """Let no frame of a camera wait any longer: no more evidence will come. `end_first` takes out the first one."""
         self._note_damage_behind(camera)
         while self._held.first(camera) is not None:
-            self._settle_first(camera)
+            end_first(camera)
 
     def _refuse_first(self, camera: int, *, contradicted: bool = False) -> None:
         """Refuse the first frame of a camera that waits."""
@@ -348,12 +348,6 @@ class Pairer:
         track = self._tracks[camera]
         while (behind := self._held.first(camera)) is not None and behind.kind is RecordKind.DAMAGED:
             track.note_damage(self._held.take(camera))
-
-    def _refuse_held(self, camera: int) -> None:
-        """Refuse all frames of a camera that wait: they cannot be believed."""
-        self._note_damage_behind(camera)
-        while self._held.first(camera) is not None:
-            self._refuse_first(camera)
 
     def _place(self, camera: int, record: Record, time: HostNs) -> OpenPulse | None:
         """Assign a frame, triggered at `time`, to its pulse; None if there is no open one."""

@@ -204,8 +204,8 @@ def _print_recounted(recounted: Recounted) -> None:
 
 
 def _first_flaw(report: VerifyReport) -> str:
-    if not report.closed:
-        return report.findings[-1]
+    if report.unclosed:
+        return report.unclosed
     if report.findings:
         more = len(report.findings) - 1
         return report.findings[0] + (f" (and {more} more)" if more else "")

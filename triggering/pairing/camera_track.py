@@ -125,17 +125,13 @@ class CameraTrack:
         self.connected = self.silent = False
         self._damaged = []
 
-    def latch(self, latch: ClockLatch) -> bool:
-        """Enter a reading of the camera's clock.
-
-        Returns:
-            Whether the clock still goes as it did, so that the times of all frames that came before are right.
-        """
+    def latch(self, latch: ClockLatch) -> None:
+        """Enter a reading of the camera's clock."""
         steps = self.clock.steps
         agrees = self.clock.latch(latch)
         self._readings += 1
         self._seen = max(self._seen, HostNs(round(latch.host - self.latency_ns - HELD_BACK_NS)))
-        if confirms := agrees and latch.round_trip_ns < self._train.shortest_ns:
+        if agrees and latch.round_trip_ns < self._train.shortest_ns:
             self._confirmed = latch
         if stepped := self.clock.steps != steps:
             self._confirmed, self.belief.doubted = None, 0
@@ -144,7 +140,6 @@ class CameraTrack:
         if self.stamping.confirmed(agrees=agrees) or stepped:
             # Times before and after it cannot be compared: the next frame counts as a first one.
             self._last, self._broken = None, True
-        return confirms
 
     def damaged(self, host: HostNs, device: DeviceNs | None = None) -> None:
         """Enter a damaged arrival.

@@ -127,8 +127,6 @@ class Pairer:
             return None
         track.waits(record)
         self._held.hold(camera, record)
-        for each in range(len(self._tracks)):  # it may bear out what waits of another one
-            self._place_held(each)
         return None
 
     def holds(self, camera: int, record: Record) -> bool:
@@ -167,11 +165,9 @@ class Pairer:
         """Enter a reading of the camera's clock; those of an epoch come after its `connected`."""
         track = self._tracks[camera]
         steps = track.clock.steps
-        agrees = track.latch(latch)
+        track.latch(latch)
         if track.clock.steps != steps:
             self._end_waiting(camera, self._refuse_first)  # their times are of a clock that is no more
-        if agrees:
-            self._place_held(camera)
 
     def fired(self, number: int, time: HostNs, uncertainty_ns: int) -> None:
         """Enter a pulse that the source says it has fired: it gets a tag even if no camera saw it.
@@ -288,15 +284,6 @@ class Pairer:
         """How long after a pulse its frames may come; longer where the pulses are far slower than the rig file says."""
         times = self._train.period_ns / self._nominal_ns
         return round(self._least_hold_ns * times) if times > _SLOWER else self._least_hold_ns
-
-    def _place_held(self, camera: int) -> None:
-        """Place the frames of a camera that wait, as far as the evidence goes.
-
-        None is refused before `released` is called: until then frames of other cameras may come that bear it out.
-        """
-        track, others = self._tracks[camera], self._others[camera]
-        while (waiting := self._held.frames(camera)) and track.judge(waiting, others) is Verdict.BELIEVED:
-            self._release(camera)
 
     def _settle_held(self, camera: int) -> None:
         """Place or refuse the frames of a camera that wait, as far as the evidence goes."""

@@ -268,6 +268,6 @@ def test_a_whole_jump_by_keys_alone(training: Serving, open_page: Open) -> None:
     expect(page.locator("#recordings-empty")).to_be_visible()
     page.keyboard.press("v")
     await_state(page, "Armed")
-    expect(page.locator("#disarm")).to_be_enabled()
+    expect(page.locator("#disarm:enabled")).to_be_visible()
     page.keyboard.press("x")
     await_state(page, "Idle")

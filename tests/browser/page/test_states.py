@@ -55,6 +55,19 @@ def test_every_state_has_its_word_and_its_button(
     wanted.to_be_enabled() if state is State.FAULT else wanted.to_be_disabled()
 
 
+def test_a_key_acts_on_the_view_that_the_key_before_it_opened(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service._become(State.ARMED)
+    page = open_page(f"{panel.url}/#/log")
+    expect(page.locator("#state-word")).to_have_text("Armed")
+    page.evaluate("""() => {
+        for (const key of ["v", "x"]) document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+    }""")
+    expect(page.locator("#live")).to_be_visible()
+    expect(page.locator("#state-word")).to_have_text("Idle")
+
+
 def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:

@@ -18,9 +18,16 @@ export function place() {
   return { view: VIEWS.includes(name) ? name : "live", id: "", trash: false };
 }
 
-/** @param {string} path e.g. "recordings" */
+let follow = () => {};
+
+/**
+ * Go to a view. It is shown when this returns: the key that is pressed next acts on it.
+ *
+ * @param {string} path e.g. "recordings"
+ */
 export function go(path) {
   location.hash = `#/${path}`;
+  follow();
 }
 
 /**
@@ -31,7 +38,9 @@ export function go(path) {
  */
 export function startRouter(entered, leaving) {
   history.scrollRestoration = "manual"; // a view that keeps its place scrolls by itself
+  let address = "";
   const show = () => {
+    address = location.hash;
     const now = place();
     for (const name of VIEWS) $(name).hidden = name !== now.view;
     const tab = UNDER[now.view] ?? now.view;
@@ -43,6 +52,12 @@ export function startRouter(entered, leaving) {
     update({ view: now.view });
     entered(now);
   };
-  addEventListener("hashchange", () => { leaving(); show(); $("main").focus({ preventScroll: true }); });
+  follow = () => {
+    if (location.hash === address) return; // the event comes after go() has shown the view
+    leaving();
+    show();
+    $("main").focus({ preventScroll: true });
+  };
+  addEventListener("hashchange", follow);
   show();
 }

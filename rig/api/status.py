@@ -193,7 +193,9 @@ class Status(Model):
     state: State
     since: datetime = Field(description="when this state began, UTC")
     statement: Statement = Field(description="the state in plain words, and what to do next")
-    alarms: tuple[Alarm, ...] = Field((), description="what is wrong with pulses, clocks and cameras, the worst first")
+    alarms: tuple[Alarm, ...] = Field(
+        (), description="what is wrong with pulses, clocks, cameras and the measuring of jumps, the worst first"
+    )
     notice: Statement | None = Field(None, description="what befell the last recording, until the next one")
     guard: TapGuard
     rig: str

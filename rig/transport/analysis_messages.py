@@ -4,6 +4,7 @@ from pathlib import Path
 
 from rig.api.jump import LastJump
 from rig.events import Event
+from rig.phrase import Phrase
 from rig.settings.model import RigSettings
 from rig.transport.message import Message
 from rig.transport.recorder_commands import TellResult
@@ -37,4 +38,14 @@ class AnalysisTold(Message):
     event: Event
 
 
-AnalysisReport = TellResult | JumpMeasured | AnalysisTold
+class Measuring(Message):
+    """Whether jumps can be measured.
+
+    Attributes:
+        refused: what is wrong with survey or poses; None: they have been read.
+    """
+
+    refused: Phrase | None = None
+
+
+AnalysisReport = TellResult | JumpMeasured | AnalysisTold | Measuring

@@ -5,17 +5,19 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
-from rig.api import status
-from rig.api.statement import Level
+from rig.api.statement import Level, Statement
+from rig.api.status import Alarm
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.health import Health
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
-from service.status.statements import pairing_alarm
-from triggering.alarms.alarm import Alarm
+from service.status.statements import not_measured, pairing_alarm
 from triggering.alarms.watch import AlarmWatch
 
 _LEVELS: Final = {EventLevel.WARNING: Level.WARNING, EventLevel.ERROR: Level.ERROR}
+#: The alarm that jumps cannot be measured, which the analysis tells.
+_MEASURING: Final = "measuring"
 
 
 class AlarmKeeper:
@@ -33,10 +35,10 @@ class AlarmKeeper:
         self._rig, self._tell = rig, tell
         self._watch: AlarmWatch | None = None
         self._numbers = 0
-        self._known: dict[str, status.Alarm] = {}
+        self._known: dict[str, Alarm] = {}
 
     @property
-    def present(self) -> tuple[status.Alarm, ...]:
+    def present(self) -> tuple[Alarm, ...]:
         """The alarms at present, the worst first, and of these the latest."""
         known = self._known.values()
         return tuple(sorted(known, key=lambda alarm: (alarm.statement.level is not Level.ERROR, -alarm.number)))
@@ -54,12 +56,30 @@ class AlarmKeeper:
             self._watch.expect_pauses()
         begun, over = self._watch.look(health, overloaded, time.monotonic())
         for alarm in begun:
-            self._numbers += 1
-            self._known[alarm.topic] = self._stated(alarm)
+            self._enter(alarm.topic, pairing_alarm(alarm.said, _LEVELS[alarm.level]))
             self._tell(Event.now(alarm.level, alarm.name, alarm.said))
         for alarm in over:
             del self._known[alarm.topic]
             self._tell(Event.now(EventLevel.INFO, alarm.name, alarm.over))
+
+    def measuring(self, refused: Phrase | None) -> None:
+        """Enter whether jumps can be measured; that they cannot stays whatever becomes of the recorder.
+
+        Args:
+            refused: why not.
+        """
+        statement = None if refused is None else not_measured(refused)
+        known = self._known.get(_MEASURING)
+        if statement == (known and known.statement):
+            return  # the process began anew
+        self._known.pop(_MEASURING, None)
+        if refused is not None and statement is not None:
+            self._enter(_MEASURING, statement)
+            text = "no jump is measured before this is put right: {why}"
+            self._tell(Event.now(EventLevel.ERROR, "analysis", phrase("event_no_analysis", text, why=refused)))
+        else:
+            said = phrase("event_analysis_again", "what was wrong is put right: jumps are measured from now on")
+            self._tell(Event.now(EventLevel.INFO, "analysis", said))
 
     def use(self, rig: RigSettings) -> None:
         """Judge by other exposures or another rate from now on."""
@@ -69,8 +89,13 @@ class AlarmKeeper:
     def forget(self) -> None:
         """Start anew: there is no recorder any more. That nobody watches any more does not end what was wrong."""
         self._watch = None
+        self._known = {topic: alarm for topic, alarm in self._known.items() if topic == _MEASURING}
+
+    def end(self) -> None:
+        """Forget everything: no process of the rig is left."""
+        self._watch = None
         self._known.clear()
 
-    def _stated(self, alarm: Alarm) -> status.Alarm:
-        statement = pairing_alarm(alarm.said, _LEVELS[alarm.level])
-        return status.Alarm(number=self._numbers, topic=alarm.topic, since=datetime.now(UTC), statement=statement)
+    def _enter(self, topic: str, statement: Statement) -> None:
+        self._numbers += 1
+        self._known[topic] = Alarm(number=self._numbers, topic=topic, since=datetime.now(UTC), statement=statement)

@@ -22,7 +22,7 @@ from rig.health import Health
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, GpioTrigger, IidcBroadcastTrigger, TriggerBoxTrigger
-from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
+from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Measuring
 from rig.transport.grabber_messages import GrabberConfig
 from rig.transport.message import Quit
 from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
@@ -65,6 +65,8 @@ ANALYSIS: Final = "analysis"
 TRIGGER: Final = "trigger"
 #: Sources whose pulses a process of its own makes.
 _MADE_BY_A_PROCESS: Final = ActionTrigger | IidcBroadcastTrigger | TriggerBoxTrigger | GpioTrigger
+#: What the processes of a rig tell the service.
+RigReport = RecorderReport | JumpMeasured | Measuring
 #: Reports that are dealt with here.
 _FORWARDED: Final = TellResult | AnalysisTold | TellActions | TellPulses | PulsesFired | TriggerTold
 
@@ -212,7 +214,7 @@ class RigProcesses:
         self.still = pulses is not None
         self._processes[TRIGGER].control.send(LetPulses(pulses=pulses))
 
-    def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RecorderReport | JumpMeasured]:
+    def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RigReport]:
         """Wait for reports of the recorder, note what they say of the cameras, and start dead grabbers again.
 
         Results of the analysis, answers to action commands, and what pulses were made, go on to the recorder.
@@ -222,7 +224,7 @@ class RigProcesses:
             wake: descriptors that end the wait when they become readable.
 
         Returns:
-            The reports, and the jumps that were measured.
+            The reports, the jumps that were measured, and whether jumps can be measured.
 
         Raises:
             ProcessDiedError: the recorder died; raised once, after all its reports have been returned.

@@ -358,6 +358,22 @@ def pairing_alarm(said: Phrase, level: Level = Level.WARNING) -> Statement:
     return Statement(level=level, code=said.code, text=text, advice=advice, values=values)
 
 
+def not_measured(why: Phrase) -> Statement:
+    """Jumps cannot be measured while they are recorded.
+
+    Args:
+        why: what is wrong with survey or poses.
+    """
+    return Statement(
+        level=Level.WARNING,
+        code="alarm_not_measured",
+        text=f"jumps are recorded, but not measured: {why}",
+        advice="put that file right, it is read again by itself; if [analysis] in the rig file names the wrong one, "
+        "correct that and restart the service",
+        values={"why": why},
+    )
+
+
 def process_restarted(name: str, restarts: int) -> Statement:
     """A process died, and the supervisor started it again."""
     return Statement(

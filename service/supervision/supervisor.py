@@ -20,7 +20,7 @@ from rig.host.disk import free_bytes
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.settings.region import RegionLimits
-from rig.transport.analysis_messages import JumpMeasured
+from rig.transport.analysis_messages import JumpMeasured, Measuring
 from rig.transport.recorder_commands import RecorderOptions
 from rig.transport.recorder_reports import CameraLimits, RecorderFailed, RecorderHealth, RecorderReport
 from service.jumpers.book import JumperBook
@@ -287,13 +287,18 @@ class Supervisor:
         if processes is None or processes.recorder_died:
             self._watch.expect_nothing()
         if processes is None:
+            self._watch.alarms.end()
             select.select([self.commands.bell], [], [], _TURN_S)
             return
         for report in processes.turn(_TURN_S, (self.commands.bell,)):
-            if isinstance(report, JumpMeasured):
-                self._jump_measured(report.jump)
-            else:
-                self._hear(report)
+            match report:
+                case JumpMeasured():
+                    self._jump_measured(report.jump)
+                case Measuring():
+                    self._watch.alarms.measuring(report.refused)
+                    self._dirty = True
+                case _:
+                    self._hear(report)
             if isinstance(report, RecorderHealth):
                 self._watch.look(report.health, processes.pids, still=processes.still)
         if not processes.recorder_died and self._watch.stuck(processes):

@@ -18,12 +18,12 @@ from rig.clocks import UtcNs
 from rig.errors import StorageError, SvevError
 from rig.events import Event, Level
 from rig.jumper import JumperState
-from rig.phrase import Phrase, phrase
+from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 from rig.settings.model import AnalysisSettings, NetworkSettings, RigSettings
 from rig.settings.region import calibration_unfit
 from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE
-from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured
+from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Measuring
 from rig.transport.channel import ControlChannel
 from rig.transport.child import ChildContext, begin
 from rig.transport.message import Quit
@@ -102,7 +102,7 @@ def main() -> None:
 def _opened(
     child: ChildContext[AnalysisConfig], rig: RigSettings, settings: AnalysisSettings, reports: _Reports
 ) -> LiveAnalysis | None:
-    """The analysis with survey or poses; while their file is wrong, says so once and looks at it again and again.
+    """The analysis with survey or poses; while their file is wrong, says so and looks at it again and again.
 
     Returns:
         None if the process was told to quit meanwhile.
@@ -111,12 +111,15 @@ def _opened(
     said = None
     while not child.stopping():
         try:
-            return LiveAnalysis(settings.survey, settings.calibration, reports, exposures)
+            analysis = LiveAnalysis(settings.survey, settings.calibration, reports, exposures)
         except SvevError as error:
             if str(error) != said:
-                said, text = str(error), "no jump is measured before this is put right: {why}"
-                reports.message(Level.ERROR, phrase("event_no_analysis", text, why=error.said))
+                said = str(error)
+                child.control.send(Measuring(refused=error.said))
             time.sleep(_WAKE_S)
+        else:
+            child.control.send(Measuring())
+            return analysis
     return None
 
 

@@ -25,7 +25,6 @@ from rig.jumper import JumperState
 from rig.pulse import PulseNumber
 from rig.settings.model import RigSettings
 from rig.topics import JUMPER
-from rig.transport.analysis_messages import JumpMeasured
 from rig.transport.preview import PreviewSlot
 from rig.transport.recorder_commands import RecorderOptions, StartRecording, TellEvent, TellResult
 from rig.transport.recorder_reports import (
@@ -33,12 +32,11 @@ from rig.transport.recorder_reports import (
     CameraNews,
     RecorderFailed,
     RecorderHealth,
-    RecorderReport,
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
 )
-from service.processes.rig_processes import RECORDER, RigProcesses
+from service.processes.rig_processes import RECORDER, RigProcesses, RigReport
 from service.processes.simulation import simulated_hill
 from tests.capture.rigs import make_rig
 from tests.recorder.logs import jumper_state
@@ -58,7 +56,7 @@ class Running:
     processes: RigProcesses
     preview: PreviewSlot
     folder: Path
-    reports: list[RecorderReport | JumpMeasured] = field(default_factory=list)
+    reports: list[RigReport] = field(default_factory=list)
 
     def turn(self) -> None:
         """Receive reports."""

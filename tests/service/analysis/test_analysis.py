@@ -37,9 +37,12 @@ def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopb
     with serving(tmp_path, rig, loopback) as service:
         assert service.arm()["last_jump"] is None, "a wrong survey does not prevent recordings"
         _await_said(service, "no jump is measured before this is put right")
+        (alarm,) = service.get("/api/status")["alarms"]
+        assert alarm["statement"]["text"].startswith("jumps are recorded, but not measured: ")
         surveyed.write_text(json.dumps(survey(training())))
         recording = service.post("/api/recordings", {"preroll_s": 0.0})["id"]
         jump, pid = _await_jump(service), service.pids()["analysis"]
+        assert "measuring" not in [alarm["topic"] for alarm in service.get("/api/status")["alarms"]]
         _balls_are_where_they_should_be(service, recording)
         os.kill(pid, signal.SIGKILL)
         wait_until(lambda: service.pids()["analysis"] != pid, "a new process", PATIENCE_S, 0.1)

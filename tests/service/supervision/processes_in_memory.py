@@ -8,17 +8,17 @@ from rig.api.recordings import Counts
 from rig.clocks import UtcNs
 from rig.errors import ProcessDiedError, StorageError
 from rig.health import Health
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
+from rig.transport.analysis_messages import Measuring
 from rig.transport.recorder_commands import RecorderCommand, StartRecording, StopRecording
 from rig.transport.recorder_reports import (
     CameraNews,
     RecorderFailed,
-    RecorderReport,
     RecordingFinished,
     RecordingStarted,
 )
-from service.processes.rig_processes import CameraPresence
+from service.processes.rig_processes import CameraPresence, RigReport
 
 
 class ProcessesInMemory:
@@ -43,7 +43,7 @@ class ProcessesInMemory:
         self.started = 0.0
         self.commands: list[RecorderCommand] = []
         self.disk_full = False
-        self._reports: list[RecorderReport] = []
+        self._reports: list[RigReport] = []
         self._dying = False
         self._recording: Path | None = None
         type(self).latest = self
@@ -84,7 +84,11 @@ class ProcessesInMemory:
         """Let the recorder die."""
         self._dying = True
 
-    def turn(self, _timeout_s: float, _wake: tuple[int, ...] = ()) -> list[RecorderReport]:
+    def measuring(self, refused: Phrase | None) -> None:
+        """Let the analysis say whether it can measure."""
+        self._reports.append(Measuring(refused=refused))
+
+    def turn(self, _timeout_s: float, _wake: tuple[int, ...] = ()) -> list[RigReport]:
         """What has happened."""
         reports, self._reports = self._reports, []
         if self._dying and not reports:

@@ -10,6 +10,7 @@ import pytest
 from rig.api.recordings import Recording, RecordingOrder, StopOrder
 from rig.api.status import State
 from rig.errors import BadInputError, StateForbidsError, StorageError
+from rig.phrase import phrase
 from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording
 from rig.transport.recorder_reports import CameraNews
 from service.status.event_hub import EventHub
@@ -191,6 +192,35 @@ def test_a_rig_that_cannot_be_set_up_is_a_fault_and_the_next_tap_tries_at_once(
     monkeypatch.setattr(ProcessesInMemory, "fails", None)
     bench.arm()
     bench.until(ARMED)
+
+
+def test_that_jumps_cannot_be_measured_is_an_alarm_until_they_can(bench: Bench) -> None:
+    def alarms() -> list[str]:
+        bench.turn()
+        return [alarm.statement.text for alarm in bench.supervisor.status.alarms]
+
+    refused = phrase("why_no_file", "{path}: there is no such file", path="balls.jsn")
+    said = "jumps are recorded, but not measured: balls.jsn: there is no such file"
+    bench.arm()
+    bench.until(ARMED)
+    assert alarms() == []
+    bench.rig.measuring(refused)
+    assert alarms() == [said]
+    assert bench.supervisor.status.statement.code == "alarm_not_measured"
+    first = bench.supervisor.status.alarms
+    bench.rig.measuring(refused)  # the process was killed, and its successor finds the same
+    bench.turn()
+    assert bench.supervisor.status.alarms == first
+    bench.recorder_dies()
+    bench.until(FAULT)
+    assert alarms() == [said], "the recorder's death does not mend it"
+    bench.rig.measuring(None)
+    assert alarms() == []
+    bench.rig.measuring(refused)
+    assert alarms() == [said]
+    bench.disarm()
+    bench.until(IDLE)
+    assert alarms() == []
 
 
 def test_after_a_fault_the_supervisor_tries_again_by_itself(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

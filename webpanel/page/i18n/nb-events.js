@@ -78,6 +78,7 @@ export const events = {
   event_motion_unrecorded: ["noe beveget seg, men ikke noe opptak kunne starte: {why}"],
 
   event_jump: ["hopp {jump} i {recording}: {verdict}"],
+  event_analysis_again: ["det som var galt, er rettet: hoppene måles fra nå av"],
   event_no_analysis: ["ingen hopp måles før dette er rettet: {why}"],
   event_not_oriented: ["kameraene er ikke orientert, det prøves igjen: {why}"],
   event_survey_refused: ["det måles ingen flere hopp: {why}; start så analysen på nytt"],

@@ -42,6 +42,7 @@ export const statements = {
   recording_resumed: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: pulsene {first} til {last} mangler, {seconds} s", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
   recording_resumed_whole: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: ingen puls mangler", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
   process_restarted: ["{process} ble startet på nytt {restarts} ganger", "skjer det igjen, sjekk riggen"],
+  alarm_not_measured: ["hoppene tas opp, men måles ikke: {why}", "rett den filen, den leses på nytt av seg selv; nevner [analysis] i riggfilen feil fil, rett det og start tjenesten på nytt"],
 
   camera_off: ["riggen er ikke gjort klar"],
   camera_connecting: ["kobler til {camera}"],

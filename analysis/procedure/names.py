@@ -26,6 +26,7 @@ UNTOLD: Final = (
 _BODY: Final = ("P1", "P2")
 _BINDINGS: Final = (("P3", "right"), ("P4", "left"))
 _FEWEST: Final = 3  #: pulses that bear a name out; in one or two it may be a coincidence
+_AHEAD_M: Final = 0.1  #: the feet of a jumper are side by side; of what lies farther ahead one is no binding
 
 
 def told_names(states: Sequence[JumperState]) -> frozenset[str]:
@@ -35,6 +36,8 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
     - A binding by its ski. Where hardly any ski was found, bindings by all four at once, if they look like a body.
     - The helmet without the hip, or the other way round, by told bindings: it is where it must be beside them, and the
       other one would not be there.
+
+    Bindings of which one lies ahead of the other along the skis are not told: one of them is something else.
     """
     points = [point for state in states for point in state.points.values() if point is not None]
     if any(point.status is Status.BY_HAND for point in points):
@@ -50,12 +53,28 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
         map(body.looks, combinations(POINTS, 2))
     ):
         told.update(POINTS)
+    if _ahead_m(states) > _AHEAD_M:
+        told.difference_update(p for p, _ in _BINDINGS)
     if not told.issuperset(_BODY) and not body.contradicts(_BODY[0], _BODY[1:]):
         bindings = told.intersection(p for p, _ in _BINDINGS)
         for name, other in (_BODY, _BODY[::-1]):
             if any(body.looks((binding, name)) and not body.looks((binding, name), other) for binding in bindings):
                 told.add(name)
     return frozenset(told)
+
+
+def _ahead_m(states: Sequence[JumperState]) -> float:
+    """How far one binding lies ahead of the other along the skis, median over the pulses that show all four, m.
+
+    0 where hardly any pulse shows them.
+    """
+    ahead = []
+    for state in states:
+        right, left, (one, other) = state.points["P3"], state.points["P4"], (state.skis[side] for side in SIDES)
+        if right is not None and left is not None and one is not None and other is not None:
+            along = one.direction + other.direction
+            ahead.append(abs(float((left.xyz - right.xyz) @ along)) / float(np.linalg.norm(along)))
+    return float(np.median(ahead)) if len(ahead) >= _FEWEST else 0.0
 
 
 def untold_line(states: Sequence[JumperState], told: Collection[str]) -> str | None:

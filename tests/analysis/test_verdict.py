@@ -17,7 +17,8 @@ from analysis.measurements.model import (
     Source,
 )
 from analysis.procedure.jump import compute_jump
-from analysis.result.model import Jump
+from analysis.procedure.names import told_names
+from analysis.result.model import Jump, JumperState
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
 
 
@@ -71,6 +72,22 @@ def test_what_nothing_names_is_not_given(names: dict[str, str], skis: tuple[str,
     else:
         assert "not given" not in jump.verdict.message
     assert jump.verdict.ok is (names == _RIGHT and len(skis) == len(SIDES))
+
+
+@pytest.mark.parametrize(("ahead_m", "told"), [(0.05, "P1 P2 P3 P4"), (0.2, "P1 P2"), (-0.2, "P1 P2")])
+def test_bindings_of_which_one_lies_ahead_of_the_other_are_not_told(ahead_m: float, told: str) -> None:
+    """A glove or a knee beside the right ski, e.g., which would shift heights and angles by centimetres."""
+
+    def moved(state: JumperState) -> JumperState:
+        binding, ski = state.points["P3"], state.skis["right"]
+        if binding is None or ski is None:
+            return state
+        elsewhere = replace(binding, xyz=binding.xyz + ahead_m * ski.direction)
+        return replace(state, points={**state.points, "P3": elsewhere})
+
+    states = [pulse.raw for pulse in _computed(lambda _, pulse: pulse).pulses]
+    assert told_names(states) == set(POINTS)
+    assert told_names([moved(state) for state in states]) == set(told.split())
 
 
 def _measured() -> Measurements:

@@ -2,10 +2,12 @@
 
 Before there are names, a spot is anything symmetric, and what is left of a half covered marker is a spot whose centre
 lies on the visible side. The markers of a jumper are alike, and most of them are in full view: these tell the size.
+Their light is told by the spots of each, where one is in the shade. What is hardly ever such a disc is no marker: a
+face, where the helmet has none.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from analysis.identification.over_time.window import Window
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Sight, Views
 from analysis.measurements.model import POINTS
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 
 _SPREAD = 0.04  #: standard deviation of the logarithm of a marker's radius: they are made alike, cloth bends them
 _FEW = 6  #: spots of a marker that tell its size; likewise of a camera, below which those of all cameras do
@@ -27,6 +29,10 @@ _LIT = 0.75  #: of the light of a whole marker, what three quarters of one have
 _SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
 _NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
 _SURE = 1.5  #: radii; where a prediction is less certain, a disc beside it would be another one's
+_ITSELF = (
+    0.25  #: radii from a spot to the disc that it is; from a spot that is something else to one beside it are more
+)
+_MOST = 0.5  #: of the spots of a marker are discs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +42,8 @@ class _Places:
     Attributes:
         step: (n,) index of the pulse.
         spot: (n,) index of the spot there; -1: a predicted place without a spot.
+        marker: (n,) index of the marker that is expected there.
+        named: (n,) whether the spot has its name.
         xy: (n, 2) px in the image.
         radius: (n,) px, expected.
         streak: (n, 2) px.
@@ -43,6 +51,8 @@ class _Places:
 
     step: Sequence[int]
     spot: Sequence[int]
+    marker: Integers
+    named: Flags
     xy: Floats
     radius: Floats
     streak: Floats
@@ -53,24 +63,81 @@ def refined(
 ) -> Markers:
     """Fit discs of the markers' size to their spots, and where markers are expected; then name them again.
 
-    The spots of the window are replaced: covered ones move to where their whole disc is.
+    The spots of the window are replaced: covered ones move to where their whole disc is. Markers that are not worn lose
+    their names.
     """
     sights = views.see_all(markers.predicted.xyz.reshape(-1, 3))
     changed: set[int] = set()
+    spots_of, discs_of = np.zeros(len(POINTS)), np.zeros(len(POINTS))
     for k, radius in enumerate(_radii(views, window, flight, markers, sights)):
         places = _places(views, window, flight, markers, k, sights[k], radius)
         if not len(places.xy):
             continue
         shape = DiscShape(places.radius, _SPREAD, places.streak, appearance.contrast, appearance.sigma)
-        pulses = [window.candidates[t].pulse for t in places.step]
-        discs = look.fit_discs(pulses, views.names[k], places.xy, shape)
+        discs = _fitted(views, window, k, places, shape, look)
+        spots_of += np.bincount(places.marker[places.named], minlength=len(POINTS))
+        discs_of += np.bincount(places.marker[places.named & _itself(places, discs)], minlength=len(POINTS))
         for t in sorted(set(places.step)):
             own = np.flatnonzero(np.array(places.step) == t)
             spots = window.candidates[t].images[views.names[k]].spots
             window.put(t, k, _replaced(spots, places, discs, own, appearance.contrast))
             changed.add(t)
     window.renew(sorted(changed))
-    return settled_again(views, window, flight, markers)
+    worn = _worn(spots_of, discs_of)
+    return _only(settled_again(views, window, flight, _only(markers, worn)), worn)
+
+
+def _fitted(views: Views, window: Window, k: int, places: _Places, shape: DiscShape, look: SecondLook) -> Spots:
+    """A disc near each place, NaN where there is none; by its own light of a marker that is none by that of all."""
+    name = views.names[k]
+    pulses = np.array([window.candidates[t].pulse for t in places.step])
+    discs = look.fit_discs(pulses.tolist(), name, places.xy, shape)
+    for i in range(len(POINTS)):
+        named, own = places.named & (places.marker == i), np.flatnonzero(places.marker == i)
+        count = np.count_nonzero(named & _itself(places, discs))
+        if named.sum() < _FEW or count >= _MOST * named.sum():
+            continue
+        at = np.flatnonzero(named).tolist()
+        images = [(window.candidates[places.step[p]].images[name].spots, places.spot[p]) for p in at]
+        light = float(np.median([spots.contrast[s] for spots, s in images]))
+        other = replace(
+            shape.of(own), contrast=light, sigma_contrast=shape.sigma_contrast * abs(light / shape.contrast)
+        )
+        again = _with(discs, own, look.fit_discs(pulses[own].tolist(), name, places.xy[own], other))
+        if np.count_nonzero(named & _itself(places, again)) > count:
+            discs = again
+    return discs
+
+
+def _worn(spots: Floats, discs: Floats) -> Flags:
+    """Which markers (4,) of so many named spots, of which so many are discs, are markers.
+
+    In some pictures hardly any marker is a disc that can be fitted; then nothing is told.
+    """
+    share = discs / np.maximum(spots, 1.0)
+    enough = spots >= _FEW
+    usual = float(np.median(share[enough])) if enough.any() else 0.0
+    return np.asarray(~enough | (share >= _MOST * usual) | (usual < _MOST))
+
+
+def _itself(places: _Places, discs: Spots) -> Flags:
+    """Whether what is at each place (n,) is a disc, not one beside it."""
+    away = np.linalg.norm(discs.xy - places.xy, axis=1)
+    return np.asarray(np.nan_to_num(away, nan=np.inf) < _ITSELF * places.radius)
+
+
+def _with(discs: Spots, chosen: Integers, others: Spots) -> Spots:
+    """The discs with others in place of the chosen ones."""
+    kept = np.delete(np.arange(len(discs)), chosen)
+    order = np.argsort(np.concatenate((kept, chosen)))
+    return Spots.joined([discs.only(kept), others]).only(order)
+
+
+def _only(markers: Markers, worn: Flags) -> Markers:
+    """The markers without the names of those (4,) that are not worn."""
+    rays, xyz = markers.assigned.rays.copy(), markers.assigned.xyz.copy()
+    rays[:, ~worn], xyz[:, ~worn] = -1, np.nan
+    return replace(markers, assigned=replace(markers.assigned, rays=rays, xyz=xyz))
 
 
 def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sights: Sequence[Sight]) -> list[float]:
@@ -144,6 +211,8 @@ def _places(
     return _Places(
         [t for t, _, _, _ in found],
         [s for _, s, _, _ in found],
+        where % n,
+        np.array([s >= 0 and s == markers.assigned.rays[t, at % n, k] for t, s, at, _ in found], bool),
         np.array([xy for _, _, _, xy in found]).reshape(-1, 2),
         np.maximum(px[where], _SMALLEST_PX),
         _streaks(views, window, flight, k, sight, where),

@@ -30,6 +30,7 @@ class Disturbed:
         hidden: (marker, camera or None for all, first, last pulse) that no spot shows.
         absent: (camera, first, last pulse) without an image.
         late_s: by camera, how much later it shows the scene.
+        light: contrast of the spots of a marker, as a share of that of the others.
         stubs: all cameras but the first one show, not a ski, but something of 1 m through its binding, 4 degrees off.
     """
 
@@ -41,6 +42,7 @@ class Disturbed:
     hidden: tuple[tuple[str, str | None, int, int], ...] = ()
     absent: tuple[tuple[str, int, int], ...] = ()
     late_s: dict[str, float] = field(default_factory=dict)
+    light: dict[str, float] = field(default_factory=dict)
     stubs: bool = False
 
 
@@ -90,7 +92,7 @@ def _image(
     made: Scene,
 ) -> ImageCandidates:
     size = system[name].size
-    xy, traces = [], []
+    xy, traces, light = [], [], list[float]()
     for jump in jumps:
         shown = pulse + how.late_s.get(name, 0.0) * jump.rate_hz
         if not -8 <= jump.pose(shown).origin[0] <= 28:
@@ -101,6 +103,7 @@ def _image(
             hidden = any(h[0] == label and h[1] in {None, name} and h[2] <= pulse <= h[3] for h in how.hidden)
             if _inside(place, size) and not hidden and rng.random() >= how.lost:
                 xy.append(place + SIGMA_PX * rng.standard_normal(2))
+                light += [1.0] * (len(xy) - 1 - len(light)) + [how.light.get(label, 1.0)]
                 made.spots[pulse, name, label] = place
         for side in (0, 1):
             found = _ski(pose, jump, system, name, side, how, rng)
@@ -120,9 +123,8 @@ def _image(
     order = rng.permutation(len(xy))
     xy_all = np.array(xy).reshape(-1, 2)[order]
     n = len(xy_all)
-    spots = Spots(
-        xy_all, np.tile(SIGMA_PX**2 * np.eye(2), (n, 1, 1)), np.full(n, 1.6), np.full(n, 80.0), np.full(n, 20.0)
-    )
+    contrast = 80.0 * np.array(light + [1.0] * (n - len(light)))[order]
+    spots = Spots(xy_all, np.tile(SIGMA_PX**2 * np.eye(2), (n, 1, 1)), np.full(n, 1.6), contrast, np.full(n, 20.0))
     mixed = [traces[i] for i in rng.permutation(len(traces))]
     return ImageCandidates(spots, tuple(mixed))
 

@@ -45,6 +45,8 @@ class Receiver:
 
     The plain socket is the default here: while a packet socket is being set up, Aravis takes the packets of every
     other stream on the machine for its own.
+
+    Its patience is that of a busy machine: a packet that is only late is not asked for again.
     """
 
     def __init__(
@@ -57,7 +59,7 @@ class Receiver:
         packet_size: int = 9000,
         extended: bool = False,
         packet_socket: bool = False,
-        retention_us: int = 100_000,
+        retention_us: int = 500_000,
         **features: str | int,
     ) -> None:
         self.camera = Aravis.Camera.new(address)
@@ -81,7 +83,7 @@ class Receiver:
         for name, value in {
             "socket-buffer": Aravis.GvStreamSocketBuffer.FIXED,
             "socket-buffer-size": 8 << 20,
-            "packet-timeout": 5000,
+            "packet-timeout": 50_000,
             "packet-request-ratio": 1.0,  # until the first packet has come the socket's buffer is small
             "frame-retention": retention_us,
         }.items():

@@ -35,11 +35,24 @@ def test_missed_pulse_leaves_no_gap_in_the_ids(make_camera: MakeCamera) -> None:
     with Receiver(simulated.address) as receiver:
         frames = around_fault(receiver, simulated, FaultKind.MISSED_PULSE)
         assert receiver.count("n_missing_frames") == 0
-        assert receiver.device.get_integer_feature_value("CounterValue") == frames[-1].block_id
+        _await_count(receiver, frames[-1].block_id)
     assert steps(frames, lambda frame: frame.block_id) == [1]
     assert steps(frames, lambda frame: frame.pulse) == [1, 2]
     assert max(later.device_ns - earlier.device_ns for earlier, later in pairwise(frames)) > 30_000_000
     assert simulated.camera.statistics().missed == 1
+
+
+def _await_count(receiver: Receiver, arrived: int) -> None:
+    """Wait until the camera has counted as many triggers as have frames: pulses come all the while."""
+
+    def agree() -> bool:
+        nonlocal arrived
+        arrived = max([arrived, *(frame.block_id for frame in receiver.frames(60, timeout_s=0.01))])
+        counted = receiver.device.get_integer_feature_value("CounterValue")
+        assert counted >= arrived
+        return bool(counted == arrived)
+
+    wait_until(agree, "as many triggers as frames")
 
 
 def test_lost_frames_leave_a_gap_that_aravis_counts_once(make_camera: MakeCamera) -> None:
@@ -57,12 +70,14 @@ def test_lost_packets_are_resent(make_camera: MakeCamera, extended: bool) -> Non
     simulated = make_camera()
     with Receiver(simulated.address, extended=extended) as receiver:
         frames = around_fault(receiver, simulated, FaultKind.LOST_PACKETS, packets=[3, 4])
-        assert receiver.count("n_resent_packets") == 2
+        resent = receiver.count("n_resent_packets")
     assert [frame.status for frame in frames] == ["success"] * 11
     assert steps(frames, lambda frame: frame.pulse) == [1], "the stamps are whole"
     statistics = simulated.camera.statistics()
-    assert statistics.resent_packets == 2
+    assert statistics.resent_packets == resent >= 2
     assert statistics.resend_requests >= 1
+    # a starved machine delivers other packets so late that they are asked for as well
+    assert resent == 2 or statistics.resend_requests > 1
 
 
 def test_lost_trailer_is_resent(make_camera: MakeCamera) -> None:
@@ -92,7 +107,7 @@ def test_frames_that_stay_incomplete_time_out(
     make_camera: MakeCamera, kind: FaultKind, fields: dict[str, object]
 ) -> None:
     simulated = make_camera()
-    with Receiver(simulated.address, retention_us=25_000) as receiver:
+    with Receiver(simulated.address, retention_us=300_000) as receiver:
         frames = around_fault(receiver, simulated, kind, **fields)
         assert receiver.count("n_timeouts") == 1
         assert receiver.count("n_missing_frames") == 0

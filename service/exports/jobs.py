@@ -4,23 +4,19 @@ The files lie in a hidden folder beside the recordings. They are removed after a
 and when the service starts.
 """
 
-import json
-import os
 import shutil
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
-from select import select
 from typing import Any, Final
 
 from rig.api.export import ENDINGS, ExportJob, ExportOrder, ExportState
 from rig.errors import StateForbidsError, StorageError, UnknownExportError
 from rig.host.files import make_folder
 from rig.phrase import Phrase, phrase
+from service.background.child import run_child
 
 FOLDER: Final = ".exports"
 #: A file is kept for so long, unless its room is needed.
@@ -29,7 +25,6 @@ KEPT_S: Final = 86_400.0
 _QUEUE_MAX: Final = 50
 _LOOK_S: Final = 0.2
 _END_S: Final = 10.0
-_PIECE: Final = 1 << 16
 _OVER: Final = (ExportState.DONE, ExportState.FAILED)
 
 
@@ -170,44 +165,21 @@ class Exports:
         try:
             make_folder(self._folder)
             place.parent.mkdir()
-            command = [sys.executable, "-m", "service.exports.program"]
-            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
-                try:
-                    asked = {"log": str(log), "order": job.order.model_dump(mode="json"), "out": str(place)}
-                    _write(child, json.dumps(asked))
-                    self._change(job.id, state=ExportState.RUNNING)
-                    self._follow(job.id, child)
-                finally:
-                    child.kill()
+            self._change(job.id, state=ExportState.RUNNING)
+            end = run_child(
+                "service.exports.program",
+                {"log": str(log), "order": job.order.model_dump(mode="json"), "out": str(place)},
+                busy=self._busy,
+                wanted=lambda: job.id in self._jobs and not self._closed.is_set(),
+                tell=lambda news: self._change(job.id, **news),
+                hold=lambda held: self._change(job.id, state=ExportState.PAUSED if held else ExportState.RUNNING),
+            )
+            if end is not None:
+                self._end(job.id, **({"problem": end["problem"]["text"]} if "problem" in end else end))
         except OSError as error:
             self._end(job.id, problem=f"the export cannot be made ({error.strerror}): try again")
         if job.id not in self._jobs:
             shutil.rmtree(place.parent, ignore_errors=True)
-
-    def _follow(self, job_id: str, child: "subprocess.Popen[bytes]") -> None:
-        """Hear what the program says until it has ended, or nobody wants the export any more."""
-        paused, said = False, b""
-        if child.stdout is None:
-            raise TypeError("the program that exports has no standard output")
-        while job_id in self._jobs and not self._closed.is_set():
-            if self._busy() != paused:
-                paused = not paused
-                _write(child, "pause" if paused else "go")
-                self._change(job_id, state=ExportState.PAUSED if paused else ExportState.RUNNING)
-            ready, _, _ = select([child.stdout], [], [], _LOOK_S)
-            if not ready:
-                continue
-            piece = os.read(child.stdout.fileno(), _PIECE)
-            *lines, said = (said + piece).split(b"\n")
-            for line in lines:
-                news: dict[str, Any] = json.loads(line)
-                if "done" not in news:
-                    self._end(job_id, **news)
-                    return
-                self._change(job_id, **news)
-            if not piece:
-                self._end(job_id, problem="the program that exports has ended by itself: try again")
-                return
 
     def _end(self, job_id: str, **said: Any) -> None:
         with self._lock:
@@ -236,9 +208,3 @@ def _cleared(folder: Path) -> Phrase | None:
         text = "{path}: exports cannot be kept there ({why}): remove it, and start the service again"
         return phrase("event_no_exports", text, path=str(folder), why=error.strerror or str(error))
     return None
-
-
-def _write(child: "subprocess.Popen[bytes]", line: str) -> None:
-    if child.stdin is not None:
-        child.stdin.write(f"{line}\n".encode())
-        child.stdin.flush()

@@ -1,0 +1,83 @@
+"""Starts such a program, tells it what to do and when to stand still, and hears how far it is; by lines of JSON."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from select import select
+from typing import Any, Final
+
+_LOOK_S: Final = 0.2
+_PIECE: Final = 1 << 16
+
+
+def run_child(
+    module: str,
+    asked: dict[str, Any],
+    *,
+    busy: Callable[[], bool],
+    wanted: Callable[[], bool],
+    tell: Callable[[dict[str, Any]], None],
+    hold: Callable[[bool], None],
+) -> dict[str, Any] | None:
+    """Run a program to its end.
+
+    Args:
+        module: its main module; it calls `service.background.program.serve`.
+        asked: what it is to do.
+        busy: whether it has to stand still at present.
+        wanted: whether anybody still wants what it does.
+        tell: takes what it says of how far it is.
+        hold: called with True when it has to stand still from now on, with False when it goes on.
+
+    Returns:
+        What it said at its end; None if it was ended because nobody wants it any more.
+
+    Raises:
+        OSError: it cannot be started, or has ended by itself.
+    """
+    command = [sys.executable, "-m", module]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        try:
+            _write(child, json.dumps(asked))
+            return _followed(child, busy, wanted, tell, hold)
+        finally:
+            child.kill()
+
+
+def _followed(
+    child: "subprocess.Popen[bytes]",
+    busy: Callable[[], bool],
+    wanted: Callable[[], bool],
+    tell: Callable[[dict[str, Any]], None],
+    hold: Callable[[bool], None],
+) -> dict[str, Any] | None:
+    held, said = False, b""
+    if child.stdout is None:
+        raise TypeError("the program has no standard output")
+    while wanted():
+        if busy() != held:
+            held = not held
+            _write(child, "pause" if held else "go")
+            hold(held)
+        ready, _, _ = select([child.stdout], [], [], _LOOK_S)
+        if not ready:
+            continue
+        piece = os.read(child.stdout.fileno(), _PIECE)
+        *lines, said = (said + piece).split(b"\n")
+        for line in lines:
+            news: dict[str, Any] = json.loads(line)
+            if "end" in news:
+                end: dict[str, Any] = news["end"]
+                return end
+            tell(news)
+        if not piece:
+            raise ChildProcessError(0, "the program has ended by itself")
+    return None
+
+
+def _write(child: "subprocess.Popen[bytes]", line: str) -> None:
+    if child.stdin is not None:
+        child.stdin.write(f"{line}\n".encode())
+        child.stdin.flush()

@@ -16,6 +16,7 @@ from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.cameras.aids import CameraAids
 from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
+from rig.api.measuring import MeasuringQueue
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, State, Status
@@ -36,6 +37,7 @@ from service.automatic.marks import Marks
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.lights import Lights
+from service.measuring.queue import Measurings
 from service.recordings.archive import Archive, as_recording
 from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
@@ -65,6 +67,7 @@ class Service(Archive):
         jumpers: the start list and the next jumper.
         catalogue: of the folder of the recordings.
         exports: of these recordings.
+        measurings: measures these recordings.
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
         rehearser: makes rehearsals of the rig.
@@ -81,6 +84,7 @@ class Service(Archive):
         jumpers: JumperBook,
         catalogue: Catalogue,
         exports: Exports,
+        measurings: Measurings,
         keeper: TrashKeeper,
         slot: PreviewSlot,
         rehearser: Rehearser,
@@ -89,7 +93,7 @@ class Service(Archive):
         balls: BallPlaces,
         examine: Callable[[Status, bool | None], DoctorReport],
     ) -> None:
-        super().__init__(catalogue, exports)
+        super().__init__(catalogue, exports, measurings)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
         self._slot, self._rehearser, self._examine = slot, rehearser, examine
         self._lights, self._trains, self._balls = lights, trains, balls
@@ -108,6 +112,8 @@ class Service(Archive):
         if (progress := self._rehearser.progress) is not None:
             said = rehearsing() if status.state is State.IDLE else status.statement
             status = status.model_copy(update={"rehearsal": progress, "statement": said})
+        if (measuring := self._measurings.view) != MeasuringQueue():
+            status = status.model_copy(update={"measuring": measuring})
         return self._keeper.counted_in(status)
 
     @property

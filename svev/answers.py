@@ -32,6 +32,16 @@ def _recording_line(answer: dict[str, Any]) -> str:
     return f"{answer['id']}  {size:22} {_said(answer['verdict'])}" + (f"  [{who}]" if who else "")
 
 
+def measurement_lines(answer: dict[str, Any]) -> list[str]:
+    """What was measured in a recording, for people: its state, then a line for each jump."""
+    words = {"waiting": f"waiting, {answer['before']} before it", "none": "not measured"}
+    state = words.get(answer["state"], answer["state"])
+    problem = answer["problem"]
+    lines = [f"{answer['recording']}: {state}" + ("" if problem is None else f": {problem['text']}")]
+    lines += [f"jump {jump['jump']}: {jump['verdict']}" for jump in answer["jumps"]]
+    return lines + ([f"files: {', '.join(answer['files'])}"] if answer["files"] else [])
+
+
 def recordings_lines(answer: dict[str, Any]) -> list[str]:
     """Recordings, for people, one a line."""
     return [_recording_line(each) for each in answer["recordings"]] or ["no recordings"]

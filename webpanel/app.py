@@ -24,6 +24,7 @@ from webpanel.routes.events import Changes, events_router
 from webpanel.routes.exports import exports_router
 from webpanel.routes.files import files_router
 from webpanel.routes.login import login_router
+from webpanel.routes.measuring import measuring_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
 from webpanel.routes.preview import cameras_router, preview_router
 from webpanel.routes.recordings import recordings_router
@@ -70,6 +71,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         contents_router(service, changes),
         files_router(service, streams.downloads),
         exports_router(service, streams.downloads),
+        measuring_router(service, streams.downloads),
         preview_router(service, streams),
         cameras_router(service, streams),
         events_router(service, changes, streams.events),

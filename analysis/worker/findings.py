@@ -5,10 +5,9 @@ from datetime import UTC, datetime
 from typing import Protocol
 
 from analysis.cameras.oriented_scene import OrientedScene
-from analysis.procedure.jump import ComputedJump
 from analysis.report.course import course_of
 from analysis.report.figures import EARLY_S, FAR_M
-from analysis.result.model import MeasuredRecording, Quantity
+from analysis.result.model import Jump, MeasuredRecording, Quantity
 from rig.api.jump import LastJump, MeasuredValue
 from rig.clocks import NS_PER_S, UtcNs
 from rig.events import Level
@@ -52,9 +51,16 @@ class Findings(Protocol):
         """Something that people should know, one line."""
 
 
-def summary_of(recording: str, rate_hz: float, computed: ComputedJump) -> LastJump:
-    """The main figures of a jump."""
-    jump, course = computed.jump, course_of(computed.jump, rate_hz)
+def summary(recording: str, rate_hz: float, jump: Jump, perpendicular: Quantity | None) -> LastJump:
+    """The main figures of a jump.
+
+    Args:
+        recording: its name.
+        rate_hz: pulses per second.
+        jump: the jump.
+        perpendicular: velocity perpendicular to the table at the take-off, m/s.
+    """
+    course = course_of(jump, rate_hz)
     time = jump.pulses[0].time if jump.takeoff is None else jump.takeoff.time
     return LastJump(
         recording=recording,
@@ -63,7 +69,7 @@ def summary_of(recording: str, rate_hz: float, computed: ComputedJump) -> LastJu
         ok=jump.verdict.ok,
         verdict=jump.verdict.message,
         takeoff_speed=_value(course.at_time("speed", 0.0)),
-        perpendicular=_value(computed.perpendicular),
+        perpendicular=_value(perpendicular),
         speed_20_m=_value(course.at_distance("speed", FAR_M)),
         angle_of_attack=_value(course.at_time("angle_of_attack", EARLY_S)),
         ski_to_body=_value(course.at_time("alpha", EARLY_S)),

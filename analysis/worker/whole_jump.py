@@ -11,7 +11,7 @@ from analysis.procedure.jump import compute_jump
 from analysis.procedure.jump_search import without_gaps
 from analysis.procedure.plumb import check_up
 from analysis.result.model import Jump, MeasuredRecording
-from analysis.worker.findings import MeasuredJump, summary_of
+from analysis.worker.findings import MeasuredJump, summary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +57,8 @@ class JumpTask:
         computed = replace(computed, jump=_with_missing(computed.jump, len(jump.pulses) - len(pulses)))
         orientation = orientation_result(self.scene)
         result = MeasuredRecording(self.recording, {}, self.rate_hz, orientation, computed.synchrony, (computed.jump,))
-        return MeasuredJump(result, summary_of(self.recording, self.rate_hz, computed))
+        told = summary(self.recording, self.rate_hz, computed.jump, computed.perpendicular)
+        return MeasuredJump(result, told)
 
 
 def _with_missing(jump: Jump, missing: int) -> Jump:

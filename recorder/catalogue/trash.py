@@ -12,6 +12,7 @@ from typing import Final
 from recorder.catalogue.entry import SUFFIX
 from recorder.catalogue.voice_notes import voice_folder
 from recorder.log.jumper_path import jumper_path
+from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_path
 from recorder.log.truth_path import truth_path
 from rig.host.files import opened_folder
@@ -105,7 +106,7 @@ def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[Tr
 
 def beside(log: Path) -> tuple[Path, ...]:
     """The files and folders that belong to a log, whether they are there or not."""
-    return session_path(log), truth_path(log), jumper_path(log), voice_folder(log)
+    return session_path(log), truth_path(log), jumper_path(log), measured_path(log), voice_folder(log)
 
 
 def _trashed(path: Path) -> TrashedLog | None:

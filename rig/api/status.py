@@ -12,6 +12,7 @@ from pydantic import Field
 
 from rig.api.fields import WHOLE, Model
 from rig.api.jump import LastJump
+from rig.api.measuring import MeasuringQueue
 from rig.api.recordings import NextJumper, Recording
 from rig.api.statement import Statement
 from rig.phrase import Value
@@ -207,6 +208,7 @@ class Status(Model):
     recording: Recording | None = Field(description="the recording in progress")
     last_recording: str | None = Field(description="id of the recording that ended last")
     last_jump: LastJump | None = Field(None, description="the jump that the analysis measured last")
+    measuring: MeasuringQueue = Field(MeasuringQueue(), description="the logs that are being measured")
     next_jumper: NextJumper = Field(NextJumper(), description="whom the next recording is of")
     automatic: AutomaticStatus | None = Field(None, description="null: the rig file has no [automatic.motion]")
     rehearsal: RehearsalProgress | None = Field(None, description="the rehearsal that runs; null: none")

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from recorder.catalogue.trash import TrashContents
 from recorder.log.extent import CONTINUES
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.looking import Moment, MomentKind, Note, VoiceNote
+from rig.api.measuring import Measurement
 from rig.api.recordings import (
     Causes,
     Counts,
@@ -32,6 +34,8 @@ from rig.errors import StateForbidsError, StillRecordingError, UnknownRecordingE
 from rig.pulse import Pause
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
+from service.measuring.queue import Measurings
+from service.measuring.results import result_file
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
@@ -69,10 +73,11 @@ class Archive(ABC):
     Args:
         catalogue: of the folder.
         exports: of the same recordings.
+        measurings: likewise.
     """
 
-    def __init__(self, catalogue: Catalogue, exports: Exports) -> None:
-        self._catalogue, self.exports = catalogue, exports
+    def __init__(self, catalogue: Catalogue, exports: Exports, measurings: Measurings) -> None:
+        self._catalogue, self.exports, self._measurings = catalogue, exports, measurings
         self._checksums: dict[str, str] = {}
         self._descriptions: dict[tuple[str, bool], tuple[Entry, Recording]] = {}
 
@@ -146,6 +151,40 @@ class Archive(ABC):
         self._check_ended(recording_id)
         entry, log = self._catalogue.entry(recording_id), self._catalogue.file(recording_id)
         return self.exports.start(recording_id, log, file_name(recording_id, entry.session, ""), order)
+
+    def measurement(self, recording_id: str) -> Measurement:
+        """What is known of the jumps of a recording: of the whole log, otherwise what was measured live."""
+        log = self._catalogue.file(recording_id)
+        known = self._measurings.measurement(recording_id, log)
+        if known.jumps or not (live := live_results.summaries(log)):
+            return known
+        return known.model_copy(update={"jumps": tuple(live), "live": True})
+
+    def measure(self, recording_id: str) -> Measurement:
+        """Have the log of a recording measured, again if it was measured before.
+
+        Raises:
+            StateForbidsError: it lies in the trash, or the rig file does not say where the balls are.
+        """
+        if self._catalogue.entry(recording_id).deleted:
+            raise StateForbidsError(f"recording {recording_id} is in the trash: restore it, then measure it")
+        return self._measurings.want(recording_id, self._catalogue.file(recording_id))
+
+    def give_up_measuring(self, recording_id: str) -> Measurement:
+        """Do not measure a recording that waits for it, or is being measured; an earlier result stays."""
+        self._measurings.give_up(recording_id, self._catalogue.file(recording_id))
+        return self.measurement(recording_id)
+
+    def measured_file(self, recording_id: str, name: str) -> Path:
+        """A file of the result.
+
+        Raises:
+            UnknownRecordingError: there is none of this name.
+        """
+        file = result_file(self._catalogue.file(recording_id), name)
+        if file is None:
+            raise UnknownRecordingError(f"recording {recording_id} has no result {name[:100]!r}: measure it")
+        return file
 
     def _check_ended(self, recording_id: str) -> None:
         current = self.status().recording

@@ -75,6 +75,7 @@ class RecordingControl:
         last: id of the recording that ended last.
         notice: why the last recording ended early, until another one starts.
         armed_at: when the rig was armed, on the monotonic clock, s.
+        on_log: called with each log that the recorder has made; set it before the first recording.
         emptied_at: since when memory can hold anything for the next recording, likewise: the last one took the rest.
     """
 
@@ -94,6 +95,7 @@ class RecordingControl:
         self.last: str | None = None
         self.notice: Statement | None = None
         self.armed_at = self.emptied_at = time.monotonic()
+        self.on_log: Callable[[Path], None] = lambda _: None
         self._answers: list[Callable[[], None]] = []
 
     def use(self, rig: RigSettings, rig_toml: str) -> None:
@@ -235,6 +237,10 @@ class RecordingControl:
         self.current.change_session(change)
         return self.current.view()
 
+    def _opened(self, log: Path) -> None:
+        self._truths.opened(log, self._session.truth)
+        self.on_log(log)
+
     def hear(self, report: RecorderReport) -> None:
         """Handle a report of the recorder."""
         current = self.current
@@ -242,13 +248,13 @@ class RecordingControl:
             return
         match report:
             case RecordingStarted() if current.interruption is not None:
-                self._truths.opened(current.order.path, self._session.truth)
+                self._opened(current.order.path)
                 current.continue_in(current.order.path)
                 self.armed_at = time.monotonic()
                 self._machine.move(State.RECORDING)
             case RecordingStarted():
                 self._answers.append(current.open(report))
-                self._truths.opened(current.path, self._session.truth)
+                self._opened(current.path)
                 self._machine.move(State.RECORDING)
                 self._say(Level.INFO, phrase("event_started", "recording {recording} started", recording=current.id))
             case RecorderHealth() if not current.opening:
@@ -256,7 +262,7 @@ class RecordingControl:
                     current.grown(current.path.stat().st_size)
             case RecordingContinued():
                 current.continue_in(report.path)
-                self._truths.opened(report.path, self._session.truth)
+                self._opened(report.path)
                 why = report.before.failure or NOTHING
                 self.notice = recording_continued(report.before.path.stem, report.path, why)
             case RecordingFinished():

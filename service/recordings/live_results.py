@@ -1,6 +1,7 @@
 """The main figures of the jumps that were measured live, from the file beside their log, `LOG.jumper.json`.
 
-`service.processes.live_jumps` writes that file. Nothing is read here but its member `summaries` and the take-off.
+`service.processes.live_jumps` writes that file. Nothing is read here but its member `summaries` and the take-off. What
+was measured in the whole log (`service.measuring.results`) goes before it.
 """
 
 import json
@@ -11,8 +12,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from recorder.log.jumper_path import jumper_path
+from recorder.log.measured_path import measured_path
 from rig.api.jump import LastJump
 from rig.host.files import TEXT_MAX, read_whole
+from service.measuring.results import jumps_of
 
 
 def summaries(log: Path) -> list[LastJump]:
@@ -21,21 +24,23 @@ def summaries(log: Path) -> list[LastJump]:
 
 
 def takeoff_pulse(log: Path) -> int | None:
-    """The pulse of the take-off in the first jump of a log that was measured live; None if there is none."""
-    try:
-        pulse: float = _content(jumper_path(log))["jumps"][0]["takeoff"]["pulse"]
-        return round(pulse)
-    except (OSError, ValueError, KeyError, IndexError, TypeError, OverflowError):
-        return None
+    """The pulse of the take-off in the first jump of a log; None if there is none, or it was not measured."""
+    for path in (measured_path(log) / "jumper.json", jumper_path(log)):
+        with suppress(OSError, ValueError, KeyError, IndexError, TypeError, OverflowError):
+            pulse: float = _content(path)["jumps"][0]["takeoff"]["pulse"]
+            return round(pulse)
+    return None
 
 
 def latest(folder: Path) -> LastJump | None:
     """The jump in a folder that was measured last; None if there is none."""
-    found: list[tuple[int, Path]] = []
-    for path in folder.glob(jumper_path(Path("*.mcap")).name):
-        with suppress(OSError):  # deleted meanwhile
-            found.append((path.stat().st_mtime_ns, path))
-    known = (_read(path) for _, path in sorted(found, reverse=True))
+    logs: dict[Path, int] = {}
+    for beside in (jumper_path, measured_path):
+        for path in folder.glob(beside(Path("*.mcap")).name):
+            log = path.with_name(f"{path.name.removesuffix(beside(Path()).suffix)}.mcap")
+            with suppress(OSError):  # deleted meanwhile
+                logs[log] = max(path.stat().st_mtime_ns, logs.get(log, 0))
+    known = (jumps_of(log) or summaries(log) for log in sorted(logs, key=lambda log: logs[log], reverse=True))
     return next((jumps[-1] for jumps in known if jumps), None)
 
 

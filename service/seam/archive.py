@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import BinaryIO, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.api.looking import Moment, Note, VoiceNote
+from rig.api.measuring import Measurement
 from rig.api.recordings import Pulses, Recording, RecordingQuery, SessionChange, Trash
 
 
@@ -116,6 +118,22 @@ class Archive(Protocol):
 
     def moment(self, recording_id: str) -> Moment:
         """The pulse at which to open a recording."""
+        ...
+
+    def measurement(self, recording_id: str) -> Measurement:
+        """What is known of the jumps of a recording, and how far its measuring is."""
+        ...
+
+    def measure(self, recording_id: str) -> Measurement:
+        """Have a recording measured, again if it was. StateForbidsError: it is deleted, or nobody says by what."""
+        ...
+
+    def give_up_measuring(self, recording_id: str) -> Measurement:
+        """Do not measure a recording that waits for it, or is being measured; an earlier result stays."""
+        ...
+
+    def measured_file(self, recording_id: str, name: str) -> Path:
+        """A file of the result. UnknownRecordingError: there is none of this name."""
         ...
 
     def notes(self, recording_id: str) -> list[Note]:

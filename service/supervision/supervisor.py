@@ -7,7 +7,7 @@ never waits for anything but the next report or command.
 import select
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from rig.api.jump import LastJump
@@ -318,6 +318,14 @@ class Supervisor:
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
         self._session.tell(Event.now(Level.INFO if jump.ok else Level.WARNING, "analysis", measured(jump)))
+
+    def know_jumps(self, jumps: Sequence[LastJump]) -> None:
+        """Take what was measured in a whole log in place of what was measured live; only in the supervisor's thread."""
+        for jump in jumps:
+            self.hub.tell(Event.now(Level.INFO if jump.ok else Level.WARNING, "analysis", measured(jump)))
+        known, last = self._last_jump, jumps[-1]
+        if known is None or known.recording == last.recording or known.time <= last.time:
+            self._last_jump, self._dirty = last, True
 
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""

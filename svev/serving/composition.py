@@ -5,14 +5,17 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from recorder.catalogue.folder import Catalogue
 from recorder.publishing.keys import check_publication
+from rig.api.jump import LastJump
 from rig.api.status import ArmOrder
+from rig.errors import ProcessDiedError
 from rig.events import Event, Level
 from rig.host.disk import free_bytes
 from rig.host.endings import ENDINGS
@@ -29,6 +32,7 @@ from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.jumpers.keeper import Keeper
 from service.lights import Lights
+from service.measuring.queue import Measurings
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.storage import usable_bytes
@@ -37,6 +41,7 @@ from service.regions import Regions
 from service.rehearsals import Rehearser
 from service.service import Service
 from service.status.event_hub import EventHub
+from service.supervision.commands import at_once
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains
 from svev import console
@@ -49,6 +54,7 @@ from webpanel.door.tls import Tls
 from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
+_SOON_S: Final = 10.0
 #: The program that makes a rehearsal.
 REHEARSE: Final = (sys.executable, "-m", "svev.serving.rehearsal_program")
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
@@ -109,7 +115,7 @@ def serve(settings: ServiceSettings) -> None:
         trains = Trains(supervisor, settings.rig, preroll_s)
         balls = BallPlaces(lambda: supervisor.rig, data)
         service = Service(
-            supervisor, jumpers, catalogue, exports, keeper, slot, rehearser, lights, trains, balls,
+            supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot, rehearser, lights, trains, balls,
             PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
         server = make_server(create_app(service, settings.access), settings.tls)
@@ -147,6 +153,21 @@ def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:
         return supervisor.status.recording is not None
 
     return Exports(data, busy, lambda: usable_bytes(rig, free_bytes(data) or 0))
+
+
+def _measurings(data: Path, supervisor: Supervisor) -> Measurings:
+    """Measures the logs of the recordings, and stands still while a recording runs."""
+
+    def busy() -> bool:
+        return supervisor.status.recording is not None
+
+    def found(jumps: tuple[LastJump, ...]) -> None:
+        with suppress(ProcessDiedError):  # the service ends; the result is on the disk
+            supervisor.commands.ask(at_once(partial(supervisor.know_jumps, jumps)), _SOON_S)
+
+    made = Measurings(data, lambda: supervisor.rig, busy, supervisor.hub.tell, found, supervisor.hub.wake)
+    supervisor.recordings.on_log = made.opened
+    return made
 
 
 def _telling(

@@ -21,6 +21,7 @@ from rig.api.cameras.aids import BINS, CameraAids
 from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.api.jump import LastJump
+from rig.api.measuring import MeasuringQueue
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals
 from rig.api.statement import Level, Statement
@@ -54,12 +55,14 @@ from rig.settings.camera import Region
 from rig.settings.region import RegionLimits
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
+from service.measuring.queue import Measurings
 from service.recordings.archive import Archive, as_recording
 from service.seam.cameras import CloseUp, Preview
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
 from svev.doctor.finding import Topic, passed, warning
 from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
+from tests.support.rigs import SIM
 
 SHAPE = (120, 480)
 COLUMNS = ((0, 160), (160, 320), (320, 480))
@@ -79,6 +82,7 @@ class MemoryService(Archive):
         well: what `healthy` says.
         broken: raised by `status`, if set.
         last_jump: what the analysis measured last, set by tests.
+        measuring: which logs are being measured, set by tests; None: as it is.
         alarms: what is wrong with pulses, clocks and cameras, set by tests.
         notice: what befell the last recording, set by tests.
         fault: what it says in a fault, set by tests.
@@ -90,15 +94,20 @@ class MemoryService(Archive):
         bursts: pulses that were asked for.
         balls: where each camera should show the balls, set by tests.
         preview_calls: how often somebody asked for a picture.
+        settings: the rig file, whose `[analysis]` tests set.
+        measurings: measures the recordings while it is entered.
     """
 
     def __init__(self, folder: Path) -> None:
         self.catalogue = Catalogue(folder)
-        super().__init__(self.catalogue, Exports(folder, lambda: self.state is State.RECORDING, lambda: 1e12))
+        self.settings = SIM
+        self.measurings = Measurings(folder, lambda: self.settings, self._busy, lambda _: None, self._found, self._wake)
+        super().__init__(self.catalogue, Exports(folder, self._busy, lambda: 1e12), self.measurings)
         self.state = State.IDLE
         self.well = True
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None
+        self.measuring: MeasuringQueue | None = None
         self.alarms: tuple[Alarm, ...] = ()
         self.notice: Statement | None = None
         self.fault: Statement | None = None
@@ -163,6 +172,7 @@ class MemoryService(Archive):
                 disk=DiskStatus(free_gb=100.0, reserve_gb=2.0, seconds_left=3500.0, jumps_left=350, jump_s=10.0),
                 recording=self._recording,
                 last_recording=self._last,
+                measuring=self.measuring or self.measurings.view,
                 last_jump=self.last_jump,
                 alarms=self.alarms,
                 notice=self.notice,
@@ -380,6 +390,13 @@ class MemoryService(Archive):
                 message=said.text, code=said.code, values=said.values,
             )  # fmt: skip
             self._events = [*self._events[-KEPT_EVENTS + 1 :], event]
+        self._wake()
+
+    def _busy(self) -> bool:
+        return self.state is State.RECORDING
+
+    def _found(self, jumps: tuple[LastJump, ...]) -> None:
+        self.last_jump = jumps[-1]
         self._wake()
 
     def _wake(self) -> None:

@@ -42,6 +42,9 @@ CALLS = {
     "DELETE /api/recordings/{recording_id}/voice-notes/{number}",
     "POST /api/recordings/{recording_id}/exports", "GET /api/exports", "GET /api/exports/{export_id}",
     "DELETE /api/exports/{export_id}", "GET /api/exports/{export_id}/file",
+    "GET /api/recordings/{recording_id}/measurement", "POST /api/recordings/{recording_id}/measurement",
+    "DELETE /api/recordings/{recording_id}/measurement",
+    "GET /api/recordings/{recording_id}/measurement/files/{name}",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 

@@ -10,7 +10,14 @@ import typer
 from rig.errors import BadInputError, CameraError, SvevError
 from rig.host.files import TEXT_MAX, read_whole
 from svev import console
-from svev.answers import jumper_lines, recording_lines, recordings_lines, start_list_lines, status_lines
+from svev.answers import (
+    jumper_lines,
+    measurement_lines,
+    recording_lines,
+    recordings_lines,
+    start_list_lines,
+    status_lines,
+)
 from svev.calling import AnywhereGroup, Json, call, client_of, path_of, show
 from svev.commands.rig.ctl_watching import doctor, log
 from svev.fetch import fetch
@@ -118,6 +125,20 @@ def start(
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=preroll, duration_s=seconds)
     show(call(context, "POST", "/api/recordings", order), recording_lines, as_json)
+
+
+@app.command()
+def measure(context: typer.Context, recording: Id, wait_s: Wait = 0.0, as_json: Json = False) -> None:
+    """Have a recording measured, again if it was measured before, and show its jumps; it waits while one is recorded.
+
+    Example: svev ctl measure 20260214-101530 --wait 120
+    """
+    path, until = f"{path_of(recording)}/measurement", time.monotonic() + wait_s
+    answer = call(context, "POST", path)
+    while answer["state"] in {"waiting", "running", "paused"} and time.monotonic() < until:
+        time.sleep(_POLL_S)
+        answer = call(context, "GET", path)
+    show(answer, measurement_lines, as_json)
 
 
 @app.command()

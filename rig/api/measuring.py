@@ -1,0 +1,57 @@
+"""The measuring of whole logs after their recording, in the form of the REST API."""
+
+from datetime import datetime
+from enum import StrEnum
+
+from pydantic import Field
+
+from rig.api.fields import Model
+from rig.api.jump import LastJump
+from rig.api.statement import Statement
+
+
+class MeasuringState(StrEnum):
+    """How far the measuring of a log is."""
+
+    NONE = "none"  #: nobody has asked for it
+    WAITING = "waiting"  #: for another log, or for the end of its recording
+    RUNNING = "running"
+    PAUSED = "paused"  #: while a recording runs
+    DONE = "done"
+    FAILED = "failed"
+
+
+class MeasuringStep(StrEnum):
+    """What is being done with a log."""
+
+    BALLS = "balls"  #: the balls are measured, and the cameras oriented by them
+    SEARCH = "search"  #: the jumper is looked for
+    NAMES = "names"  #: points and skis get their names
+    COMPUTING = "computing"
+    WRITING = "writing"
+
+
+class Measurement(Model):
+    """What is known of the jumps of a recording."""
+
+    recording: str = Field(description="id of the recording")
+    state: MeasuringState
+    step: MeasuringStep | None = Field(None, description="what is being done")
+    share: float = Field(0.0, description="of this step that is done, 0 to 1")
+    before: int = Field(0, description="logs that are measured before this one")
+    problem: Statement | None = Field(None, description="why it could not be measured, and what to do")
+    measured: datetime | None = Field(None, description="when the log was measured, UTC")
+    version: str = Field("", description="of svev, that measured it")
+    jumps: tuple[LastJump, ...] = Field((), description="main figures of its jumps")
+    live: bool = Field(False, description="the figures are those that were measured live, before the log was closed")
+    files: tuple[str, ...] = Field((), description="names of the files of the result")
+
+
+class MeasuringQueue(Model):
+    """The logs that are being measured, or wait for it."""
+
+    recording: str | None = Field(None, description="id of the one that is being measured; null: none")
+    state: MeasuringState = MeasuringState.NONE
+    step: MeasuringStep | None = None
+    share: float = Field(0.0, description="of this step that is done, 0 to 1")
+    waiting: int = Field(0, description="so many more wait")

@@ -1,0 +1,1 @@
+"""Measures the log of every recording after its end, beside the service."""

@@ -1,0 +1,41 @@
+"""The program that measures one log, started by `service.measuring.queue`."""
+
+from pathlib import Path
+from typing import Any, Final
+
+from rig.api.measuring import MeasuringStep
+from service.background.program import Teller, serve
+
+#: What the steps of the analysis are called by those who translate them.
+_STEPS: Final = {
+    "looking at the balls": MeasuringStep.BALLS,
+    "looking for the jumper": MeasuringStep.SEARCH,
+    "naming points and skis": MeasuringStep.NAMES,
+    "computing": MeasuringStep.COMPUTING,
+    "writing": MeasuringStep.WRITING,
+}
+
+
+def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
+    """Measure `log` by `survey` or `calibration` into the folder `out`; says the main figures of the jumps."""
+    from analysis.cameras.source import read_source  # noqa: PLC0415 - its libraries start their threads with our low priority
+    from analysis.procedure.analyze import analyze  # noqa: PLC0415
+    from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
+    from analysis.worker.findings import summary  # noqa: PLC0415
+
+    def progress(step: str, share: float) -> None:
+        tell(last=share in {0.0, 1.0}, step=_STEPS[step], share=share)
+
+    log, out = Path(asked["log"]), Path(asked["out"])
+    survey, calibration = (Path(asked[key]) if asked[key] else None for key in ("survey", "calibration"))
+    found = analyze(log, read_source(survey, calibration), progress=progress)
+    write_folder(found, log, out, progress=progress)
+    result = found.result
+    jumps = [
+        summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
+    ]
+    return {"jumps": [jump.model_dump(mode="json") for jump in jumps]}
+
+
+if __name__ == "__main__":
+    serve(_measure)

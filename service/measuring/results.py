@@ -1,0 +1,147 @@
+"""What was measured in a log after its end: a folder beside the log, whole or absent."""
+
+import json
+import os
+import shutil
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from recorder.log.measured_path import measured_path
+from rig.api.fields import Model
+from rig.api.jump import LastJump
+from rig.api.measuring import Measurement, MeasuringState
+from rig.api.statement import Statement
+from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, opened_folder, read_whole
+
+_NAME: Final = "measurement.json"
+_VERSION: Final = version("svev")
+
+
+class _Outcome(Model):
+    """What the measuring of a log came to; in the folder beside the files of the analysis.
+
+    Attributes:
+        measured: when, UTC.
+        version: of svev.
+        jumps: main figures of the jumps of the result that lies in the folder.
+        problem: why the last attempt failed; the result, if there is one, is of an attempt before.
+    """
+
+    measured: datetime
+    version: str
+    jumps: tuple[LastJump, ...] = ()
+    problem: Statement | None = None
+
+
+def measurement_of(recording: str, log: Path) -> Measurement:
+    """What was measured in a log; state `NONE` if that was never tried, or its outcome cannot be read."""
+    folder = measured_path(log)
+    found = _outcome(folder)
+    if found is None:
+        return Measurement(recording=recording, state=MeasuringState.NONE)
+    return Measurement(
+        recording=recording,
+        state=MeasuringState.DONE if found.problem is None else MeasuringState.FAILED,
+        problem=found.problem,
+        measured=found.measured,
+        version=found.version,
+        jumps=tuple(jump.model_copy(update={"recording": recording}) for jump in found.jumps),
+        files=tuple(sorted(each.name for each in _files(folder))),
+    )
+
+
+def result_file(log: Path, name: str) -> Path | None:
+    """The file of this name in the result of a log; None if there is none."""
+    return next((each for each in _files(measured_path(log)) if each.name == name), None)
+
+
+def jumps_of(log: Path) -> tuple[LastJump, ...]:
+    """The main figures of the jumps that were measured in a log; none if it was not measured."""
+    found = _outcome(measured_path(log))
+    return () if found is None else found.jumps
+
+
+def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...]) -> None:
+    """Put a folder with the files of a result beside its log, in place of an earlier one.
+
+    Args:
+        made: the folder, on the same disk; it is gone afterwards.
+        log: the log.
+        jumps: main figures.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    outcome = _Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps)
+    _write(outcome, made)
+    for path in made.iterdir():
+        _flushed(path)
+    target, old = measured_path(log), made.with_name(f"{made.name}.old")
+    if os.path.lexists(target):
+        target.rename(old)
+    made.rename(target)
+    _flushed(target.parent)
+    _remove(old)
+
+
+def keep_problem(log: Path, problem: Statement) -> None:
+    """Note why a log could not be measured; a result that is there stays.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    folder = measured_path(log)
+    folder.mkdir(exist_ok=True)
+    before = _outcome(folder)
+    _write(
+        _Outcome(
+            measured=datetime.now(UTC) if before is None or not before.jumps else before.measured,
+            version=_VERSION,
+            jumps=() if before is None else before.jumps,
+            problem=problem,
+        ),
+        folder,
+    )
+
+
+def _write(outcome: _Outcome, folder: Path) -> None:
+    replace_file(folder / _NAME, (outcome.model_dump_json() + "\n").encode(), links=False)
+
+
+def _outcome(folder: Path) -> _Outcome | None:
+    try:
+        with opened_folder(folder):
+            return _Outcome.model_validate(json.loads(read_whole(folder / _NAME, TEXT_MAX, links=False)))
+    except (OSError, ValueError, ValidationError):
+        return None
+
+
+def _files(folder: Path) -> list[Path]:
+    """The files for people and programs; links are none of them."""
+    try:
+        with opened_folder(folder):
+            return [
+                each for each in folder.iterdir() if each.name != _NAME and not each.is_symlink() and each.is_file()
+            ]
+    except OSError:
+        return []
+
+
+def _flushed(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _remove(path: Path) -> None:
+    if path.is_symlink():
+        path.unlink()
+    else:
+        shutil.rmtree(path, ignore_errors=True)

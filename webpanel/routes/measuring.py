@@ -1,0 +1,69 @@
+"""Routes about what was measured in a recording: its figures, its files, and the order to measure it (again)."""
+
+from http import HTTPStatus
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Depends, Path
+from fastapi.responses import FileResponse
+
+from rig.api.measuring import Measurement
+from service.seam.rig import RigService
+from webpanel.door.streams import Streams
+from webpanel.routes.common import CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
+from webpanel.routes.files import attachment
+
+FileName = Annotated[
+    str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.\-]{0,99}$", description="name of a file", examples=["report.html"])
+]
+_FILE: Final[Responses] = {
+    200: {
+        "description": "The file.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+#: What a browser shows itself. A page among them runs as if it came from nowhere: it reaches nothing of the panel.
+_SHOWN: Final = {".html": "text/html; charset=utf-8", ".webm": "video/webm", ".txt": "text/plain; charset=utf-8"}
+_ALONE: Final = "sandbox allow-scripts allow-popups allow-downloads"
+
+
+def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
+    """The routes about what was measured in a recording."""
+    router = strict_router("Measurements")
+
+    @router.get("/recordings/{recording_id}/measurement", responses=refusals(404))
+    def get_measurement(recording_id: RecordingId) -> Measurement:
+        """What is known of the jumps of a recording, and how far its measuring is.
+
+        The log of every recording is measured by itself after its end, if the rig file has `[analysis]`; until then the
+        figures are those that were measured live (`live`). Progress is in `measuring` of `GET /status` and its events.
+        """
+        return service.measurement(recording_id)
+
+    @router.post(
+        "/recordings/{recording_id}/measurement", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404)
+    )
+    def measure(recording_id: RecordingId, _: NoFields = None) -> Measurement:
+        """Have a recording measured, or measured again. It waits for those before it, and while a recording runs."""
+        return service.measure(recording_id)
+
+    @router.delete("/recordings/{recording_id}/measurement", responses=CHANGING | refusals(404))
+    def give_up_measuring(recording_id: RecordingId) -> Measurement:
+        """Do not measure a recording that waits for it, or is being measured; an earlier result stays."""
+        return service.give_up_measuring(recording_id)
+
+    @router.get(
+        "/recordings/{recording_id}/measurement/files/{name}",
+        response_class=FileResponse,
+        dependencies=[Depends(downloads.place)],
+        responses=_FILE | refusals(404, 503),
+    )
+    def get_measured_file(recording_id: RecordingId, name: FileName) -> FileResponse:
+        """A file of the result: the coach's page `report.html`, tables, C3D, TRC, the protocol, the network."""
+        file = service.measured_file(recording_id, name)
+        shown = _SHOWN.get(file.suffix)
+        headers = {"Content-Security-Policy": _ALONE, "X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
+        if shown is None:
+            headers["Content-Disposition"] = attachment(f"{recording_id}-{name}")
+        return FileResponse(file, headers=headers, media_type=shown or "application/octet-stream")
+
+    return router

@@ -36,8 +36,9 @@ def latest(folder: Path) -> LastJump | None:
     """The jump in a folder that was measured last; None if there is none."""
     logs: dict[Path, int] = {}
     for beside in (jumper_path, measured_path):
-        for path in folder.glob(beside(Path("*.mcap")).name):
-            log = path.with_name(f"{path.name.removesuffix(beside(Path()).suffix)}.mcap")
+        pattern = beside(Path("*.mcap")).name
+        for path in folder.glob(pattern):
+            log = path.with_name(f"{path.name.removesuffix(pattern[1:])}.mcap")
             with suppress(OSError):  # deleted meanwhile
                 logs[log] = max(path.stat().st_mtime_ns, logs.get(log, 0))
     known = (jumps_of(log) or summaries(log) for log in sorted(logs, key=lambda log: logs[log], reverse=True))

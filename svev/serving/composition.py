@@ -115,8 +115,8 @@ def serve(settings: ServiceSettings) -> None:
         trains = Trains(supervisor, settings.rig, preroll_s)
         balls = BallPlaces(lambda: supervisor.rig, data)
         service = Service(
-            supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot, rehearser, lights, trains, balls,
-            PanelDoctor(lambda: supervisor.rig, data).report,
+            supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot,
+            rehearser, lights, trains, balls, PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
         server = make_server(create_app(service, settings.access), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))

@@ -1,0 +1,205 @@
+"""Logs wait to be measured, are measured one after the other, and none is forgotten."""
+
+import json
+import os
+import shutil
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from bench.analysis.hill_logs import HillLog, write_hill_log
+from recorder.catalogue.folder import Catalogue
+from recorder.log.measured_path import measured_path
+from rig.api.jump import LastJump
+from rig.api.measuring import Measurement, MeasuringState
+from rig.errors import StateForbidsError
+from rig.events import Event
+from rig.settings.model import AnalysisSettings
+from service.measuring.queue import NAME, Measurings
+from service.recordings import live_results
+from tests.analysis.simulated import training
+from tests.recorder.logs import write_log
+from tests.support.rigs import SIM
+from tests.support.waiting import wait_until
+
+#: A measuring gets only the processor time that nobody else wants.
+PATIENCE_S = 120
+OVER = (MeasuringState.DONE, MeasuringState.FAILED)
+
+
+@pytest.fixture(scope="module")
+def hill(tmp_path_factory: pytest.TempPathFactory) -> HillLog:
+    """One jump; the jumper is in sight from hill pulse 23 to 60."""
+    return write_hill_log(tmp_path_factory.mktemp("hill") / "jump", training(), range(16, 66))
+
+
+class Bench:
+    """A folder of recordings with its queue.
+
+    Attributes:
+        folder: it.
+        busy: whether a recording runs.
+        survey: what the rig file names; None: it has no `[analysis]`.
+        found: recordings whose jumps were told.
+        said: the events.
+    """
+
+    def __init__(self, folder: Path, survey: Path | None) -> None:
+        self.folder, self.busy, self.survey = folder, False, survey
+        self.found: list[str] = []
+        self.said: list[str] = []
+
+    @contextmanager
+    def running(self) -> Iterator[Measurings]:
+        """A service that measures."""
+        analysis = self.survey and AnalysisSettings(survey=self.survey)
+        rig = SIM.model_copy(update={"analysis": analysis})
+        with Measurings(self.folder, lambda: rig, lambda: self.busy, self._hear, self._know, lambda: None) as queue:
+            yield queue
+
+    def log(self, recording: str) -> Path:
+        """The log of a recording."""
+        return self.folder / f"{recording}.mcap"
+
+    def of(self, queue: Measurings, recording: str) -> Measurement:
+        """How far it is."""
+        return queue.measurement(recording, self.log(recording))
+
+    def until_over(self, queue: Measurings, recording: str) -> Measurement:
+        """Wait until a recording is measured, or cannot be."""
+        wait_until(lambda: self.of(queue, recording).state in OVER, f"{recording} is measured", PATIENCE_S, 0.05)
+        return self.of(queue, recording)
+
+    def waiting(self) -> list[str]:
+        """The queue on the disk."""
+        path = self.folder / NAME
+        found: list[str] = json.loads(path.read_text()) if path.exists() else []
+        return found
+
+    def _hear(self, event: Event) -> None:
+        self.said.append(event.message)
+
+    def _know(self, jumps: tuple[LastJump, ...]) -> None:
+        self.found += [jump.recording for jump in jumps]
+
+
+@pytest.fixture
+def bench(tmp_path: Path, hill: HillLog) -> Bench:
+    shutil.copy(hill.path, tmp_path / "jump.mcap")
+    return Bench(tmp_path, hill.survey)
+
+
+def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside_it(bench: Bench) -> None:
+    bench.busy = True
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        wait_until(lambda: bench.waiting() == ["jump"], "it stands in the queue", poll_s=0.01)
+        assert bench.of(queue, "jump").state is MeasuringState.WAITING
+        assert queue.view.waiting == 1
+        bench.busy = False
+        done = bench.until_over(queue, "jump")
+    assert done.state is MeasuringState.DONE, done.problem
+    (jump,) = done.jumps
+    assert jump.ok, jump.verdict
+    assert (jump.recording, bench.found, bench.waiting()) == ("jump", ["jump"], [])
+    assert jump.takeoff_speed is not None
+    assert abs(jump.takeoff_speed.value - 26.1) < 1.0
+    assert {"report.html", "jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html"} <= set(done.files)
+    assert live_results.latest(bench.folder) == jump
+    assert live_results.takeoff_pulse(bench.log("jump")) == pytest.approx(30 - 16 + 1, abs=1)
+    catalogue = Catalogue(bench.folder)
+    catalogue.delete("jump")
+    assert not measured_path(bench.log("jump")).exists()
+    catalogue.restore("jump")
+    assert (measured_path(bench.log("jump")) / "report.html").stat().st_size > 10_000
+    _a_failure_leaves_the_result(bench)
+    catalogue.delete("jump")
+    catalogue.purge()
+    assert sorted(path.name for path in bench.folder.rglob("*") if path.is_file() and "jump" in path.name) == []
+
+
+def _a_failure_leaves_the_result(bench: Bench) -> None:
+    bench.survey = bench.folder / "misspelt.json"
+    with bench.running() as queue:
+        queue.want("jump", bench.log("jump"))
+        wait_until(lambda: bench.of(queue, "jump").problem is not None, "it failed", PATIENCE_S, 0.05)
+        failed = bench.of(queue, "jump")
+    assert failed.state is MeasuringState.FAILED
+    assert failed.problem is not None
+    assert "misspelt.json" in failed.problem.text
+    assert len(failed.jumps) == 1
+    assert "report.html" in failed.files
+
+
+def test_a_service_that_ends_in_the_middle_goes_on_when_it_is_started_again(bench: Bench) -> None:
+    write_log(bench.log("other"))
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        queue.opened(bench.log("other"))
+        wait_until(lambda: queue.view.state is MeasuringState.RUNNING, "it is being measured", PATIENCE_S, 0.01)
+    assert bench.waiting() == ["jump", "other"]
+    assert not measured_path(bench.log("jump")).exists()
+    with bench.running() as queue:
+        wait_until(lambda: queue.view.recording == "jump", "it goes on", PATIENCE_S, 0.01)
+        queue.give_up("jump", bench.log("jump"))
+        assert bench.until_over(queue, "other").state is MeasuringState.FAILED
+        assert bench.of(queue, "jump").state is MeasuringState.NONE
+    assert bench.waiting() == []
+    assert not list((bench.folder / ".measuring").iterdir())
+
+
+def test_it_stands_still_while_a_recording_runs_and_says_so_if_it_is_killed(bench: Bench) -> None:
+    with bench.running() as queue:
+        queue.want("jump", bench.log("jump"))
+        wait_until(lambda: queue.view.step is not None, "it is under way", PATIENCE_S, 0.01)
+        bench.busy = True
+        wait_until(lambda: queue.view.state is MeasuringState.PAUSED, "it stands still", PATIENCE_S, 0.01)
+        assert bench.of(queue, "jump").state is MeasuringState.PAUSED
+        os.kill(_child(), signal.SIGKILL)
+        failed = bench.until_over(queue, "jump")
+    assert failed.problem is not None
+    assert "has ended by itself" in failed.problem.text
+    assert bench.said == [f"jump is not measured: {failed.problem.text}"]
+
+
+def _child() -> int:
+    """The program that measures, which this process has started."""
+    children = Path(f"/proc/{os.getpid()}/task").glob("*/children")
+    pids = [pid for path in children for pid in path.read_text().split()]
+    (found,) = [pid for pid in pids if b"service.measuring.program" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    return int(found)
+
+
+def test_what_cannot_be_measured_says_why_and_the_next_one_goes_on(bench: Bench) -> None:
+    write_log(bench.log("dark"))
+    with bench.running() as queue:
+        bench.busy = True
+        queue.want("gone", bench.log("gone"))
+        queue.want("dark", bench.log("dark"))
+        assert bench.of(queue, "dark").before == 1
+        bench.busy = False
+        failed = bench.until_over(queue, "dark")
+    assert failed.problem is not None
+    assert failed.problem.text
+    assert (failed.files, failed.jumps) == ((), ())
+    assert bench.waiting() == []
+
+
+def test_without_survey_nothing_is_queued_and_who_asks_is_told_what_is_missing(bench: Bench) -> None:
+    bench.survey = None
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        with pytest.raises(StateForbidsError, match=r"give the rig file an \[analysis\] with survey or calibration"):
+            queue.want("jump", bench.log("jump"))
+        assert bench.of(queue, "jump").state is MeasuringState.NONE
+        assert queue.view.waiting == 0
+
+
+def test_a_queue_that_cannot_be_read_is_said(bench: Bench) -> None:
+    (bench.folder / NAME).write_text("{")
+    with bench.running():
+        wait_until(lambda: bench.said != [], "it is said")
+    assert bench.said[0].startswith(f"{NAME}: cannot be read, so logs that waited to be measured are forgotten")

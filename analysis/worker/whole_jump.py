@@ -12,6 +12,7 @@ from analysis.procedure.jump_search import without_gaps
 from analysis.procedure.plumb import check_up
 from analysis.result.model import Jump, MeasuredRecording
 from analysis.worker.findings import MeasuredJump, summary
+from rig.api.jump import LastJump
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +59,14 @@ class JumpTask:
         orientation = orientation_result(self.scene)
         result = MeasuredRecording(self.recording, {}, self.rate_hz, orientation, computed.synchrony, (computed.jump,))
         told = summary(self.recording, self.rate_hz, computed.jump, computed.perpendicular)
-        return MeasuredJump(result, told)
+        return MeasuredJump(result, _as_live(told, len(pulses), len(jump.pulses)))
+
+
+def _as_live(told: LastJump, seen: int, pulses: int) -> LastJump:
+    """The figures of a jump of whose pulses so many were seen: what they are worth, the log alone tells."""
+    more = "what was measured well, the log tells" if told.ok else told.verdict
+    verdict = f"measured live, in {seen} of its {pulses} pulses; {more}"
+    return told.model_copy(update={"live": True, "ok": False, "verdict": verdict})
 
 
 def _with_missing(jump: Jump, missing: int) -> Jump:

@@ -20,6 +20,7 @@ class LastJump(Model):
     recording: str
     jump: int = Field(description="number of the jump in the recording")
     time: datetime = Field(description="take-off, or first pulse where that was not found, UTC")
+    live: bool = Field(False, description="measured while it was recorded: `ok` is false then, the log tells more")
     ok: bool = Field(description="whether the jump was measured well")
     verdict: str = Field(description="the verdict in words")
     takeoff_speed: MeasuredValue | None = None

@@ -205,7 +205,7 @@ def moved(before: State, to: State, fault: Statement | None) -> Phrase:
 
 
 def measured(jump: LastJump) -> Phrase:
-    """A jump was measured live."""
+    """A jump was measured, live or in its log."""
     text = "jump {jump} of {recording}: {verdict}"
     return phrase("event_jump", text, jump=jump.jump, recording=jump.recording, verdict=jump.verdict)
 

@@ -317,12 +317,12 @@ class Supervisor:
 
     def _jump_measured(self, jump: LastJump) -> None:
         self._last_jump, self._dirty = jump, True
-        self._session.tell(Event.now(Level.INFO if jump.ok else Level.WARNING, "analysis", measured(jump)))
+        self._session.tell(Event.now(_level(jump), "analysis", measured(jump)))
 
     def know_jumps(self, jumps: Sequence[LastJump]) -> None:
         """Take what was measured in a whole log in place of what was measured live; only in the supervisor's thread."""
         for jump in jumps:
-            self.hub.tell(Event.now(Level.INFO if jump.ok else Level.WARNING, "analysis", measured(jump)))
+            self.hub.tell(Event.now(_level(jump), "analysis", measured(jump)))
         known, last = self._last_jump, jumps[-1]
         if known is None or known.recording == last.recording or known.time <= last.time:
             self._last_jump, self._dirty = last, True
@@ -411,3 +411,7 @@ class Supervisor:
             restarts={RECORDER: self._fault.deaths, **(processes.restarts if processes else {})},
         )
         return picture(self.rig, facts)
+
+
+def _level(jump: LastJump) -> Level:
+    return Level.INFO if jump.ok or jump.live else Level.WARNING

@@ -31,3 +31,13 @@ def test_pulses_that_did_not_come_have_entries_and_are_told() -> None:
 
 def test_of_a_jump_that_came_whole_nothing_is_said() -> None:
     assert "did not come" not in _computed(1).summary.verdict
+
+
+def test_a_live_jump_is_never_measured_well_but_says_how_much_of_it_was_seen() -> None:
+    whole, half = _computed(1).summary, _computed(2).summary
+    count = len(_computed(1).result.jumps[0].pulses)
+    assert whole.live
+    assert not whole.ok
+    assert whole.verdict == f"measured live, in {count} of its {count} pulses; what was measured well, the log tells"
+    assert half.verdict.startswith(f"measured live, in {-(-count // 2)} of its ")
+    assert "measured well:" not in half.verdict

@@ -1,0 +1,82 @@
+"""What was measured in a recording, over the API: figures, files, the order to measure it, and its refusals."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import httpx
+import pytest
+
+from recorder.log.jumper_path import jumper_path
+from rig.api.jump import LastJump
+from rig.settings.model import AnalysisSettings
+from service.measuring.results import keep_result
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import refused
+
+PATH = "/api/recordings/jump/measurement"
+PAGE = "<!doctype html><script>1</script>"
+
+
+@pytest.fixture(autouse=True)
+def log(service: MemoryService) -> Path:
+    """A recording with the id `jump`."""
+    return write_recording(service.catalogue.directory, "jump")
+
+
+def _jump(verdict: str) -> LastJump:
+    return LastJump(recording="jump", jump=1, time=datetime(2026, 2, 14, tzinfo=UTC), ok=True, verdict=verdict)
+
+
+def _measured(log: Path) -> None:
+    made = log.parent / "made"
+    made.mkdir()
+    for name, text in {"report.html": PAGE, "jumper.csv": "a,b\n", "jumper.c3d": "C3D"}.items():
+        (made / name).write_text(text)
+    keep_result(made, log, (_jump("measured well"),))
+
+
+def test_live_figures_are_given_until_the_log_is_measured(client: httpx.Client, log: Path) -> None:
+    before = client.get(PATH).json()
+    assert (before["state"], before["jumps"], before["live"]) == ("none", [], False)
+    jumper_path(log).write_text(f'{{"summaries": [{_jump("seen live").model_dump_json()}]}}')
+    live = client.get(PATH).json()
+    assert (live["state"], live["live"], live["jumps"][0]["verdict"]) == ("none", True, "seen live")
+    _measured(log)
+    done = client.get(PATH).json()
+    assert (done["state"], done["live"], done["jumps"][0]["verdict"]) == ("done", False, "measured well")
+    assert done["files"] == ["jumper.c3d", "jumper.csv", "report.html"]
+
+
+def test_a_page_among_the_files_reaches_nothing_of_the_panel(client: httpx.Client, log: Path) -> None:
+    _measured(log)
+    page = client.get(f"{PATH}/files/report.html")
+    assert page.text == PAGE
+    assert page.headers["content-type"].startswith("text/html")
+    assert page.headers["content-security-policy"].startswith("sandbox allow-scripts")
+    assert "allow-same-origin" not in page.headers["content-security-policy"]
+    table = client.get(f"{PATH}/files/jumper.csv")
+    assert "attachment" in table.headers["content-disposition"]
+    assert "jump-jumper.csv" in table.headers["content-disposition"]
+
+
+@pytest.mark.parametrize("name", ["measurement.json", "nothing.html", "..%2F..%2Fjump.mcap", "link.html"])
+def test_nothing_but_the_files_of_the_result_is_given(client: httpx.Client, log: Path, name: str) -> None:
+    _measured(log)
+    (log.with_suffix(".measured") / "link.html").symlink_to("/etc/passwd")
+    answer = client.get(f"{PATH}/files/{name}")
+    assert answer.status_code in {404, 422}, answer.text
+
+
+def test_who_asks_waits_his_turn_and_may_give_up(client: httpx.Client, service: MemoryService) -> None:
+    assert "give the rig file an [analysis]" in refused(client.post(PATH), 409).detail
+    service.settings = service.settings.model_copy(update={"analysis": AnalysisSettings(survey=Path("balls.json"))})
+    write_recording(service.catalogue.directory, "other")
+    first, second = client.post(PATH), client.post(PATH.replace("jump", "other"))
+    assert (first.status_code, first.json()["state"]) == (202, "waiting")
+    assert second.json()["before"] == 1
+    assert client.get("/api/status").json()["measuring"]["waiting"] == 2
+    assert client.delete(PATH).json()["state"] == "none"
+    assert client.get(PATH.replace("jump", "other")).json()["before"] == 0
+    assert client.delete("/api/recordings/jump").status_code == 200
+    assert "restore it" in refused(client.post(PATH), 409).detail
+    assert refused(client.get(PATH.replace("jump", "nobody")), 404).code == "unknown_recording"

@@ -208,8 +208,8 @@ class Measurings:
             LastJump.model_validate(jump).model_copy(update={"recording": recording}) for jump in end["jumps"]
         )
         keep_result(made, log, jumps)
-        self._forget(recording)
         self._found(jumps)
+        self._forget(recording)
 
     def _fail(self, recording: str, log: Path, why: Phrase) -> None:
         """Note that a log cannot be measured: it waits no more."""

@@ -33,14 +33,14 @@ def takeoff_pulse(log: Path) -> int | None:
 
 
 def latest(folder: Path) -> LastJump | None:
-    """The jump in a folder that was measured last; None if there is none."""
+    """The last jump of the latest recording in a folder that was measured; None if there is none."""
     logs: dict[Path, int] = {}
     for beside in (jumper_path, measured_path):
         pattern = beside(Path("*.mcap")).name
         for path in folder.glob(pattern):
             log = path.with_name(f"{path.name.removesuffix(pattern[1:])}.mcap")
             with suppress(OSError):  # deleted meanwhile
-                logs[log] = max(path.stat().st_mtime_ns, logs.get(log, 0))
+                logs[log] = log.stat().st_mtime_ns
     known = (jumps_of(log) or summaries(log) for log in sorted(logs, key=lambda log: logs[log], reverse=True))
     return next((jumps[-1] for jumps in known if jumps), None)
 

@@ -325,7 +325,8 @@ class Supervisor:
             self.hub.tell(Event.now(_level(jump), "analysis", measured(jump)))
         known, last = self._last_jump, jumps[-1]
         if known is None or known.recording == last.recording or known.time <= last.time:
-            self._last_jump, self._dirty = last, True
+            self._last_jump = last
+            self._refresh()
 
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""

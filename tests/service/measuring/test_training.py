@@ -44,7 +44,7 @@ def test_every_log_is_measured_by_itself_also_after_the_service_was_killed(tmp_p
         _await_measured(service, second)
         assert service.get("/api/status")["measuring"]["waiting"] == 0
         last = service.get("/api/status")["last_jump"]
-        assert (last["recording"], last["live"]) == (second, False)
+        assert (last["recording"], last["live"]) == (second, False), service.log.read_text()
     assert json.loads((data / NAME).read_text()) == []
 
 

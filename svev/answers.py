@@ -16,6 +16,10 @@ def status_lines(answer: dict[str, Any]) -> list[str]:
         lines.append(f"held       the last {answer['preroll']['seconds']:.1f} s")
     if answer["recording"] is not None:
         lines.append(f"recording  {_recording_line(answer['recording'])}")
+    measuring = answer["measuring"]
+    if measuring["recording"] is not None or measuring["waiting"]:
+        now = f"{measuring['recording']} ({measuring['state']})" if measuring["recording"] else "nothing"
+        lines.append(f"measuring  {now}, {measuring['waiting']} waiting")
     return lines
 
 

@@ -32,6 +32,8 @@ NAME: Final = ".svev-measuring.json"
 _WORKSHOP: Final = ".measuring"
 _MOST: Final = 2000
 _LOOK_S: Final = 0.2
+#: Share of a step.
+_SEEN: Final = 0.05
 _END_S: Final = 10.0
 _IDS: Final = TypeAdapter(list[str])
 
@@ -230,7 +232,10 @@ class Measurings:
         )
 
     def _hear(self, news: dict[str, Any]) -> None:
-        self._change(step=MeasuringStep(news["step"]), share=news["share"])
+        """Enter how far the program is; in steps that somebody would see, since everybody is told of each."""
+        step, share, known = MeasuringStep(news["step"]), float(news["share"]), self.view
+        if step is not known.step or share >= known.share + _SEEN:
+            self._change(step=step, share=share)
 
     def _hold(self, held: bool) -> None:
         self._change(state=MeasuringState.PAUSED if held else MeasuringState.RUNNING)

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
@@ -16,7 +17,8 @@ from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState
 from rig.api.statement import Statement
 from rig.host.disk import replace_file
-from rig.host.files import TEXT_MAX, opened_folder, read_whole
+from rig.host.files import TEXT_MAX, open_to_read, opened_folder, read_whole
+from service.seam.archive import Download
 
 _NAME: Final = "measurement.json"
 _VERSION: Final = version("svev")
@@ -58,6 +60,29 @@ def measurement_of(recording: str, log: Path) -> Measurement:
 def result_file(log: Path, name: str) -> Path | None:
     """The file of this name in the result of a log; None if there is none."""
     return next((each for each in _files(measured_path(log)) if each.name == name), None)
+
+
+def result_downloads(log: Path, name: str) -> list[Download]:
+    """The whole result of a log as files to take away, in a folder that belongs beside the log's file.
+
+    Args:
+        log: the log.
+        name: of the file that it is taken away as.
+    """
+    folder = measured_path(log)
+    return [
+        _download(path, f"{measured_path(Path(name)).name}/{path.name}") for path in (*_files(folder), *_own(folder))
+    ]
+
+
+def _download(path: Path, name: str) -> Download:
+    stat, opened = path.stat(), partial(open_to_read, path, links=False)
+    tag = f"{stat.st_ino}-{stat.st_mtime_ns}-{stat.st_size}"
+    return Download(name, stat.st_size, stat.st_mtime, tag, corrected=False, open=opened)
+
+
+def _own(folder: Path) -> list[Path]:
+    return [] if _outcome(folder) is None else [folder / _NAME]
 
 
 def jumps_of(log: Path) -> tuple[LastJump, ...]:

@@ -35,7 +35,7 @@ from rig.pulse import Pause
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
 from service.measuring.queue import Measurings
-from service.measuring.results import result_file
+from service.measuring.results import result_downloads, result_file
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
@@ -209,10 +209,11 @@ class Archive(ABC):
         return self._checksums.get(download.tag, "")
 
     def zipped(self, recording_ids: Sequence[str]) -> tuple[int, Iterator[bytes]]:
-        """Several recordings with their spoken notes as one archive: its size, and its bytes piece by piece."""
+        """Several recordings with results and spoken notes as one archive: its size, and its bytes piece by piece."""
         downloads: list[Download] = []
         for recording_id in dict.fromkeys(recording_ids):
             downloads.append(self.download(recording_id))
+            downloads += result_downloads(self._catalogue.file(recording_id), downloads[-1].name)
             downloads += [self.voice_file(recording_id, note.number) for note in self.voice_notes(recording_id)]
         return zipped_size(downloads), zipped(downloads)
 

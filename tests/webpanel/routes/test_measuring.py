@@ -1,5 +1,7 @@
 """What was measured in a recording, over the API: figures, files, the order to measure it, and its refusals."""
 
+import io
+import zipfile
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import pytest
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import keep_result
+from service.measuring.results import keep_result, measurement_of
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 
@@ -80,3 +82,14 @@ def test_who_asks_waits_his_turn_and_may_give_up(client: httpx.Client, service: 
     assert client.delete("/api/recordings/jump").status_code == 200
     assert "restore it" in refused(client.post(PATH), 409).detail
     assert refused(client.get(PATH.replace("jump", "nobody")), 404).code == "unknown_recording"
+
+
+def test_the_archive_has_the_result_where_a_folder_of_recordings_has_it(client: httpx.Client, log: Path) -> None:
+    _measured(log)
+    answer = client.get("/api/recordings.zip?ids=jump")
+    assert int(answer.headers["content-length"]) == len(answer.content)
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.read("jump.measured/report.html").decode() == PAGE
+        archive.extractall(log.parent / "elsewhere")
+    elsewhere = log.parent / "elsewhere" / "jump.mcap"
+    assert measurement_of("jump", elsewhere).jumps == (_jump("measured well"),)

@@ -159,13 +159,14 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
     found = []
     for camera, presence, report, columns in zip(rig.cameras, heard, reported, rig.columns(), strict=True):
         state = camera_state(trying, presence)
+        idle = report is not None and report.frames_per_s == 0
         found.append(
             CameraStatus(
                 name=camera.name,
                 backend=camera.backend,
                 address=camera.address,
                 state=state,
-                statement=about_camera(camera, state, presence.said, overloaded=bool(facts.overloaded)),
+                statement=about_camera(camera, state, presence.said, overloaded=bool(facts.overloaded), idle=idle),
                 columns=columns,
                 actions=None if report is None else _answers(report.actions),
                 **({} if report is None else {name: getattr(report, name) for name in _MEASURED}),

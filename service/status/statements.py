@@ -40,7 +40,9 @@ def camera_state(trying: bool, heard: CameraPresence) -> CameraState:
     return CameraState.CONNECTING if heard.news is None else _CAMERA_STATES[heard.news]
 
 
-def about_camera(camera: CameraSettings, state: CameraState, said: Phrase, *, overloaded: bool) -> Statement:
+def about_camera(
+    camera: CameraSettings, state: CameraState, said: Phrase, *, overloaded: bool, idle: bool
+) -> Statement:
     """The state of a camera in words.
 
     Args:
@@ -48,6 +50,7 @@ def about_camera(camera: CameraSettings, state: CameraState, said: Phrase, *, ov
         state: its state.
         said: the last news of it, e.g. why it is not there.
         overloaded: whether the computer is too slow for several cameras: then silence tells nothing of a cable.
+        idle: whether it has sent no frame for a second.
     """
     values: dict[str, Value] = {"camera": camera.name, "reason": said}
     match state:
@@ -56,7 +59,7 @@ def about_camera(camera: CameraSettings, state: CameraState, said: Phrase, *, ov
         case CameraState.CONNECTING:
             return Statement(code="camera_connecting", text=f"connecting {camera.name}", values=values)
         case CameraState.READY:
-            return Statement(level=Level.GOOD, code="camera_ready", text=f"{camera.name} is ready", values=values)
+            return _connected(camera.name, values, idle=idle)
         case CameraState.SILENT if overloaded:
             what = f"the frames of {camera.name} come too late: this computer is too slow for the cameras"
             return Statement(level=Level.WARNING, code="camera_overloaded", text=what, advice=_FASTER, values=values)
@@ -66,6 +69,14 @@ def about_camera(camera: CameraSettings, state: CameraState, said: Phrase, *, ov
             return Statement(level=Level.WARNING, code="camera_silent", text=what, advice=advice, values=values)
         case CameraState.ABSENT:
             return _absent(camera.name, said, values)
+
+
+def _connected(camera: str, values: dict[str, Value], *, idle: bool) -> Statement:
+    if idle:
+        return Statement(
+            code="camera_waits", text=f"{camera} is connected, but no frames come at present", values=values
+        )
+    return Statement(level=Level.GOOD, code="camera_ready", text=f"{camera} is ready", values=values)
 
 
 def _absent(camera: str, said: Phrase, values: dict[str, Value]) -> Statement:

@@ -47,6 +47,7 @@ export const statements = {
   camera_off: ["riggen er ikke gjort klar"],
   camera_connecting: ["kobler til {camera}"],
   camera_ready: ["{camera} er klar"],
+  camera_waits: ["{camera} er tilkoblet, men sender ingen bilder nå"],
   camera_silent: ["{camera} sender ingen bilder mens de andre gjør det", "sjekk triggerkabelen; kameraet kobles til på nytt av seg selv"],
   camera_overloaded: ["bildene fra {camera} kommer for sent: denne datamaskinen er for treg for kameraene", "lukk andre programmer på den; er det ikke nok, senk trigger.rate_hz eller gjør kameraenes utsnitt mindre"],
   camera_absent: ["{camera} er borte", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],

@@ -56,6 +56,7 @@ class Verdict(StrEnum):
     PARTIAL = (
         "partial"  #: consistent; pulses lack frames, and their tags say which and why, or no pulses came for a while
     )
+    CONTRADICTED = "contradicted"  #: sound, but frames are of other pulses, by their numbers, than their tags say
     DAMAGED = "damaged"  #: not closed, unreadable in part, or inconsistent
 
 
@@ -98,12 +99,15 @@ class VerifyReport:
 
     @property
     def verdict(self) -> Verdict:
-        """DAMAGED if the log is not sound, otherwise CLEAN if nothing is missing, no time either, otherwise PARTIAL.
+        """DAMAGED if the log is not sound, else CONTRADICTED if frames are of other pulses than their tags say.
 
-        What a log misses at its end, or before its beginning in another one, counts as missing too.
+        Otherwise CLEAN if nothing is missing, no time either, and PARTIAL if something is. What a log misses at
+        its end, or before its beginning in another one, counts as missing too.
         """
         if self.findings or not self.closed or not set(self.ledger.missing) <= set(self.known_lost):
             return Verdict.DAMAGED
+        if self.recounted.misfiled:
+            return Verdict.CONTRADICTED
         whole = self.ledger.whole and not (self.part_before or self.ended_early)
         return Verdict.CLEAN if whole else Verdict.PARTIAL
 
@@ -135,6 +139,7 @@ class VerifyReport:
             "ended_early": self.ended_early,
             "part_before": self.part_before,
             "off_time": list(self.off_time),
+            "misfiled": [difference.to_json() for difference in self.recounted.misfiled],
             "findings": list(self.findings),
             "events": [wire.to_builtins(event) for event in self.events],
         }

@@ -8,18 +8,34 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import pytest
 import zmq
 
+from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from rig.clocks import DecimalNs, UtcNs
 from rig.frame import FrameStatus
 from rig.health import DiskHealth, Health, Latency, PairingHealth, PrerollHealth, ToldPulses
 from rig.host.utc_clock import UtcState
+from rig.tag import CameraTag
 from rig.transport import wire
 from svev.cli import main
-from tests.recorder.logs import ALL_OK, DESCRIPTION, LOST, OK, PERIOD_NS, START, write_log
+from tests.recorder.logs import (
+    ALL_OK,
+    DESCRIPTION,
+    LOST,
+    OK,
+    PERIOD_NS,
+    READY_NS,
+    SHAPE,
+    START,
+    make_tag,
+    open_writer,
+    write_log,
+    write_pulse,
+)
 from tests.support.loopback import Loopback
 
 
@@ -133,6 +149,71 @@ def test_a_tag_that_the_frame_numbers_contradict_is_named(tmp_path: Path, svev: 
     assert "its ledger does not agree with its tags: pulse 2: K2" in done.stderr
     (difference,) = json.loads(svev("verify", path, "--ledger", "--json").stdout)["ledger"]["differences"]
     assert (difference["pulse"], difference["camera"], difference["found"]) == (2, "K2", "lost")
+
+
+def write_tags(path: Path, change: Callable[[int, CameraTag], CameraTag], pulses: int = 120) -> None:
+    """A log of complete pulses in which K2's part of each tag, (pulse, part), is changed; frames come after 5 ms."""
+    buffers = TripletBuffers(SHAPE, 4)
+    with open_writer(path, buffers) as log:
+        for pulse in range(1, pulses + 1):
+            tag = make_tag(pulse)
+            late = UtcNs(tag.time + READY_NS)
+            first, second, third = (msgspec.structs.replace(part, host_time=late) for part in tag.cameras)
+            cameras = (first, change(pulse, second), third)
+            write_pulse(log, buffers, msgspec.structs.replace(tag, cameras=cameras))
+    buffers.close()
+
+
+def frames_of_the_next_pulse(pulse: int, part: CameraTag) -> CameraTag:
+    """From pulse 40 on, K2's times are one period early; at pulse 90 they come back, and no frame is left for it."""
+    if pulse == 90:
+        return CameraTag(part.name, part.columns, FrameStatus.MISSED)
+    if not 40 <= pulse < 90:
+        return part
+    assert part.frame_id is not None
+    assert part.host_time is not None
+    assert part.trigger_count is not None
+    return msgspec.structs.replace(
+        part, frame_id=part.frame_id + 1, trigger_count=part.trigger_count + 1,
+        host_time=UtcNs(part.host_time + PERIOD_NS),
+    )  # fmt: skip
+
+
+def number_of_the_pulse_before(pulse: int, part: CameraTag) -> CameraTag:
+    assert part.frame_id is not None
+    return msgspec.structs.replace(part, frame_id=part.frame_id - (pulse == 40))
+
+
+@pytest.mark.parametrize(
+    ("change", "said", "stretch"),
+    [
+        (frames_of_the_next_pulse, "pulses 40 to 89: K2 holds the frames of 1 pulse later: ", (40, 89, 1)),
+        (
+            number_of_the_pulse_before,
+            "pulse 40: K2 is tagged ok: its frame number is 46, that of pulse 39 is 46, and its clock goes on",
+            (40, 40, 0),
+        ),
+    ],
+)
+def test_frames_that_their_numbers_file_elsewhere_are_named_without_asking_for_the_ledger(
+    tmp_path: Path, svev: Svev, change: Callable[[int, CameraTag], CameraTag], said: str, stretch: tuple[int, int, int]
+) -> None:
+    log = tmp_path / "log.mcap"
+    write_tags(log, lambda _, part: part)
+    assert svev("verify", log).returncode == 0
+    log.unlink()
+    write_tags(log, change)
+    done = svev("verify", log)
+    assert done.returncode == 7
+    assert done.stdout.startswith(f"{log}: contradicted\n")
+    assert f"\n  {said}" in done.stdout
+    assert f"its ledger does not agree with its tags: {said}" in done.stderr
+    again = svev("verify", log, "--json")
+    assert again.returncode == 7
+    found = json.loads(again.stdout)
+    assert found["verdict"] == "contradicted"
+    first = found["misfiled"][0]
+    assert (first["camera"], first["pulse"], first["last_pulse"], first["by_pulses"]) == ("K2", *stretch)
 
 
 @pytest.mark.parametrize("command", ["info", "verify"])

@@ -12,7 +12,7 @@ those at which it was gone or silent (the log's events tell) or its clock was se
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from rig.clocks import NS_PER_S, UtcNs
@@ -20,37 +20,23 @@ from rig.events import Event
 from rig.frame import FrameStatus
 from rig.health import Health
 from rig.pulse import PulseNumber
-from rig.tag import CameraTag, TripletTag
+from rig.tag import TripletTag
 from rig.transport.recorder_reports import CameraNews
 from triggering.ledger.recounted import Difference, Recounted
 from triggering.ledger.source_recount import SourceRecount
+from triggering.ledger.stretches import Run, shifts, stretches
+from triggering.ledger.tagged_frames import TaggedFrame, frame_of, goes_on, id_step, is_of_another_pulse, recomputed
 
 #: News after which numbers and clock of a camera prove nothing about the frames before it.
 _BREAKS: Final = frozenset(
     {CameraNews.CONNECTED.value, CameraNews.SILENT.value, CameraNews.GONE.value, FrameStatus.ABSENT.value}
 )
-#: 16-bit block ids run from 1 to this and skip 0.
-_IDS_16_BIT: Final = 65535
 #: The rate of a camera's clock is known from frames that are at least so far apart.
 _BASE_NS: Final = NS_PER_S
 #: No clock is wrong by more than this share; what looks like it is no clock.
 _GAIN_MAX: Final = 0.01
-#: Frame numbers and trigger counts have 64 bits.
-_COUNT_MAX: Final = 1 << 64
 #: Disagreements that are kept one by one; the counts go on.
 _KEPT: Final = 10_000
-
-
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """A whole frame as its tag describes it; times in ns."""
-
-    pulse: PulseNumber
-    time: UtcNs
-    frame_id: int
-    triggers: int | None
-    device: int
-    host: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +47,14 @@ class _Gap:
         before, after: the frames.
         tagged: the pulses between them that have tags, with their states.
         cut: the clock or the numbers do not go on from one to the other.
+        run: the run of frames that begins with `after`.
     """
 
-    before: _Frame | None
-    after: _Frame | None
+    before: TaggedFrame | None
+    after: TaggedFrame | None
     tagged: tuple[tuple[PulseNumber, FrameStatus], ...]
     cut: bool
+    run: Run | None = None
 
 
 @dataclass(slots=True)
@@ -75,15 +63,17 @@ class _Camera:
 
     name: str
     states: Counter[FrameStatus] = field(default_factory=Counter)
-    last: _Frame | None = None
-    first: _Frame | None = None  #: since which the clock has been going on
+    last: TaggedFrame | None = None
+    first: TaggedFrame | None = None  #: since which the clock has been going on
     between: list[tuple[PulseNumber, FrameStatus]] = field(default_factory=list)
     gaps: list[_Gap] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
+    elsewhere: Difference | None = None  #: the stretch of frames of other pulses, by their clock, that goes on
     breaks: list[UtcNs] = field(default_factory=list)
     soonest: int | None = None  #: time from a pulse to the arrival of its frame, ns
     latest: int = 0
 
-    def arrived(self, frame: _Frame) -> None:
+    def arrived(self, frame: TaggedFrame) -> None:
         """Note how long after its pulse a frame came."""
         late = frame.host - frame.time
         self.soonest = late if self.soonest is None else min(self.soonest, late)
@@ -142,10 +132,20 @@ class Recount:
             self._take(self._held, None)
         for camera in self._cameras.values():
             camera.breaks.sort()
+            self._end_elsewhere(camera)
             if camera.between:
                 camera.gaps.append(_Gap(camera.last, None, tuple(camera.between), cut=True))
-            for gap in camera.gaps:
-                self._judge(camera, gap)
+            for gap, moved in _with_moves(camera):
+                if moved:
+                    self._believe(camera, gap)
+                else:
+                    self._judge(camera, gap)
+            for stretch in stretches(camera.runs, shifts(camera.runs)):
+                late = f"{abs(stretch.later) / 1e6:.1f} ms {'later' if stretch.by > 0 else 'sooner'}"
+                why = f"its frame numbers jump against the pulses, and its frames come {late} after them than before"
+                ok = FrameStatus.OK
+                self._differs(Difference(stretch.first, camera.name, ok, None, why, stretch.last, stretch.by))
+        self._differences.sort(key=lambda each: each.pulse)
         seen = {name: camera.states for name, camera in self._cameras.items() if camera.states}
         source = None if merged else self._source.finish()
         return Recounted(self._pulses, seen, self._unproven, tuple(self._differences), self._disagreements, source)
@@ -157,21 +157,21 @@ class Recount:
         """Take a tag whose neighbours are known."""
         self._pulses += 1
         times = [other.time for other in (self._earlier, later) if other is not None]
-        nearest = min((abs(tag.time - time) for time in times), default=NS_PER_S)
+        apart = [abs(tag.time - time) for time in times] or [NS_PER_S]
         for part in tag.cameras:
             camera = self._camera(part.name)
             if part.status is not FrameStatus.OK:
                 camera.between.append((tag.pulse, part.status))
-            elif (frame := _frame(tag, part)) is not None:
-                self._whole(camera, frame, nearest)
+            elif (frame := frame_of(tag, part)) is not None:
+                self._whole(camera, frame, min(apart), max(apart))
             else:  # a tag that names no number or time: nothing can be proved across it
                 camera.states[FrameStatus.OK] += 1
                 camera.gaps.append(_Gap(camera.last, None, tuple(camera.between), cut=True))
                 camera.between.clear()
                 camera.last = None
 
-    def _whole(self, camera: _Camera, frame: _Frame, nearest: int) -> None:
-        """Take a whole frame; `nearest` is the time from its pulse to the nearest other one, ns."""
+    def _whole(self, camera: _Camera, frame: TaggedFrame, nearest: int, farther: int) -> None:
+        """Take a whole frame; `nearest` and `farther` are the times from its pulse to those beside it, ns."""
         last = camera.last
         if last is None:
             cut, camera.first = True, frame
@@ -182,16 +182,21 @@ class Recount:
             if cut and (frames := _slept_through(camera, last, frame, off)):
                 why = f"{frames} frames that its numbers tell of came while this computer's clock stood still"
                 self._differs(Difference(last.pulse, camera.name, FrameStatus.OK, None, why))
-            elif cut and _is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
+            elif cut and is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
                 why = f"clock and number say that it was triggered {abs(off) / 1e6:.1f} ms "
                 why += "after this pulse" if off > 0 else "before this pulse"
-                self._differs(Difference(frame.pulse, camera.name, FrameStatus.OK, None, why))
+                self._is_elsewhere(camera, frame.pulse, why, round(off / nearest))
                 return
+        self._end_elsewhere(camera)
         camera.arrived(frame)
         camera.states[FrameStatus.OK] += 1
         steps = 0 if last is None else frame.pulse - last.pulse
-        if cut or camera.between or not _goes_on(last, frame, steps):
-            camera.gaps.append(_Gap(last, frame, tuple(camera.between), cut))
+        excess = 0 if last is None or cut else id_step(last.frame_id, frame.frame_id) - steps
+        if last is None or cut or excess or camera.between:
+            camera.runs.append(Run(frame.pulse, frame.pulse, excess, nearest, farther))
+        camera.runs[-1].take(frame.pulse, frame.host - frame.time, nearest, farther)
+        if cut or camera.between or not goes_on(last, frame, steps):
+            camera.gaps.append(_Gap(last, frame, tuple(camera.between), cut, camera.runs[-1]))
             camera.between.clear()
         camera.last = frame
         if cut:
@@ -202,8 +207,11 @@ class Recount:
         if gap.cut or before is None or after is None or _broken(camera, before, after):
             self._believe(camera, gap)
             return
-        step = _id_step(before.frame_id, after.frame_id)
+        step = id_step(before.frame_id, after.frame_id)
         if step <= 0:
+            why = f"its frame number is {after.frame_id}, that of pulse {before.pulse} is {before.frame_id}, and its "
+            why += "clock goes on"
+            self._differs(Difference(after.pulse, camera.name, FrameStatus.OK, None, why))
             self._believe(camera, gap)
             return
         pulses = after.pulse - before.pulse - 1
@@ -218,7 +226,7 @@ class Recount:
             if seen > pulses:
                 why = f"it counted {seen - pulses} triggers until pulse {after.pulse} that have no pulse"
                 self._differs(Difference(before.pulse, camera.name, FrameStatus.OK, None, why))
-        for pulse, tagged, found in _recomputed(gap.tagged, taken, untagged):
+        for pulse, tagged, found in recomputed(gap.tagged, taken, untagged):
             camera.states[found] += 1
             if found is not tagged:
                 why = f"its frame numbers say that it took {taken} of the {pulses} frames between pulses "
@@ -230,82 +238,49 @@ class Recount:
         self._unproven += len(gap.tagged)
         camera.states.update(status for _, status in gap.tagged)
 
+    def _is_elsewhere(self, camera: _Camera, pulse: PulseNumber, why: str, by: int) -> None:
+        """Note a frame that its clock files under another pulse; those that follow each other are one stretch."""
+        earlier = camera.elsewhere
+        if earlier is not None and earlier.by == by:
+            camera.elsewhere = replace(earlier, last=pulse)
+            return
+        self._end_elsewhere(camera)
+        camera.elsewhere = Difference(pulse, camera.name, FrameStatus.OK, None, why, pulse, by)
+
+    def _end_elsewhere(self, camera: _Camera) -> None:
+        if camera.elsewhere is not None:
+            self._differs(camera.elsewhere)
+            camera.elsewhere = None
+
     def _differs(self, difference: Difference) -> None:
         self._disagreements += 1
         if len(self._differences) < _KEPT:
             self._differences.append(difference)
 
 
-def _frame(tag: TripletTag, part: CameraTag) -> _Frame | None:
-    """The frame of a camera's part of a tag; None if that says too little of it."""
-    if part.frame_id is None or part.device_time is None or part.host_time is None:
-        return None
-    if max(abs(part.frame_id), abs(part.trigger_count or 0)) > _COUNT_MAX:
-        return None
-    return _Frame(tag.pulse, tag.time, part.frame_id, part.trigger_count, part.device_time, part.host_time)
-
-
-def _goes_on(last: _Frame | None, frame: _Frame, steps: int) -> bool:
-    """Whether numbers and triggers of a frame go on from the last one as the pulses do."""
-    if last is None or _id_step(last.frame_id, frame.frame_id) != steps:
-        return False
-    return last.triggers is None or frame.triggers is None or frame.triggers - last.triggers == steps
-
-
-def _slept_through(camera: _Camera, last: _Frame, frame: _Frame, off: float) -> int:
+def _slept_through(camera: _Camera, last: TaggedFrame, frame: TaggedFrame, off: float) -> int:
     """How many frames the camera took while the clock stood still that times pulses and arrivals; 0: it went on.
 
     That clock stops while the computer is suspended; then pulses and arrivals agree, and the camera's clock went on.
     """
-    frames = _id_step(last.frame_id, frame.frame_id) - (frame.pulse - last.pulse)
+    frames = id_step(last.frame_id, frame.frame_id) - (frame.pulse - last.pulse)
     by_arrival = (frame.host - last.host) - (frame.time - last.time)
     return frames if frames > 0 and off > 2 * camera.scatter and abs(by_arrival) < off / 2 else 0
 
 
-def _is_of_another_pulse(last: _Frame, frame: _Frame, by_clock: float, nearest: int, *, certain: bool) -> bool:
-    """Whether a frame is filed under a wrong pulse, where its clock says so and its number bears the clock out.
-
-    Otherwise the clock was set: then it stands alone. A camera that missed a pulse while its clock was set back by just
-    one period looks alike; there, the arrival decides. `certain`: no pulse between the two is said to be missing.
-    """
-    step = _id_step(last.frame_id, frame.frame_id)
-    if abs(by_clock - step * nearest) >= nearest / 2:
-        return False
-    return certain or step > frame.pulse - last.pulse or abs(by_clock - (frame.host - last.host)) < nearest / 2
-
-
-def _broken(camera: _Camera, before: _Frame, after: _Frame) -> bool:
+def _broken(camera: _Camera, before: TaggedFrame, after: TaggedFrame) -> bool:
     """Whether the camera came, went or fell silent between two frames."""
     place = bisect_left(camera.breaks, before.time)
     return place < len(camera.breaks) and camera.breaks[place] <= after.host
 
 
-def _recomputed(
-    tagged: tuple[tuple[PulseNumber, FrameStatus], ...], taken: int, untagged: int
-) -> Iterator[tuple[PulseNumber, FrameStatus, FrameStatus]]:
-    """Pulse, tagged and recomputed state in a gap in which the camera took `taken` frames.
-
-    The numbers tell how many, not at which pulses; as many tags as possible are left as they are. `untagged` pulses of
-    the gap have no tag: any of them may have had one of the frames.
-    """
-    is_taken = {FrameStatus.LOST, FrameStatus.DAMAGED}
-    claimed = sum(status in is_taken for _, status in tagged)
-    too_few, too_many = max(0, taken - untagged - claimed), max(0, claimed - taken)
-    # Damage was seen to arrive; "lost" was concluded, and so it is revised first.
-    spare = sum(status is FrameStatus.LOST for _, status in tagged)
-    for pulse, status in tagged:
-        found = status
-        if status in is_taken and too_many > 0 and (status is FrameStatus.LOST or too_many > spare):
-            found, too_many = FrameStatus.MISSED, too_many - 1
-        elif status not in is_taken:
-            found = FrameStatus.LOST if too_few > 0 else FrameStatus.MISSED
-            too_few -= found is FrameStatus.LOST
-        spare -= status is FrameStatus.LOST
-        yield pulse, status, found
-
-
-def _id_step(before: int, after: int) -> int:
-    """Frames taken from one frame number to another; a log does not say whether numbers wrap, but they do at 65535."""
-    step = after - before
-    wraps = step < 0 and before <= _IDS_16_BIT and step < -_IDS_16_BIT // 2
-    return step + _IDS_16_BIT if wraps else step
+def _with_moves(camera: _Camera) -> Iterator[tuple[_Gap, bool]]:
+    """The gaps of a camera, and whether a stretch of frames of other pulses begins or ends in each."""
+    for gap in camera.gaps:
+        if gap.run is not None and gap.before is not None and gap.after is not None:
+            gap.run.anew |= gap.run.first == gap.after.pulse and _broken(camera, gap.before, gap.after)
+    shifted = shifts(camera.runs)
+    earlier = [0, *shifted]
+    moves = {run.first: after != before for run, after, before in zip(camera.runs, shifted, earlier, strict=False)}
+    for gap in camera.gaps:
+        yield gap, gap.after is not None and moves.get(gap.after.pulse, False)

@@ -15,11 +15,13 @@ class Difference:
     """A pulse and camera in which the tag and the recomputed ledger differ.
 
     Attributes:
-        pulse: the pulse; where frames have no pulse, the one before them.
+        pulse: the pulse, or the first of several; where frames have no pulse, the one before them.
         camera: name of the camera.
         tagged: what the tag says.
         found: what follows from the log; None: no state of this pulse says it.
         why: the evidence, in words.
+        last: the last pulse of a stretch that holds frames of other pulses.
+        by: the frames of the stretch are of so many pulses later; negative: earlier; 0: not known, or no stretch.
     """
 
     pulse: PulseNumber
@@ -27,16 +29,24 @@ class Difference:
     tagged: FrameStatus
     found: FrameStatus | None
     why: str
+    last: PulseNumber | None = None
+    by: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """The difference as JSON."""
         found = None if self.found is None else self.found.value
         return {
-            "pulse": self.pulse, "camera": self.camera, "tagged": self.tagged.value, "found": found, "why": self.why,
+            "pulse": self.pulse, "last_pulse": self.pulse if self.last is None else self.last, "camera": self.camera,
+            "tagged": self.tagged.value, "found": found, "by_pulses": self.by, "why": self.why,
         }  # fmt: skip
 
     def in_words(self) -> str:
         """The difference as one line, e.g. "pulse 61: K2 is tagged lost and was missed: (why)"."""
+        if self.last is not None:
+            pulses = f"pulse {self.pulse}" if self.last == self.pulse else f"pulses {self.pulse} to {self.last}"
+            pulse = "pulse" if abs(self.by) == 1 else "pulses"
+            later = "later" if self.by > 0 else "earlier"
+            return f"{pulses}: {self.camera} holds the frames of {abs(self.by)} {pulse} {later}: {self.why}"
         found = "" if self.found is None else f" and was {self.found.value}"
         return f"pulse {self.pulse}: {self.camera} is tagged {self.tagged.value}{found}: {self.why}"
 
@@ -65,6 +75,14 @@ class Recounted:
     def agrees(self) -> bool:
         """Whether no tag is contradicted, and the source's own count bears them out."""
         return self.disagreements == 0 and (self.source is None or self.source.agrees)
+
+    @property
+    def misfiled(self) -> tuple[Difference, ...]:
+        """Of the differences, those of whole frames: their numbers and times say that they are of other pulses.
+
+        The others concern the cause of a missing frame.
+        """
+        return tuple(difference for difference in self.differences if difference.found is None)
 
     def in_words(self) -> Iterator[str]:
         """One line for each disagreement that is kept."""

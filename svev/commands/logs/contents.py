@@ -1,20 +1,20 @@
 """`svev info`, `svev verify`, `svev recover`: say what a log holds, check it, make a whole log of it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from recorder.checking.verify import VerifyReport, verify
+from recorder.checking.verify import Verdict, VerifyReport, verify
 from recorder.reading.info import LogInfo, info, merged_in_words
 from recorder.recovering.recover import RecoverReport, recover
 from rig.clocks import NS_PER_S
 from rig.errors import LedgerDiffersError, LogDamagedError, LogTruncatedError
 from service.recordings import live_results
 from svev import console
-from triggering.ledger.recounted import Recounted
+from triggering.ledger.recounted import Difference, Recounted
 
 _LINES_MAX = 60
 
@@ -60,16 +60,17 @@ def verify_command(
 
     Checks checksums, message indexes, summary and statistics, compares tags with images, and looks for pulses without
     a tag and for pauses: time without a pulse. The verdict is "clean" (every pulse complete, no pause), "partial" (the
-    log is sound; its tags say which frames are missing and why, and the times of its pulses where there is a pause) or
-    "damaged" (not closed, unreadable in part, or inconsistent).
+    log is sound; its tags say which frames are missing and why, and the times of its pulses where there is a pause),
+    "contradicted" (the log is sound, but numbers and times of frames say that they are of other pulses than their tags
+    say: the pulses and cameras are named) or "damaged" (not closed, unreadable in part, or inconsistent).
 
-    With --ledger it also recomputes from frame numbers, clocks, arrivals and trigger counts what became of every pulse
-    in every camera, and names each pulse whose tag says something else. Where the log holds what the source of the
-    pulses told (a trigger box, a line of the computer), that is compared as well.
+    With --ledger it also prints what became of every pulse in every camera by frame numbers, clocks, arrivals and
+    trigger counts, and names each missing frame whose tag says another cause. Where the log holds what the source of
+    the pulses told (a trigger box, a line of the computer), that is compared as well.
 
     Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
-    was killed leaves a log that is not closed); 7 with --ledger: sound, but a tag is contradicted. What can be read is
-    printed in any case.
+    was killed leaves a log that is not closed); 7 sound, but contradicted, with --ledger also where only a cause is.
+    What can be read is printed in any case.
 
     Example: svev verify recordings/jump.mcap
     """
@@ -79,15 +80,16 @@ def verify_command(
         recounted = {"ledger": report.recounted.to_json()} if with_ledger else {}
         console.print_json(report.to_json() | recounted)
     else:
-        _print_verified(report)
+        _print_verified(report, () if with_ledger else report.recounted.misfiled)
         if with_ledger:
             _print_recounted(report.recounted)
     if report.truncated:
         raise truncated(log)
     if report.damaged:
         raise LogDamagedError(f"{log}: damaged: {_first_flaw(report)}; the pulses counted above are readable")
-    if with_ledger and not report.recounted.agrees:
-        first = next(report.recounted.in_words())
+    contradicted = report.verdict is Verdict.CONTRADICTED
+    if contradicted or (with_ledger and not report.recounted.agrees):
+        first = report.recounted.misfiled[0].in_words() if contradicted else next(report.recounted.in_words())
         raise LedgerDiffersError(
             f"{log}: its ledger does not agree with its tags: {first}; measure nothing at the pulses that are named, "
             "and look at the events of that time"
@@ -174,13 +176,14 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
             yield name, text
 
 
-def _print_verified(report: VerifyReport) -> None:
+def _print_verified(report: VerifyReport, misfiled: Sequence[Difference]) -> None:
     ledger = report.ledger
     console.say(f"{report.path}: {report.verdict.value}")
     console.say(f"{ledger.summary_line()}; {report.bytes / 1e6:.1f} MB; {'' if report.closed else 'not '}closed")
     if report.closed and not report.every_byte:
         console.say("  no checksum over the whole log: what stands outside of images, tags and messages is not checked")
-    lines = [*report.parts_in_words(), *ledger.in_words(), *report.findings, *report.off_time]
+    told = (difference.in_words() for difference in misfiled)
+    lines = [*report.parts_in_words(), *told, *ledger.in_words(), *report.findings, *report.off_time]
     for line in lines[:_LINES_MAX]:
         console.say(f"  {line}")
     if len(lines) > _LINES_MAX:

@@ -13,7 +13,7 @@ from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
-from tests.triggering.simulation import Hill, Outage, Run, Scenario
+from tests.triggering.simulation import MS, Hill, Outage, Run, Scenario
 from tests.triggering.tags import OK, recount, tags_of
 
 LOST, MISSED, DAMAGED, ABSENT = FrameStatus.LOST, FrameStatus.MISSED, FrameStatus.DAMAGED, FrameStatus.ABSENT
@@ -70,16 +70,68 @@ def test_a_false_tag_is_named(tags: list[TripletTag], pulse: int, tagged: FrameS
     assert difference.in_words().startswith(f"pulse {pulse}: K2 is tagged {tagged} and was {found}: its frame numbers")
 
 
-def test_frames_under_the_wrong_pulse_are_named_one_by_one(tags: list[TripletTag]) -> None:
-    """From pulse 40 to 59 K2's frames are those of the next pulse."""
+def test_frames_under_the_wrong_pulse_are_named_as_one_stretch(tags: list[TripletTag]) -> None:
+    """From pulse 40 to 59 K2's frames are those of the next pulse, and their times say so."""
     mixed = list(tags)
     for pulse in range(40, 60):
         other = tags[pulse].cameras[1]
         mixed = changed(mixed, pulse, lambda _, other=other: other)  # type: ignore[misc]
     mixed = changed(mixed, 60, lambda part: CameraTag(part.name, part.columns, LOST))
     found = recount(mixed)
-    assert [each.pulse for each in found.differences if each.found is None] == list(range(40, 60))
-    assert all("33.3 ms after this pulse" in each.why for each in found.differences[:20])
+    (stretch,) = [each for each in found.differences if each.found is None]
+    assert (stretch.pulse, stretch.last, stretch.camera, stretch.by) == (40, 59, "K2", 1)
+    assert "33.3 ms after this pulse" in stretch.why
+
+
+def slipped(tags: Sequence[TripletTag], first: int, last: int, by: int) -> list[TripletTag]:
+    """K2's times slip by whole periods while the camera numbers its frames on: pulses hold those of others.
+
+    The pulses from `first` to `last` hold the frames of `by` pulses later, at the times of their own pulses. Where two
+    frames have one pulse, the second one is not used.
+    """
+    found, own = list(tags), {tag.pulse: tag for tag in tags}
+    nothing = CameraTag("K2", tags[0].cameras[1].columns, MISSED)
+    for tag in tags:
+        source = own.get(PulseNumber(tag.pulse + by))
+        if last < tag.pulse <= last + by or (first <= tag.pulse <= last and (source is None or source.pulse < first)):
+            found = changed(found, tag.pulse, lambda _: nothing)
+        elif first <= tag.pulse <= last and source is not None:
+            part = source.cameras[1]
+            if part.device_time is not None:
+                part = msgspec.structs.replace(part, device_time=DeviceNs(part.device_time - (source.time - tag.time)))
+            found = changed(found, tag.pulse, lambda _, part=part: part)  # type: ignore[misc]
+    return found
+
+
+@pytest.mark.parametrize("by", [1, -1, 2, -2])
+@pytest.mark.parametrize("last", [300, 400])
+@pytest.mark.parametrize(("seed", "latest_ms", "unnamed"), [(0, 9, 3), (1, 9, 3), (3, 9, 3), (4, 45, 40)])
+def test_a_stretch_of_frames_of_other_pulses_is_named_whole(
+    by: int, last: int, seed: int, latest_ms: int, unnamed: int
+) -> None:
+    """The times slip at pulse 150 and come back at 300, or never; what is named are the pulses that are mixed.
+
+    Where arrivals scatter over more than a period, a few frames beside missing ones may not be named.
+    """
+    scenario = Scenario(
+        seed=seed, pulses=400, missed=0.01, lost=0.01, damaged=0.005, drift_ppm=(0.0, 50.0, -50.0),
+        latency_ns=(5 * MS, latest_ms * MS),
+    )  # fmt: skip
+    right = tags_of(Run(Hill(scenario)).closed)
+    assert recount(right).agrees
+    tags = slipped(right, 150, last, by)
+    own = {tag.pulse: tag.cameras[1].frame_id for tag in right}
+    mixed = [tag.pulse for tag in tags if tag.cameras[1].status is OK and tag.cameras[1].frame_id != own[tag.pulse]]
+    (stretch,) = recount(tags).differences
+    assert (stretch.camera, stretch.by) == ("K2", by)
+    assert stretch.last is not None
+    assert mixed[0] <= stretch.pulse <= mixed[0] + unnamed
+    assert mixed[-1] - unnamed <= stretch.last <= mixed[-1]
+    pulses = "pulse" if abs(by) == 1 else "pulses"
+    said = f"pulses {stretch.pulse} to {stretch.last}: K2 holds the frames of {abs(by)} {pulses} "
+    assert stretch.in_words().startswith(said)
+    found = stretch.to_json()
+    assert (found["pulse"], found["last_pulse"], found["by_pulses"]) == (stretch.pulse, stretch.last, by)
 
 
 def test_a_pulse_without_any_tag_is_noticed(tags: list[TripletTag]) -> None:

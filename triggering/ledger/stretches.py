@@ -1,0 +1,139 @@
+"""Finds stretches of pulses that hold the frames of other pulses, from frame numbers and arrivals.
+
+Where the times of a camera's frames slip by whole periods, tags and times agree, and only two witnesses are left: the
+frame numbers jump against the pulses where the slip begins or ends, and in between each frame comes by so many periods
+later, or sooner, after its pulse than those before. Frame numbers alone do not tell how long it lasts: where they fall
+short, the times may have come back, or the camera missed a pulse.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from rig.pulse import PulseNumber
+
+#: So many frames tell how much the arrivals of a camera scatter.
+_FRAMES: Final = 8
+#: The soonest of n arrivals lies beyond half a period by chance with a probability of exp(-n p / 2 m), where m is their
+#: mean excess over the soonest possible one and p the period, if they are exponential, and less often if they are
+#: bounded. n p / m must be so large that this is below 1e-4.
+_SURE: Final = 18.4
+#: Pulses have a rhythm if the times between neighbours differ by less than this factor.
+_RHYTHM: Final = 1.5
+
+
+@dataclass(slots=True)
+class Run:
+    """Whole frames of a camera, one for each pulse.
+
+    Attributes:
+        first, last: pulses of its first and last frame.
+        excess: by how much the numbers went on more than the pulses where it begins; 0 where they prove nothing.
+        nearest, farther: the least times from one of its pulses to the nearer and the farther pulse beside it, ns.
+        anew: the camera came, went or was silent before it, so that nothing is known of an earlier slip.
+        frames: how many there are.
+        soonest: least time from a pulse to the arrival of its frame, ns.
+        late: sum of these times, ns.
+    """
+
+    first: PulseNumber
+    last: PulseNumber
+    excess: int
+    nearest: int
+    farther: int
+    anew: bool = False
+    frames: int = 0
+    soonest: int = 0
+    late: int = 0
+
+    def take(self, pulse: PulseNumber, late: int, nearest: int, farther: int) -> None:
+        """Take the next frame, which arrived `late` ns after its pulse."""
+        self.nearest, self.farther = min(self.nearest, nearest), min(self.farther, farther)
+        self.soonest = late if not self.frames else min(self.soonest, late)
+        self.last, self.frames, self.late = pulse, self.frames + 1, self.late + late
+
+    def add(self, other: "Run") -> None:
+        """Take the frames of another run."""
+        self.soonest = min(self.soonest, other.soonest) if self.frames else other.soonest
+        self.frames, self.late = self.frames + other.frames, self.late + other.late
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Pulses that hold frames of a camera that belong to other pulses.
+
+    Attributes:
+        first, last: its pulses.
+        by: the frames are of so many pulses later; negative: earlier.
+        later: by how much later, on average, they came after their pulses than the frames before, ns.
+    """
+
+    first: PulseNumber
+    last: PulseNumber
+    by: int
+    later: float
+
+
+def shifts(runs: Sequence[Run]) -> list[int]:
+    """By how many pulses the frames of each run are filed too early; the first one is taken to be right.
+
+    Frames that come as they used to are right, whatever their numbers do. Where too few frames come to tell, a run is
+    like those around it, and right if these differ.
+    """
+    found: list[int | None] = []
+    usual = Run(PulseNumber(0), PulseNumber(0), 0, 0, 0)  # all frames that are right
+    shift = low = high = 0
+    for run in runs:
+        if run.anew:
+            usual = Run(run.first, run.first, 0, 0, 0)
+            shift = low = high = 0
+        low, high = low + min(0, run.excess), high + max(0, run.excess)
+        # A camera may miss pulses where its times come back: the numbers only bound what arrivals tell.
+        if (low == high and not shift) or usual.frames < _FRAMES:
+            told: int | None = 0
+        else:
+            told = _told(usual, run)
+        found.append(told)
+        if told is None:
+            continue
+        if low <= told - shift <= high or not told:
+            shift = told
+        found[-1], low, high = shift, 0, 0
+        if not shift:
+            usual.add(run)
+    return [_between(found, place) for place in range(len(found))]
+
+
+def stretches(runs: Sequence[Run], shifted: Sequence[int]) -> list[Stretch]:
+    """The stretches of runs that are shifted, as `shifts` says."""
+    found: list[Stretch] = []
+    right: Run | None = None
+    for place, (run, by) in enumerate(zip(runs, shifted, strict=True)):
+        if not by:
+            right = run
+        elif place and shifted[place - 1] == by:
+            found[-1] = Stretch(found[-1].first, run.last, by, found[-1].later)
+        else:
+            usual = 0.0 if right is None else right.late / right.frames
+            found.append(Stretch(run.first, run.last, by, run.late / run.frames - usual))
+    return found
+
+
+def _told(usual: Run, run: Run) -> int | None:
+    """By how many periods later than usual the frames of a run came; None: too few to tell, or no rhythm."""
+    if run.farther >= _RHYTHM * run.nearest:
+        return None
+    mean_excess = max(each.late / each.frames - each.soonest for each in (usual, run))
+    if min(usual.frames, run.frames) * run.nearest < _SURE * mean_excess:
+        return None
+    return round((run.soonest - usual.soonest) / run.nearest)
+
+
+def _between(found: Sequence[int | None], place: int) -> int:
+    """The shift of a run; where it is not known, that of its neighbours if they have one."""
+    shift = found[place]
+    if shift is not None:
+        return shift
+    before = next((each for each in reversed(found[:place]) if each is not None), 0)
+    after = next((each for each in found[place:] if each is not None), 0)
+    return before if before == after else 0

@@ -78,7 +78,7 @@ class ProcessDiedError(SvevError):
 
 
 class LogDamagedError(SvevError):
-    """A log was not closed or is damaged; what could be read has been reported."""
+    """A log was not closed, is damaged or not its whole recording; what could be read has been reported."""
 
     exit_code = 3
 

@@ -24,6 +24,8 @@ from triggering.ledger.recounted import Recounted
 _PULSES_MAX = 10_000
 _FINDINGS_MAX = 500
 _FINDING_MAX = 300
+_STILL_WRITTEN = "the log is still being written: verify it when the recording has ended"
+_STOPPED_SHORT = "the log was not closed: the recorder was stopped short"
 
 
 class Findings:
@@ -78,6 +80,7 @@ class VerifyReport:
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
         part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
+        being_written: a program is writing the log.
         off_time: messages far outside of the pulses, one sentence each; nothing is wrong with the pulses.
         unclosed: the finding that the log is not closed; empty: it is.
     """
@@ -94,6 +97,7 @@ class VerifyReport:
     known_lost: tuple[tuple[int, int], ...] = ()
     ended_early: str = ""
     part_before: str = ""
+    being_written: bool = False
     off_time: tuple[str, ...] = ()
     unclosed: str = ""
 
@@ -129,6 +133,7 @@ class VerifyReport:
             "log": str(self.path),
             "verdict": self.verdict.value,
             "closed": self.closed,
+            "being_written": self.being_written,
             "truncated": self.truncated,
             "every_byte_checked": self.every_byte,
             **self.ledger.counts().model_dump(),
@@ -170,22 +175,16 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
         pulses.finish()
         structure.finish()
         apply_extent(reader.metadata, pulses.ledger)
-        if unclosed := "" if reader.closed else _unclosed(path):
+        being_written = not reader.closed and is_being_written(path)
+        if unclosed := "" if reader.closed else _STILL_WRITTEN if being_written else _STOPPED_SHORT:
             findings.add(unclosed)
         return VerifyReport(
             path, reader.size, reader.closed, reader.truncated, pulses.ledger,
             pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
             known_lost(reader), ended_early(reader.metadata), part_before(reader.metadata, path),
-            tuple(times.in_words()), unclosed,
+            being_written, tuple(times.in_words()), unclosed,
         )  # fmt: skip
-
-
-def _unclosed(log: Path) -> str:
-    """Why a log is not closed."""
-    if is_being_written(log):
-        return "the log is still being written: verify it when the recording has ended"
-    return "the log was not closed: the recorder was stopped short"
 
 
 def _flaw(item: Item) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from recorder.log.extent import apply_extent, ended_early, forgotten_s, part_before
 from recorder.log.session_changes import session_changes
+from recorder.log.write_lock import is_being_written
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
@@ -35,6 +36,7 @@ class LogInfo:
         path: the log.
         bytes: size of the file.
         closed: the recorder closed the log properly.
+        being_written: a program is writing the log.
         truncated: the log ends in the middle of a record.
         damaged_bytes: bytes that could not be read.
         torn_bytes: how many of them are an unfinished record at the end; every log that was not closed may have one.
@@ -57,6 +59,7 @@ class LogInfo:
     path: Path
     bytes: int
     closed: bool
+    being_written: bool
     truncated: bool
     damaged_bytes: int
     torn_bytes: int
@@ -105,6 +108,7 @@ class LogInfo:
         return {
             "log": str(self.path),
             "closed": self.closed,
+            "being_written": self.being_written,
             "truncated": self.truncated,
             "damaged_bytes": self.damaged_bytes,
             **ledger.counts().model_dump(),
@@ -169,8 +173,9 @@ def info(path: Path, *, original: bool = False, source: bool = False) -> LogInfo
         if MERGE_METADATA in reader.metadata:
             told = None  # the health records of two computers have two clocks
         session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
+        being_written = not reader.closed and is_being_written(path)
         return LogInfo(
-            path, reader.size, reader.closed, reader.truncated, damaged, torn, ledger, first, session,
+            path, reader.size, reader.closed, being_written, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
             "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata),
             ended_early(reader.metadata), part_before(reader.metadata, path), messages, reader.library,

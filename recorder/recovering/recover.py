@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from recorder.log.extent import END_UNKNOWN, last_before
 from recorder.log.session_changes import session_changes
+from recorder.log.write_lock import is_being_written
 from recorder.reading.items import Message
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import images_of, read_tag, tag_of
@@ -52,6 +53,7 @@ class RecoverReport:
         path: the log that was written.
         bytes: size of the log that was written.
         was_closed: the source had been closed properly.
+        was_written: a program was writing the source, so that more pulses come in it.
         ledger: what became of every pulse, as the new log has it; pulses without a tag are lost.
         lost_pixels: runs of pulses, (first, last), whose tag was found but not their image.
         findings: what could not be read, one sentence each.
@@ -64,6 +66,7 @@ class RecoverReport:
     ledger: Ledger
     lost_pixels: tuple[tuple[int, int], ...]
     findings: tuple[str, ...]
+    was_written: bool = False
 
     @property
     def lossless(self) -> bool:
@@ -77,7 +80,7 @@ class RecoverReport:
     @property
     def end_unknown(self) -> str:
         """What is not known of the end of the recording; empty: the source had been closed."""
-        return "" if self.was_closed else _end_unknown(self.ledger)
+        return "" if self.was_closed else _end_unknown(self.ledger, was_written=self.was_written)
 
     def to_json(self) -> dict[str, Any]:
         """The report as one JSON object."""
@@ -86,6 +89,7 @@ class RecoverReport:
             "log": str(self.path),
             "bytes": self.bytes,
             "was_closed": self.was_closed,
+            "was_written": self.was_written,
             "end_unknown": self.end_unknown,
             "lossless": self.lossless,
             **self.ledger.counts().model_dump(),
@@ -99,7 +103,7 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
     """Write everything of `source` that is sound into a new log.
 
     Args:
-        source: the log, which may still be written; it is only read.
+        source: the log, which may still be written: then the new one says so; it is only read.
         target: must not exist.
         progress: called with the number of bytes of the source that are done.
 
@@ -108,6 +112,7 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
         StorageError: the disk refuses; the target is removed.
     """
     done = progress or (lambda _: None)
+    was_written = is_being_written(source)
     with LogReader(source, salvage=True) as reader:
         _check_target(target)
         changes = session_changes(source)
@@ -131,11 +136,18 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
         found = chain.constants
         own_topics = [(camera.name, camera.columns) for camera in found.cameras] if reader.has_camera_topics else ()
         with RebuiltLog(target, description, found.shape, own_topics, found.pixels) as rebuilt:
-            recovery = _Recovery(reader, rebuilt, chain, scan)
+            recovery = _Recovery(reader, rebuilt, chain, scan, was_written=was_written)
             recovery.write(lambda share: done(reader.size // 2 + round(reader.size / 2 * share)))
             size = recovery.finish()
         return RecoverReport(
-            source, target, size, reader.closed, recovery.ledger, recovery.lost_pixels, recovery.findings.lines()
+            source,
+            target,
+            size,
+            reader.closed,
+            recovery.ledger,
+            recovery.lost_pixels,
+            recovery.findings.lines(),
+            was_written,
         )
 
 
@@ -155,7 +167,8 @@ class _Recovery:
         findings: what could not be read, except pulses.
     """
 
-    def __init__(self, reader: LogReader, rebuilt: RebuiltLog, chain: Chain, scan: Scan) -> None:
+    def __init__(self, reader: LogReader, rebuilt: RebuiltLog, chain: Chain, scan: Scan, *, was_written: bool) -> None:
+        self._was_written = was_written
         self._reader, self._rebuilt, self._chain = reader, rebuilt, chain
         self._others = iter(scan.others)
         self._next_other = next(self._others, None)
@@ -198,7 +211,7 @@ class _Recovery:
         lost = {"lost_pulses": runs_to_text(self.ledger.missing), "lost_pixels": runs_to_text(self.lost_pixels)}
         name, time = self._reader.path.name, datetime.now(UTC).isoformat(timespec="seconds")
         words = _loss(self.ledger, self.lost_pixels, self.findings.lines())
-        end = {} if self._reader.closed else {END_UNKNOWN: _end_unknown(self.ledger)}
+        end = {} if self._reader.closed else {END_UNKNOWN: _end_unknown(self.ledger, was_written=self._was_written)}
         kept = "no pulse up to the last one is lost" if end else "no pulse is lost"
         told = "; ".join([f"this is lost: {words}" if words else kept, *end.values()])
         event = Event.now(
@@ -254,8 +267,10 @@ class _Recovery:
             self._next_other = next(self._others, None)
 
 
-def _end_unknown(ledger: Ledger) -> str:
-    """Says of a log that was never closed that pulses may be missing at its end."""
+def _end_unknown(ledger: Ledger, *, was_written: bool) -> str:
+    """Says of a log that was not closed that pulses are missing at its end, or may be."""
+    if was_written:
+        return f"it was still being written: more pulses came after pulse {ledger.last_pulse or 0}"
     return f"it was never closed: nobody knows whether pulses came after pulse {ledger.last_pulse or 0}"
 
 

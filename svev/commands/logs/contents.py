@@ -30,8 +30,9 @@ def info_command(log: LogPath, as_json: AsJson = False) -> None:
     of the tags. Tells of the jumps too that were measured while it was recorded. Reads no images and so takes a moment
     even for a long log; `svev verify` checks every byte.
 
-    Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed or is damaged. What can be
-    read is printed in any case.
+    Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed, is still being written, is
+    damaged, or is not its whole recording (it ended early, or goes on from one that does not lie beside it). What can
+    be read is printed in any case.
 
     Example: svev info recordings/jump.mcap
     """
@@ -41,12 +42,15 @@ def info_command(log: LogPath, as_json: AsJson = False) -> None:
     else:
         for name, text in (*_lines(found), *((f"jump {jump.jump}", jump.verdict) for jump in jumps)):
             console.say(f"{name:<10} {text}")
+    if found.being_written:
+        raise LogDamagedError(f"{log}: the log is still being written: look at it when the recording has ended")
     if found.truncated:
         raise truncated(log)
     if not found.closed:
-        raise LogDamagedError(f"{log}: the log was not closed, or is still being written; check it with `svev verify`")
+        raise LogDamagedError(f"{log}: the log was not closed; check it with `svev verify`")
     if found.damaged_bytes:
         raise LogDamagedError(f"{log}: {found.damaged_bytes} bytes are damaged; see which pulses with `svev verify`")
+    _refuse_a_part(log, found.ended_early, found.part_before)
 
 
 def verify_command(
@@ -69,8 +73,9 @@ def verify_command(
     the pulses told (a trigger box, a line of the computer), that is compared as well.
 
     Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
-    was killed leaves a log that is not closed); 7 sound, but contradicted, with --ledger also where only a cause is.
-    What can be read is printed in any case.
+    was killed leaves a log that is not closed), still being written, or not the whole recording (it ended early, its
+    end is not known, or it goes on from a log that does not lie beside it); 7 sound, but contradicted, with --ledger
+    also where only a cause is. What can be read is printed in any case.
 
     Example: svev verify recordings/jump.mcap
     """
@@ -83,7 +88,7 @@ def verify_command(
         _print_verified(report, () if with_ledger else report.recounted.misfiled)
         if with_ledger:
             _print_recounted(report.recounted)
-    if report.truncated:
+    if report.truncated and not report.being_written:
         raise truncated(log)
     if report.damaged:
         raise LogDamagedError(f"{log}: damaged: {_first_flaw(report)}; the pulses counted above are readable")
@@ -94,6 +99,7 @@ def verify_command(
             f"{log}: its ledger does not agree with its tags: {first}; measure nothing at the pulses that are named, "
             "and look at the events of that time"
         )
+    _refuse_a_part(log, report.ended_early, report.part_before)
 
 
 def recover_command(
@@ -106,8 +112,9 @@ def recover_command(
     Copies everything that is sound. If the image of a pulse is destroyed but not its tag, the tag is kept, and calls
     the frames that the image had "damaged". Prints what is lost, and writes it into the new log too.
 
-    Exit codes: 0 nothing was lost; 2 no such file, or no pulse in it that can be read, or the new log cannot be made;
-    3 recovered, but something was lost; 4 the disk is full or fails.
+    Exit codes: 0 everything in the log is in the new one (whether that is the whole recording, `svev verify` of the
+    new one says); 2 no such file, or no pulse in it that can be read, or the new log cannot be made;
+    3 recovered, but something was lost, or the log is still being written; 4 the disk is full or fails.
 
     Example: svev recover recordings/jump.mcap -o recordings/jump-recovered.mcap
     """
@@ -119,6 +126,25 @@ def recover_command(
         _print_recovered(report)
     if not report.lossless:
         raise LogDamagedError(f"{log}: recovered into {out}, but this is lost: {report.in_words()}")
+    if report.was_written:
+        raise LogDamagedError(
+            f"{log}: recovered into {out}, but it is still being written: recover it again when the recording has ended"
+        )
+
+
+def _refuse_a_part(log: Path, ended_early: str, part_before: str) -> None:
+    """Say by the exit code that a sound log does not hold its whole recording.
+
+    Raises:
+        LogDamagedError: it ended early, or the log before it does not lie beside it.
+    """
+    if part_before:
+        raise LogDamagedError(
+            f"{log}: not the whole recording: goes on from {part_before}, which does not lie beside it: put both into "
+            "one folder"
+        )
+    if ended_early:
+        raise LogDamagedError(f"{log}: not the whole recording: {ended_early}; what it holds is sound")
 
 
 def truncated(log: Path) -> LogTruncatedError:

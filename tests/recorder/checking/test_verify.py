@@ -122,6 +122,7 @@ def test_a_complete_log_is_clean(tmp_path: Path) -> None:
     assert read[-1] == (tmp_path / "log.mcap").stat().st_size - 8  # all but the closing magic
     assert report.to_json() | {"events": []} == {
         "log": str(tmp_path / "log.mcap"), "verdict": "clean", "closed": True, "truncated": False,
+        "being_written": False,
         "every_byte_checked": True, "pulses": 5, "complete": 5, "partial": 0,
         "causes": {"lost": 0, "missed": 0, "damaged": 0, "absent": 0}, "bytes": (tmp_path / "log.mcap").stat().st_size,
         "missing_pulses": [], "incomplete_pulses": [], "pauses": [], "ended_early": "",

@@ -16,6 +16,7 @@ from rig.settings.model import RigSettings
 from service.headless import HeadlessRig, record
 from service.recordings.storage import new_log_path
 from svev import console
+from svev.claims import folder_claim
 from svev.demo_analysis import measure
 
 Bus = Literal["gige", "firewire", "sim"]
@@ -51,9 +52,13 @@ def run_demo(
     """
     rig_file = CONFIG / "rigs" / _RIGS[bus]
     rig = _on_free_addresses(load_rig(rig_file))
-    path = new_log_path(out)
     say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
-    with counted_endings() as asks, HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running:
+    with (
+        folder_claim(out, "svev demo", "--out"),
+        counted_endings() as asks,
+        HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running,
+    ):
+        path = new_log_path(out)
         running.wait_until_warm(asks)
         with subscriber(rig.network.publish) as count_received:
             session = {"session": "demo", "athlete": "simulated jumper"}

@@ -17,6 +17,7 @@ from service.headless import HeadlessRig
 from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
+from svev.claims import folder_claim
 
 
 def record(
@@ -35,7 +36,8 @@ def record(
     frame came and, if not, why. Ctrl-C ends the recording early; its log is finished properly. A second Ctrl-C does not
     wait for a disk that is slow or hangs.
 
-    Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, or a camera does not answer,
+    Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, another svev records into the
+    folder, or a camera does not answer,
     4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but no pulses come, or none
     came for a while (the log is whole, and "pauses" says when), or clocks, trigger or rate were wrong (the log is
     whole, and "alarms" says what), 6 the recorder died; the log is readable up to that moment.
@@ -46,8 +48,12 @@ def record(
     settings = settings.without_absent() if allow_absent else settings
     _check_session(session)
     check_publication(settings.network)
-    path = new_log_path(out)
-    with counted_endings() as asks, HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running:
+    with (
+        folder_claim(out, "svev record", "--out"),
+        counted_endings() as asks,
+        HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running,
+    ):
+        path = new_log_path(out)
         result, disk_error = record_with(
             running, settings, path, seconds, session={"session": session},
             progress=console.progress, asks=asks,

@@ -10,14 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.clocks import UtcNs
-from rig.errors import BadInputError, ProcessDiedError, StorageError
+from rig.errors import ProcessDiedError, StorageError
 from rig.events import Event, Level
 from rig.transport.process_table import BackOff
 from service.recordings.storage import check_room_for, room_for
 from service.status.event_hub import EventHub
 from service.supervision.commands import Commands
 from service.supervision.watching import PulseRate
-from svev.serving.claims import data_lock
 from svev.serving.systemd import log_line
 from tests.support.rigs import SIM
 
@@ -138,14 +137,3 @@ def test_commands_are_answered_by_their_owner_in_order() -> None:
     with pytest.raises(ProcessDiedError, match="is ending"):
         commands.ask(note(0), 10.0)
     commands.close()
-
-
-def test_a_directory_has_one_service(tmp_path: Path) -> None:
-    data = tmp_path / "new" / "data"
-    with data_lock(data), pytest.raises(BadInputError, match="another svev serve"), data_lock(data):
-        pass
-    with data_lock(data):
-        pass
-    (tmp_path / "file").touch()
-    with pytest.raises(BadInputError, match="cannot be written"), data_lock(tmp_path / "file"):
-        pass

@@ -1,7 +1,6 @@
 """What the catalogue knows of one recording, read from its log."""
 
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -15,13 +14,11 @@ from recorder.reading.log_reader import ForeignFileError
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
+from rig.host.file_names import is_recording_id
 from rig.pulse import Pause
 from rig.topics import TAG
 
 SUFFIX: Final = ".mcap"
-#: What the id of a recording looks like: the name of its log without the suffix. A browser
-#: names a second copy `jump (1)`.
-LOG_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. ()-]{0,99}", re.ASCII)
 
 
 class LogState(StrEnum):
@@ -149,6 +146,16 @@ def _in_words(path: Path, error: Exception) -> str:
 def _trouble(path: Path, stat: os.stat_result, text: str, kind: Trouble = Trouble.UNREADABLE) -> Entry:
     """The entry of a file of which nothing can be read."""
     return Entry(path.stem, stat.st_size, UtcNs(stat.st_mtime_ns), LogState.DAMAGED, trouble=text, kind=kind)
+
+
+def unlisted_logs(folder: Path) -> list[str]:
+    """Names of the logs in a folder that no list can show, since no address can hold them; hidden ones are nobody's.
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    names = (name for name in os.listdir(folder) if name.endswith(SUFFIX) and not name.startswith("."))  # noqa: PTH208
+    return sorted(name for name in names if not is_recording_id(name.removesuffix(SUFFIX)))
 
 
 def with_changes(entry: Entry, path: Path, *, deleted: bool) -> Entry:

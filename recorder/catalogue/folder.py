@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.catalogue.entry import LOG_ID, SUFFIX, Entry, link_text
+from recorder.catalogue.entry import SUFFIX, Entry, link_text
 from recorder.catalogue.log_cache import LogCache
 from recorder.catalogue.trash import (
     TrashContents,
@@ -35,13 +35,14 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.errors import BadInputError, LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
-from rig.host.file_names import give_name
+from rig.host.file_names import ID_BYTES_MAX, give_name, is_recording_id
 from rig.host.files import make_folder, opened_folder
 from rig.images.picture import shown
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
 _STEM_MAX: Final = 90
+_NUMBER_MAX: Final = 10
 
 
 class Catalogue:
@@ -298,7 +299,7 @@ class Catalogue:
 
     def _path(self, recording: str, *, prefer_deleted: bool = False) -> Path:
         """The log of a recording, looked for in the folder first or, if `prefer_deleted`, in the trash first."""
-        if LOG_ID.fullmatch(recording):
+        if is_recording_id(recording):
             for deleted in (prefer_deleted, not prefer_deleted):
                 if deleted and self._trash.is_symlink():  # whatever it leads to does not lie in this folder
                     continue
@@ -331,7 +332,7 @@ class Catalogue:
         name, numbers = log.name, count(2)
         if os.path.lexists(target / name):
             while os.path.lexists(self.directory / name) or os.path.lexists(self._trash / name):
-                name = f"{log.stem[:_STEM_MAX]}-{next(numbers)}{SUFFIX}"
+                name = f"{_cut(log.stem)}-{next(numbers)}{SUFFIX}"
         return target / name
 
 
@@ -341,6 +342,14 @@ def _remove(logs: Iterable[TrashedLog]) -> TrashContents:
     for log in logs:
         remove_for_good(log)
     return TrashContents(len(logs), sum(log.bytes for log in logs))
+
+
+def _cut(stem: str) -> str:
+    """As much of an id as leaves room for a number behind it."""
+    stem = stem[:_STEM_MAX]
+    while len(os.fsencode(stem)) > ID_BYTES_MAX - _NUMBER_MAX:
+        stem = stem[:-1]
+    return stem
 
 
 def _move_beside(log: Path, target: Path) -> None:

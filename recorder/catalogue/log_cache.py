@@ -10,13 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from recorder.catalogue.entry import LOG_ID, SUFFIX, Entry, LogState, read_entry, with_changes
+from recorder.catalogue.entry import SUFFIX, Entry, LogState, read_entry, with_changes
 from recorder.catalogue.index_file import FileKey, KeptEntry, file_key, keep, load_kept
 from recorder.log.session_changes import session_name, session_path
 from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets
 from rig.errors import BadInputError
+from rig.host.file_names import is_recording_id
 from rig.pulse import PulseNumber
 
 #: A growing log is read again when this many times the duration of the last reading has passed.
@@ -87,7 +88,7 @@ class LogCache:
         entries = []
         with self._lock:
             for name, file in files.items():
-                if name.endswith(SUFFIX) and LOG_ID.fullmatch(stem := name.removesuffix(SUFFIX)):
+                if name.endswith(SUFFIX) and is_recording_id(stem := name.removesuffix(SUFFIX)):
                     beside = files.get(session_name(stem))
                     looks = (
                         partial(file.stat, follow_symlinks=False),

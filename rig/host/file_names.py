@@ -1,15 +1,34 @@
-"""The names of a file: the one under which it is written, and the one that it gets when it is whole."""
+"""The names of a file: the one under which it is written, the one that it gets when it is whole, ids of recordings."""
 
 import ctypes
 import errno
 import os
+import re
 import zlib
 from pathlib import Path
 from typing import Final
 
 #: Longest name of a file, bytes (linux/limits.h).
 NAME_MAX: Final = 255
+#: What no id holds: control characters, soft hyphens, marks without width or that turn the direction, no-characters.
+_UNSEEN: Final = r"\u00ad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff0-\uffff"
+#: What the id of a recording looks like, for Python, Rust and JavaScript: it begins with a letter or digit, and holds
+#: nothing that ends a part of an address, that Windows forbids in names, or that nobody sees.
+ID_PATTERN: Final = (
+    rf"[^\u0000-/:-@\[-`{{-\u00a0{_UNSEEN}]" rf'[^\u0000-\u001f"*/:<>?\\|\u007f-\u00a0{_UNSEEN}]{{0,99}}'
+)
+#: Files beside a log have longer names.
+ID_BYTES_MAX: Final = 220
+_ID: Final = re.compile(ID_PATTERN)
 _AT_FDCWD, _RENAME_NOREPLACE = -100, 1  # linux/fcntl.h, linux/fs.h
+
+
+def is_recording_id(name: str) -> bool:
+    """Whether a recording may have this id: the name of its log without the suffix."""
+    try:
+        return _ID.fullmatch(name) is not None and len(name.encode()) <= ID_BYTES_MAX
+    except UnicodeEncodeError:  # no UTF-8 on the disk: no address can hold it
+        return False
 
 
 def unfinished_path(path: Path, ending: str) -> Path:

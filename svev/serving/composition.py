@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+from recorder.catalogue.entry import unlisted_logs
 from recorder.catalogue.folder import Catalogue
 from recorder.publishing.keys import check_publication
 from rig.api.jump import LastJump
@@ -132,7 +133,7 @@ def serve(settings: ServiceSettings) -> None:
         with _signals(server, supervisor, notify):
             supervisor.start()
             try:
-                _tell_of_folders(settings, rig, hub, exports)
+                _tell_of_folders(settings, rig, data, hub, exports)
                 if settings.access.tokens.warning:
                     hub.tell(Event.now(Level.WARNING, "access", plain(settings.access.tokens.warning)))
                 service.watch()
@@ -183,10 +184,14 @@ def _telling(
     return turn
 
 
-def _tell_of_folders(settings: ServiceSettings, rig: RigSettings, hub: EventHub, exports: Exports) -> None:
-    """Say if exports have no folder, and warn if the command line overrides a folder that the rig file names."""
+def _tell_of_folders(settings: ServiceSettings, rig: RigSettings, data: Path, hub: EventHub, exports: Exports) -> None:
+    """Say if exports have no folder, logs cannot be listed, or the command line overrides the rig file's folder."""
     if exports.refused is not None:
         hub.tell(Event.now(Level.ERROR, "exports", exports.refused))
+    if hidden := unlisted_logs(data):
+        text = "{count} logs in {folder} are not listed, such as {name}: rename them, beginning with a letter or digit"
+        said = phrase("event_unlisted", text, count=len(hidden), folder=str(data), name=hidden[0])
+        hub.tell(Event.now(Level.WARNING, "service", said))
     named = rig.recorder.directory
     given = settings.data
     if given is None or "directory" not in rig.recorder.model_fields_set or given.resolve() == named.resolve():

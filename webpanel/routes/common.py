@@ -9,6 +9,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 
 from rig.api.fields import Model
+from rig.host.file_names import ID_PATTERN
 from webpanel.problems import MEDIA_TYPE
 
 
@@ -16,11 +17,9 @@ class Nothing(Model):
     """A body without fields."""
 
 
-#: What an id of a recording looks like.
-ID_PATTERN: Final = r"[A-Za-z0-9][A-Za-z0-9_. ()\-]{0,99}"
 RecordingId = Annotated[
     str,
-    Path(pattern=f"^{ID_PATTERN}$", description="id of a recording", examples=["20260214-101530"]),
+    Path(pattern=f"^{ID_PATTERN}$", description="id of a recording, percent-encoded", examples=["20260214-101530"]),
 ]
 NoFields = Annotated[Nothing | None, Body(description="nothing, or an empty object")]
 

@@ -11,7 +11,7 @@ from contextlib import asynccontextmanager
 from email.utils import formatdate
 from http import HTTPStatus
 from typing import Annotated, Any, Final
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 import anyio
 from anyio.to_thread import run_sync
@@ -24,7 +24,7 @@ from service.seam.archive import Download
 from service.seam.rig import RigService
 from webpanel.door.streams import Streams
 from webpanel.problems import problem
-from webpanel.routes.common import ID_PATTERN, RecordingId, Responses, refusals, strict_router
+from webpanel.routes.common import RecordingId, Responses, refusals, strict_router
 
 _BINARY: Final = {"schema": {"type": "string", "format": "binary"}}
 _LOG: Final = {"application/octet-stream": _BINARY}
@@ -47,8 +47,11 @@ _TOGETHER_MAX: Final = 500
 Ids = Annotated[
     str,
     Query(
-        pattern=rf"^{ID_PATTERN}(,{ID_PATTERN}){{0,{_TOGETHER_MAX - 1}}}$",
-        description=f"ids of the recordings, with commas between, at most {_TOGETHER_MAX}",
+        pattern=rf"^[^,]+(,[^,]+){{0,{_TOGETHER_MAX - 1}}}$",
+        description=(
+            f"ids of the recordings, each percent-encoded if it holds a comma or %, with commas between, at most "
+            f"{_TOGETHER_MAX}"
+        ),
         examples=["jump-1,jump-2"],
     ),
 ]
@@ -60,6 +63,8 @@ _LOOK_S: Final = 0.2
 _PLAIN: Final = str.maketrans(
     {"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "đ": "d", "Đ": "D", "ł": "l", "Ł": "L", "ß": "ss", "ð": "d", "þ": "th"}
 )
+
+_QUOTES: Final = str.maketrans(dict.fromkeys('"/\\', "-"))
 
 
 @asynccontextmanager
@@ -131,25 +136,30 @@ def files_router(service: RigService, downloads: Streams) -> APIRouter:
     )
     def download_together(ids: Ids) -> StreamingResponse:
         """Several recordings as one ZIP archive without compression; `SHA256SUMS` in it has their checksums."""
-        size, pieces = service.zipped(ids.split(","))
+        size, pieces = service.zipped(_split(ids))
         return StreamingResponse(pieces, media_type="application/zip", headers=_zip_headers(ids, size))
 
     @router.head("/recordings.zip", include_in_schema=False)
     def head_together(ids: Ids) -> Response:
-        size, _ = service.zipped(ids.split(","))
+        size, _ = service.zipped(_split(ids))
         return Response(media_type="application/zip", headers=_zip_headers(ids, size))
 
     return router
 
 
+def _split(ids: str) -> list[str]:
+    return [unquote(each) for each in ids.split(",")]
+
+
 def _zip_headers(ids: str, size: int) -> dict[str, str]:
-    name = f"svev_{len(set(ids.split(',')))}-jumps.zip"
+    name = f"svev_{len(set(_split(ids)))}-jumps.zip"
     return {"Content-Disposition": f'attachment; filename="{name}"', "Content-Length": str(size)}
 
 
 def attachment(name: str) -> str:
     """The header that names a file; other letters than ASCII in the extended form (RFC 6266, 4.3)."""
     apart = unicodedata.normalize("NFKD", name.translate(_PLAIN)).encode("ascii", "ignore").decode()
+    apart = apart.translate(_QUOTES)  # wide letters fall apart into them
     extended = "" if apart == name else f"; filename*=UTF-8''{quote(name)}"
     return f'attachment; filename="{apart}"{extended}'
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from recorder.catalogue import log_cache
-from recorder.catalogue.entry import LogState, read_entry
+from recorder.catalogue.entry import LogState, read_entry, unlisted_logs
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.reading.info import info
@@ -87,11 +87,12 @@ def test_a_missing_folder_holds_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["", ".", "..", "../secret", "..%2fsecret", "a/b", "/etc/passwd", ".hidden", "-rf", "a\0", "a\n", "å", "a,b",
-     "x" * 101, ".trash/jump", "secret.mcap/../secret"],
+    ["", ".", "..", "../secret", "..%2fsecret", "a/b", "/etc/passwd", ".hidden", "-rf", "a\0", "a\n", "å", "a:b",
+     "x" * 101, "å" * 111, "a\\b", 'a"b', "a\u202eb", "a\u200bb", "a\x85", "sted-\udce5",
+     ".trash/jump", "secret.mcap/../secret"],
 )  # fmt: skip
 def test_an_id_never_leaves_the_folder(folder: Path, name: str) -> None:
-    for place in (folder.parent / "secret.mcap", folder / ".hidden.mcap", folder / "a,b.mcap"):
+    for place in (folder.parent / "secret.mcap", folder / ".hidden.mcap", folder / "a:b.mcap"):
         write_log(place, (ALL_OK,))
     catalogue = Catalogue(folder)
     for ask in (catalogue.entry, catalogue.tags, catalogue.delete, catalogue.restore):
@@ -307,11 +308,17 @@ def test_the_changes_are_plain_json(folder: Path) -> None:
     assert json.loads((folder / "jump.session.json").read_text()) == {"bib": "3"}
 
 
-def test_a_copy_as_browsers_name_it_is_listed_and_goes_to_the_trash_and_back(tmp_path: Path) -> None:
-    for name in ("jump", "jump (1)"):
-        write_log(tmp_path / f"{name}.mcap", (ALL_OK,))
+@pytest.mark.parametrize("name", ["jump (1)", "Åre, 2. omgang", "a+b%2f", "飛躍", "å" * 100, "😀" * 50, "a'&;=#~"])
+def test_whatever_an_address_can_hold_is_listed_and_goes_to_the_trash_and_back(tmp_path: Path, name: str) -> None:
+    for each in ("jump", name, "a:b", "sted-\udce5", ".hidden"):
+        write_log(tmp_path / f"{each}.mcap", (ALL_OK,))
+    assert unlisted_logs(tmp_path) == ["a:b.mcap", "sted-\udce5.mcap"]
     catalogue = Catalogue(tmp_path)
-    assert {entry.id for entry in catalogue.entries()} == {"jump", "jump (1)"}
-    catalogue.change_session("jump (1)", {"bib": "17"})
-    assert catalogue.delete("jump (1)").deleted
-    assert catalogue.restore("jump (1)").session["bib"] == "17"
+    assert {entry.id for entry in catalogue.entries()} == {"jump", name}
+    catalogue.change_session(name, {"bib": "17"})
+    assert catalogue.delete(name).deleted
+    write_log(tmp_path / f"{name}.mcap", (ALL_OK,))
+    second = catalogue.delete(name).id
+    assert second != name
+    assert {entry.id for entry in Catalogue(tmp_path).entries(deleted=True)} == {name, second}
+    assert catalogue.restore(name).session["bib"] == "17"

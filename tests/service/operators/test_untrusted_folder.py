@@ -26,11 +26,15 @@ def test_the_service_comes_up_beside_pipes_and_links_and_says_so(tmp_path: Path,
     for name in (NAME, FOLDER, REHEARSAL, ".svev-catalogue", "jump.mcap", "jump.jumper.json", "jump.session.json"):
         os.mkfifo(data / name)
     (data / UNDO_NAME).symlink_to(dear)
+    (data / "jump 10:30.mcap").touch()
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
         assert service.data == data
         messages = service.log.read_text().splitlines()
         assert any(NAME in each and "a device or a pipe" in each for each in messages), messages
         assert any(FOLDER in each and "exports cannot be kept there" in each for each in messages), messages
+        assert any("1 logs in" in each and "such as jump 10:30.mcap: rename them" in each for each in messages), (
+            messages
+        )
         assert service.get("/api/recordings")[0]["verdict"]["level"] == "error"
         service.call_table(b"bib,athlete\n17,Ola Nordmann\n")
         wait_until(lambda: not (data / UNDO_NAME).is_symlink(), "the start list is kept")

@@ -5,6 +5,7 @@ import contextlib
 import hashlib
 import io
 import zipfile
+from urllib.parse import quote
 
 import cv2
 import httpx
@@ -185,8 +186,9 @@ def test_several_recordings_come_as_one_archive(client: httpx.Client, service: M
     assert int(answer.headers["content-length"]) == len(answer.content)
     head = client.head("/api/recordings.zip?ids=jump,other").headers
     assert (head["content-type"], head["content-length"]) == ("application/zip", answer.headers["content-length"])
-    refused(client.get("/api/recordings.zip?ids=jump,nobody"), 404)
-    for wrong in ("", "?ids=", "?ids=jump,", "?ids=a/b", "?ids=jump&ids=other"):
+    for missing in ("nobody", "a/b", "%252e%252e", "a%252fb"):
+        refused(client.get(f"/api/recordings.zip?ids=jump,{missing}"), 404)
+    for wrong in ("", "?ids=", "?ids=jump,", "?ids=jump&ids=other"):
         refused(client.get(f"/api/recordings.zip{wrong}"), 422)
 
 
@@ -292,6 +294,23 @@ def test_a_broken_log_is_a_problem_not_a_crash(client: httpx.Client, service: Me
         for path in ("", "/pulses", "/pulses/1.jpg", "/thumbnail.jpg", "/file"):
             answer = client.get(f"/api/recordings/{name}{path}")
             assert answer.status_code in {200, 404, 422, 503}, answer.text
+
+
+@pytest.mark.parametrize("name", ["Åre, 2. omgang", "a+b%2f", "飛躍", "\uff02x", "a#"])
+def test_logs_with_any_letters_are_reached_by_their_percent_encoded_names(
+    service: MemoryService, client: httpx.Client, log: bytes, name: str
+) -> None:
+    (service.catalogue.directory / f"{name}.mcap").write_bytes(log)
+    assert {each["id"] for each in client.get("/api/recordings").json()} == {"jump", name}
+    address = f"/api/recordings/{quote(name, safe='')}"
+    assert client.get(address).json()["id"] == name
+    answer = client.get(f"{address}/file")
+    assert answer.content == log
+    assert f"filename*=UTF-8''{quote(name + '.mcap')}" in answer.headers["content-disposition"] or name.isascii()
+    assert answer.headers["content-disposition"].count('"') == 2
+    together = client.get("/api/recordings.zip", params={"ids": f"jump,{quote(name, safe='')}"})
+    with zipfile.ZipFile(io.BytesIO(together.content)) as archive:
+        assert archive.namelist() == ["jump.mcap", f"{name}.mcap", "SHA256SUMS"]
 
 
 def test_a_copy_as_browsers_name_it_is_handed_out(service: MemoryService, client: httpx.Client, log: bytes) -> None:

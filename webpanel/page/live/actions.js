@@ -106,7 +106,7 @@ async function save() {
 function announce(recording) {
   const { level, text } = { level: recording.verdict.level, text: say(recording.verdict).text };
   const saved = t("actions.saved", { who: who(recording.session, recording.id), verdict: text });
-  tell(level === "error" ? "warning" : level, saved, { words: t("actions.view"), action: () => go(`recordings/${recording.id}`) });
+  tell(level === "error" ? "warning" : level, saved, { words: t("actions.view"), action: () => go(`recordings/${encodeURIComponent(recording.id)}`) });
 }
 
 /**

@@ -132,7 +132,7 @@ function draw() {
   const running = status.recording;
   $("jumping").hidden = !running;
   if (running) {
-    $("jumping").href = `#/recordings/${running.id}`;
+    $("jumping").href = `#/recordings/${encodeURIComponent(running.id)}`;
     setText($("jumping"), t("session.running", { who: who(running.session, t("recordings.nobody")) }));
   }
   const { line, more } = status.next_jumper;

@@ -79,7 +79,7 @@ export function drawSelection() {
   const possible = those.length > 0 && those.length <= MOST_TOGETHER;
   link.classList.toggle("off", !possible);
   if (!possible) link.removeAttribute("href");
-  else link.href = those.length === 1 ? partOf(those[0].id, "file") : `./api/recordings.zip?ids=${those.map(({ id }) => encodeURIComponent(id)).join(",")}`;
+  else link.href = those.length === 1 ? partOf(those[0].id, "file") : `./api/recordings.zip?ids=${those.map(({ id }) => encodeURIComponent(encodeURIComponent(id))).join(",")}`;
 }
 
 /** @param {(those: Recording[]) => Promise<void>} action */

@@ -11,6 +11,7 @@ from typing import Final
 from recorder.log.session_changes import session_changes
 from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import ForeignFileError
+from recorder.reading.records import link_text
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
@@ -112,7 +113,7 @@ def read_entry(path: Path) -> Entry:
         if not S_ISREG(stat.st_mode):
             text = f"{path}: is a folder or a device, no log; move it out of the folder"
             return _trouble(path, stat, text, Trouble.NO_FILE)
-        found = info(path, original=True)
+        found = info(path, original=True, links=False)  # another file may have got the name
     except ForeignFileError:
         text = f"{path}: is no log of svev, or its beginning is damaged; try svev recover, or move it out of the folder"
         return _trouble(path, stat, text, Trouble.HEADLESS)
@@ -128,11 +129,6 @@ def read_entry(path: Path) -> Entry:
         cameras=found.cameras, shape=found.shape, session=found.session,
         disk=found.trouble, forgotten_s=found.forgotten_s, ended_early=found.ended_early,
     )  # fmt: skip
-
-
-def link_text(path: Path) -> str:
-    """What is wrong with a link under the name of a log."""
-    return f"{path}: is a link, and links are not followed; put the log itself here, or remove the link"
 
 
 def _in_words(path: Path, error: Exception) -> str:

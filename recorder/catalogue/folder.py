@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.catalogue.entry import SUFFIX, Entry, link_text
+from recorder.catalogue.entry import SUFFIX, Entry
 from recorder.catalogue.log_cache import LogCache
 from recorder.catalogue.trash import (
     TrashContents,
@@ -34,7 +34,7 @@ from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
-from rig.errors import BadInputError, LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
+from rig.errors import LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
 from rig.host.file_names import ID_BYTES_MAX, give_name, is_recording_id
 from rig.host.files import make_folder, opened_folder
 from rig.images.picture import shown
@@ -100,8 +100,8 @@ class Catalogue:
             UnknownRecordingError: no recording has this id.
             BadInputError: it may not be read, or is no regular file.
         """
-        path = self._log(recording)
-        FileWindow(path, direct=False).close()
+        path = self._path(recording)
+        FileWindow(path, direct=False, links=False).close()
         return path
 
     def tags(self, recording: str) -> tuple[TripletTag, ...]:
@@ -111,7 +111,7 @@ class Catalogue:
             UnknownRecordingError: no recording has this id.
             BadInputError: the log cannot be read.
         """
-        return tuple(tags(self._log(recording)))
+        return tuple(tags(self._path(recording), links=False))
 
     def image(self, recording: str, pulse: int) -> NDArray[np.uint8]:
         """The image of one pulse, to look at, a copy: (rows, columns), uint8, of a mosaic (rows, columns, 3).
@@ -123,11 +123,13 @@ class Catalogue:
             BadInputError: the log cannot be read.
             LogDamagedError: the image is damaged.
         """
-        path = self._log(recording)
-        place = self._logs.image_places(path, pulse).get(PulseNumber(pulse))
-        if place is None:
-            raise UnknownRecordingError(f"recording {recording} has no image of pulse {pulse}: choose another pulse")
-        with LogReader(path, skim=True) as reader:
+        path = self._path(recording)
+        with LogReader(path, skim=True, links=False) as reader:
+            place = self._logs.image_places(reader, pulse).get(PulseNumber(pulse))
+            if place is None:
+                raise UnknownRecordingError(
+                    f"recording {recording} has no image of pulse {pulse}: choose another pulse"
+                )
             try:
                 stored, pixels = stored_image(reader, pulse, *place)
                 return np.array(shown(stored, pixels, coloured=True))
@@ -307,18 +309,6 @@ class Catalogue:
                 if os.path.lexists(path):
                     return path
         raise _unknown(recording)
-
-    def _log(self, recording: str) -> Path:
-        """The log of a recording, to be read.
-
-        Raises:
-            UnknownRecordingError: no recording has this id.
-            BadInputError: it is a link: whatever it leads to does not lie in this folder.
-        """
-        path = self._path(recording)
-        if path.is_symlink():
-            raise BadInputError(link_text(path))
-        return path
 
     def _entry(self, path: Path) -> Entry | None:
         """The entry of a file, None if the file has just been removed."""

@@ -155,22 +155,19 @@ class LogCache:
         self._unsaved = self._unsaved or entry.state is not LogState.UNFINISHED
         return entry
 
-    def image_places(self, path: Path, pulse: int) -> Mapping[PulseNumber, tuple[int, int]]:
-        """Offset and length of the log's image messages by pulse, that of `pulse` among them if there is one.
+    def image_places(self, reader: LogReader, pulse: int) -> Mapping[PulseNumber, tuple[int, int]]:
+        """Offset and length of an open log's image messages by pulse, that of `pulse` among them if there is one.
 
         Places in a log that has only grown since it was read are still true.
 
         Raises:
             BadInputError: the log cannot be read.
         """
+        path = reader.path
         with self._lock:
-            try:
-                key, known = file_key(path.lstat()), self._places.pop(path, None)
-            except OSError as error:
-                raise BadInputError(f"{path}: cannot be read ({error.strerror}); correct or remove it") from None
+            key, known = file_key(reader.status), self._places.pop(path, None)
             if known is None or (known.key != key and (known.key[0] != key[0] or pulse not in known.by_pulse)):
-                with LogReader(path, skim=True) as reader:
-                    by_pulse = {stored.tag.pulse: (stored.offset, stored.length) for stored in stored_triplets(reader)}
+                by_pulse = {stored.tag.pulse: (stored.offset, stored.length) for stored in stored_triplets(reader)}
                 known = _Places(key, by_pulse)
             self._places[path] = known  # the newest stands last
             if len(self._places) > _PLACES_MAX:
@@ -184,7 +181,7 @@ class LogCache:
         if known.key[0] != key[0]:
             return False
         try:
-            with LogReader(self._directory / name, skim=True) as reader:
+            with LogReader(self._directory / name, skim=True, links=False) as reader:
                 return not reader.closed
         except (OSError, BadInputError):
             return False  # then reading it anew says what is wrong

@@ -67,12 +67,14 @@ class CorrectedLog:
 
     Attributes:
         path: the original.
+        status: of the original when it was looked at.
         size: bytes of the corrected log.
         pieces: from its begin to its end.
         corrected: it differs from the original.
     """
 
     path: Path
+    status: os.stat_result
     size: int
     pieces: tuple[Piece, ...]
     corrected: bool
@@ -81,7 +83,8 @@ class CorrectedLog:
         """The corrected log, open for reading; close it.
 
         Raises:
-            OSError: the original is no longer there, or may not be read.
+            BadInputError: the original is another file by now.
+            OSError: it is no longer there, or may not be read.
         """
         return io.BufferedReader(_CorrectedFile(self), _BUFFER)
 
@@ -100,7 +103,7 @@ def corrected_log(path: Path, changes: Mapping[str, str]) -> CorrectedLog:
     Raises:
         BadInputError: the log cannot be read, or is no regular file.
     """
-    window = FileWindow(path, direct=False)
+    window = FileWindow(path, direct=False, links=False)
     try:
         found = _find(window) if changes else None
         pieces = None if found is None else _Correction(window, found, changes).pieces()
@@ -109,8 +112,8 @@ def corrected_log(path: Path, changes: Mapping[str, str]) -> CorrectedLog:
     finally:
         window.close()
     if pieces is None:
-        return CorrectedLog(path, window.size, (Piece(0, window.size, 0),), corrected=False)
-    return CorrectedLog(path, pieces[-1].begin + pieces[-1].length, pieces, corrected=True)
+        return CorrectedLog(path, window.status, window.size, (Piece(0, window.size, 0),), corrected=False)
+    return CorrectedLog(path, window.status, pieces[-1].begin + pieces[-1].length, pieces, corrected=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,6 +262,11 @@ class _Correction:
         return int(offset)
 
 
+def _identity(status: os.stat_result) -> tuple[int, ...]:
+    """What tells a file from another one that got its name, and from itself when somebody has written into it."""
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
 class _CorrectedFile(io.RawIOBase):
     """A corrected log, open for reading."""
 
@@ -268,6 +276,9 @@ class _CorrectedFile(io.RawIOBase):
         self._begins = [piece.begin for piece in log.pieces]
         self._place = 0
         self._fd = open_regular(log.path, links=False)
+        if _identity(os.fstat(self._fd)) != _identity(log.status):
+            self.close()
+            raise BadInputError(f"{log.path}: is another file than before: load the page again")
 
     def readable(self) -> bool:
         """It is."""

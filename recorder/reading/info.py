@@ -136,7 +136,7 @@ class LogInfo:
         }
 
 
-def info(path: Path, *, original: bool = False, source: bool = False) -> LogInfo:
+def info(path: Path, *, original: bool = False, source: bool = False, links: bool = True) -> LogInfo:
     """Read what a log says about itself, and count its pulses by their tags.
 
     The time this takes depends on the number of pulses, not on the size of the log. Nothing is checked: `verify` does
@@ -145,6 +145,7 @@ def info(path: Path, *, original: bool = False, source: bool = False) -> LogInfo
     Args:
         path: the log.
         original: give the session as the log has it, without the changes in the file beside it.
+        links: whether a link of this name is followed.
         source: compare the tags with what the source of the pulses told, too.
 
     Raises:
@@ -154,7 +155,7 @@ def info(path: Path, *, original: bool = False, source: bool = False) -> LogInfo
     told = SourceRecount() if source else None
     messages: dict[str, int] = {}
     damaged = torn = 0
-    with LogReader(path, skim=True) as reader:
+    with LogReader(path, skim=True, links=links) as reader:
         for item in reader.items(only=(TAG.name, HEALTH.name) if source else (TAG.name,)):
             if isinstance(item, Damage):
                 damaged += item.length

@@ -51,7 +51,8 @@ class LogReader:
 
     Attributes:
         path: the log.
-        size: bytes of the file when it was opened.
+        status: of the file when it was opened.
+        size: its bytes then.
         closed: the log was closed properly: it ends in a footer.
         truncated: the log ends in the middle of a record; known only when it has been read to its end.
         has_camera_topics: the log declares images of single cameras, as far as it has been read.
@@ -62,7 +63,7 @@ class LogReader:
             come to that record without meeting damage, and always if it does not read everything.
     """
 
-    def __init__(self, path: Path, *, skim: bool = False, salvage: bool = False) -> None:
+    def __init__(self, path: Path, *, skim: bool = False, salvage: bool = False, links: bool = True) -> None:
         """Open the log and check its header.
 
         Args:
@@ -70,6 +71,7 @@ class LogReader:
             skim: the caller will read only small parts of it.
             salvage: read it even if its beginning is destroyed: check no header, and assume the channels that all our
                 logs declare there.
+            links: whether a link of this name is followed; not in a folder of recordings.
 
         Raises:
             BadInputError: no such file, no MCAP log, or not one of ours.
@@ -82,7 +84,8 @@ class LogReader:
         self.has_camera_topics = False
         self._assumed = _usual_channels() if salvage else {}
         self._topics = dict(self._assumed)
-        self._window = FileWindow(path, direct=not skim)
+        self._window = FileWindow(path, direct=not skim, links=links)
+        self.status = self._window.status
         self.size = self._window.size
         try:
             self.library = "" if salvage else self._check_header()

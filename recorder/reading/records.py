@@ -72,34 +72,43 @@ class Damage:
     torn: bool = False
 
 
+def link_text(path: Path) -> str:
+    """What is wrong with a link under the name of a log."""
+    return f"{path}: is a link, and links are not followed; put the log itself here, or remove the link"
+
+
 class FileWindow:
     """Random access to a file.
 
     Attributes:
         path: the file.
-        size: its size when it was opened, in bytes.
+        status: of the file when it was opened.
+        size: its size then, in bytes.
     """
 
-    def __init__(self, path: Path, *, direct: bool) -> None:
+    def __init__(self, path: Path, *, direct: bool, links: bool = True) -> None:
         """Open the file.
 
         Args:
             path: the file.
             direct: read past the page cache where the file system can; this is cheaper for long reads in order.
+            links: whether a link of this name is followed; not in a folder of recordings.
 
         Raises:
             BadInputError: the file is missing, may not be read, or is not a regular file.
         """
         try:
-            self._fd = open_regular(path, links=True)
+            self._fd = open_regular(path, links=links)
         except FileNotFoundError:
             raise BadInputError(f"{path}: no such file; name an existing log") from None
-        except UntrustedFileError:
-            raise BadInputError(f"{path}: is no file; name a log") from None
+        except UntrustedFileError as error:
+            text = link_text(path) if error.errno == errno.ELOOP else f"{path}: is no file; name a log"
+            raise BadInputError(text) from None
         except OSError as error:
             raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
         self.path = path
-        self.size = os.fstat(self._fd).st_size
+        self.status = os.fstat(self._fd)
+        self.size = self.status.st_size
         self._begin = self._end = 0
         self._buffer = self._allocate(_READ_ON)
         if direct:

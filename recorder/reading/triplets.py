@@ -49,13 +49,17 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, Stored]]:
                     yield tag, np.zeros(tag.shape, tag.pixels.dtype) if data is None else pixels(view_image(data))
 
 
-def tags(path: Path) -> Iterator[TripletTag]:
+def tags(path: Path, *, links: bool = True) -> Iterator[TripletTag]:
     """The tags of a log, in its order, without those in damaged parts; reads no pixels.
+
+    Args:
+        path: the log.
+        links: whether a link of this name is followed.
 
     Raises:
         BadInputError: the log cannot be read.
     """
-    with LogReader(path, skim=True) as reader:
+    with LogReader(path, skim=True, links=links) as reader:
         for chunk in reader.sound_chunks(only=(TAG.name,)):
             for message in chunk.messages:
                 if (tag := tag_of(message)) is not None:

@@ -35,12 +35,12 @@ def download_of(entry: Entry, path: Path) -> Download:
     Raises:
         BadInputError: the log cannot be read.
     """
-    stat = path.stat()
     try:
         changes = session_changes(path)
     except BadInputError:  # the entry's verdict says so; the recording itself is as good as ever
         changes = {}
     log = corrected_log(path, changes)
+    stat = log.status
     facts = (stat.st_ino, stat.st_mtime_ns, stat.st_size, sorted(changes.items()) if log.corrected else ())
     tag = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
     return Download(file_name(entry.id, entry.session), log.size, stat.st_mtime, tag, log.corrected, log.open)

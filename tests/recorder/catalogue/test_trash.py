@@ -3,10 +3,11 @@
 import os
 import time
 from pathlib import Path
+from stat import S_ISREG
 
 import pytest
 
-from recorder.catalogue.entry import LogState
+from recorder.catalogue.entry import LogState, read_entry
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import remove_for_good, trashed_logs
 from rig.errors import BadInputError, StorageError, UnknownRecordingError
@@ -96,6 +97,29 @@ def test_links_are_listed_and_never_followed(tmp_path: Path) -> None:
     assert catalogue.purge().recordings == 2
     assert elsewhere.exists()
     assert (tmp_path / "private.json").exists()
+
+
+def test_a_link_that_gets_the_name_after_the_look_at_it_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, elsewhere = tmp_path / "recordings", tmp_path / "elsewhere.mcap"
+    folder.mkdir()
+    write_log(elsewhere, (ALL_OK,))
+    log = folder / "jump.mcap"
+    write_log(log, (ALL_OK,))
+    look = Path.lstat
+
+    def replaced(path: Path) -> os.stat_result:
+        status = look(path)
+        if path == log and S_ISREG(status.st_mode):
+            log.unlink()
+            log.symlink_to(elsewhere)
+        return status
+
+    monkeypatch.setattr(Path, "lstat", replaced)
+    entry = read_entry(log)
+    assert (entry.pulses, entry.state) == (0, LogState.DAMAGED)
+    assert "links are not followed" in entry.trouble
 
 
 def test_a_link_as_trash_is_refused_and_what_it_leads_to_stays(tmp_path: Path) -> None:

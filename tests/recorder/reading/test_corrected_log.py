@@ -13,6 +13,7 @@ from recorder.log.session_changes import write_session_changes
 from recorder.reading.corrected_log import corrected_log
 from recorder.reading.info import info
 from recorder.recovering.recover import recover
+from rig.errors import BadInputError
 from rig.topics import SESSION_METADATA
 from tests.recorder.logs import ALL_OK, DAMAGED, LOST, OK, OWN_TOPICS, SESSION, write_log
 
@@ -146,3 +147,22 @@ def test_changes_beside_a_corrected_copy_are_changes_of_it(tmp_path: Path) -> No
     with corrected_log(tmp_path / "copy.mcap", {"gate": "9"}).open() as file:
         (tmp_path / "again.mcap").write_bytes(file.read())
     assert info(tmp_path / "again.mcap").session == {**SESSION, "bib": "18", "gate": "9"}
+
+
+@pytest.mark.parametrize("changes", [{}, {"bib": "18"}])
+def test_another_file_that_gets_the_name_is_not_taken_for_the_log(tmp_path: Path, changes: dict[str, str]) -> None:
+    """The pieces were laid out for the first one."""
+    path = tmp_path / "jump.mcap"
+    write_log(path, PULSES)
+    write_log(tmp_path / "other.mcap", PULSES)
+    log = corrected_log(path, changes)
+    (tmp_path / "other.mcap").replace(path)
+    with pytest.raises(BadInputError, match="is another file than before: load the page again"):
+        log.open()
+
+
+def test_a_link_is_not_corrected(tmp_path: Path) -> None:
+    write_log(tmp_path / "jump.mcap", PULSES)
+    (tmp_path / "link.mcap").symlink_to("jump.mcap")
+    with pytest.raises(BadInputError, match="is a link, and links are not followed; put the log itself here"):
+        corrected_log(tmp_path / "link.mcap", {})

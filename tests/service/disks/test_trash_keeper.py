@@ -125,3 +125,25 @@ def test_what_is_old_goes_one_an_hour_and_never_by_a_clock_that_was_just_set(
     times.go_on(3601)
     assert left() == 0
     assert all("it was older than 30 days" in event.message for event in events)
+
+
+def test_a_clock_that_nobody_keeps_right_ages_nothing_but_room_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a hill without a network: what was deleted stays until its room is needed."""
+    catalogue = _deleted(tmp_path, "a", "b")
+    times = _Times(time.time(), 0.0)
+    monkeypatch.setattr("recorder.catalogue.folder.time.time", lambda: times.utc_s)
+    plenty = SIM.model_copy(update={"recorder": SIM.recorder.model_copy(update={"reserve_gb": 0.0, "jump_s": 0.01})})
+    clock = SteadyClock(lambda: times.utc_s, lambda: times.running_s, lambda: False)
+    rigs, events = [plenty], list[Event]()
+    keeper = TrashKeeper(lambda: rigs[-1], catalogue, events.append, clock, lambda: times.running_s)
+    for _ in range(3):
+        times.go_on(400 * 86400)
+        keeper.look()
+    assert catalogue.trash().recordings == 2
+    with _without_room(tmp_path) as rig:
+        rigs.append(rig)
+        keeper.look()
+    assert catalogue.trash().recordings == 0
+    assert ["room was needed" in event.message for event in events] == [True]

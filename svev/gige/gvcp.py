@@ -15,12 +15,12 @@ from typing import Final
 
 from svev.gige.interfaces import Interface, own_interfaces
 
-_PORT = 3956
+PORT: Final = 3956
 _REQUEST = struct.Struct(">BBHHH")  # 0x42, flags, command, length, request id (GigE Vision 2.0, section 15)
 _ANSWER = struct.Struct(">HHHH")  # status, acknowledge, length, request id
 _FORCE_IP = struct.Struct(">2xHI12xI12xI12xI")  # MAC address in two parts, address, mask, gateway (section 14.2)
 _KEY, _WANTS_ANSWER, _BY_BROADCAST = 0x42, 0x01, 0x10
-_DISCOVERY, _FORCEIP, _READ_REGISTER = 0x0002, 0x0004, 0x0080
+_DISCOVERY, _FORCEIP, _READ_REGISTER, _WRITE_REGISTER = 0x0002, 0x0004, 0x0080, 0x0082
 _CONTROL_CHANNEL_PRIVILEGE = 0x0A00
 _CONTROLLED = 0b11  # exclusive access or control access is taken
 _TRIES = 3
@@ -75,7 +75,7 @@ def ask_camera(address: str, timeout_s: float) -> tuple[GigeCamera, bool] | None
         ValueError: the answer is not that of a camera.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
-        channel.connect((address, _PORT))
+        channel.connect((address, PORT))
         who = _ask(channel, _DISCOVERY, b"", timeout_s)
         if who is None:
             return None
@@ -140,7 +140,7 @@ def _send_to_everybody(channel: socket.socket, interface: Interface, request: by
     # Linux delivers the broadcast to all networks on no loopback interface, but that of its subnet.
     everybody = str(interface.network.broadcast_address) if interface.network.is_loopback else _EVERYBODY
     with suppress(OSError):  # a port without a cable: nobody is there
-        channel.sendto(request, (everybody, _PORT))
+        channel.sendto(request, (everybody, PORT))
 
 
 def _answers(channel: socket.socket, deadline: float) -> Iterator[bytes]:
@@ -153,8 +153,20 @@ def _answers(channel: socket.socket, deadline: float) -> Iterator[bytes]:
             return
 
 
+def write_register(channel: socket.socket, register: int, value: int, timeout_s: float) -> bool:
+    """Write a register of the camera to which a socket is connected; False: it refuses, or does not answer."""
+    answer = _answer(channel, _WRITE_REGISTER, struct.pack(">II", register, value), timeout_s)
+    return answer is not None and _ANSWER.unpack_from(answer)[0] == 0
+
+
 def _ask(channel: socket.socket, command: int, payload: bytes, timeout_s: float) -> bytes | None:
-    """The payload of the answer, None if there is none; repeats the request, since a datagram may get lost."""
+    """The payload of the answer, None if there is none."""
+    answer = _answer(channel, command, payload, timeout_s)
+    return None if answer is None else answer[_ANSWER.size :]
+
+
+def _answer(channel: socket.socket, command: int, payload: bytes, timeout_s: float) -> bytes | None:
+    """The answer, None if there is none; repeats the request, since a datagram may get lost."""
     for request_id in range(1, _TRIES + 1):
         channel.send(_REQUEST.pack(_KEY, _WANTS_ANSWER, command, len(payload), request_id) + payload)
         deadline = time.monotonic() + timeout_s / _TRIES
@@ -165,7 +177,7 @@ def _ask(channel: socket.socket, command: int, payload: bytes, timeout_s: float)
             except (TimeoutError, ConnectionRefusedError):  # refused: the address is of a computer, not of a camera
                 break
             if len(answer) >= _ANSWER.size and _ANSWER.unpack_from(answer)[1] == command + 1:
-                return answer[_ANSWER.size :]
+                return answer
     return None
 
 

@@ -12,6 +12,7 @@ from service.processes.replayed_log import check_replay
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras
 from svev.gige.interfaces import sharing_subnet, way_to
+from svev.gige.path_probe import SMALL, largest_packet
 
 _ANSWER_S = 1.5
 _GVCP_PORT = 3956
@@ -29,7 +30,9 @@ def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
             case "aravis" if rig.simulation is not None:
                 yield _look_at_simulated(camera)
             case "aravis":
-                yield _look_at_gige(camera)
+                yield (found := _look_at_gige(camera))
+                if found.level is Level.PASS and rig.network.packet_size > SMALL:
+                    yield from _look_at_way(camera, rig.network.packet_size)
             case "iidc":
                 pass  # `svev.doctor.cameras.firewire` examines these together
             case "replay":
@@ -133,6 +136,30 @@ def _look_at_gige(camera: CameraSettings) -> Finding:
         what, remedy = "{said}, is controlled by another program", "end that program (another svev?)"
         return failure(Topic.CAMERAS, "check_controlled", what, remedy, said=said)
     return judged(Level.PASS, Topic.CAMERAS, said, remedy)
+
+
+def _look_at_way(camera: CameraSettings, size: int) -> Iterator[Finding]:
+    """Do packets as large as are asked for come through? Switches drop larger ones than theirs without a word."""
+    largest = largest_packet(camera.address, size)
+    if largest is None:  # nothing is known
+        return
+    said = phrase(
+        "check_packets", "{camera}: packets of {size} bytes come through", camera=camera.name, size=str(largest)
+    )
+    if largest == size:
+        yield judged(Level.PASS, Topic.NETWORK, said, "")
+        return
+    yield failure(
+        Topic.NETWORK,
+        "check_packets_dropped",
+        "{said}, and {wanted} are asked for: no frame will arrive",
+        "allow jumbo frames in every switch between {camera} and this computer, or set network.packet_size = {size} in "
+        "the rig file",
+        said=said,
+        wanted=str(size),
+        camera=camera.name,
+        size=str(largest),
+    )
 
 
 def _look_at_simulated(camera: CameraSettings) -> Finding:

@@ -65,6 +65,8 @@ export const findings = {
   check_link: ["{cameras} gjennom {port}: MTU {mtu}"],
   check_link_speed: ["{cameras} gjennom {port}: MTU {mtu}, {speed} Mbit/s"],
   check_mtu_small: ["{said}, men det bes om pakker på {size} byte: ingen bilder kommer fram", "kjør: sudo ip link set {port} mtu {size}; eller sett network.packet_size = {mtu} i riggfilen"],
+  check_packets: ["{camera}: pakker på {size} byte kommer fram"],
+  check_packets_dropped: ["{said}, og det bes om {wanted}: ingen bilder kommer fram", "tillat jumbo-rammer i hver svitsj mellom {camera} og denne maskinen, eller sett network.packet_size = {size} i riggfilen"],
   check_way_narrow: ["{camera}: veien til {address} gjennom {port} tar pakker på {mtu} byte, og det bes om {size}: bildene kommer kanskje ikke fram", "koble kameraet til {port} uten ruter, se på: ip route get {address}; eller sett network.packet_size = {mtu} i riggfilen"],
   check_shared: ["portene {ports} deler subnettet {subnet}, og maskinen sender til {cameras} bare gjennom {port}"],
   check_shared_elsewhere: ["{said}; {elsewhere} finnes ikke der", "gi hver port sitt eget subnett (192.168.11.1/24, 192.168.12.1/24, ...), og hvert kamera en adresse i subnettet til porten sin: svev cameras set-ip"],

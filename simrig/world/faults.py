@@ -15,7 +15,7 @@ from rig.settings.strict_toml import StrictModel
 
 
 class FaultKind(StrEnum):
-    """Kinds of fault. The first six befall single frames, the last four the camera or its bus."""
+    """Kinds of fault. The first seven befall single frames, the last four the camera or its bus."""
 
     MISSED_PULSE = "missed_pulse"  #: the camera does not see the pulse: no frame, no frame id, no trigger count
     OVERRUN = "overrun"  #: the pulse comes too soon after the one before: a trigger count, but no frame
@@ -23,6 +23,9 @@ class FaultKind(StrEnum):
     LOST_PACKETS = "lost_packets"  #: the named packets do not arrive
     LOST_LEADER = "lost_leader"  #: the first packet does not arrive (GigE Vision: leader; FireWire: first pixels)
     DAMAGED_FRAME = "damaged_frame"  #: the frame arrives, and the camera says that it is not whole
+    TIMES_SLIP = (
+        "times_slip"  #: times of frames are off by `slip_ms`, the clock that is read goes on (GigE Vision only)
+    )
     FROZEN = "frozen"  #: the camera answers nothing and sends nothing for a while, then goes on
     RESTART = "restart"  #: the camera dies and comes back with default settings (FireWire: unplugged meanwhile)
     SLOW_LINK = "slow_link"  #: the cable carries only `mbit_s` for a while
@@ -34,8 +37,9 @@ LASTING = frozenset({FaultKind.FROZEN, FaultKind.RESTART, FaultKind.SLOW_LINK})
 OF_THE_CAMERA = frozenset({FaultKind.RESTART, FaultKind.FROZEN})
 #: Faults that a GigE Vision camera can have.
 ON_GIGE = frozenset(FaultKind) - {FaultKind.BUS_RESET}
-#: Faults that a FireWire camera can have: the bus sets the rate of its transfer, and no packet reports damage.
-ON_FIREWIRE = frozenset(FaultKind) - {FaultKind.SLOW_LINK, FaultKind.DAMAGED_FRAME}
+#: Faults that a FireWire camera can have: the bus sets the rate of its transfer, no packet reports damage, and the
+#: bus's own clock times its frames.
+ON_FIREWIRE = frozenset(FaultKind) - {FaultKind.SLOW_LINK, FaultKind.DAMAGED_FRAME, FaultKind.TIMES_SLIP}
 
 
 class Fault(StrictModel):
@@ -51,6 +55,7 @@ class Fault(StrictModel):
     )
     duration_s: float | None = Field(None, gt=0, le=3600, description="frozen, restart, slow_link: how long")
     mbit_s: float | None = Field(None, gt=0, description="slow_link: what is left of the link")
+    slip_ms: float | None = Field(None, ge=-1000, le=1000, description="times_slip: by how much they are off")
 
     @model_validator(mode="after")
     def _fields_fit_kind(self) -> "Fault":
@@ -59,6 +64,7 @@ class Fault(StrictModel):
             "packets": (bool(self.packets), kind is FaultKind.LOST_PACKETS),
             "duration_s": (self.duration_s is not None, kind in LASTING),
             "mbit_s": (self.mbit_s is not None, kind is FaultKind.SLOW_LINK),
+            "slip_ms": (self.slip_ms is not None, kind is FaultKind.TIMES_SLIP),
         }
         for key, (given, wanted) in needed.items():
             if given != wanted:

@@ -54,6 +54,9 @@ class Scenario:
     modulus: int = 65535
     latency_ns: tuple[int, int] = (5 * MS, 45 * MS)
     retention_ns: int = 25 * MS
+    bursts: dict[tuple[int, int], int] = field(
+        default_factory=dict
+    )  # (pulse, camera) -> by how much later that frame comes, ns; those behind it come at once with it
     latch_every_s: float | None = (
         2.0  # beside the readings after frames that come out of turn; None: no readings at all
     )
@@ -204,8 +207,12 @@ class _Camera:
         # Frames come in the camera's order: a late one holds up those behind it.
         exposure = self.scenario.exposures_ns[self.camera] if self.scenario.exposures_ns else 0
         arrival = max(
-            self.last_arrival, HostNs(time + exposure + self.rng.randint(*self.scenario.latency_ns) + retention)
-        )
+            self.last_arrival,
+            HostNs(
+                time + exposure + self.rng.randint(*self.scenario.latency_ns) + retention
+                + self.scenario.bursts.get((pulse, self.camera), 0)
+            ),
+        )  # fmt: skip
         self.last_arrival = arrival
         if fate is FrameStatus.DAMAGED:
             # ids and times of a damaged frame are those of an earlier one

@@ -54,9 +54,19 @@ class HeldFrames:
         """The cameras whose frames have waited for as long as they may."""
         return [camera for camera, end in self._ends() if now >= end]
 
-    def last_end(self, pulse: OpenPulse) -> HostNs:
-        """Until when frames that a pulse lacks may wait."""
-        return max((end for camera, end in self._ends() if pulse.frames[camera] is None), default=HostNs(0))
+    def last_end(self, pulse: OpenPulse, arrived: HostNs) -> HostNs:
+        """Until when frames that a pulse lacks may wait.
+
+        Args:
+            pulse: an open one.
+            arrived: its frames have come by then. Frames that have come later do not keep it waiting: of a camera that
+                is doubted for good there is always one that waits.
+        """
+        lacking = (
+            end for camera, end in self._ends()
+            if pulse.frames[camera] is None and self._queues[camera][0].host_time <= arrived
+        )  # fmt: skip
+        return max(lacking, default=HostNs(0))
 
     def _ends(self) -> Iterator[tuple[int, HostNs]]:
         for camera, queue in enumerate(self._queues):

@@ -394,7 +394,7 @@ class Pairer:
         pulse = self._open[0]
         hold = HostNs(pulse.time + self._hold_ns())
         if self._held.count:
-            hold = max(hold, self._held.last_end(pulse))
+            hold = max(hold, self._held.last_end(pulse, hold))
         if pulse.time <= self._hurry_until or self._train.rhythm_ns is not None:
             return hold
         if not any(track.will_tell and track.may_deliver(pulse.time) for track in self._lacking(pulse)):

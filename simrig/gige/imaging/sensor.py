@@ -268,7 +268,8 @@ class Sensor:
         modulus = 1 << 64 if frame.extended else _IDS_16_BIT
         block_id = (self._next_id - 1) % modulus + 1
         self._next_id = block_id + 1
-        ticks = self._clock.exposure_ticks(trigger.time, trigger.pulse)
+        slip_ns = round(sum(fault.slip_ms or 0.0 for fault in faults) * 1e6)
+        ticks = self._clock.exposure_ticks(HostNs(trigger.time + slip_ns), trigger.pulse)
         shot = Shot(ahead.slot, trigger.pulse, block_id, ticks, ready)
         _spoil(shot, faults)
         self._ahead = None

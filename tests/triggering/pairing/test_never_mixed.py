@@ -24,6 +24,8 @@ COST = 4
 #: A step that only the next reading of the clock shows costs all frames until then, a quarter of a second. So does a
 #: time in which the computer takes no frames.
 COST_LATE = 16
+#: A pulse is decided after so long, whatever waits: the hold, and as long as a frame may wait for its clock.
+MOST_OPEN_S = 1.3
 #: Steps that are smaller are seen by the times of frames only.
 LEAST_SEEN_MS = 10.0
 
@@ -38,14 +40,17 @@ class WatchedHill(Hill):
     Attributes:
         closed: the decided pulses.
         said: the first thing that was said of clocks, trigger or rate; empty: nothing.
+        most_open: most pulses that were undecided at a time: each takes a buffer for its images.
     """
 
     def __init__(self, case: Case) -> None:
         super().__init__(case if case.slips_ms else replace(case, every_s=4.0), PULSES)
         self.closed: list[ClosedPulse] = []
         self.said = ""
+        self.most_open = 0
 
     def _check(self, closed: list[ClosedPulse]) -> None:
+        self.most_open = max(self.most_open, self._pairer.health().open)
         for pulse in closed:
             self.closed.append(pulse)
             if not self.said and len(self.closed) % LOOK == 0:
@@ -80,6 +85,7 @@ def test_no_triplet_mixes_pulses_and_every_possible_one_is_found(case: Case, fau
     result = hill.run()
     assert result.possible > PULSES // 4
     assert result.mixed == 0
+    assert hill.most_open <= MOST_OPEN_S * max(case.rates_hz) * (2 if case.slips_ms or case.doubled else 1)
     found = recount(tags_of(hill.closed))
     if case.slips_ms:  # nobody can find them again: the camera is not used any more, and that is said
         assert "contradict each other" in hill.said or "and no camera has both" in hill.said

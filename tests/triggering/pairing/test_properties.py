@@ -75,3 +75,16 @@ def test_cameras_go_and_come_back(scenario: Scenario, away: list[tuple[float, fl
     batch_ns = min(scenario.batch_ns, 3 * MS)
     run = Run(Hill(Scenario(**{**vars(scenario), "outages": outages, "batch_ns": batch_ns})))
     check(run)
+
+
+@SETTINGS
+@given(
+    st.builds(Scenario, pulses=st.just(160), hold_periods=st.sampled_from([3.0, 9.0]), **common),
+    st.dictionaries(st.tuples(st.integers(20, 140), st.integers(0, 2)), st.just(300 * MS), min_size=1, max_size=4),
+)
+def test_bursts_of_late_frames(scenario: Scenario, bursts: dict[tuple[int, int], int]) -> None:
+    """A link stands still for 0.3 s, then all frames come at once: too late for their pulses, or just in time."""
+    run = Run(Hill(Scenario(**{**vars(scenario), "bursts": bursts})))
+    check(run, causes=False)
+    late = sum(counters.late for counters in run.pairer.counters)
+    assert len(run.unplaced) <= late + sum(counters.implausible + counters.stale for counters in run.pairer.counters)

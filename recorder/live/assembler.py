@@ -298,7 +298,9 @@ class Assembler:
         part = pulse.cargo
         if not isinstance(part, _Composition):
             part = pulse.cargo = _Composition()
-            part.slot = self.buffers.acquire()
+            # One that has just become free is of the pulse that waits for it: later ones could take them all, and be
+            # written only behind it.
+            part.slot = None if self._waiting else self.buffers.acquire()
         if part.slot is not None:
             self._copy(camera, record, part.slot)
             return

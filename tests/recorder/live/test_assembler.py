@@ -86,6 +86,34 @@ def test_without_a_free_buffer_frames_wait_in_the_rings_and_none_is_lost(
     assert buffers.free_count == buffers.count
 
 
+def test_buffers_that_become_free_go_to_the_pulse_that_has_waited_longest(
+    parts: Parts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk frees buffers while frames are read: later pulses must not take them all, and wait behind the first."""
+    assembler, cameras, buffers = parts
+    acquire = buffers.acquire
+    at_the_disk = [slot for _ in range(4) if (slot := acquire()) is not None]
+
+    def acquire_just_before_they_are_free() -> int | None:
+        slot = acquire()
+        if slot is None:
+            while at_the_disk:
+                buffers.release(at_the_disk.pop())
+        return slot
+
+    monkeypatch.setattr(buffers, "acquire", acquire_just_before_they_are_free)
+    cameras.expose(1, 0, 2)
+    for pulse in range(2, 7):
+        cameras.expose(pulse, 0, 1, 2)
+    numbers = []
+    for now in range(6, 60):
+        for triplet in assembler.pump(_now(now)):
+            numbers.append(triplet.pulse.number)
+            _blocks(buffers, triplet)
+    assert numbers == [1, 2, 3, 4, 5, 6]
+    assert not assembler.backlog
+
+
 def test_a_recorder_that_takes_anothers_place_goes_on_with_its_cameras() -> None:
     rig = ring_rig()
     with camera_rings(rig) as rings:

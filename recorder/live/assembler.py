@@ -156,7 +156,8 @@ class Assembler:
         # frame's, or it would take the unread frames for missing ones.
         waiting = [record.host_time for part in self._waiting for _, record in part.pending]
         until = min(waiting, default=now)
-        self._place_released(until)
+        # Frames that wait to be believed hold buffers for which others wait: their wait ends in real time.
+        self._place_released(now)
         self._decided.extend(self.pairer.advance(until))
         self._ask_silent_cameras(now)
         self._tell_slow_cameras(now)

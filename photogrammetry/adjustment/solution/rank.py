@@ -17,6 +17,7 @@ from photogrammetry.adjustment.solution.datum import (
     inner_operator,
     similarity_directions,
 )
+from photogrammetry.adjustment.solution.levelled import levelled, orders_apart
 from photogrammetry.adjustment.solution.normals import Normals, SingularError, build_normals, factorise, reduce_points
 from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.diagnosis import Defect, DefectKind, NotSolvableError
@@ -55,6 +56,22 @@ def check_rank(problem: Problem, state: State) -> FreeDatum:
     Raises:
         NotSolvableError: it does not; has all causes and their sizes.
     """
+    free, defects = _analysed(problem, state)
+    if not defects:
+        return free
+    alike = levelled(problem, state)
+    _, again = _analysed(alike, state)
+    if again:
+        raise NotSolvableError(tuple(again))
+    message = (
+        f"the sigmas lie {orders_apart(problem, alike):.0f} orders of magnitude apart in their effect, and rounding "
+        "hides what the least accurate observations determine; give sigmas as large as the errors are"
+    )
+    raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, message),))
+
+
+def _analysed(problem: Problem, state: State) -> tuple[FreeDatum, list[Defect]]:
+    """The free similarity transformations, and what is undetermined."""
     normals = build_normals(problem, problem.equations(state))
     free = find_free_datum(problem, normals, state)
     cameras, images, points = _local_defects(problem, normals)
@@ -64,9 +81,7 @@ def check_rank(problem: Problem, state: State) -> FreeDatum:
     defects += _image_defects(problem, images) + _point_defects(problem, points)
     defects += _datum_defects(problem, state, free)
     defects += _joint_defects(problem, state, normals, free, local)
-    if defects:
-        raise NotSolvableError(tuple(defects))
-    return free
+    return free, defects
 
 
 def _local_defects(problem: Problem, normals: Normals) -> tuple[list[_Local], list[_Local], list[_Local]]:

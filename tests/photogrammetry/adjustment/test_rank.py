@@ -1,5 +1,6 @@
 """Rank defects: size, cause and remedy in words."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -176,3 +177,20 @@ def test_affinity_and_shear_with_free_poses_are_told_apart_by_roll() -> None:
     adjustment = adjust_once(observed(network))
     assert adjustment.redundancy == 2 * len(adjustment.problem.image) - 18 - 10
     assert np.all(np.isfinite(adjustment.sigmas(adjustment.problem.unknowns.camera)))
+
+
+def _with_sigma(network: Network, sigma: float) -> Network:
+    o = network.observations
+    return replace(network, observations=replace(o, sigma=np.full_like(o.sigma, sigma)))
+
+
+def test_sigmas_out_of_all_proportion_are_no_missing_datum() -> None:
+    network = hill(1).network
+    (defect,) = _defects(_with_sigma(network, 1e-9))
+    assert re.match(r"the sigmas lie \d+ orders of magnitude apart", defect.message)
+    points = tuple(replace(p, sigma=np.full(3, 1e-9)) if p.role is Role.CONTROL else p for p in network.points)
+    accurate = adjust_once(replace(network, points=points))
+    assert np.abs(accurate.state.position - hill(1).truth.position).max() < 0.3
+    alone = replace(network, points=tuple(replace(p, role=Role.TIE, sigma=None) for p in network.points))
+    (defect,) = _defects(_with_sigma(alone, 1e-9))
+    assert defect.kind is DefectKind.DATUM

@@ -1,6 +1,6 @@
 """Parts of a network: some of its images, points or observations; the images alone without the survey."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -24,6 +24,8 @@ _Relation = TypeVar("_Relation", Distance, Difference)
 
 #: A point without survey needs at least so many.
 RAYS = 2
+_DATUM_POINTS = 4
+_THIN = 0.02  # second to first extent of points that are nearly a line
 
 
 def rays(network: Network) -> Integers:
@@ -99,18 +101,29 @@ def as_check_points(network: Network, names: Collection[str]) -> Network:
 def without_survey(network: Network) -> Network:
     """The free network of the images alone, without any surveyed point, distance, difference or weighted pose.
 
-    Points that fewer than two images show are left out: the images alone do not determine them.
+    Points that fewer than two images show are left out: the images alone do not determine them. The points that were
+    surveyed define the datum, if there are enough: a far tie point would make all coordinates uncertain.
     """
     seen = only_points(network, rays(network) >= RAYS)
+    surveyed = [i for i, p in enumerate(seen.points) if p.role in (Role.CONTROL, Role.FIXED) and p.xyz is not None]
     return replace(
         seen,
         points=tuple(Point(point.name, Role.TIE) for point in seen.points),
         images=tuple(replace(image, sigma_position=None, sigma_angles=None) for image in seen.images),
         distances=(),
         differences=(),
-        datum=Datum(DatumType.INNER),
+        datum=Datum(DatumType.INNER, tuple(surveyed) if _spread([seen.points[i].xyz for i in surveyed]) else None),
         reweight=Reweight.NONE,
     )
+
+
+def _spread(places: Sequence[Floats | None]) -> bool:
+    """Whether points define a datum: four at least, clearly not on a line."""
+    if len(places) < _DATUM_POINTS:
+        return False
+    xyz = np.array(places, dtype=float)
+    extent = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
+    return bool(extent[1] > _THIN * extent[0])
 
 
 def with_interior(network: Network, interior: Floats) -> Network:

@@ -1,6 +1,6 @@
 """Reads interior orientations from the result file of a calibration; step 2 takes them as constants."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,7 +10,8 @@ from pydantic import BaseModel, Field
 
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
 from photogrammetry.network.entries import Finite, Pixels, Positive
-from photogrammetry.network.model import Network
+from photogrammetry.network.model import Camera, Network, Role
+from photogrammetry.network.selection import only_points, rays, sub_network
 from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
 from rig.settings.strict_toml import validate
@@ -71,33 +72,59 @@ def _camera(body: Any, source: str) -> CalibratedCamera:
     return validate(CalibratedCamera, body, source)
 
 
-def with_calibration(network: Network, cameras: Mapping[str, CalibratedCamera]) -> Network:
+def with_calibration(network: Network, cameras: Mapping[str, CalibratedCamera]) -> tuple[Network, list[str]]:
     """The network with calibrated cameras, which are constant.
 
+    Returns:
+        The network without the images of cameras that the calibration lacks, and a line for each of these cameras.
+
     Raises:
-        BadInputError: a camera was not calibrated, or with images of another size.
+        BadInputError: no camera was calibrated, or one with images of another size.
     """
-    for camera in network.cameras:
-        if camera.name not in cameras:
-            raise BadInputError(
-                f"cameras.{camera.name}: the calibration lacks it (it has {', '.join(cameras) or 'none'}); "
-                "calibrate it too or correct the name"
-            )
-        size = cameras[camera.name].size
-        if size is not None and camera.size is not None and tuple(size) != camera.size:
-            raise BadInputError(
-                f"cameras.{camera.name}: was calibrated with images of {size[0]} x {size[1]} px, those of the network "
-                f"have {camera.size[0]} x {camera.size[1]} px; calibrate it with images of this size"
-            )
-    calibrated = tuple(
-        replace(
-            camera,
-            interior=np.array([getattr(cameras[camera.name], parameter) for parameter in INTERIOR], dtype=float),
-            balance=cameras[camera.name].r0,
-            distortion=Distortion(cameras[camera.name].distortion),
-            estimate=(),
-            sigma={},
+    lacking = [camera.name for camera in network.cameras if camera.name not in cameras]
+    there = ", ".join(cameras) or "none"
+    if len(lacking) == len(network.cameras):
+        raise BadInputError(
+            f"cameras.{lacking[0]}: the calibration lacks it (it has {there}); calibrate it too or correct the name"
         )
-        for camera in network.cameras
+    notes = [
+        f"camera {name} is left out: the calibration lacks it (it has {there}); calibrate it too or correct the name"
+        for name in lacking
+    ]
+    network = _without_cameras(network, lacking) if lacking else network
+    return replace(
+        network, cameras=tuple(_calibrated(camera, cameras[camera.name]) for camera in network.cameras)
+    ), notes
+
+
+def _without_cameras(network: Network, names: Collection[str]) -> Network:
+    """The network without some cameras, their images, and the tie points that only these show."""
+    keep = np.array([network.cameras[image.camera].name not in names for image in network.images], dtype=bool)
+    less = sub_network(network, keep, np.ones(len(network.points), dtype=bool))
+    cameras = tuple(camera for camera in network.cameras if camera.name not in names)
+    place = {camera.name: i for i, camera in enumerate(cameras)}
+    images = tuple(replace(image, camera=place[network.cameras[image.camera].name]) for image in less.images)
+    less = replace(less, cameras=cameras, images=images)
+    known = np.array([point.role is not Role.TIE for point in less.points], dtype=bool)
+    return only_points(less, known | (rays(less) > 0))
+
+
+def _calibrated(camera: Camera, known: CalibratedCamera) -> Camera:
+    """The camera with its calibration.
+
+    Raises:
+        BadInputError: it was calibrated with images of another size.
+    """
+    if known.size is not None and camera.size is not None and tuple(known.size) != camera.size:
+        raise BadInputError(
+            f"cameras.{camera.name}: was calibrated with images of {known.size[0]} x {known.size[1]} px, those of the "
+            f"network have {camera.size[0]} x {camera.size[1]} px; calibrate it with images of this size"
+        )
+    return replace(
+        camera,
+        interior=np.array([getattr(known, parameter) for parameter in INTERIOR], dtype=float),
+        balance=known.r0,
+        distortion=Distortion(known.distortion),
+        estimate=(),
+        sigma={},
     )
-    return replace(network, cameras=calibrated)

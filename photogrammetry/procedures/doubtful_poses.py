@@ -1,6 +1,6 @@
 """Poses that must not be believed: one of several, not those that were given, or those of exchanged cameras."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Final
@@ -20,9 +20,11 @@ from photogrammetry.network.diagnosis import (
 )
 from photogrammetry.network.model import Camera, Network
 from photogrammetry.network.selection import with_interior
+from photogrammetry.procedures.minima import Minimum, moved_images, possible_minima
 from photogrammetry.start_values.resection import resect
 from photogrammetry.start_values.search import complete
 from photogrammetry.start_values.sightings import reduce_observations
+from rig.arrays import Floats
 from rig.errors import BadInputError
 
 _FEWEST: Final = 3  # points of a resection; with so many up to four poses fit exactly
@@ -36,7 +38,7 @@ _IMAGES: Final = 8  # with more images one exchange of cameras spoils little, an
 
 
 def refuse_ambiguous(given: Network, a: Adjustment) -> None:
-    """Refuse a result in which three points alone fix an image, and fix it in several ways.
+    """Refuse a result whose images have several possible poses, because three points alone or a plane fix them.
 
     Args:
         given: the network before it got start values: an image whose pose it gives is decided by that.
@@ -46,9 +48,39 @@ def refuse_ambiguous(given: Network, a: Adjustment) -> None:
         NotSolvableError: names the images with all their possible places.
     """
     known = {image.name for image in given.images if image.position is not None and image.rotation is not None}
-    defects = tuple(_ambiguities(a, known))
+    defects = (*_ambiguities(a, known), *_undecided(given, a, known))
     if defects:
         raise NotSolvableError(defects)
+
+
+def _undecided(given: Network, a: Adjustment, known: set[str]) -> Iterator[Defect]:
+    """The images that the possible minima put at different places."""
+    first, *others = possible_minima(a, given)
+    for i, image in enumerate(a.network.images):
+        apart = [other for other in others if moved_images(other.adjustment, first.adjustment)[i]]
+        if image.name in known or not apart:
+            continue
+        places, sums = _distinct_places(i, [first, *apart])
+        words = (
+            f"image {image.name} has {len(places)} poses between which the residuals do not decide, because the "
+            f"surveyed points nearly lie in a plane: X0 {' or '.join(places)} with vTPv {' or '.join(sums)}; survey a "
+            "point off that plane, come nearer, or give an approximate pose"
+        )
+        yield Defect(DefectKind.IMAGES, 0, words, images=(image.name,))
+
+
+def _distinct_places(image: int, found: Sequence[Minimum]) -> tuple[list[str], list[str]]:
+    """Where the minima put an image, each place once, and their sums of squares."""
+    kept: list[Minimum] = []
+    for one in found:
+        if all(moved_images(one.adjustment, other.adjustment)[image] for other in kept):
+            kept.append(one)
+    places = [_place(one.adjustment.state.position[image]) for one in kept]
+    return places, [f"{one.square_sum:.1f}" for one in kept]
+
+
+def _place(position: Floats) -> str:
+    return f"({', '.join(f'{x:.3f}' for x in position)})"
 
 
 def _ambiguities(a: Adjustment, known: set[str]) -> Iterator[Defect]:
@@ -68,7 +100,7 @@ def _ambiguities(a: Adjustment, known: set[str]) -> Iterator[Defect]:
             continue  # two measurements of one point, or points on a line: the rank analysis has judged them
         if found.ambiguous:
             poses = (found.camera, *found.alternatives)
-            places = " or ".join(f"({', '.join(f'{x:.3f}' for x in pose.X0)})" for pose in poses)
+            places = " or ".join(_place(pose.X0) for pose in poses)
             name = a.network.images[i].name
             words = (
                 f"image {name} shows three points only, which fit {len(poses)} poses equally: X0 {places}; measure a "
@@ -126,7 +158,8 @@ def refuse_exchanged_cameras(alone: Network, ratio: float) -> None:
     """
     if ratio <= BENT or len(alone.images) > _IMAGES:
         return
-    trials = [(trial, pair) for pair, network in _exchanges(alone) if (trial := _ratio(network)) * BENT < ratio]
+    enough = min(ratio, BENT * BENT) if np.isinf(ratio) else ratio  # beside no block at all any other one looks good
+    trials = [(trial, pair) for pair, network in _exchanges(alone) if (trial := _ratio(network)) * BENT < enough]
     if not trials:
         return
     least, (one, other) = min(trials)

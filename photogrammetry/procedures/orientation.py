@@ -6,16 +6,23 @@ The tie points are the static ones (alternative 1) or these and the places of mo
 
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import Final
 
 import numpy as np
 
+from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.run import Outcome, settled
+from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from photogrammetry.network.model import Datum, Network, Role
 from photogrammetry.network.selection import only_points, require_unknown_poses
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous, refuse_contradicted
 from photogrammetry.procedures.findings import Stage
+from photogrammetry.procedures.left_out import unplaced_points, without_images, without_points
 from photogrammetry.procedures.stages import constrained_stage, search_block
+from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
+
+_CAUTION: Final = 30.0  # start values are so much less accurate than image points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,11 +33,13 @@ class Orientation:
         outcome: the constrained adjustment; `removed` has the observations that all stages took out.
         stages: the three stages.
         notes: changes that were made to the network.
+        left_out: those of them that nobody asked for: images and tie points without which it was oriented.
     """
 
     outcome: Outcome
     stages: tuple[Stage, ...]
     notes: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
 
 def orient(
@@ -54,12 +63,49 @@ def orient(
     """
     network, held = _with_interior(network, uncertain_interior)
     network, notes = _prepared(network, alternative, moving)
-    search = search_block(network)
-    outcome, stage = constrained_stage(search)
-    outcome = settled(outcome)
+    outcome, stages, left_out = _oriented(network)
     refuse_ambiguous(network, outcome.adjustment)
     refuse_contradicted(network, outcome.adjustment)
-    return Orientation(outcome, (*search.stages, stage), (*held, *notes))
+    return Orientation(outcome, stages, (*held, *notes, *left_out), tuple(left_out))
+
+
+def _oriented(network: Network) -> tuple[Outcome, tuple[Stage, ...], list[str]]:
+    """The three stages; where they fail, without images that nothing orients and ties that their rays do not place."""
+    gone: dict[str, str] = {}
+    said: list[str] = []
+    while True:
+        try:
+            outcome, stages = _in_stages(without_points(network, gone))
+        except (NotSolvableError, NotConvergedError, RefusedError) as failure:
+            less = without_images(network, failure)
+            if less is not None:
+                network = less[0]
+                said += less[1]
+                continue
+            left = without_points(network, gone)
+            more = unplaced_points(left, state_of(complete(left)), _CAUTION)
+            if not more:
+                raise
+        else:
+            # a point that has nearly no place bends the free block, in whose system it counts like the others
+            more = unplaced_points(outcome.adjustment.network, outcome.adjustment.state)
+            if not more:
+                break
+        gone |= more
+    # what the start values did not place, the adjusted poses may
+    if back := set(gone) - set(unplaced_points(network, outcome.adjustment.state)):
+        try:
+            outcome, stages = _in_stages(without_points(network, gone.keys() - back))
+            gone = {name: words for name, words in gone.items() if name not in back}
+        except (NotSolvableError, NotConvergedError, RefusedError):
+            pass  # they do not fit
+    return outcome, stages, [*said, *(f"point {name} is left out: {words}" for name, words in gone.items())]
+
+
+def _in_stages(network: Network) -> tuple[Outcome, tuple[Stage, ...]]:
+    search = search_block(network)
+    outcome, stage = constrained_stage(search)
+    return settled(outcome), (*search.stages, stage)
 
 
 def _with_interior(network: Network, uncertain: bool) -> tuple[Network, list[str]]:

@@ -10,7 +10,6 @@ An observation that a stage takes out stays out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -25,29 +24,29 @@ from photogrammetry.adjustment.gross_errors.blunders import (
 from photogrammetry.adjustment.gross_errors.snooping import BENT
 from photogrammetry.adjustment.run import Outcome, adjust
 from photogrammetry.adjustment.solution.adjustment import adjust_once
-from photogrammetry.adjustment.solution.global_test import ABSURD, GlobalTest
+from photogrammetry.adjustment.solution.global_test import GlobalTest
 from photogrammetry.adjustment.solution.usability import is_unusable
-from photogrammetry.geometry.similarity import Similarity, fit_similarity
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
-from photogrammetry.network.model import Network, Role
-from photogrammetry.network.selection import (
-    RAYS,
-    as_check_points,
-    only_points,
-    rays,
-    without_observations,
-    without_survey,
-)
-from photogrammetry.procedures.consensus import FEWEST_AGREEING
+from photogrammetry.network.model import Network
+from photogrammetry.network.selection import without_survey
 from photogrammetry.procedures.doubtful_poses import refuse_contradicted, refuse_exchanged_cameras
 from photogrammetry.procedures.findings import STAGE_RISK, SURVEYED, Finding, Stage, StageName, told_of, too_many
-from photogrammetry.procedures.similarity_stage import similarity_stage
+from photogrammetry.procedures.free_block import (
+    OF_POINTS,
+    adjusted_words,
+    carried,
+    findings_of,
+    free_stage,
+    state_in,
+    without_removed,
+    without_suspects,
+)
+from photogrammetry.procedures.minima import Minimum, adjust_least, is_worse, least_minimum
+from photogrammetry.procedures.reference.consensus import FEWEST_AGREEING
+from photogrammetry.procedures.reference.similarity_stage import similarity_stage
 from photogrammetry.procedures.single_rays import contradicted_rays
 from photogrammetry.start_values.search import complete
-from rig.arrays import Floats
 from rig.errors import BadInputError
-
-_OF_POINTS: Final = (BlunderKind.IMAGE, BlunderKind.CONTROL)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,18 +75,60 @@ def search_block(network: Network) -> Search:
     Raises:
         RefusedError: images and survey contradict each other, and not because of a few points.
     """
-    free, gone, stage = _free_stage(network)
-    cleaned = _cleaned(network, gone)
+    free, gone, stage = free_stage(network)
+    cleaned = without_removed(network, gone)
     refuse_exchanged_cameras(without_survey(cleaned), np.inf if free is None else free.adjustment.ratio)
     if free is None:
         nothing = Stage(StageName.SIMILARITY, "left out: there is no free block")
         return Search(cleaned, None, (), (stage, nothing))
-    block = _without_suspects(free)
-    fit, wrong, second = similarity_stage(cleaned, block)
+    block = without_suspects(free)
+    try:
+        fit, wrong, second = similarity_stage(cleaned, block)
+    except RefusedError as error:
+        start = _start_by_survey(cleaned, None)
+        if start is None:
+            raise
+        return Search(cleaned, start, tuple(gone), (stage, _other_block(str(error))))
+    start = None if fit is None else carried(cleaned, block, free, fit.estimate.transform)
+    if start is not None and second.findings and (other := _start_by_survey(cleaned, start)) is not None:
+        words = "; ".join(finding.message for finding in second.findings)
+        return Search(cleaned, other, tuple(gone), (stage, _other_block(words)))
     removed = (*gone, *wrong)
-    cleaned = _cleaned(network, removed)
-    start = None if fit is None else _carried(cleaned, block, free, fit.estimate.transform)
-    return Search(cleaned, start, removed, (stage, second))
+    left = without_removed(network, removed)
+    start = None if fit is None else carried(left, block, free, fit.estimate.transform)
+    return Search(left, start, removed, (stage, second))
+
+
+def _start_by_survey(network: Network, by_block: State | None) -> State | None:
+    """Where survey and images agree although the free block contradicts the survey; None: they do not.
+
+    Images of a plane form two blocks that fit them alike, and only one of them fits the survey.
+
+    Args:
+        network: with all of its survey.
+        by_block: the start that the free block leads to, which must lead to a worse minimum; None if there is none.
+    """
+    try:
+        found = least_minimum(adjust_once(network, state_of(complete(network))), network)
+    except (BadInputError, NotSolvableError, NotConvergedError):
+        return None
+    if found.ratio > BENT:
+        return None
+    if by_block is not None:
+        try:
+            other = adjust_once(network, by_block)
+        except (NotSolvableError, NotConvergedError):
+            return found.state
+        if not is_worse(Minimum.of(other), Minimum.of(found), found.redundancy):
+            return None
+    return found.state
+
+
+def _other_block(words: str) -> Stage:
+    return Stage(
+        StageName.SIMILARITY,
+        f"left out: the images alone form a block other than that of the survey, with which they agree ({words})",
+    )
 
 
 def constrained_stage(search: Search) -> tuple[Outcome, Stage]:
@@ -100,14 +141,20 @@ def constrained_stage(search: Search) -> tuple[Outcome, Stage]:
     network, start, aside = search.network, search.start, list[Removed]()
     if start is not None:
         aside = contradicted_rays(network, start)
-        cleaned = _cleaned(network, aside)
-        network, start = cleaned, _state_in(cleaned, network, start)
+        cleaned = without_removed(network, aside)
+        network, start = cleaned, state_in(cleaned, network, start)
     start = state_of(complete(network)) if start is None else start
-    outcome = adjust(network, start, snoop=True, family_risk=STAGE_RISK)
+    try:
+        outcome = adjust_least(network, start, search.network, snoop=True, family_risk=STAGE_RISK)
+    except (NotSolvableError, NotConvergedError):
+        if search.start is None:
+            raise
+        other = state_of(complete(network))  # the block may have led astray
+        outcome = adjust_least(network, other, search.network, snoop=True, family_risk=STAGE_RISK)
     outcome, more = _without_doubtful_points(outcome)
     aside += more
-    findings = (*(Finding(_aside_words(one), removed=False) for one in aside), *_findings(outcome))
-    stage = Stage(StageName.CONSTRAINED, _adjusted_words(outcome), findings)
+    findings = (*(Finding(_aside_words(one), removed=False) for one in aside), *findings_of(outcome))
+    stage = Stage(StageName.CONSTRAINED, adjusted_words(outcome), findings)
     outcome = replace(outcome, removed=(*search.removed, *outcome.removed), aside=tuple(aside))
     refuse_absurd(outcome, [finding.message for part in (*search.stages, stage) for finding in part.findings])
     return outcome, stage
@@ -122,9 +169,9 @@ def _without_doubtful_points(outcome: Outcome) -> tuple[Outcome, list[Removed]]:
     while doubtful := [b for b in outcome.blunders if len(_points_of(outcome.adjustment.network, b)) == 1]:
         network, state = outcome.adjustment.network, outcome.adjustment.state
         gone = Removed(doubtful[0], network)
-        cleaned = _cleaned(network, [gone])
+        cleaned = without_removed(network, [gone])
         try:
-            again = adjust(cleaned, _state_in(cleaned, network, state), snoop=True, family_risk=STAGE_RISK)
+            again = adjust(cleaned, state_in(cleaned, network, state), snoop=True, family_risk=STAGE_RISK)
         except (BadInputError, NotSolvableError, NotConvergedError):
             break  # the network needs them
         outcome = replace(again, removed=(*outcome.removed, *again.removed))
@@ -134,7 +181,7 @@ def _without_doubtful_points(outcome: Outcome) -> tuple[Outcome, list[Removed]]:
 
 def _points_of(network: Network, blunder: Blunder) -> set[str]:
     """The points of a group that cannot be told apart; none if it is not such a group, or not of points alone."""
-    if len(blunder.candidates) < 2 or any(one.kind not in _OF_POINTS for one in blunder.candidates):
+    if len(blunder.candidates) < 2 or any(one.kind not in OF_POINTS for one in blunder.candidates):
         return set()
     return {observation_to_json(network, one)["point"] for one in blunder.candidates}
 
@@ -168,8 +215,8 @@ def snoop_network(network: Network) -> Outcome:
             refuse_contradicted(network, outcome.adjustment)
             return outcome
         start = whole.state
-    outcome = adjust(network, start, snoop=True)
-    refuse_absurd(outcome, [finding.message for finding in _findings(outcome)])
+    outcome = adjust_least(network, start, network, snoop=True)
+    refuse_absurd(outcome, [finding.message for finding in findings_of(outcome)])
     return outcome
 
 
@@ -194,105 +241,3 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
     left = sum(point.role in SURVEYED for point in a.network.points)
     if 3 * len(gone) > len(gone) + left:
         raise RefusedError(too_many(gone, len(gone) + left) + told_of(findings))
-
-
-def _free_stage(network: Network) -> tuple[Outcome | None, list[Removed], Stage]:
-    """Adjust the images alone; None if they do not determine a block."""
-    try:
-        outcome = _alone(without_survey(network))
-    except (BadInputError, NotSolvableError, NotConvergedError) as error:
-        return None, [], Stage(StageName.FREE, f"left out: the images alone do not form a block ({error})")
-    return outcome, list(outcome.removed), Stage(StageName.FREE, _adjusted_words(outcome), _findings(outcome))
-
-
-def _alone(network: Network) -> Outcome:
-    """Adjust a free network; where given poses lead to nothing that can be believed, without them."""
-    given = all(image.position is not None for image in network.images)
-    try:
-        outcome = adjust(network, state_of(complete(network)), snoop=True, family_risk=STAGE_RISK)
-        if not given or outcome.adjustment.ratio <= ABSURD:
-            return outcome
-    except (NotConvergedError, NotSolvableError):
-        if not given:
-            raise
-    forgotten = replace(network, images=tuple(replace(i, position=None, rotation=None) for i in network.images))
-    return adjust(forgotten, state_of(complete(forgotten)), snoop=True, family_risk=STAGE_RISK)
-
-
-def _without_suspects(free: Outcome) -> Outcome:
-    """The free block without the undecided candidates, which might deform it; unchanged if it needs them."""
-    if not free.blunders:
-        return free
-    network = free.adjustment.network
-    suspects = {candidate for blunder in free.blunders for candidate in (blunder.suspect, *blunder.candidates)}
-    named = [observation_to_json(network, suspect) for suspect in suspects]
-    less = without_survey(without_observations(network, {(names["image"], names["point"]) for names in named}))
-    try:
-        return adjust(less, state_of(complete(less)), family_risk=STAGE_RISK)
-    except (BadInputError, NotSolvableError, NotConvergedError):
-        return free
-
-
-def _cleaned(network: Network, removed: Sequence[Removed]) -> Network:
-    """The network without the removed observations, matched by name because indices differ from stage to stage."""
-    named = [
-        observation_to_json(gone.network, one)
-        for gone in removed
-        for one in gone.blunder.candidates or (gone.blunder.suspect,)
-    ]
-    rows = {(n["image"], n["point"]) for n in named if n["kind"] == BlunderKind.IMAGE}
-    points = {n["point"] for n in named if n["kind"] == BlunderKind.CONTROL}
-    left = as_check_points(without_observations(network, rows), points)
-    # nothing determines a point that one image shows, without its survey
-    touched = {n["point"] for n in named if n["kind"] in _OF_POINTS}
-    lonely = np.array(
-        [
-            p.name in touched and p.role not in SURVEYED and n < RAYS
-            for p, n in zip(left.points, rays(left), strict=True)
-        ],
-        dtype=bool,
-    )
-    return only_points(left, ~lonely) if lonely.any() else left
-
-
-def _carried(network: Network, block: Outcome, free: Outcome, transform: Similarity) -> State | None:
-    """Start values from the block; None if a tie point is in neither it nor the free adjustment with all points."""
-    state, places = block.adjustment.state, _places(block)
-    whole = _places(free)
-    if any(point.name in whole and point.name not in places for point in network.points):
-        common = list(places)
-        onto = fit_similarity([whole[name] for name in common], [places[name] for name in common])
-        places = {name: onto.apply(xyz) for name, xyz in whole.items()} | places
-    xyz = [transform.apply(places[p.name]) if p.name in places else p.xyz for p in network.points]
-    if any(known is None for known in xyz):
-        return None
-    fixed = [p.xyz if p.role is Role.FIXED else known for p, known in zip(network.points, xyz, strict=True)]
-    turned = transform.turn(state.rotation)
-    return State(state.interior, transform.apply(state.position), turned, np.array(fixed, dtype=float))
-
-
-def _places(outcome: Outcome) -> dict[str, Floats]:
-    """Coordinates of the points by name."""
-    a = outcome.adjustment
-    return {point.name: xyz for point, xyz in zip(a.network.points, a.state.xyz, strict=True)}
-
-
-def _state_in(network: Network, before: Network, state: State) -> State:
-    """The state of a network after some of its points were taken out."""
-    place = {point.name: i for i, point in enumerate(before.points)}
-    return replace(state, xyz=state.xyz[[place[point.name] for point in network.points]])
-
-
-def _adjusted_words(outcome: Outcome) -> str:
-    a = outcome.adjustment
-    sigma0 = "not estimable" if a.sigma0 is None else f"{a.sigma0:.4g}"
-    return (
-        f"{a.problem.n_observations} observations, redundancy {a.redundancy}, "
-        f"sigma0 {sigma0} (a priori {a.network.sigma0:g})"
-    )
-
-
-def _findings(outcome: Outcome) -> tuple[Finding, ...]:
-    gone = [Finding(describe(removed.network, removed.blunder), removed=True) for removed in outcome.removed]
-    network = outcome.adjustment.network
-    return (*gone, *(Finding(describe(network, blunder), removed=False) for blunder in outcome.blunders))

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from photogrammetry.adjustment.equations.unknowns import state_of
-from photogrammetry.adjustment.run import adjust as adjust_from
 from photogrammetry.network.file import network_from_json, read_network
 from photogrammetry.network.file_writer import write_network
 from photogrammetry.network.model import Network
 from photogrammetry.procedures.calibration import calibrate as calibrate_network
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous
+from photogrammetry.procedures.minima import adjust_least
 from photogrammetry.procedures.orientation import orient as orient_network
 from photogrammetry.procedures.stages import snoop_network
 from photogrammetry.programming.results import Result
@@ -54,7 +54,7 @@ def adjust(network: Network, *, snoop: bool = False) -> Result:
         NotConvergedError: no optimum was reached.
         RefusedError: with `snoop`, the data contradict each other.
     """
-    outcome = snoop_network(network) if snoop else adjust_from(network, state_of(complete(network)))
+    outcome = snoop_network(network) if snoop else adjust_least(network, state_of(complete(network)), network)
     refuse_ambiguous(network, outcome.adjustment)
     return Result(outcome)
 

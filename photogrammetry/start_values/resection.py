@@ -3,6 +3,9 @@
 `resect` needs no start values. Three points and their rays fix the three distances up to at most four solutions
 (Grunert's quartic). With more points it computes the solutions of several well-spread triples, judges each by all
 points, and refines the best by least squares (`refine_pose`). The points may lie in a plane.
+
+A plane has two poses, of which the wrong one is a minimum too (`reflected_pose`): from far away a plane that is tilted
+towards the camera looks like one that is tilted away from it.
 """
 
 from dataclasses import dataclass
@@ -199,10 +202,45 @@ def _distinct(poses: list[RefinedPose], same: float) -> list[RefinedPose]:
     """Poses in the order of their square sums, the best of each group of nearly equal ones."""
     kept: list[RefinedPose] = []
     for pose in sorted(poses, key=lambda candidate: candidate.square_sum):
-        turns = [np.arccos(np.clip((np.trace(other.camera.R.T @ pose.camera.R) - 1) / 2, -1, 1)) for other in kept]
-        if all(turn > same for turn in turns):
+        if all(_turn(other.camera, pose.camera) > same for other in kept):
             kept.append(pose)
     return kept
+
+
+def _turn(one: IdealCamera, other: IdealCamera) -> float:
+    """Angle between two rotations, rad."""
+    return float(np.arccos(np.clip((np.trace(one.R.T @ other.R) - 1) / 2, -1, 1)))
+
+
+def reflected_pose(camera: IdealCamera, points: Floats, xy: Floats) -> RefinedPose | None:
+    """The other pose in which points in a plane have nearly the same image.
+
+    The points are mirrored in the camera system, across the plane through their centroid at right angles to the mean
+    ray. Of a plane the mirror image is congruent, and from far away it has the same image: the pose that it leads to is
+    the second minimum of the plane's resection (Oberkampf, DeMenthon and Davis 1996; Schweighofer and Pinz 2006).
+
+    Args:
+        camera: at one minimum, all points in front of it.
+        points: (n, 3) object coordinates, n >= 3, not on a line.
+        xy: (n, 2) reduced image coordinates.
+
+    Returns:
+        The minimum reached from there; None if there is none but that at which the camera is. Points far off a plane
+        may lead to a pose with large residuals.
+
+    Raises:
+        BadInputError: the points lie on a line.
+    """
+    k = (points - camera.X0) @ camera.R
+    rays = k / np.linalg.norm(k, axis=1, keepdims=True)
+    mean = rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0))
+    mirrored = k - 2.0 * ((k - k.mean(axis=0)) @ mean)[:, None] * mean
+    fit = fit_similarity(mirrored, points, scale=1.0)
+    other = refine_pose(IdealCamera(camera.c, fit.translation, fit.rotation), points, xy)
+    here = refine_pose(camera, points, xy)
+    if not np.isfinite(other.square_sum) or _turn(here.camera, other.camera) <= _SAME_TURN:
+        return None
+    return other
 
 
 def refine_pose(camera: IdealCamera, points: Floats, xy: Floats, steps: int = _MAX_STEPS) -> RefinedPose:

@@ -60,7 +60,7 @@ def _completed(network: Network) -> Network:
     if cameras and block.typical_residual() > _FITS:
         block = _with_better_c(network, given, block, cameras)
     _place_images(block)
-    _place_points(block)
+    place_points(block)
     return _filled(network, block)
 
 
@@ -183,8 +183,12 @@ def _place_images(block: ImageBlock) -> None:
             block.cameras[image] = IdealCamera(block.sightings.c_of(image), place, np.eye(3))
 
 
-def _place_points(block: ImageBlock) -> None:
-    """Put points without coordinates onto their first ray, or into the middle of the block; all images have a pose."""
+def place_points(block: ImageBlock) -> None:
+    """Put points without coordinates onto their first ray, or into the middle of the block.
+
+    Args:
+        block: all its images have a pose; changed in place.
+    """
     middle, size = _extent(block)
     seen = block.sightings.seen()
     for point in np.flatnonzero(~block.known):

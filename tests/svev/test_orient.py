@@ -88,6 +88,22 @@ def test_calibration_replaces_the_cameras(run: Run, tmp_path: Path) -> None:
     assert result["cameras"]["K1"]["sigma"] == {}
 
 
+def test_a_camera_that_the_calibration_lacks_is_left_out(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    network = hill(1, helmets=17).network
+    calibration = _calibration(tmp_path / "cameras.json")
+    known = json.loads(calibration.read_text())
+    del known["cameras"]["K3"]
+    calibration.write_text(json.dumps(known))
+    code, result = run(network, "--calibration", str(calibration))
+    assert code == 0
+    assert list(result["images"]) == ["hill-1", "hill-2"]
+    words = "camera K3 is left out: the calibration lacks it (it has K1, K2); calibrate it too or correct the name"
+    assert words in result["notes"]
+    assert words in capsys.readouterr().out
+
+
 def test_alternatives(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     network = hill(1, helmets=17).network
     _, static = run(network, "--alternative", "1")

@@ -7,11 +7,11 @@ import typer
 
 from photogrammetry.adjustment.equations.unknowns import state_of
 from photogrammetry.adjustment.run import Outcome, settled
-from photogrammetry.adjustment.run import adjust as adjust_network
 from photogrammetry.adjustment.solution.usability import is_unusable
 from photogrammetry.network.file import read_network
 from photogrammetry.network.model import Network
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous
+from photogrammetry.procedures.minima import adjust_least
 from photogrammetry.procedures.stages import snoop_network
 from photogrammetry.reports.adjusted import Wishes, adjusted_sections
 from photogrammetry.reports.document import Report
@@ -71,7 +71,7 @@ def adjust(
     named_points(given, covariance or (), "--covariance")
 
     def adjusted() -> tuple[dict[str, Any], list[str]]:
-        outcome = snoop_network(given) if snoop else adjust_network(given, state_of(_started(given)))
+        outcome = snoop_network(given) if snoop else adjust_least(given, state_of(_started(given)), given)
         outcome = settled(outcome)
         refuse_ambiguous(given, outcome.adjustment)
         if datum:

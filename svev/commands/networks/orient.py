@@ -1,5 +1,6 @@
 """`svev orient`: poses of the cameras on the hill."""
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -65,21 +66,23 @@ def orient(
 ) -> None:
     """Estimate the cameras' poses from reference points, with a search for gross errors in three stages.
 
-    Exit codes: 0 oriented, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or refused
-    because images and survey contradict each other.
+    Exit codes: 0 oriented, 2 bad input, 3 not solvable (the result says what is missing, or which poses are possible
+    where several are), 4 not converged, or refused because images and survey contradict each other.
 
     Example: svev orient hill.json --calibration cameras.json -o poses.json --report orientation
     """
     refuse_overwriting(output, network, calibration)
     given = read_network(network)
+    left_out: list[str] = []
     if calibration is not None:
-        given = with_calibration(given, read_calibration(calibration))
+        given, left_out = with_calibration(given, read_calibration(calibration))
     given = with_weights(given, reweight=reweight, paper=paper)
     came_from = origin(context, network=network, calibration=calibration)
     named_points(given, covariance or (), "--covariance")  # before anything is computed
 
     def oriented() -> tuple[dict[str, Any], list[str]]:
         orientation = orient_network(given, int(alternative), moving, uncertain_interior=uncertain_interior)
+        orientation = replace(orientation, notes=(*left_out, *orientation.notes))
         result = with_extras(
             orientation_to_json(orientation),
             orientation.outcome.adjustment,

@@ -19,8 +19,6 @@ from photogrammetry.network.model import Network, Point
 from photogrammetry.network.selection import (
     observation_names,
 )
-from photogrammetry.procedures.consensus import FEWEST_AGREEING
-from photogrammetry.procedures.exchanged import Exchange, find_exchanges, is_mirrored
 from photogrammetry.procedures.findings import (
     STAGE_RISK,
     SURVEYED,
@@ -31,8 +29,10 @@ from photogrammetry.procedures.findings import (
     told_of,
     too_many,
 )
-from photogrammetry.procedures.reference_estimate import ReferencePoint, Suspect
-from photogrammetry.procedures.reference_fit import ReferenceFit, fit_reference, reference_points
+from photogrammetry.procedures.reference.consensus import FEWEST_AGREEING
+from photogrammetry.procedures.reference.exchanged import Exchange, find_exchanges, is_mirrored
+from photogrammetry.procedures.reference.reference_estimate import ReferencePoint, Suspect
+from photogrammetry.procedures.reference.reference_fit import ReferenceFit, fit_reference, reference_points
 from rig.arrays import Floats
 from rig.errors import BadInputError
 

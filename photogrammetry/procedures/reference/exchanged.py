@@ -9,9 +9,9 @@ from scipy import special
 from photogrammetry.adjustment.gross_errors.suspicion import SINGLE_RISK
 from photogrammetry.adjustment.solution.global_test import ABSURD
 from photogrammetry.network.model import Point
-from photogrammetry.procedures.consensus import FEWEST_AGREEING
-from photogrammetry.procedures.reference_estimate import ReferencePoint
-from photogrammetry.procedures.reference_fit import ReferenceFit, fit_reference
+from photogrammetry.procedures.reference.consensus import FEWEST_AGREEING
+from photogrammetry.procedures.reference.reference_estimate import ReferencePoint
+from photogrammetry.procedures.reference.reference_fit import ReferenceFit, fit_reference
 from rig.arrays import Floats
 from rig.errors import BadInputError
 

@@ -11,8 +11,13 @@ from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK, SINGLE
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.similarity import fit_similarity
 from photogrammetry.network.model import Point
-from photogrammetry.procedures.consensus import agreeing_points
-from photogrammetry.procedures.reference_estimate import ImagePoint, ReferenceEstimate, ReferencePoint, Suspect
+from photogrammetry.procedures.reference.consensus import agreeing_points
+from photogrammetry.procedures.reference.reference_estimate import (
+    ImagePoint,
+    ReferenceEstimate,
+    ReferencePoint,
+    Suspect,
+)
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 

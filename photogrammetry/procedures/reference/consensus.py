@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from scipy import special
 
-from photogrammetry.procedures.reference_estimate import ReferenceEstimate, ReferencePoint
+from photogrammetry.procedures.reference.reference_estimate import ReferenceEstimate, ReferencePoint
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 

@@ -23,6 +23,8 @@ from rig.arrays import Flags, Floats
 
 #: Errors of an adjustment.
 Failure = NotSolvableError | NotConvergedError | RefusedError
+#: Rays from start values are so much less accurate than their image points.
+START_CAUTION: Final = 30.0
 #: Part of the tie points that may be other objects in each image; of more the cause is not single points.
 _MOST_WRONG: Final = 3
 _CONTRADICTED: Final = (PointState.OK, PointState.BEHIND, PointState.NOT_CONVERGED)
@@ -50,6 +52,15 @@ def unplaced_points(network: Network, state: State, caution: float = 1.0) -> dic
     ties = sum(point.role not in SURVEYED for point in network.points)
     believed = sum(how in _CONTRADICTED for _, how, _ in found) <= max(1, ties // _MOST_WRONG)
     return {name: words for name, how, words in found if believed or how not in _CONTRADICTED}
+
+
+def naming_unplaced(error: NotConvergedError, network: Network, start: State) -> NotConvergedError:
+    """The error with the tie points that their rays do not place at the start values, if there are any."""
+    found = unplaced_points(network, start, START_CAUTION)
+    if not found:
+        return error
+    words = "; ".join(f"{name} {why}" for name, why in found.items())
+    return NotConvergedError(f"{error}; tie points without a place, leave them out: {words}")
 
 
 def _unplaced(network: Network, state: State, caution: float) -> Iterator[tuple[str, PointState, str]]:

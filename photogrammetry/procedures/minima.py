@@ -2,7 +2,7 @@
 
 From far away a plane that is tilted towards the camera looks like one that is tilted away from it, so the sum of
 squares has a minimum at both, and start values lead to either of them. From each adjustment the other minima are sought
-here, with the poses of single images and of all of them reflected (`start_values.resection.reflected_pose`). The least
+here, with the poses of single images and of all of them reflected (`start_values.resection.second_pose`). The least
 is taken. Where the sums of squares do not decide, nobody knows which pose is right.
 
 Without surveyed points nothing is reflected: of a free network the minimum stands that its start values lead to.
@@ -25,8 +25,9 @@ from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network.model import Network, Reweight
 from photogrammetry.network.selection import only_points, with_interior
 from photogrammetry.procedures.findings import SURVEYED
+from photogrammetry.procedures.left_out import naming_unplaced
 from photogrammetry.start_values.image_block import ImageBlock
-from photogrammetry.start_values.resection import reflected_pose
+from photogrammetry.start_values.resection import second_pose
 from photogrammetry.start_values.search import place_points
 from photogrammetry.start_values.sightings import Sightings, reduce_observations
 from rig.arrays import Flags, Floats
@@ -37,6 +38,8 @@ from rig.errors import BadInputError
 WORSE: Final = 25.0
 #: Times that: a reflected pose whose own image says so beforehand is not adjusted.
 _HOPELESS: Final = 20.0
+#: Redundant observations that the a-priori variance is worth: sigmas are misjudged by a factor of two at times.
+_A_PRIORI: Final = 4
 _FEWEST: Final = 4  # points of an image; three fit several poses exactly (`doubtful_poses`)
 _COMBINED: Final = 3  # images of which all combinations are tried; of more of them each alone, and all together
 _SAME: Final = 0.05  # sigmas of the projection centres by which one minimum differs from itself
@@ -59,7 +62,10 @@ def adjust_least(
     Raises:
         NotSolvableError, NotConvergedError, BadInputError: as `adjust`.
     """
-    outcome = adjust(network, start, snoop=snoop, family_risk=family_risk)
+    try:
+        outcome = adjust(network, start, snoop=snoop, family_risk=family_risk)
+    except NotConvergedError as error:
+        raise naming_unplaced(error, network, start) from error
     for _ in range(_ROUNDS):
         # what was taken out beside the wrong pose need not be wrong beside the right one: all of it takes part again
         best = least_minimum(outcome.adjustment, given)
@@ -138,7 +144,7 @@ def is_worse(other: Minimum, best: Minimum, redundancy: int) -> bool:
     """Whether the sums of squares decide against a minimum: by the a-priori variances, and by those estimated.
 
     The turn from one pose to the other is one parameter, so the difference is tested with one degree of freedom (F
-    test). With little redundancy that asks for much, since the estimated variance is uncertain itself.
+    test). The a-priori variance counts as a few observations beside the redundant ones, which may be two.
 
     Args:
         other: a minimum.
@@ -146,12 +152,9 @@ def is_worse(other: Minimum, best: Minimum, redundancy: int) -> bool:
         redundancy: of the network.
     """
     difference = other.square_sum - best.square_sum
-    if not difference > WORSE:
-        return False
-    if redundancy <= 0:
-        return True
-    variance = max(best.square_sum / redundancy, np.finfo(float).tiny)
-    return bool(special.fdtrc(1, redundancy, difference / variance) < SINGLE_RISK)
+    freedom = redundancy + _A_PRIORI
+    variance = (best.square_sum + _A_PRIORI) / freedom
+    return bool(difference > WORSE and special.fdtrc(1, freedom, difference / variance) < SINGLE_RISK)
 
 
 def moved_images(other: Adjustment, best: Adjustment) -> Flags:
@@ -243,7 +246,7 @@ def _other_pose(a: Adjustment, sightings: Sightings, surveyed: Flags, image: int
     if not camera.in_front(xyz).all():
         return None
     try:
-        other = reflected_pose(camera, xyz, xy)
+        other = second_pose(camera, xyz, xy)
     except BadInputError:
         return None  # the points lie on a line
     if other is None:

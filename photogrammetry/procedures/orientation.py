@@ -6,7 +6,6 @@ The tie points are the static ones (alternative 1) or these and the places of mo
 
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Final
 
 import numpy as np
 
@@ -17,12 +16,10 @@ from photogrammetry.network.model import Datum, Network, Role
 from photogrammetry.network.selection import only_points, require_unknown_poses
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous, refuse_contradicted
 from photogrammetry.procedures.findings import Stage
-from photogrammetry.procedures.left_out import unplaced_points, without_images, without_points
+from photogrammetry.procedures.left_out import START_CAUTION, unplaced_points, without_images, without_points
 from photogrammetry.procedures.stages import constrained_stage, search_block
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
-
-_CAUTION: Final = 30.0  # start values are so much less accurate than image points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +80,7 @@ def _oriented(network: Network) -> tuple[Outcome, tuple[Stage, ...], list[str]]:
                 said += less[1]
                 continue
             left = without_points(network, gone)
-            more = unplaced_points(left, state_of(complete(left)), _CAUTION)
+            more = unplaced_points(left, state_of(complete(left)), START_CAUTION)
             if not more:
                 raise
         else:

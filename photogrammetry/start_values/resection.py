@@ -2,10 +2,7 @@
 
 `resect` needs no start values. Three points and their rays fix the three distances up to at most four solutions
 (Grunert's quartic). With more points it computes the solutions of several well-spread triples, judges each by all
-points, and refines the best by least squares (`refine_pose`). The points may lie in a plane.
-
-A plane has two poses, of which the wrong one is a minimum too (`reflected_pose`): from far away a plane that is tilted
-towards the camera looks like one that is tilted away from it.
+points, and refines the best by least squares (`refine_pose`). The points may lie in a plane, which has a `second_pose`.
 """
 
 from dataclasses import dataclass
@@ -29,6 +26,7 @@ _SAME_TURN = 0.02  # rad: poses closer than that are one solution
 _SAME_EXACT = 1e-5  # rad: the same for three points, whose poses are exact
 _ROUNDING = 1e-7  # of c: smaller residuals are rounding
 _AMBIGUOUS = 4.0  # ratio of square sums below which a second pose remains possible
+_FEW = 5  # points that may have a second pose without lying in a plane
 _MAX_STEPS = 30
 _DAMPING = 1e-3
 _TOO_DAMPED = 1e12
@@ -212,12 +210,12 @@ def _turn(one: IdealCamera, other: IdealCamera) -> float:
     return float(np.arccos(np.clip((np.trace(one.R.T @ other.R) - 1) / 2, -1, 1)))
 
 
-def reflected_pose(camera: IdealCamera, points: Floats, xy: Floats) -> RefinedPose | None:
-    """The other pose in which points in a plane have nearly the same image.
+def second_pose(camera: IdealCamera, points: Floats, xy: Floats) -> RefinedPose | None:
+    """The best pose beside the one that a camera has: the reflected one, or another one that few points allow.
 
-    The points are mirrored in the camera system, across the plane through their centroid at right angles to the mean
-    ray. Of a plane the mirror image is congruent, and from far away it has the same image: the pose that it leads to is
-    the second minimum of the plane's resection (Oberkampf, DeMenthon and Davis 1996; Schweighofer and Pinz 2006).
+    For the reflected one the points are mirrored in the camera system, across the plane through their centroid at right
+    angles to the mean ray. Of a plane the mirror image is congruent, and from afar it looks the same: its pose leads to
+    the second minimum of the resection (Schweighofer and Pinz 2006). Of few points those of three are tried too.
 
     Args:
         camera: at one minimum, all points in front of it.
@@ -225,8 +223,7 @@ def reflected_pose(camera: IdealCamera, points: Floats, xy: Floats) -> RefinedPo
         xy: (n, 2) reduced image coordinates.
 
     Returns:
-        The minimum reached from there; None if there is none but that at which the camera is. Points far off a plane
-        may lead to a pose with large residuals.
+        The minimum with the smallest residuals, perhaps large ones; None if there is none but that of the camera.
 
     Raises:
         BadInputError: the points lie on a line.
@@ -236,11 +233,16 @@ def reflected_pose(camera: IdealCamera, points: Floats, xy: Floats) -> RefinedPo
     mean = rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0))
     mirrored = k - 2.0 * ((k - k.mean(axis=0)) @ mean)[:, None] * mean
     fit = fit_similarity(mirrored, points, scale=1.0)
-    other = refine_pose(IdealCamera(camera.c, fit.translation, fit.rotation), points, xy)
+    starts = [IdealCamera(camera.c, fit.translation, fit.rotation)]
+    if len(points) <= _FEW:
+        measured = unit_rays(xy, camera.c)
+        of_three = [p for t in _triples(points) for p in _three_points(points[t], measured[t], camera.c)]
+        candidates = _distinct([RefinedPose(p, _fit(p, points, measured)) for p in of_three], _SAME_TURN)
+        starts += [candidate.camera for candidate in candidates[: _REFINED + 1]]
     here = refine_pose(camera, points, xy)
-    if not np.isfinite(other.square_sum) or _turn(here.camera, other.camera) <= _SAME_TURN:
-        return None
-    return other
+    found = (refine_pose(start, points, xy) for start in starts)
+    others = [p for p in found if np.isfinite(p.square_sum) and _turn(here.camera, p.camera) > _SAME_TURN]
+    return min(others, key=lambda other: other.square_sum, default=None)
 
 
 def refine_pose(camera: IdealCamera, points: Floats, xy: Floats, steps: int = _MAX_STEPS) -> RefinedPose:

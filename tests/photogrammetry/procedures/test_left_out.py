@@ -101,6 +101,15 @@ def test_a_tie_point_that_is_another_object_in_each_image_is_named(seed: int, im
     assert all("T6" in line for line in _told(orientation))
 
 
+def test_plain_adjust_names_the_tie_point_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    case = hill(1)
+    write_network(
+        _with_tie(case, dict.fromkeys((0, 1), _far(case, -300.0)), np.random.default_rng(1)), tmp_path / "n.json"
+    )
+    assert main(["adjust", str(tmp_path / "n.json"), "-o", str(tmp_path / "result.json")]) == 4
+    assert "tie points without a place, leave them out: T6 in hill-1, hill-2, rays" in capsys.readouterr().out
+
+
 def test_a_tie_point_with_one_ray_is_named() -> None:
     case = hill(1)
     orientation = orient(_with_tie(case, {1: _MIDDLE}, np.random.default_rng(1)))

@@ -15,7 +15,7 @@ from photogrammetry.network.model import Image, Network
 from photogrammetry.procedures.minima import adjust_least, minima
 from photogrammetry.procedures.orientation import orient
 from photogrammetry.procedures.stages import snoop_network
-from photogrammetry.start_values.resection import reflected_pose
+from photogrammetry.start_values.resection import second_pose
 from photogrammetry.start_values.search import complete
 from svev.cli import main
 from tests.photogrammetry.planar import Planar, planar
@@ -40,20 +40,20 @@ def _in_other_pose(case: Planar, chosen: tuple[int, ...]) -> State:
     position, rotation = state.position.copy(), state.rotation.copy()
     known = [i for i, point in enumerate(case.network.points) if point.xyz is not None]
     for i in chosen:
-        other = reflected_pose(case.cameras[i], case.xyz[known], case.cameras[i].project(case.xyz[known]))
+        other = second_pose(case.cameras[i], case.xyz[known], case.cameras[i].project(case.xyz[known]))
         assert other is not None
         position[i], rotation[i] = other.camera.X0, other.camera.R
     return replace(state, position=position, rotation=rotation)
 
 
-def test_the_reflected_pose_is_the_second_minimum_of_a_plane_and_of_nothing_else() -> None:
+def test_the_second_pose_is_the_second_minimum_of_a_plane_and_of_nothing_else() -> None:
     case = planar(np.random.default_rng(1), 1, 60.0)
     camera, xy = case.cameras[0], case.cameras[0].project(case.xyz)
-    other = reflected_pose(camera, case.xyz, xy)
+    other = second_pose(camera, case.xyz, xy)
     assert other is not None
     assert np.linalg.norm(other.camera.X0 - camera.X0) > 10.0
     assert np.sqrt(other.square_sum / len(xy)) < 0.3
-    again = reflected_pose(other.camera, case.xyz, xy)
+    again = second_pose(other.camera, case.xyz, xy)
     assert again is not None
     assert np.abs(again.camera.X0 - camera.X0).max() < 1e-3
     network = hill(1, noise=0.0).network
@@ -62,7 +62,7 @@ def test_the_reflected_pose_is_the_second_minimum_of_a_plane_and_of_nothing_else
     assert image.position is not None
     assert image.rotation is not None
     there = replace(camera, X0=image.position, R=image.rotation)
-    assert reflected_pose(there, xyz, there.project(xyz)) is None
+    assert second_pose(there, xyz, there.project(xyz)) is None
 
 
 @pytest.mark.parametrize("command", ["adjust", "orient"])

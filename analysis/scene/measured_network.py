@@ -50,7 +50,7 @@ def measured_network(
         known: the surveyed balls, as `namings` counts them.
 
     Returns:
-        The network with start values of the poses, and what there is to say, one line each.
+        The network, with poses where the survey gives approximate ones, and what there is to say, one line each.
     """
     given = {point.name: point for point in survey.network.points}
     points: dict[str, Point] = {}
@@ -73,7 +73,7 @@ def measured_network(
     network = replace(
         survey.network,
         cameras=tuple(views[name].camera for name in cameras),
-        images=tuple(_image(i, name, namings[name], survey) for i, name in enumerate(cameras)),
+        images=tuple(_image(i, views[name], namings[name], survey) for i, name in enumerate(cameras)),
         points=chosen,
         observations=_observations([views[name].spots for name in cameras], cameras, chosen, seen),
         distances=(),
@@ -93,12 +93,20 @@ def _observations(
     return ImageObservations(image, point, xy, np.sqrt(variance), np.zeros(len(rows), np.intp))
 
 
-def _image(index: int, camera: str, naming: Naming, survey: Survey) -> Image:
-    """The image of a camera with start values; an approximate pose with a sigma stays a weighted observation."""
+def _image(index: int, view: View, naming: Naming, survey: Survey) -> Image:
+    """The image of a camera; an approximate pose with a sigma stays a weighted observation.
+
+    Without an approximate pose there is none: what the balls of one image say of it, the adjustment finds out itself,
+    and a pose that is given counts as evidence where the balls do not decide between two.
+    """
+    camera = view.camera.name
     given = survey.image(camera)
     if given is not None and (given.sigma_position is not None or given.sigma_angles is not None):
         return replace(given, name=camera, camera=index)
-    return Image(camera, index, naming.pose.position, naming.pose.rotation)
+    pose = naming.pose
+    if view.approximate is None or not view.approximate.admits(pose.position[None], pose.rotation[None])[0]:
+        return Image(camera, index)
+    return Image(camera, index, pose.position, pose.rotation)
 
 
 def _nearest_points(

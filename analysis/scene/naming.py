@@ -72,6 +72,7 @@ class Naming:
         spots: (k,) of the detections.
         expected: number of known points that should be in sight.
         decades: by which chance is ruled out, apart from the number of hypotheses.
+        doubtful: whether another pose fits these balls nearly as well (`analysis.scene.reflection`).
     """
 
     pose: SinglePose
@@ -79,6 +80,7 @@ class Naming:
     spots: Integers
     expected: int
     decades: float
+    doubtful: bool = False
 
 
 def name_balls(camera: Camera, spots: Spots, known: KnownPoints, approximate: Approximate | None = None) -> Naming:
@@ -275,10 +277,11 @@ class _Image:
                 "clear the balls, or give an approximate pose"
             )
         best_one = found[0]
-        if len(found) > 1 and found[1].decades > best_one.decades - _CLEARLY:
+        rival = next((other for other in found[1:] if not _same_names(best_one, other)), None)
+        if rival is not None and rival.decades > best_one.decades - _CLEARLY:
             raise NotNamedError(
                 f"{spots}, which fit the surveyed balls in two ways ({len(best_one.points)} and "
-                f"{len(found[1].points)} balls, X0 {_words(best_one)} and {_words(found[1])}), so names are ambiguous; "
+                f"{len(rival.points)} balls, X0 {_words(best_one)} and {_words(rival)}), so names are ambiguous; "
                 "show more balls, or give an approximate pose"
             )
         centre = self.known.xyz[best_one.points].mean(axis=0)
@@ -297,6 +300,12 @@ def _is_part(hypothesis: Hypothesis, naming: Naming) -> bool:
     names = dict(zip(naming.points.tolist(), naming.spots.tolist(), strict=True))
     pairs = zip(hypothesis.points.tolist(), hypothesis.detections.tolist(), strict=True)
     return all(names.get(point) == spot for point, spot in pairs)
+
+
+def _same_names(one: Naming, other: Naming) -> bool:
+    """Whether two namings, at whatever poses, contradict each other in no name, and share those of one of them."""
+    names, others = (set(zip(n.points.tolist(), n.spots.tolist(), strict=True)) for n in (one, other))
+    return names <= others or others <= names
 
 
 def _words(naming: Naming) -> str:

@@ -16,6 +16,7 @@ from analysis.scene.detection import Detections, detect_balls
 from analysis.scene.hypotheses import Approximate
 from analysis.scene.measured_network import View, measured_network
 from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
+from analysis.scene.reflection import with_better_pose
 from analysis.scene.static_image import StaticImage, static_images
 from analysis.scene.survey import KnownPoints, Survey, check_lengths
 from analysis.scene.ties import Station, Tie, ball_size, find_ties
@@ -101,8 +102,8 @@ def orient_log(log: Path, survey: Survey, pulses: range | None = None) -> Scene:
         pulses: use only these; all if left out.
 
     Raises:
-        BadInputError: the survey does not belong to the log (camera missing, other image size), or fewer than two
-            cameras can be oriented; the message says why for each.
+        BadInputError: the survey does not belong to the log (other image size), or fewer than two cameras can be
+            oriented; the message says why for each.
         LogDamagedError: the log has no images there, or damaged ones.
         NotSolvableError, NotConvergedError: of the adjustment.
     """
@@ -119,7 +120,7 @@ def orient_images(
         survey: balls and interior orientations.
         detections: what `detect_balls` finds in them, if that is known already.
     """
-    cameras = {name: _checked(image, survey.camera(name), survey) for name, image in static.items()}
+    cameras, strange = survey.cameras_of({name: image.size for name, image in static.items()})
     known = survey.surveyed()
     found = detections or {name: detect_balls(image) for name, image in static.items()}
     views = {name: _view(camera, found[name], survey, known) for name, camera in cameras.items()}
@@ -137,29 +138,21 @@ def orient_images(
                 f"{survey.source}: the images show the surveyed balls as in a mirror: its axes are left-handed, as "
                 "where north stands before east; interchange two columns of the coordinates, or change the sign of one"
             )
-        reasons = "; ".join(f"camera {name}: {reason}" for name, reason in failures.items())
+        reasons = "; ".join([*strange.values(), *(f"camera {name}: {reason}" for name, reason in failures.items())])
         raise BadInputError(
             reasons or f"{survey.source}: the log has one camera; two at least are needed to measure in space"
         )
     network, notes = measured_network(views, namings, ties, survey, known)
     orientation = orient(network, uncertain_interior=True)
+    if len(orientation.outcome.adjustment.network.images) < _FEWEST_CAMERAS:
+        raise BadInputError("; ".join(orientation.left_out))
+    failures = strange | failures
     messages = [f"camera {name} is not oriented: {reason}" for name, reason in failures.items()]
     missing = [camera.name for camera in survey.network.cameras if camera.name not in static]
     messages += [f"camera {name} of the survey has no image in the log" for name in missing]
-    messages += [*notes, *_misfit(orientation)]
+    messages += [*notes, *orientation.left_out, *_misfit(orientation)]
     messages += [finding.message for stage in orientation.stages for finding in stage.findings]
     return scene_of(network, orientation, static, failures, messages)
-
-
-def _checked(image: StaticImage, camera: Camera, survey: Survey) -> Camera:
-    """The camera, if it is calibrated for images of this size."""
-    if camera.size != image.size:
-        size = "unknown size" if camera.size is None else f"{camera.size[0]} x {camera.size[1]} px"
-        raise BadInputError(
-            f"{survey.source}: camera {camera.name} is calibrated for images of {size}, those of the log have "
-            f"{image.size[0]} x {image.size[1]} px; give the interior orientation of this image size"
-        )
-    return camera
 
 
 def _view(camera: Camera, detections: Detections, survey: Survey, known: KnownPoints) -> View:
@@ -194,13 +187,13 @@ def _named(views: Mapping[str, View], known: KnownPoints) -> tuple[dict[str, Nam
 
 
 def _named_view(view: View, known: KnownPoints) -> Naming:
-    """Names near the approximate pose; if there are none, without it."""
+    """Names near the approximate pose, which also decides between two poses; if there are none, without it."""
     if view.approximate is not None:
         try:
             return name_balls(view.camera, view.spots, known, view.approximate)
         except NotNamedError:
             pass  # the approximate pose may be worse than it says: the balls decide
-    return name_balls(view.camera, view.spots, known)
+    return with_better_pose(name_balls(view.camera, view.spots, known), view.camera, view.spots, known)
 
 
 def _only_first(naming: Naming, n: int) -> Naming:
@@ -223,7 +216,7 @@ def _stations(views: Mapping[str, View], namings: Mapping[str, Naming]) -> list[
             naming.pose,
             views[name].spots,
             views[name].detections.radius,
-            np.setdiff1d(np.arange(len(views[name].spots)), naming.spots),
+            np.setdiff1d(np.arange(0 if naming.doubtful else len(views[name].spots)), naming.spots),
         )
         for name, naming in namings.items()
     ]

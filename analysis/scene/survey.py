@@ -1,5 +1,6 @@
 """Reads the survey of the balls: a `svev-network/1` file, JSON or TOML, without observations."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -69,10 +70,38 @@ class Survey:
         for camera in self.network.cameras:
             if camera.name == name:
                 return camera
+        raise BadInputError(self.lacks(name))
+
+    def has(self, camera: str) -> bool:
+        """Whether it has a camera's interior orientation."""
+        return any(there.name == camera for there in self.network.cameras)
+
+    def lacks(self, camera: str) -> str:
+        """Words for a camera that it has not."""
         there = ", ".join(camera.name for camera in self.network.cameras) or "none"
-        raise BadInputError(
-            f"{self.source}: camera {name} of the log is missing (there: {there}); name the cameras as in the log"
-        )
+        return f"{self.source}: camera {camera} of the log is missing (there: {there}); name the cameras as in the log"
+
+    def cameras_of(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[dict[str, Camera], dict[str, str]]:
+        """The cameras of a log, and for those that it has not why there is none.
+
+        Args:
+            sizes: width and height of the images by camera.
+
+        Raises:
+            BadInputError: a camera is calibrated for images of another size.
+        """
+        cameras: dict[str, Camera] = {}
+        for name, here in sizes.items():
+            if not self.has(name):
+                continue
+            camera = cameras[name] = self.camera(name)
+            if camera.size != here:
+                size = "unknown size" if camera.size is None else f"{camera.size[0]} x {camera.size[1]} px"
+                raise BadInputError(
+                    f"{self.source}: camera {name} is calibrated for images of {size}, those of the log have "
+                    f"{here[0]} x {here[1]} px; give the interior orientation of this image size"
+                )
+        return cameras, {name: self.lacks(name) for name in sizes if name not in cameras}
 
     def image(self, camera: str) -> Image | None:
         """The image of a camera that carries its approximate pose; None if there is none."""

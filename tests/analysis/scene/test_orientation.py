@@ -172,6 +172,17 @@ def test_a_camera_that_sees_no_balls_is_named_and_the_others_are_oriented() -> N
     assert any(message.startswith("camera K2 is not oriented: ") for message in scene.messages)
 
 
+def test_a_camera_that_the_survey_lacks_is_named_and_the_others_are_oriented() -> None:
+    data = survey_json(training(), 5)
+    del data["cameras"]["K3"]
+    scene = oriented(data)
+    assert list(scene.cameras) == ["K1", "K2"]
+    assert (np.abs(normalized_error(scene, training())) < 3.5).all()
+    words = "survey.json: camera K3 of the log is missing (there: K1, K2); name the cameras as in the log"
+    assert f"camera K3 is not oriented: {words}" in scene.messages
+    assert scene.failures == {"K3": words}
+
+
 def test_wrong_spots_in_all_images_are_thrown_out() -> None:
     rng = np.random.default_rng(9)
     images = {}
@@ -237,6 +248,7 @@ def _resized(data: dict[str, Any]) -> dict[str, Any]:
 def _renamed(data: dict[str, Any]) -> dict[str, Any]:
     other = deepcopy(data)
     other["cameras"]["Cam2"] = other["cameras"].pop("K2")
+    other["cameras"]["Cam3"] = other["cameras"].pop("K3")
     return other
 
 
@@ -290,7 +302,7 @@ def _same_place(data: dict[str, Any]) -> dict[str, Any]:
         ),
         (_wrong_c, "camera K1: .* do not fit the 15 surveyed balls .*; check survey and interior orientation"),
         (_resized, "camera K2 is calibrated for images of 1936 x 1216 px, those of the log have 640 x 480 px; give"),
-        (_renamed, r"camera K2 of the log is missing \(there: K1, K3, Cam2\); name the cameras as in the log"),
+        (_renamed, r"camera K2 of the log is missing \(there: K1, Cam2, Cam3\); name the cameras as in the log"),
         (_few, "has 3 surveyed balls .* at least 4"),
         (_metric, '"image_frame" is "metric"; a survey for a log needs c, x0, y0 in px'),
         (lambda data: data | {"length_unit": "ft"}, '"length_unit" is "ft", but jumps are measured in metres'),

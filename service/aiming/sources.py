@@ -77,17 +77,33 @@ def _found(rig: RigSettings, camera: CameraSettings, folder: Path, nothing: Came
     if given is not None and given.calibration is not None:
         balls = _of_calibration(read_poses(given.calibration), camera)
         return _told(nothing, BallSource.CALIBRATION, balls, given.calibration)
+    lacking: str | None = None
     if given is not None and given.survey is not None:
         survey = read_survey(given.survey)
         kept = kept_in(folder).get(camera.name)
         if kept is not None and (kept.given, kept.region) == (survey_id(survey.network), camera.region):
             oriented = _told(nothing, BallSource.ORIENTATION, kept.balls, given.survey)
             return oriented.model_copy(update={"oriented": kept.oriented, "recording": kept.recording})
-        if (approximate := _of_survey(survey, camera)) is not None:
+        if not survey.has(camera.name):
+            lacking = survey.lacks(camera.name)
+        elif (approximate := _of_survey(survey, camera)) is not None:
             return _told(nothing, BallSource.SURVEY, approximate, given.survey)
     if rig.plan is not None:
-        return _told(nothing, BallSource.PLAN, _of_plan(rig.plan, camera), rig.plan)
+        planned = _told(nothing, BallSource.PLAN, _of_plan(rig.plan, camera), rig.plan)
+        return planned if lacking is None else planned.model_copy(update={"statement": _by_plan(camera, lacking)})
+    if lacking is not None:
+        raise BadInputError(lacking)
     return None
+
+
+def _by_plan(camera: CameraSettings, why: str) -> Statement:
+    """The survey cannot measure with this camera, although the plan says where it should show the balls."""
+    return Statement(
+        level=Level.WARNING,
+        code="balls_by_plan",
+        text=f"{camera.name} shows the balls where the plan has them, and will not be oriented: {why}",
+        values={"camera": camera.name, "why": why},
+    )
 
 
 def _told(nothing: CameraBalls, source: BallSource, balls: tuple[BallPlace, ...], file: Path) -> CameraBalls:

@@ -46,4 +46,6 @@ class CameraBalls(Model):
     oriented: datetime | None = Field(None, description="when the live analysis oriented the camera")
     recording: str | None = Field(None, description="id of the recording in which it did")
     balls: tuple[BallPlace, ...] = ()
-    statement: Statement | None = Field(None, description="why the places are not known, and what to do")
+    statement: Statement | None = Field(
+        None, description="why the places are not known, or only from the plan, and what to do"
+    )

@@ -150,6 +150,29 @@ def test_poses_of_the_rig_file_come_first_and_what_is_missing_is_said(tmp_path: 
     assert found.statement.text.startswith(f"where K1 shows the balls is not known: {path}: ")
 
 
+def test_a_camera_that_the_survey_lacks_is_shown_by_the_plan_and_the_others_by_the_survey(tmp_path: Path) -> None:
+    path = survey_file(tmp_path / "hill.json", training(), true_pose)
+    data = json.loads(path.read_text())
+    del data["cameras"]["K3"], data["images"]["K3"]
+    path.write_text(json.dumps(data))
+    missing = "camera K3 of the log is missing (there: K1, K2); name the cameras as in the log"
+    without_plan = BallPlaces(lambda: surveyed(path), tmp_path)
+    assert without_plan.of("K1").source is BallSource.SURVEY
+    found = without_plan.of("K3")
+    assert said(found) == ("balls_unknown", "warning")
+    assert found.statement is not None
+    assert missing in found.statement.text
+    rig = SIM.model_copy(update={"plan": plan_file(tmp_path / "plan.toml", training())})
+    planned = BallPlaces(lambda: surveyed(path, rig), tmp_path)
+    assert planned.of("K1").source is BallSource.SURVEY
+    found = planned.of("K3")
+    assert found.source is BallSource.PLAN
+    assert largest_error(found, training()) < 0.01
+    assert found.statement is not None
+    assert (found.statement.code, found.statement.level.value) == ("balls_by_plan", "warning")
+    assert missing in found.statement.text
+
+
 def said(found: CameraBalls) -> tuple[str, str]:
     assert (found.source, found.balls) == (None, ())
     assert found.statement is not None

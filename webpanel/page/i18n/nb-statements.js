@@ -55,6 +55,7 @@ export const statements = {
 
   balls_no_file: ["hvor ballene skal være, er ikke kjent: riggfilen nevner ingen innmåling av dem", "skriv den inn, survey = \"hill.json\" under [analysis]; før den finnes, skriv inn planen, plan = \"hill.toml\""],
   balls_not_oriented: ["{camera} er ikke orientert ennå, så hvor det viser ballene, er ikke kjent", "gjør ett opptak på fem sekunder med ballene i sikte; eller gi kameraets omtrentlige plass i innmålingen, eller planen i riggfilen, plan = \"hill.toml\""],
+  balls_by_plan: ["{camera} viser ballene der planen har dem, og blir ikke orientert: {why}"],
   balls_unknown: ["hvor {camera} viser ballene, er ikke kjent: {why}"],
 
   recording_running: ["tar opp: {pulses} pulser, {partial} mangler et bilde"],

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import special
 
 from photogrammetry.adjustment.equations.unknowns import State
+from photogrammetry.adjustment.gross_errors.snooping import BENT
 from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK, SINGLE_RISK
 from photogrammetry.adjustment.run import Outcome, adjust
 from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
@@ -62,6 +63,8 @@ def adjust_least(
     Raises:
         NotSolvableError, NotConvergedError, BadInputError: as `adjust`.
     """
+    if snoop:
+        start = _unbent(network, start, given)
     try:
         outcome = adjust(network, start, snoop=snoop, family_risk=family_risk)
     except NotConvergedError as error:
@@ -73,6 +76,17 @@ def adjust_least(
             break
         outcome = adjust(network, best.state, snoop=snoop, family_risk=family_risk)
     return outcome
+
+
+def _unbent(network: Network, start: State, given: Network) -> State:
+    """The least minimum where `start` leads to a bad one, beside which sound observations would be accused in turn."""
+    try:
+        reached = adjust_once(network, start)
+    except (NotConvergedError, NotSolvableError):
+        return start
+    if reached.ratio <= BENT:
+        return start
+    return start if (best := least_minimum(reached, given)) is reached else best.state
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,12 +7,16 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
+from rig.api.jump import LastJump, MeasuredValue
 from rig.frame import FrameStatus
+from service.measuring.results import keep_result
 from tests.recorder.logs import ALL_OK
 from tests.support.processes import shared_from_now_on
 from tests.webpanel.conftest import client, panel, service
@@ -116,10 +120,35 @@ def open_page(browser: Browser) -> Iterator[Open]:
     assert not complaints
 
 
+MEASURED = LastJump(
+    recording="jump-2",
+    jump=1,
+    time=datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC),
+    ok=True,
+    verdict="measured well: all points in 35 of 35 pulses in sight",
+    takeoff_speed=MeasuredValue(value=26.104, sigma=0.0151),
+    perpendicular=MeasuredValue(value=2.1085, sigma=0.115),
+    speed_20_m=MeasuredValue(value=25.489, sigma=0.004),
+    angle_of_attack=MeasuredValue(value=19.5121, sigma=0.5),
+    ski_to_body=MeasuredValue(value=9.12, sigma=0.04),
+)
+
+
+def keep_measured(log: Path, jumps: tuple[LastJump, ...]) -> None:
+    """Keep a result beside a log, without measuring it: main figures, and files with little in them."""
+    made = log.parent / "made"
+    made.mkdir()
+    (made / "report.html").write_text("<!doctype html><title>Report</title><h1>For the coach</h1>")
+    for name in ("jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html", "protocol.txt"):
+        (made / name).write_text(name)
+    keep_result(made, log, jumps)
+
+
 @pytest.fixture
 def jumps(service: MemoryService) -> None:
-    """Two recordings, one with a lost frame."""
+    """Two recordings, one with a lost frame; that one is measured."""
     folder = service.catalogue.directory
     write_recording(folder, "jump-1", (ALL_OK,) * 30, {"athlete": "Anna Berg", "bib": "17"})
     lost = (FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK)
-    write_recording(folder, "jump-2", (lost, *(ALL_OK,) * 29), {"athlete": "Ola <b>Nordmann</b>", "bib": "4"})
+    log = write_recording(folder, "jump-2", (lost, *(ALL_OK,) * 29), {"athlete": "Ola <b>Nordmann</b>", "bib": "4"})
+    keep_measured(log, (MEASURED,))

@@ -12,7 +12,7 @@ READY = {
     "live": "#cameras li",
     "recordings": "#recordings-list li",
     "trash": "#recordings-empty",
-    "recordings/jump-2": "#frame-slider",
+    "recordings/jump-2": "#measurement-files a",
     "log": "#log-list li, #log-empty",
     "doctor": "#doctor-run",
     "aim": "#aim-cameras button",

@@ -16,6 +16,7 @@ import { startStartList } from "./live/startlist.js";
 import { startState } from "./live/state.js";
 import { drawExports, startExports } from "./recordings/exports.js";
 import { startLast } from "./recordings/last.js";
+import { startMeasurement } from "./recordings/measurement.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
 import { connect, startBanner } from "./shared/connection.js";
@@ -67,7 +68,7 @@ function entered({ view, id }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

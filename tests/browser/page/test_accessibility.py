@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.api.status import State
-from tests.browser.conftest import Open
+from tests.browser.conftest import MEASURED, Open
 from tests.browser.views import AXE, READY, SMALLEST_TOUCH_PX, TOO_SMALL, enter
 from tests.support.repeats import repeats
 from tests.webpanel.memory_service import MemoryService
@@ -19,6 +19,7 @@ def test_a_narrow_phone_scrolls_down_only_and_takes_gloves(
     panel: Panel, service: MemoryService, jumps: None, open_page: Open, locale: str
 ) -> None:
     service.arm()
+    service.last_jump = MEASURED
     page = open_page(panel.url, width=360, height=780, locale=locale, has_touch=True, is_mobile=True)
     for view in READY:
         enter(page, panel, view)
@@ -50,6 +51,7 @@ def test_axe_finds_nothing_grave(
 ) -> None:
     if not AXE.exists():
         pytest.fail(f"the npm packages are not installed: run `npm ci` in {AXE.parents[2]}, or `make test`")
+    service.last_jump = MEASURED
     page = open_page(
         panel.url, width=width, color_scheme="light" if look == "outdoor" else look, reduced_motion="reduce"
     )

@@ -7,7 +7,7 @@ from playwright.sync_api import Locator, Page, expect
 from playwright.sync_api import TimeoutError as NotInTimeError
 
 from rig.api.status import State
-from tests.browser.conftest import Open
+from tests.browser.conftest import MEASURED, Open
 from tests.browser.views import BROKEN, READY, enter
 from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
@@ -33,6 +33,7 @@ def test_no_word_is_broken_and_nothing_is_cut_off(
 ) -> None:
     width, height = size
     service.jumpers.import_table("bib;athlete\n1;Berit Kristiansdatter Øvrebø\n2;Anna\n".encode())
+    service.last_jump = MEASURED
     page = open_page(panel.url, width=width, height=height, reduced_motion="reduce")
     for language in ("en", "nb"):
         page.evaluate("language => localStorage.setItem('svev.language', JSON.stringify(language))", language)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import jump, recordings, rehearsal, start_list, statement, status
+from rig.api import jump, measuring, recordings, rehearsal, start_list, statement, status
 from rig.api.cameras import aids, balls, light
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -35,6 +35,7 @@ COMPOSED = (
     "export.",
     "log.is_",
     "log.of_",
+    "measurement.step_",
 )
 #: The rooms whose sentences reach the page.
 SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
@@ -45,7 +46,7 @@ SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 def _words(language: str) -> dict[str, str]:
     return {
         key: text
-        for name in (language, f"{language}-check")
+        for name in (language, f"{language}-check", f"{language}-measuring")
         for key, text in WORDS.findall((PAGE / "i18n" / f"{name}.js").read_text())
     }
 
@@ -55,7 +56,9 @@ def _placeholders(text: str) -> set[str]:
 
 
 def _sources() -> str:
-    own_words = {PAGE / "i18n" / f"{name}.js" for name in ("en", "en-check", "nb", "nb-check")}
+    own_words = {
+        PAGE / "i18n" / f"{language}{part}.js" for language in ("en", "nb") for part in ("", "-check", "-measuring")
+    }
     return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
 
 
@@ -191,7 +194,9 @@ def _types() -> dict[str, list[str]]:
     """Properties by name of the typedef."""
     types: dict[str, list[str]] = {}
     name = ""
-    for line in "".join((PAGE / room / "types.js").read_text() for room in ("shared", "system")).splitlines():
+    for line in "".join(
+        (PAGE / room / "types.js").read_text() for room in ("shared", "system", "recordings")
+    ).splitlines():
         if found := re.search(r"@typedef \{object\} (\w+)", line):
             name = found[1]
             types[name] = []
@@ -202,7 +207,7 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    rooms = (aids, balls, light, start_list, recordings, rehearsal, statement, jump, status)
+    rooms = (aids, balls, light, start_list, recordings, rehearsal, statement, jump, measuring, status)
     model: type[Any] = next(getattr(room, name) for room in rooms if hasattr(room, name))
     fields = (
         list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]

@@ -69,7 +69,7 @@ def test_a_key_acts_on_the_view_that_the_key_before_it_opened(
 
 
 def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
-    panel: Panel, service: MemoryService, open_page: Open
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open
 ) -> None:
     service.arm()
     page = open_page(panel.url)
@@ -89,7 +89,7 @@ def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
     figures = page.locator("#measured-figures > div")
     expect(figures).to_have_text(
         [
-            "Take-off speed26.10\u202f±\u202f0.02\u202fm/s",
+            "Take-off speed26.10\u202f±\u202f0.02\u202fm/s\n93.97\u202f±\u202f0.05\u202fkm/h",
             "Perpendicular to the table2.1\u202f±\u202f0.1\u202fm/s",
             "Speed at 20 m25.489\u202f±\u202f0.004\u202fm/s",
             "Angle of attack, 0.5 s19.5\u202f±\u202f0.5\u202f°",
@@ -103,7 +103,7 @@ def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
     expect(norwegian.locator("#measured-verdict")).to_have_text("Godt målt")
     expect(norwegian.locator("#measured-why")).to_be_hidden()
     expect(norwegian.locator("#measured-figures > div").first).to_have_text(
-        "Fart på kanten26,10\u202f±\u202f0,02\u202fm/s"
+        "Fart på kanten26,10\u202f±\u202f0,02\u202fm/s\n93,97\u202f±\u202f0,05\u202fkm/h"
     )
     wide = (
         "[...document.querySelectorAll('#measured *')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth)"

@@ -1,9 +1,11 @@
 /** English. Every key stands in nb.js too (a test looks). */
 
 import { check } from "./en-check.js";
+import { measuring } from "./en-measuring.js";
 
 export const en = {
   ...check,
+  ...measuring,
 
   "skip": "Skip to the content",
   "close": "Close",
@@ -135,14 +137,6 @@ export const en = {
   "camera.reconnects": "{count} × reconnected",
 
   "last.title": "Last jump",
-  "measured.title": "Measured last",
-  "measured.ok": "Measured well",
-  "measured.doubtful": "Doubtful",
-  "measured.takeoff_speed": "Take-off speed",
-  "measured.perpendicular": "Perpendicular to the table",
-  "measured.speed_20_m": "Speed at 20 m",
-  "measured.angle_of_attack": "Angle of attack, 0.5 s",
-  "measured.ski_to_body": "Ski to body, 0.5 s",
   "recordings.search": "Find bib, name or tag",
   "recordings.found": "{total} found",
   "recordings.more": "Show more",

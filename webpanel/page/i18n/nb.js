@@ -1,9 +1,11 @@
 /** Norsk bokmål. De samme nøklene som i en.js. */
 
 import { check } from "./nb-check.js";
+import { measuring } from "./nb-measuring.js";
 
 export const nb = {
   ...check,
+  ...measuring,
 
   "skip": "Hopp til innholdet",
   "close": "Lukk",
@@ -135,14 +137,6 @@ export const nb = {
   "camera.reconnects": "koblet til på nytt {count} ×",
 
   "last.title": "Siste hopp",
-  "measured.title": "Sist målt",
-  "measured.ok": "Godt målt",
-  "measured.doubtful": "Usikkert",
-  "measured.takeoff_speed": "Fart på kanten",
-  "measured.perpendicular": "Vinkelrett på bordet",
-  "measured.speed_20_m": "Fart ved 20 m",
-  "measured.angle_of_attack": "Angrepsvinkel, 0,5 s",
-  "measured.ski_to_body": "Ski mot kropp, 0,5 s",
   "recordings.search": "Finn startnummer, navn eller merke",
   "recordings.found": "{total} funnet",
   "recordings.more": "Vis flere",

@@ -1,42 +1,65 @@
-/** The jump that was measured last: five figures with their standard deviations, and whether they can be trusted. */
+/** The jump that was measured last: whose it is, its figures, whether they can be trusted; and how many logs are measured and wait. */
 
 import { t } from "../i18n/i18n.js";
-import { $, fillList, setText } from "../shared/dom.js";
-import { number, timeOfDay } from "../shared/format.js";
+import { call, recordingPath } from "../shared/api.js";
+import { hear } from "../shared/connection.js";
+import { $, setText } from "../shared/dom.js";
+import { fillFigures } from "../shared/figures.js";
+import { timeOfDay, who } from "../shared/format.js";
 import { known, watch } from "../shared/store.js";
 
-/** @typedef {import("../shared/types.js").MeasuredValue} MeasuredValue */
+/** Id of the recording that was asked for last. */
+let asked = "";
+/** The recording of the jump; null: not known (yet), or deleted for good. @type {import("../shared/types.js").Recording|null} */
+let recording = null;
 
 export function startMeasured() {
-  watch(drawMeasured);
+  hear({ recordings: () => void load(true) });
+  watch(() => {
+    void load(false);
+    draw();
+  });
 }
 
-function drawMeasured() {
+/** @param {boolean} again also if it is known already: somebody may have changed it */
+async function load(again) {
+  const id = known.status?.last_jump?.recording ?? "";
+  if (!known.connected || (id === asked && !again)) return;
+  asked = id;
+  try {
+    const found = id ? await call("GET", recordingPath(id)) : null;
+    if (asked === id) recording = found;
+  } catch {
+    if (asked === id) recording = null; // it was deleted for good meanwhile, or the connection is lost, which the banner says
+  }
+  draw();
+}
+
+function draw() {
   const jump = known.status?.last_jump ?? null;
-  $("measured").hidden = !jump;
-  if (!jump) return;
-  setText($("measured-time"), timeOfDay(jump.time));
-  $("measured-verdict").dataset.level = jump.ok ? "good" : "warning";
-  setText($("measured-verdict"), jump.ok ? t("measured.ok") : t("measured.doubtful"));
-  $("measured-why").hidden = jump.ok;
-  setText($("measured-why"), jump.ok ? "" : jump.verdict);
-  fillList($("measured-figures"), [
-    [t("measured.takeoff_speed"), withSigma(jump.takeoff_speed, "m/s")],
-    [t("measured.perpendicular"), withSigma(jump.perpendicular, "m/s")],
-    [t("measured.speed_20_m"), withSigma(jump.speed_20_m, "m/s")],
-    [t("measured.angle_of_attack"), withSigma(jump.angle_of_attack, "°")],
-    [t("measured.ski_to_body"), withSigma(jump.ski_to_body, "°")],
-  ]);
+  const shown = jump && recording?.id === jump.recording && !recording.deleted ? jump : null; // no figures without a name
+  const queue = queueInWords();
+  $("measured").hidden = !shown && !queue;
+  setText($("measured-queue"), queue);
+  $("measured-queue").hidden = !queue;
+  setText($("measured-title"), t(shown ? "measured.title" : "measurement.title"));
+  setText($("measured-time"), shown ? timeOfDay(shown.time) : "");
+  for (const part of ["measured-who", "measured-verdict", "measured-figures"]) $(part).hidden = !shown;
+  $("measured-why").hidden = !shown || shown.ok;
+  if (!shown || !recording) return;
+  setText($("measured-who"), who(recording.session, t("recordings.nobody")));
+  $("measured-who").href = `#/recordings/${encodeURIComponent(recording.id)}`;
+  $("measured-verdict").dataset.level = shown.ok ? "good" : "warning";
+  setText($("measured-verdict"), shown.ok ? t("measured.ok") : t("measured.doubtful"));
+  setText($("measured-why"), shown.ok ? "" : shown.verdict);
+  fillFigures($("measured-figures"), shown);
 }
 
-/**
- * A value with its standard deviation, both to the same place: the first digit of the standard deviation.
- *
- * @param {MeasuredValue|null} measured
- * @param {string} unit
- */
-function withSigma(measured, unit) {
-  if (!measured) return "–";
-  const digits = Math.min(4, Math.max(0, -Math.floor(Math.log10(measured.sigma))));
-  return `${number(measured.value, digits)}\u202f±\u202f${number(measured.sigma, digits)}\u202f${unit}`;
+/** How many logs are being measured, and wait; empty if there are none. */
+function queueInWords() {
+  const measuring = known.status?.measuring;
+  if (!measuring) return "";
+  const running = measuring.recording === null ? "" : t(measuring.state === "paused" ? "measured.queue_paused" : "measured.queue_running");
+  const waiting = measuring.waiting > 0 ? t("measured.queue_waiting", { count: measuring.waiting }) : "";
+  return [running, waiting].filter(Boolean).join(", ");
 }

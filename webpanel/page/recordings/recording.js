@@ -14,6 +14,7 @@ import { clearScrubber, scrub, setMoment } from "../viewing/scrubber.js";
 import { loadVoices } from "../viewing/voice.js";
 import { remove, restore, watchCatalogue } from "./catalogue.js";
 import { loadExports } from "./exports.js";
+import { loadMeasurement } from "./measurement.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 
@@ -52,6 +53,7 @@ function clear(id, why) {
   recording = null;
   scrubbing = false;
   clearScrubber();
+  void loadMeasurement(null);
   setText($("recording-title"), id);
   for (const part of ["recording-verdict", "recording-buttons"]) $(part).replaceChildren();
   for (const part of ["player", "recording-columns", "recording-favourite", "recording-recover"]) $(part).hidden = true;
@@ -89,6 +91,7 @@ async function load(id) {
   if (loaded.state === "recording" && recording && !isRunning()) return; // an answer that was overtaken
   recording = loaded;
   draw();
+  void attempt(() => loadMeasurement(loaded));
   if (!isRunning()) {
     void attempt(() => loadNotes(id));
     void attempt(() => loadVoices(id));

@@ -148,6 +148,13 @@
  * @property {MeasuredValue|null} angle_of_attack
  * @property {MeasuredValue|null} ski_to_body
  *
+ * @typedef {object} MeasuringQueue
+ * @property {string|null} recording
+ * @property {"none"|"waiting"|"running"|"paused"|"done"|"failed"} state
+ * @property {"balls"|"search"|"names"|"computing"|"writing"|null} step
+ * @property {number} share
+ * @property {number} waiting
+ *
  * @typedef {object} TapGuard
  * @property {number} number
  * @property {number} hold_s
@@ -204,6 +211,7 @@
  * @property {Recording|null} recording
  * @property {string|null} last_recording
  * @property {LastJump|null} last_jump
+ * @property {MeasuringQueue} measuring
  * @property {NextJumper} next_jumper
  * @property {{ on: boolean, camera: string }|null} automatic
  * @property {RehearsalProgress|null} rehearsal

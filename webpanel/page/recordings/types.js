@@ -1,0 +1,22 @@
+/**
+ * The shapes of answers about recordings that no other view reads, as in rig/api (a test compares them).
+ *
+ * @typedef {import("../shared/types.js").LastJump} LastJump
+ * @typedef {import("../shared/types.js").MeasuringQueue} MeasuringQueue
+ * @typedef {import("../shared/types.js").Statement} Statement
+ *
+ * @typedef {object} Measurement What is known of the jumps of a recording.
+ * @property {string} recording
+ * @property {MeasuringQueue["state"]} state
+ * @property {MeasuringQueue["step"]} step
+ * @property {number} share
+ * @property {number} before
+ * @property {Statement|null} problem
+ * @property {string|null} measured
+ * @property {string} version
+ * @property {LastJump[]} jumps
+ * @property {boolean} live
+ * @property {string[]} files
+ */
+
+export {};

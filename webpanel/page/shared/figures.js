@@ -1,0 +1,43 @@
+/** The main figures of a measured jump, each with its standard deviation. */
+
+import { t } from "../i18n/i18n.js";
+import { fillList } from "./dom.js";
+import { number } from "./format.js";
+
+/** @typedef {import("./types.js").MeasuredValue} MeasuredValue */
+
+const KMH = 3.6; // km/h in one m/s
+/** Digits after the decimal point: of a speed what its standard deviation allows, of an angle no more than coaches say. */
+const MOST_DIGITS = { "m/s": 4, "km/h": 4, "°": 1 };
+
+/**
+ * Fill a <dl class="figures"> with the figures of a jump.
+ *
+ * @param {Element} list
+ * @param {import("./types.js").LastJump} jump
+ */
+export function fillFigures(list, jump) {
+  const speed = jump.takeoff_speed;
+  fillList(list, [
+    [t("measured.takeoff_speed"), speed ? `${withSigma(speed, "m/s")}\n${withSigma({ value: KMH * speed.value, sigma: KMH * speed.sigma }, "km/h")}` : "–"],
+    [t("measured.perpendicular"), withSigma(jump.perpendicular, "m/s")],
+    [t("measured.speed_20_m"), withSigma(jump.speed_20_m, "m/s")],
+    [t("measured.angle_of_attack"), withSigma(jump.angle_of_attack, "°")],
+    [t("measured.ski_to_body"), withSigma(jump.ski_to_body, "°")],
+  ]);
+}
+
+/**
+ * A value with its standard deviation, both to the same place: the first digit of the standard deviation, if that is shown.
+ *
+ * @param {MeasuredValue|null} measured
+ * @param {keyof typeof MOST_DIGITS} unit
+ */
+function withSigma(measured, unit) {
+  if (!measured) return "–";
+  const { value, sigma } = measured;
+  const digits = Math.min(MOST_DIGITS[unit], Math.max(0, -Math.floor(Math.log10(sigma))));
+  const least = 10 ** -digits;
+  const deviation = sigma < least / 2 ? `<\u202f${number(least, digits)}` : number(sigma, digits);
+  return `${number(value, digits)}\u202f±\u202f${deviation}\u202f${unit}`;
+}

@@ -4,7 +4,7 @@ import { t } from "../i18n/i18n.js";
 import { call, recordingPath } from "../shared/api.js";
 import { hear } from "../shared/connection.js";
 import { $, setText } from "../shared/dom.js";
-import { fillFigures } from "../shared/figures.js";
+import { fillFigures, levelOf, MARKS } from "../shared/figures.js";
 import { timeOfDay, who } from "../shared/format.js";
 import { known, watch } from "../shared/store.js";
 
@@ -49,8 +49,9 @@ function draw() {
   if (!shown || !recording) return;
   setText($("measured-who"), who(recording.session, t("recordings.nobody")));
   $("measured-who").href = `#/recordings/${encodeURIComponent(recording.id)}`;
-  $("measured-verdict").dataset.level = shown.ok ? "good" : "warning";
-  setText($("measured-verdict"), shown.ok ? t("measured.ok") : t("measured.doubtful"));
+  const level = levelOf(shown);
+  $("measured-verdict").dataset.level = level;
+  setText($("measured-verdict"), t(MARKS[level]));
   setText($("measured-why"), shown.ok ? "" : shown.verdict);
   fillFigures($("measured-figures"), shown);
 }

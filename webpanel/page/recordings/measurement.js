@@ -3,7 +3,7 @@
 import { languageInUse, say, t } from "../i18n/i18n.js";
 import { call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { $, icon, make, makeMark, setText } from "../shared/dom.js";
-import { fillFigures } from "../shared/figures.js";
+import { fillFigures, levelOf, MARKS } from "../shared/figures.js";
 import { day, number, timeOfDay } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
@@ -177,10 +177,10 @@ function drawResult({ recording: id, state, problem, jumps, live, files }) {
 function makeJump(jump, live, several) {
   const figures = make("dl", { class: "figures" });
   fillFigures(figures, jump);
-  const level = jump.ok ? (live ? "info" : "good") : "warning";
+  const level = levelOf(jump, live);
   return make("section", {},
     several ? make("h3", {}, t("measurement.jump", { jump: jump.jump, time: timeOfDay(jump.time) })) : null,
-    makeMark(level, level, [jump.ok ? "" : t("measured.doubtful"), live ? t("measurement.live_jump") : jump.ok ? t("measured.ok") : ""].filter(Boolean).join(", ")),
+    makeMark(level, level, t(MARKS[level])),
     make("p", { class: "measured-why" }, jump.verdict.replace(/^measured well: /, "")), // the mark says so, in both languages
     figures);
 }

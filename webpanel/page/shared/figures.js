@@ -10,6 +10,21 @@ const KMH = 3.6; // km/h in one m/s
 /** Digits after the decimal point: of a speed what its standard deviation allows, of an angle no more than coaches say. */
 const MOST_DIGITS = { "m/s": 4, "km/h": 4, "°": 1 };
 
+/** What is said of a jump of each level. */
+export const MARKS = { good: "measured.ok", warning: "measured.doubtful", info: "measurement.live_jump" };
+
+/**
+ * What the figures of a jump are worth: those that were measured live are replaced by what the log tells.
+ *
+ * @param {import("./types.js").LastJump} jump
+ * @param {boolean} [live] they are live ones of before that stood in them
+ * @returns {"good"|"warning"|"info"}
+ */
+export function levelOf(jump, live = false) {
+  if (live || jump.live) return "info";
+  return jump.ok ? "good" : "warning";
+}
+
 /**
  * Fill a <dl class="figures"> with the figures of a jump.
  *

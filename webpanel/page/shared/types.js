@@ -140,6 +140,7 @@
  * @property {string} recording
  * @property {number} jump
  * @property {string} time
+ * @property {boolean} live
  * @property {boolean} ok
  * @property {string} verdict
  * @property {MeasuredValue|null} takeoff_speed
@@ -240,11 +241,6 @@
  * @property {number|null} jumps
  * @property {number|null} spread_us
  * @property {Finding[]} findings
- *
- * @typedef {object} RigView
- * @property {string} name
- * @property {string} toml
- * @property {Record<string, any>} settings
  */
 
 export {};

@@ -6,7 +6,7 @@ import { $, fillList, setText } from "../shared/dom.js";
 import { attempt } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
 
-/** @type {import("../shared/types.js").RigView|null} */
+/** @type {import("./types.js").RigView|null} */
 let rig = null;
 
 export function startRig() {

@@ -54,6 +54,11 @@
  * @property {string|null} recording
  * @property {BallPlace[]} balls
  * @property {import("../shared/types.js").Statement|null} statement
+ *
+ * @typedef {object} RigView
+ * @property {string} name
+ * @property {string} toml
+ * @property {Record<string, any>} settings
  */
 
 export {};

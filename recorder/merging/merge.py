@@ -29,6 +29,7 @@ from recorder.writing.log_writer import LogDescription
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError, StorageError
 from rig.events import Event, Level
+from rig.host.disk import sync
 from rig.host.file_names import give_name, unfinished_path
 from rig.phrase import plain
 from rig.topics import (
@@ -275,7 +276,7 @@ def _unfinished(target: Path) -> Iterator[Path]:
     except OSError as error:
         raise StorageError(f"{target}: cannot be made ({error.strerror}); {kept}") from error
     try:
-        _sync(target.parent)
+        sync(target.parent)
     except OSError as error:
         text = f"{target}: may not survive a loss of power ({error.strerror}); look at `dmesg`, copy it to another disk"
         raise StorageError(text) from error
@@ -301,11 +302,3 @@ def _is_whole(log: Path) -> bool:
         return is_closed(window)
     finally:
         window.close()
-
-
-def _sync(directory: Path) -> None:
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -64,6 +64,19 @@ def replace_file(path: Path, content: bytes, *, links: bool) -> None:
         raise
 
 
+def sync(path: Path) -> None:
+    """Have the disk take a file, or the names in a folder; links are not followed.
+
+    Raises:
+        OSError: it refuses.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def _take_rights(descriptor: int, of: os.stat_result) -> None:
     """Give an open file the rights of another; owner and group first, because a change of these takes rights away."""
     for owner, group in ((of.st_uid, -1), (-1, of.st_gid)):

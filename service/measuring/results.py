@@ -16,7 +16,7 @@ from rig.api.fields import Model
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState
 from rig.api.statement import Statement
-from rig.host.disk import replace_file
+from rig.host.disk import replace_file, sync
 from rig.host.files import TEXT_MAX, open_to_read, opened_folder, read_whole
 from service.seam.archive import Download
 
@@ -105,12 +105,12 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...]) -> None:
     outcome = _Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps)
     _write(outcome, made)
     for path in made.iterdir():
-        _flushed(path)
+        sync(path)
     target, old = measured_path(log), made.with_name(f"{made.name}.old")
     if os.path.lexists(target):
         target.rename(old)
     made.rename(target)
-    _flushed(target.parent)
+    sync(target.parent)
     _remove(old)
 
 
@@ -155,14 +155,6 @@ def _files(folder: Path) -> list[Path]:
             ]
     except OSError:
         return []
-
-
-def _flushed(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _remove(path: Path) -> None:

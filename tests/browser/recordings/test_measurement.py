@@ -24,8 +24,9 @@ LIVE = LastJump(
     recording="jump-1",
     jump=1,
     time=datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC),
-    ok=True,
-    verdict="measured well: all points in 18 of 18 pulses in sight",
+    live=True,
+    ok=False,
+    verdict="all points in 18 of 18 pulses in sight",
     takeoff_speed=MeasuredValue(value=26.1, sigma=0.2),
 )
 
@@ -132,8 +133,9 @@ def test_a_live_figure_is_never_measured_well(panel: Panel, log: Path, open_page
     expect(page.locator("#measurement-jumps .mark")).to_have_text("Measured live")
     expect(page.locator("#measurement-jumps .mark")).to_have_attribute("data-level", "info")
     expect(page.locator("#measurement-jumps .measured-why")).to_have_text("all points in 18 of 18 pulses in sight")
+    whole = LIVE.model_copy(update={"live": False, "ok": True})
     keep_measured(
-        log, (LIVE, LIVE.model_copy(update={"jump": 2, "ok": False, "verdict": "the take-off was not found"}))
+        log, (whole, whole.model_copy(update={"jump": 2, "ok": False, "verdict": "the take-off was not found"}))
     )
     page.reload()
     expect(page.locator("#measurement-jumps h3")).to_have_text(
@@ -190,6 +192,8 @@ def test_the_live_view_says_whose_jump_was_measured_and_how_many_wait(
     service.last_jump = LIVE
     service._wake()
     expect(jumper).to_have_text("17 · Anna Berg")
+    expect(page.locator("#measured-verdict")).to_have_text("Measured live")
+    expect(page.locator("#measured-why")).to_have_text("all points in 18 of 18 pulses in sight")
     expect(queue).to_have_text("measuring 1 (waits while a recording runs)")
     expect(page.locator("#measured-figures")).to_be_visible()
     service.measuring = MeasuringQueue()

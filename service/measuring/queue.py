@@ -133,9 +133,10 @@ class Measurings:
     def view(self) -> MeasuringQueue:
         """What is being measured, and how many logs wait."""
         with self._lock:
-            if self._running is not None:
-                return self._running.model_copy(update={"waiting": len(self._waiting) - 1})
-            return MeasuringQueue(waiting=len(self._waiting))
+            if self._running is None:
+                return MeasuringQueue(waiting=len(self._waiting))
+            others = [recording for recording in self._waiting if recording != self._running.recording]
+            return self._running.model_copy(update={"waiting": len(others)})
 
     def _append(self, recording: str) -> None:
         if recording not in self._waiting:

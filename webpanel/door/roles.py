@@ -86,6 +86,14 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         r"POST /api/recordings/([^/]+)/exports?",
         lambda recording: phrase("act_exported", "asked for an export of recording {recording}", recording=recording),
     ),
+    (
+        r"POST /api/recordings/([^/]+)/measurement",
+        lambda recording: phrase("act_measured", "asked for recording {recording} to be measured", recording=recording),
+    ),
+    (
+        r"DELETE /api/recordings/([^/]+)/measurement",
+        lambda recording: phrase("act_not_measured", "gave up measuring recording {recording}", recording=recording),
+    ),
     (r"DELETE /api/exports/[^/]+", lambda: phrase("act_export_ended", "ended or removed an export")),
     (r"[A-Z]+ /api/next-jumper(?:/.*)?", lambda: phrase("act_next_jumper", "edited the next jumper")),
     (r"[A-Z]+ /api/start-list(?:/.*)?", lambda: phrase("act_start_list", "edited the start list")),

@@ -128,6 +128,8 @@ export const events = {
   act_spoke: ["leste inn et notat om opptaket {recording}"],
   act_voice_removed: ["fjernet et talenotat i opptaket {recording}"],
   act_exported: ["ba om en eksport av opptaket {recording}"],
+  act_measured: ["ba om at opptak {recording} måles"],
+  act_not_measured: ["ga opp å måle opptak {recording}"],
   act_export_ended: ["avbrøt eller fjernet en eksport"],
   act_next_jumper: ["endret neste hopper"],
   act_start_list: ["endret startlisten"],

@@ -118,10 +118,10 @@ class Measurings:
 
     def measurement(self, recording: str, log: Path) -> Measurement:
         """What is known of the jumps of a log that lies in the folder, and how far its measuring is."""
-        known = measurement_of(recording, log)
         with self._lock:
             place = self._waiting.index(recording) if recording in self._waiting else None
             running = self._running
+        known = measurement_of(recording, log)  # what left the queue before is there
         if place is None:
             return known
         update: dict[str, Any] = {"state": MeasuringState.WAITING, "before": place}

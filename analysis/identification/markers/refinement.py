@@ -29,9 +29,7 @@ _LIT = 0.75  #: of the light of a whole marker, what three quarters of one have
 _SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
 _NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
 _SURE = 1.5  #: radii; where a prediction is less certain, a disc beside it would be another one's
-_ITSELF = (
-    0.25  #: radii from a spot to the disc that it is; from a spot that is something else to one beside it are more
-)
+_ITSELF = 0.25  #: radii from a spot to the disc that it is; a disc beside something else is farther away
 _MOST = 0.5  #: of the spots of a marker are discs
 
 

@@ -2,11 +2,17 @@
 
 The assembler copies a frame as soon as it arrives, while the frame is still in the processor's cache, and frees the
 camera's slot at once. If the disk is behind and no triplet buffer is free, frames wait in the cameras' rings.
+
+Triplets are handed on in the order of their pulses. So the oldest pulses have the buffers: later ones could hold all of
+them, and be handed on only behind a pulse that waits for one.
 """
 
+from bisect import insort
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from operator import attrgetter
 from typing import Final
 
 from msgspec import UNSET
@@ -59,15 +65,22 @@ class _Composition:
     """The triplet of a pulse while its frames are copied together: the cargo of its `OpenPulse`.
 
     Attributes:
+        time: of the pulse, when its first frame came.
         slot: triplet buffer; None as long as no buffer is free.
         pending: camera and record of the frames that wait for the buffer in their rings.
+        aside: what was copied together in a buffer that an older pulse had to get.
     """
 
-    __slots__ = ("pending", "slot")
+    __slots__ = ("aside", "pending", "slot", "time")
 
-    def __init__(self) -> None:
+    def __init__(self, time: HostNs) -> None:
+        self.time = time
         self.slot: int | None = None
         self.pending: list[tuple[int, Record]] = []
+        self.aside: Stored | None = None
+
+
+_TIME: Final = attrgetter("time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,14 +196,13 @@ class Assembler:
     def _ready(self) -> Iterator[Triplet]:
         """The decided pulses up to the first one of which a frame is not copied yet."""
         while self._decided:
-            part = self._decided[0].cargo
-            if isinstance(part, _Composition) and part.pending:
-                return
-            pulse = self._decided.popleft()
-            slot = part.slot if isinstance(part, _Composition) else None
-            if slot is not None:
-                self._blacken(pulse, slot)
-            yield Triplet(pulse, slot)
+            part, slot = self._decided[0].cargo, None
+            if isinstance(part, _Composition):
+                slot = part.slot
+                if slot is None:
+                    return
+                self._blacken(self._decided[0], slot)
+            yield Triplet(self._decided.popleft(), slot)
 
     @property
     def backlog(self) -> bool:
@@ -298,7 +310,7 @@ class Assembler:
         """Copy a frame into its triplet, or let it wait in its ring until a buffer is free."""
         part = pulse.cargo
         if not isinstance(part, _Composition):
-            part = pulse.cargo = _Composition()
+            part = pulse.cargo = _Composition(pulse.time)
             # One that has just become free is of the pulse that waits for it: later ones could take them all, and be
             # written only behind it.
             part.slot = None if self._waiting else self.buffers.acquire()
@@ -306,17 +318,44 @@ class Assembler:
             self._copy(camera, record, part.slot)
             return
         part.pending.append((camera, record))
+        self._wait(part)
+
+    def _wait(self, part: _Composition) -> None:
         if part not in self._waiting:
-            self._waiting.append(part)
+            insort(self._waiting, part, key=_TIME)
 
     def _serve_waiting(self) -> None:
-        """Give buffers that have become free to the pulses that wait for one, first come, first served."""
-        while self._waiting and (slot := self.buffers.acquire()) is not None:
-            part = self._waiting.pop(0)
+        """Give buffers to the pulses that wait for one, the oldest first."""
+        while self._waiting:
+            part = self._waiting[0]
+            slot = self.buffers.acquire()
+            if slot is None:
+                slot = self._taken_from_later(part)
+            if slot is None:
+                return
+            self._waiting.remove(part)
             part.slot = slot
+            if part.aside is not None:
+                self.buffers.write(slot, part.aside)
+                part.aside = None
             for camera, record in part.pending:
                 self._copy(camera, record, slot)
             part.pending.clear()
+
+    def _taken_from_later(self, part: _Composition) -> int | None:
+        """The buffer of the latest pulse behind that of `part`, whose pixels are put aside; None: none behind has one.
+
+        It happens only where a camera's frames come much later than those of the others, which lost some: no memory is
+        kept ready for it.
+        """
+        for later in chain(reversed(self.pairer.open), reversed(self._decided)):
+            if later.cargo is part:
+                break
+            if isinstance(later.cargo, _Composition) and (slot := later.cargo.slot) is not None:
+                later.cargo.aside, later.cargo.slot = self.buffers.pixels(slot).copy(), None
+                self._wait(later.cargo)
+                return slot
+        return None
 
     def _copy(self, camera: int, record: Record, slot: int) -> None:
         self._unpack[camera](self._rings[camera].frame(record.slot), self._blocks_of(slot)[camera])

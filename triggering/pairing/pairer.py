@@ -216,6 +216,11 @@ class Pairer:
         return deadline
 
     @property
+    def open(self) -> Sequence[OpenPulse]:
+        """The pulses that some camera saw and that are not decided yet, in the order of time; not to be changed."""
+        return self._open
+
+    @property
     def oldest(self) -> HostNs | None:
         """Time of the oldest pulse that is not decided yet; None if there is none."""
         fired = self._fired.oldest

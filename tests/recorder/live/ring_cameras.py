@@ -48,11 +48,11 @@ class RingCameras:
             ring.put(Record(RecordKind.CONNECTED, 1, HostNs(start - 1)))
         self.latch()
 
-    def latch(self) -> None:
-        """Read the cameras' clocks."""
+    def latch(self, pulse: float = 0) -> None:
+        """Read the cameras' clocks just before a pulse."""
         for ring in self.rings:
             for i in range(16):
-                time = HostNs(self.start - 16 + i)
+                time = HostNs(self.time(pulse) - 16 + i)
                 ring.put(Record(RecordKind.LATCH, 1, time, device_time=DeviceNs(time), value=10_000))
 
     def expose(self, pulse: int, *cameras: int, lose: bool = False) -> None:

@@ -4,13 +4,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from recorder.live.assembler import Assembler, Triplet
+from recorder.live.assembler import Assembler, Triplet, least_buffers
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus
 from rig.transport.recorder_reports import CameraNews
-from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, ring_rig
+from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
 
 Parts = tuple[Assembler, RingCameras, TripletBuffers]
 
@@ -112,6 +114,64 @@ def test_buffers_that_become_free_go_to_the_pulse_that_has_waited_longest(
             _blocks(buffers, triplet)
     assert numbers == [1, 2, 3, 4, 5, 6]
     assert not assembler.backlog
+
+
+@pytest.mark.parametrize("lost", [(1,), (1, 2, 3), (3, 4, 9), tuple(range(1, 18))])
+def test_pulses_that_one_camera_alone_has_do_not_wait_for_the_buffers_of_later_ones(lost: tuple[int, ...]) -> None:
+    """The recorder was held up and reads the cameras one after the other: the last one has pulses that others lost."""
+    rig, last = ring_rig(), 40
+    with camera_rings(rig, slots=64) as rings:
+        buffers = TripletBuffers(rig.triplet_shape, least_buffers(rig.trigger.period_ns))
+        assembler, cameras = Assembler(rig, rings, buffers), RingCameras(rings)
+        for pulse in range(1, last + 1):
+            cameras.latch(pulse)
+            for camera in range(3):
+                cameras.expose(pulse, camera, lose=pulse in lost and camera < 2)
+        seen: dict[int, list[set[int]]] = {}
+        for _ in range(200):
+            for triplet in assembler.pump(_now(last + 1)):
+                seen[triplet.pulse.number] = _blocks(buffers, triplet)
+        assert buffers.free_count == buffers.count
+        buffers.close()
+    whole = {n: [{grey(n, camera)} for camera in range(3)] for n in range(1, last + 1)}
+    assert seen == {n: [{0}, {0}, blocks[2]] if n in lost else blocks for n, blocks in whole.items()}
+
+
+@given(st.data())
+@settings(max_examples=40, deadline=None)
+def test_whatever_is_lost_and_however_slow_the_disk_every_pulse_is_handed_on(data: st.DataObject) -> None:
+    """Frames lost at random, a recorder that is held up at random, a disk that frees buffers at random."""
+    rig, last = ring_rig(), 60
+    numbers = st.sets(st.integers(1, last - 1), max_size=30)
+    lost = [data.draw(numbers, label=f"lost by camera {camera}") for camera in range(3)]
+    held_up = data.draw(numbers, label="pulses at which the recorder does nothing")
+    busy = data.draw(numbers, label="pulses at which the disk frees nothing")
+    with camera_rings(rig, slots=last + 4) as rings:
+        buffers = TripletBuffers(rig.triplet_shape, least_buffers(rig.trigger.period_ns))
+        assembler, cameras = Assembler(rig, rings, buffers), RingCameras(rings)
+        at_the_disk: list[Triplet] = []
+        seen: dict[int, list[set[int]]] = {}
+        for pulse in range(1, last + 60):
+            if pulse <= last:
+                cameras.latch(pulse)
+                for camera in range(3):
+                    cameras.expose(pulse, camera, lose=pulse in lost[camera])
+            if pulse not in held_up:
+                at_the_disk += assembler.pump(_now(pulse + 0.3))
+            if pulse not in busy:
+                for triplet in at_the_disk:
+                    if triplet.slot is not None:
+                        at = round((triplet.pulse.time - START) / PERIOD)
+                        seen[at] = _blocks(buffers, triplet)
+                at_the_disk = []
+        assert not assembler.backlog
+        assert buffers.free_count == buffers.count
+        buffers.close()
+    unseen = lost[0] & lost[1] & lost[2]
+    assert seen == {
+        n: [{0} if n in lost[camera] else {grey(n, camera)} for camera in range(3)]
+        for n in range(1, last + 1) if n not in unseen
+    }  # fmt: skip
 
 
 def test_a_recorder_that_takes_anothers_place_goes_on_with_its_cameras() -> None:

@@ -42,7 +42,7 @@ def measurement_lines(answer: dict[str, Any]) -> list[str]:
     state = words.get(answer["state"], answer["state"])
     problem = answer["problem"]
     lines = [f"{answer['recording']}: {state}" + ("" if problem is None else f": {problem['text']}")]
-    lines += [f"jump {jump['jump']}: {jump['verdict']}" for jump in answer["jumps"]]
+    lines += [f"jump {jump['jump']}: {jump['verdict']}" for jump in answer["figures"]]
     return lines + ([f"files: {', '.join(answer['files'])}"] if answer["files"] else [])
 
 

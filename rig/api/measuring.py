@@ -2,6 +2,7 @@
 
 from datetime import datetime
 from enum import StrEnum
+from typing import Any
 
 from pydantic import Field
 
@@ -15,8 +16,7 @@ class MeasuringState(StrEnum):
 
     NONE = "none"  #: nobody has asked for it
     WAITING = "waiting"  #: for another log, or for the end of its recording
-    RUNNING = "running"
-    PAUSED = "paused"  #: while a recording runs
+    MEASURING = "measuring"
     DONE = "done"
     FAILED = "failed"
 
@@ -36,13 +36,17 @@ class Measurement(Model):
 
     recording: str = Field(description="id of the recording")
     state: MeasuringState
+    paused: bool = Field(False, description="the measuring stands still while a recording runs")
     step: MeasuringStep | None = Field(None, description="what is being done")
     share: float = Field(0.0, description="of this step that is done, 0 to 1")
     before: int = Field(0, description="logs that are measured before this one")
     problem: Statement | None = Field(None, description="why it could not be measured, and what to do")
     measured: datetime | None = Field(None, description="when the log was measured, UTC")
     version: str = Field("", description="of svev, that measured it")
-    jumps: tuple[LastJump, ...] = Field((), description="main figures of its jumps")
+    jumps: tuple[dict[str, Any], ...] | None = Field(
+        None, description="its jumps as in the `jumper.json` (svev-jumper/1) of the result; null: not asked for"
+    )
+    figures: tuple[LastJump, ...] = Field((), description="main figures of its jumps")
     live: bool = Field(False, description="the figures are those that were measured live, before the log was closed")
     files: tuple[str, ...] = Field((), description="names of the files of the result")
 
@@ -52,6 +56,7 @@ class MeasuringQueue(Model):
 
     recording: str | None = Field(None, description="id of the one that is being measured; null: none")
     state: MeasuringState = MeasuringState.NONE
+    paused: bool = Field(False, description="it stands still while a recording runs")
     step: MeasuringStep | None = None
     share: float = Field(0.0, description="of this step that is done, 0 to 1")
     waiting: int = Field(0, description="so many more wait")

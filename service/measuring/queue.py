@@ -126,7 +126,7 @@ class Measurings:
             return known
         update: dict[str, Any] = {"state": MeasuringState.WAITING, "before": place}
         if running is not None and running.recording == recording:
-            update |= {"state": running.state, "step": running.step, "share": running.share}
+            update |= running.model_dump(include={"state", "paused", "step", "share"})
         return known.model_copy(update=update)
 
     @property
@@ -172,7 +172,7 @@ class Measurings:
         log, made = self._log(recording), self._folder / _WORKSHOP / recording
         settings = self._in_use().analysis
         with self._lock:
-            self._running = MeasuringQueue(recording=recording, state=MeasuringState.RUNNING)
+            self._running = MeasuringQueue(recording=recording, state=MeasuringState.MEASURING)
         self._changed()
         try:
             make_folder(made.parent)
@@ -239,7 +239,7 @@ class Measurings:
             self._change(step=step, share=share)
 
     def _hold(self, held: bool) -> None:
-        self._change(state=MeasuringState.PAUSED if held else MeasuringState.RUNNING)
+        self._change(paused=held)
 
     def _change(self, **what: Any) -> None:
         with self._lock:

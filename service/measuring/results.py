@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -16,11 +16,13 @@ from rig.api.fields import Model
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState
 from rig.api.statement import Statement
+from rig.errors import StateForbidsError
 from rig.host.disk import replace_file, sync
 from rig.host.files import TEXT_MAX, open_to_read, opened_folder, read_whole
 from service.seam.archive import Download
 
 _NAME: Final = "measurement.json"
+_JUMPER: Final = "jumper.json"
 _VERSION: Final = version("svev")
 
 
@@ -52,7 +54,7 @@ def measurement_of(recording: str, log: Path) -> Measurement:
         problem=found.problem,
         measured=found.measured,
         version=found.version,
-        jumps=tuple(jump.model_copy(update={"recording": recording}) for jump in found.jumps),
+        figures=tuple(jump.model_copy(update={"recording": recording}) for jump in found.jumps),
         files=tuple(sorted(each.name for each in _files(folder))),
     )
 
@@ -60,6 +62,21 @@ def measurement_of(recording: str, log: Path) -> Measurement:
 def result_file(log: Path, name: str) -> Path | None:
     """The file of this name in the result of a log; None if there is none."""
     return next((each for each in _files(measured_path(log)) if each.name == name), None)
+
+
+def jumps_in_full(log: Path) -> tuple[dict[str, Any], ...]:
+    """The jumps of the result of a log as they stand in its `jumper.json`; none if there is no such file.
+
+    Raises:
+        StateForbidsError: the file is damaged.
+    """
+    try:
+        content = json.loads(read_whole(measured_path(log) / _JUMPER, TEXT_MAX, links=False))
+        return tuple(content["jumps"])
+    except FileNotFoundError:
+        return ()
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise StateForbidsError(f"{log.name}: {_JUMPER} of its result cannot be read: measure it again") from error
 
 
 def result_downloads(log: Path, name: str) -> list[Download]:

@@ -35,7 +35,7 @@ from rig.pulse import Pause
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
 from service.measuring.queue import Measurings
-from service.measuring.results import result_downloads, result_file
+from service.measuring.results import jumps_in_full, result_downloads, result_file
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
@@ -152,13 +152,20 @@ class Archive(ABC):
         entry, log = self._catalogue.entry(recording_id), self._catalogue.file(recording_id)
         return self.exports.start(recording_id, log, file_name(recording_id, entry.session, ""), order)
 
-    def measurement(self, recording_id: str) -> Measurement:
-        """What is known of the jumps of a recording: of the whole log, otherwise what was measured live."""
+    def measurement(self, recording_id: str, *, jumps: bool) -> Measurement:
+        """What is known of the jumps of a recording: of the whole log, otherwise what was measured live.
+
+        Args:
+            recording_id: its id.
+            jumps: with the jumps in full, pulse by pulse; they are of the whole log, never live.
+        """
         log = self._catalogue.file(recording_id)
         known = self._measurings.measurement(recording_id, log)
-        if known.jumps or not (live := live_results.summaries(log)):
+        if jumps:
+            known = known.model_copy(update={"jumps": jumps_in_full(log)})
+        if known.figures or not (live := live_results.summaries(log)):
             return known
-        return known.model_copy(update={"jumps": tuple(live), "live": True})
+        return known.model_copy(update={"figures": tuple(live), "live": True})
 
     def measure(self, recording_id: str) -> Measurement:
         """Have the log of a recording measured, again if it was measured before.
@@ -173,7 +180,7 @@ class Archive(ABC):
     def give_up_measuring(self, recording_id: str) -> Measurement:
         """Do not measure a recording that waits for it, or is being measured; an earlier result stays."""
         self._measurings.give_up(recording_id, self._catalogue.file(recording_id))
-        return self.measurement(recording_id)
+        return self.measurement(recording_id, jumps=False)
 
     def measured_file(self, recording_id: str, name: str) -> Path:
         """A file of the result.

@@ -120,8 +120,8 @@ class Archive(Protocol):
         """The pulse at which to open a recording."""
         ...
 
-    def measurement(self, recording_id: str) -> Measurement:
-        """What is known of the jumps of a recording, and how far its measuring is."""
+    def measurement(self, recording_id: str, *, jumps: bool) -> Measurement:
+        """What is known of the jumps of a recording, in full if `jumps`, and how far its measuring is."""
         ...
 
     def measure(self, recording_id: str) -> Measurement:

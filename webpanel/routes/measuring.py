@@ -3,7 +3,7 @@
 from http import HTTPStatus
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path
+from fastapi import APIRouter, Depends, Path, Query
 from fastapi.responses import FileResponse
 
 from rig.api.measuring import Measurement
@@ -14,6 +14,9 @@ from webpanel.routes.files import attachment
 
 FileName = Annotated[
     str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.\-]{0,99}$", description="name of a file", examples=["report.html"])
+]
+WithJumps = Annotated[
+    bool, Query(description="with `jumps` in full, some 400 kB each; false: `null` stands in their place")
 ]
 _FILE: Final[Responses] = {
     200: {
@@ -30,14 +33,15 @@ def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
     """The routes about what was measured in a recording."""
     router = strict_router("Measurements")
 
-    @router.get("/recordings/{recording_id}/measurement", responses=refusals(404))
-    def get_measurement(recording_id: RecordingId) -> Measurement:
+    @router.get("/recordings/{recording_id}/measurement", responses=refusals(404, 409))
+    def get_measurement(recording_id: RecordingId, jumps: WithJumps = True) -> Measurement:
         """What is known of the jumps of a recording, and how far its measuring is.
 
         The log of every recording is measured by itself after its end, if the rig file has `[analysis]`; until then the
-        figures are those that were measured live (`live`). Progress is in `measuring` of `GET /status` and its events.
+        figures are those that were measured live (`live`), and `jumps` is empty. Progress is in `measuring` of
+        `GET /status` and its events.
         """
-        return service.measurement(recording_id)
+        return service.measurement(recording_id, jumps=jumps)
 
     @router.post(
         "/recordings/{recording_id}/measurement", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404)

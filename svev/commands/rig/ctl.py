@@ -135,9 +135,9 @@ def measure(context: typer.Context, recording: Id, wait_s: Wait = 0.0, as_json: 
     """
     path, until = f"{path_of(recording)}/measurement", time.monotonic() + wait_s
     answer = call(context, "POST", path)
-    while answer["state"] in {"waiting", "running", "paused"} and time.monotonic() < until:
+    while answer["state"] in {"waiting", "measuring"} and time.monotonic() < until:
         time.sleep(_POLL_S)
-        answer = call(context, "GET", path)
+        answer = call(context, "GET", f"{path}?jumps=false")
     show(answer, measurement_lines, as_json)
 
 

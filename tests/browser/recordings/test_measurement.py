@@ -90,14 +90,14 @@ def test_progress_from_order_to_failure_without_loading_anew(
     _state(page, "Waits to be measured, 1 before it.")
     service.give_up_measuring("jump-2")
     _state(page, "Waits to be measured: it is the next one.")
-    running = MeasuringQueue(recording="jump-1", state=MeasuringState.RUNNING, step=MeasuringStep.SEARCH, share=0.4)
+    running = MeasuringQueue(recording="jump-1", state=MeasuringState.MEASURING, step=MeasuringStep.SEARCH, share=0.4)
     _measuring(service, running)
     _state(page, "Measuring: looking for the jumper")
     expect(page.locator("#measurement-share")).to_have_text("40\u202f%")
     _measuring(service, running.model_copy(update={"share": 0.73}))
     expect(page.locator("#measurement-share")).to_have_text("73\u202f%")
     expect(page.locator("#measurement-bar")).to_have_js_property("value", 0.73)
-    _measuring(service, running.model_copy(update={"state": MeasuringState.PAUSED}))
+    _measuring(service, running.model_copy(update={"paused": True}))
     _state(page, "Waits while a recording runs.")
 
     keep_problem(log, Statement(level=Level.WARNING, code="", text="hill.json: has no balls", advice="Survey them"))
@@ -182,13 +182,13 @@ def test_the_live_view_says_whose_jump_was_measured_and_how_many_wait(
     card, queue, jumper = page.locator("#measured"), page.locator("#measured-queue"), page.locator("#measured-who")
     expect(page.locator("#state-word")).to_have_text("Armed")
     expect(card).to_be_hidden()
-    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.RUNNING, waiting=2)
+    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.MEASURING, waiting=2)
     service._wake()
     expect(queue).to_have_text("measuring 1, waiting 2")
     expect(card.get_by_role("heading")).to_have_text("Measurement ")
     for hidden in ("#measured-who", "#measured-figures", "#measured-verdict"):
         expect(page.locator(hidden)).to_be_hidden()
-    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.PAUSED)
+    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.MEASURING, paused=True)
     service.last_jump = LIVE
     service._wake()
     expect(jumper).to_have_text("17 · Anna Berg")
@@ -215,7 +215,7 @@ def test_the_live_view_says_whose_jump_was_measured_and_how_many_wait(
 def test_a_phone_shows_all_of_it(panel: Panel, service: MemoryService, log: Path, open_page: Open, part: str) -> None:
     keep_problem(service.catalogue.file("jump-2"), Statement(level=Level.WARNING, code="", text="no balls " * 20))
     service.last_jump = LIVE
-    service.measuring = MeasuringQueue(recording="x", state=MeasuringState.PAUSED, waiting=12)
+    service.measuring = MeasuringQueue(recording="x", state=MeasuringState.MEASURING, paused=True, waiting=12)
     for locale in ("en-GB", "nb-NO"):
         page = open_page(f"{panel.url}/#/{part}", width=360, height=780, locale=locale, has_touch=True, is_mobile=True)
         expect(page.locator(".figures:visible > div")).to_have_count(5)

@@ -102,7 +102,7 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
         bench.busy = False
         done = bench.until_over(queue, "jump")
     assert done.state is MeasuringState.DONE, done.problem
-    (jump,) = done.jumps
+    (jump,) = done.figures
     assert jump.ok, jump.verdict
     assert (jump.recording, bench.found, bench.waiting()) == ("jump", ["jump"], [])
     assert jump.takeoff_speed is not None
@@ -130,7 +130,7 @@ def _a_failure_leaves_the_result(bench: Bench) -> None:
     assert failed.state is MeasuringState.FAILED
     assert failed.problem is not None
     assert "misspelt.json" in failed.problem.text
-    assert len(failed.jumps) == 1
+    assert len(failed.figures) == 1
     assert "report.html" in failed.files
 
 
@@ -139,7 +139,7 @@ def test_a_service_that_ends_in_the_middle_goes_on_when_it_is_started_again(benc
     with bench.running() as queue:
         queue.opened(bench.log("jump"))
         queue.opened(bench.log("other"))
-        wait_until(lambda: queue.view.state is MeasuringState.RUNNING, "it is being measured", PATIENCE_S, 0.01)
+        wait_until(lambda: queue.view.state is MeasuringState.MEASURING, "it is being measured", PATIENCE_S, 0.01)
     assert bench.waiting() == ["jump", "other"]
     assert not measured_path(bench.log("jump")).exists()
     with bench.running() as queue:
@@ -156,8 +156,9 @@ def test_it_stands_still_while_a_recording_runs_and_says_so_if_it_is_killed(benc
         queue.want("jump", bench.log("jump"))
         wait_until(lambda: queue.view.step is not None, "it is under way", PATIENCE_S, 0.01)
         bench.busy = True
-        wait_until(lambda: queue.view.state is MeasuringState.PAUSED, "it stands still", PATIENCE_S, 0.01)
-        assert bench.of(queue, "jump").state is MeasuringState.PAUSED
+        wait_until(lambda: queue.view.paused, "it stands still", PATIENCE_S, 0.01)
+        now = bench.of(queue, "jump")
+        assert (now.state, now.paused) == (MeasuringState.MEASURING, True)
         os.kill(_child(), signal.SIGKILL)
         failed = bench.until_over(queue, "jump")
     assert failed.problem is not None
@@ -184,7 +185,7 @@ def test_what_cannot_be_measured_says_why_and_the_next_one_goes_on(bench: Bench)
         failed = bench.until_over(queue, "dark")
     assert failed.problem is not None
     assert failed.problem.text
-    assert (failed.files, failed.jumps) == ((), ())
+    assert (failed.files, failed.figures) == ((), ())
     assert bench.waiting() == []
 
 

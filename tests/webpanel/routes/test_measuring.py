@@ -1,6 +1,7 @@
 """What was measured in a recording, over the API: figures, files, the order to measure it, and its refusals."""
 
 import io
+import json
 import zipfile
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,12 +11,15 @@ import pytest
 
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump
+from rig.api.statement import Statement
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import keep_result, measurement_of
+from service.measuring.results import keep_problem, keep_result, measurement_of
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 
 PATH = "/api/recordings/jump/measurement"
+JUMPS = [{"number": 1, "pulses": [{"pulse": 94, "points": {"P1": None}, "height": {"value": 1.25, "sigma": 0.006}}]}]
+JUMPER = json.dumps({"format": "svev-jumper/1", "jumps": JUMPS})
 PAGE = "<!doctype html><script>1</script>"
 
 
@@ -32,21 +36,32 @@ def _jump(verdict: str) -> LastJump:
 def _measured(log: Path) -> None:
     made = log.parent / "made"
     made.mkdir()
-    for name, text in {"report.html": PAGE, "jumper.csv": "a,b\n", "jumper.c3d": "C3D"}.items():
+    for name, text in {"report.html": PAGE, "jumper.csv": "a,b\n", "jumper.c3d": "C3D", "jumper.json": JUMPER}.items():
         (made / name).write_text(text)
     keep_result(made, log, (_jump("measured well"),))
 
 
 def test_live_figures_are_given_until_the_log_is_measured(client: httpx.Client, log: Path) -> None:
     before = client.get(PATH).json()
-    assert (before["state"], before["jumps"], before["live"]) == ("none", [], False)
+    assert (before["state"], before["jumps"], before["figures"], before["live"]) == ("none", [], [], False)
     jumper_path(log).write_text(f'{{"summaries": [{_jump("seen live").model_dump_json()}]}}')
     live = client.get(PATH).json()
-    assert (live["state"], live["live"], live["jumps"][0]["verdict"]) == ("none", True, "seen live")
+    assert (live["state"], live["live"], live["figures"][0]["verdict"]) == ("none", True, "seen live")
     _measured(log)
     done = client.get(PATH).json()
-    assert (done["state"], done["live"], done["jumps"][0]["verdict"]) == ("done", False, "measured well")
-    assert done["files"] == ["jumper.c3d", "jumper.csv", "report.html"]
+    assert (done["state"], done["live"], done["figures"][0]["verdict"]) == ("done", False, "measured well")
+    assert done["files"] == ["jumper.c3d", "jumper.csv", "jumper.json", "report.html"]
+
+
+def test_jumps_stand_in_the_answer_as_in_the_file_of_the_result(client: httpx.Client, log: Path) -> None:
+    _measured(log)
+    assert client.get(PATH).json()["jumps"] == JUMPS
+    assert client.get(f"{PATH}?jumps=false").json()["jumps"] is None
+    keep_problem(log, Statement(code="", text="no balls"))
+    failed = client.get(PATH).json()
+    assert (failed["state"], failed["jumps"]) == ("failed", JUMPS)
+    (log.with_suffix(".measured") / "jumper.json").write_text("[]")
+    assert "measure it again" in refused(client.get(PATH), 409).detail
 
 
 def test_a_page_among_the_files_reaches_nothing_of_the_panel(client: httpx.Client, log: Path) -> None:
@@ -92,4 +107,4 @@ def test_the_archive_has_the_result_where_a_folder_of_recordings_has_it(client: 
         assert archive.read("jump.measured/report.html").decode() == PAGE
         archive.extractall(log.parent / "elsewhere")
     elsewhere = log.parent / "elsewhere" / "jump.mcap"
-    assert measurement_of("jump", elsewhere).jumps == (_jump("measured well"),)
+    assert measurement_of("jump", elsewhere).figures == (_jump("measured well"),)

@@ -60,7 +60,7 @@ function draw() {
 function queueInWords() {
   const measuring = known.status?.measuring;
   if (!measuring) return "";
-  const running = measuring.recording === null ? "" : t(measuring.state === "paused" ? "measured.queue_paused" : "measured.queue_running");
+  const running = measuring.recording === null ? "" : t(measuring.paused ? "measured.queue_paused" : "measured.queue_running");
   const waiting = measuring.waiting > 0 ? t("measured.queue_waiting", { count: measuring.waiting }) : "";
   return [running, waiting].filter(Boolean).join(", ");
 }

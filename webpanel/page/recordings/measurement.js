@@ -12,8 +12,7 @@ import { known, watch } from "../shared/store.js";
 /** @typedef {import("./types.js").Measurement} Measurement */
 /** @typedef {import("../shared/types.js").LastJump} LastJump */
 
-const BEGUN = ["running", "paused"];
-const QUEUED = ["waiting", ...BEGUN];
+const QUEUED = ["waiting", "measuring"];
 /** Files of the result that people open, in this order; any others come after them, folded away. */
 const FILES = [/^report\.html$/, /^overlay\.webm$/, /\.c3d$/, /\.trc$/, /\.csv$/, /^protocol\.html$/];
 /** What the browser shows itself instead of keeping it. */
@@ -54,7 +53,7 @@ export async function loadMeasurement(shown) {
 function follow() {
   const now = known.status?.measuring;
   const before = queue;
-  if (now) queue = `${now.recording} ${now.state} ${now.waiting}`;
+  if (now) queue = `${now.recording} ${now.state} ${now.paused} ${now.waiting}`;
   if (queue !== before) void attempt(look);
   draw();
 }
@@ -72,7 +71,7 @@ async function look() {
 /** @param {"GET"|"POST"|"DELETE"} method */
 async function take(method) {
   const [id, own] = [recording?.id ?? "", ++calls];
-  const answer = await call(method, recordingPath(id, "/measurement"));
+  const answer = await call(method, recordingPath(id, method === "GET" ? "/measurement?jumps=false" : "/measurement"));
   if (own !== calls || recording?.id !== id) return;
   measured = answer;
   draw();
@@ -118,9 +117,9 @@ function draw() {
 /** @param {Measurement} shown */
 function drawProgress(shown) {
   const now = known.status?.measuring;
-  const { state, step, share } = now && now.recording === shown.recording && BEGUN.includes(shown.state) ? now : shown;
-  const begun = state === "running" && step !== null;
-  setText($("measurement-state"), inWords(shown, state, step));
+  const { paused, step, share } = now && now.recording === shown.recording && shown.state === "measuring" ? now : shown;
+  const begun = shown.state === "measuring" && !paused && step !== null;
+  setText($("measurement-state"), inWords(shown, paused, step));
   setText($("measurement-share"), begun ? `${number(100 * share)}\u202f%` : "");
   $("measurement-share").hidden = $("measurement-bar").hidden = !begun;
   $("measurement-bar").value = share;
@@ -130,18 +129,19 @@ function drawProgress(shown) {
  * How far the measuring is, without the share of the step: that changes too often to be read out.
  *
  * @param {Measurement} shown
- * @param {Measurement["state"]} state
+ * @param {boolean} paused
  * @param {Measurement["step"]} step
  */
-function inWords({ before, measured: then, version, jumps, live }, state, step) {
+function inWords({ state, before, measured: then, version, figures, live }, paused, step) {
   const when = { day: then ? day(then) : "", time: then ? timeOfDay(then) : "" };
-  const old = jumps.length && !live ? t("measurement.earlier", when) : "";
+  const old = figures.length && !live ? t("measurement.earlier", when) : "";
   const sentences = {
     none: [t(live ? "measurement.live" : "measurement.none")],
     waiting: [before ? t("measurement.waiting", { before }) : t("measurement.next"), known.status?.recording ? t("measurement.while_recording") : "", old],
-    running: [old, step ? t("measurement.running", { step: t(`measurement.step_${step}`) }) : t("measurement.begun")], // the share follows
-    paused: [t("measurement.paused"), old],
-    done: [t("measurement.done", { ...when, version }), jumps.length ? "" : t("measurement.no_jump")],
+    measuring: paused
+      ? [t("measurement.paused"), old]
+      : [old, step ? t("measurement.running", { step: t(`measurement.step_${step}`) }) : t("measurement.begun")], // the share follows
+    done: [t("measurement.done", { ...when, version }), figures.length ? "" : t("measurement.no_jump")],
     failed: [t("measurement.failed"), old],
   };
   return sentences[state].filter(Boolean).join(" ");
@@ -152,15 +152,15 @@ function inWords({ before, measured: then, version, jumps, live }, state, step) 
  *
  * @param {Measurement} shown
  */
-function drawResult({ recording: id, state, problem, jumps, live, files }) {
-  const now = JSON.stringify([languageInUse(), id, state === "failed" ? problem : null, jumps, live, files]);
+function drawResult({ recording: id, state, problem, figures, live, files }) {
+  const now = JSON.stringify([languageInUse(), id, state === "failed" ? problem : null, figures, live, files]);
   if (now === drawn) return;
   drawn = now;
   const failed = state === "failed" ? problem : null;
   const { text, advice } = failed ? say(failed) : { text: "", advice: "" };
   $("measurement-problem").hidden = !failed;
   $("measurement-problem").replaceChildren(...failed ? [makeMark(failed.level, failed.level, text), ...advice ? [make("p", { class: "advice" }, advice)] : []] : []);
-  $("measurement-jumps").replaceChildren(...jumps.map((jump) => makeJump(jump, live, jumps.length > 1)));
+  $("measurement-jumps").replaceChildren(...figures.map((jump) => makeJump(jump, live, figures.length > 1)));
   const [first, rest] = sorted(files);
   $("measurement-files").replaceChildren(...first.map((name) => makeFile(id, name)));
   $("measurement-more").hidden = !rest.length;

@@ -8,13 +8,15 @@
  * @typedef {object} Measurement What is known of the jumps of a recording.
  * @property {string} recording
  * @property {MeasuringQueue["state"]} state
+ * @property {boolean} paused
  * @property {MeasuringQueue["step"]} step
  * @property {number} share
  * @property {number} before
  * @property {Statement|null} problem
  * @property {string|null} measured
  * @property {string} version
- * @property {LastJump[]} jumps
+ * @property {object[]|null} jumps
+ * @property {LastJump[]} figures
  * @property {boolean} live
  * @property {string[]} files
  */

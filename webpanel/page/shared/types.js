@@ -151,7 +151,8 @@
  *
  * @typedef {object} MeasuringQueue
  * @property {string|null} recording
- * @property {"none"|"waiting"|"running"|"paused"|"done"|"failed"} state
+ * @property {"none"|"waiting"|"measuring"|"done"|"failed"} state
+ * @property {boolean} paused
  * @property {"balls"|"search"|"names"|"computing"|"writing"|null} step
  * @property {number} share
  * @property {number} waiting

@@ -60,6 +60,29 @@ def in_sight(page: Page, element: Locator) -> bool:
     return found
 
 
+@pytest.mark.parametrize(
+    "size", repeats([[PHONE], [SMALL_LAPTOP], [LAPTOP], [TABLET], [ACROSS]]), ids="{0[0]}x{0[1]}".format
+)
+def test_state_record_and_save_stay_in_sight_however_far_one_scrolls(
+    panel: Panel, service: MemoryService, open_page: Open, size: tuple[int, int]
+) -> None:
+    lines = "".join(f"{bib};Jumper {bib}\n" for bib in range(1, 41))
+    service.jumpers.import_table(f"bib;athlete\n{lines}".encode())
+    service.last_jump = MEASURED
+    service.arm()
+    page = open_page(panel.url, width=size[0], height=size[1])
+    expect(page.locator("#list-rows li")).to_have_count(40)
+    state = page.locator("#state-word, #pill")
+    for scrolled in ("0", "innerHeight", "document.documentElement.scrollHeight"):
+        page.evaluate(f"scrollTo({{ top: {scrolled}, behavior: 'instant' }})")
+        wait_until(
+            lambda: any(in_sight(page, each) and "armed" in each.inner_text().lower() for each in state.all()),
+            f"the state is in sight at {scrolled}",
+        )
+        assert in_sight(page, page.locator("#next-step"))
+        assert in_sight(page, page.locator("#save-last"))
+
+
 @pytest.mark.parametrize("size", repeats([[ACROSS], [SMALL_LAPTOP], [LAPTOP]]), ids="{0[0]}x{0[1]}".format)
 def test_the_slider_of_a_jump_is_in_sight_also_with_one_camera_large(
     panel: Panel, jumps: None, open_page: Open, size: tuple[int, int]

@@ -187,6 +187,11 @@ def test_a_switch_says_whether_recordings_begin_by_themselves(
     switch.uncheck()
     wait_until(lambda: service.automatic == AutomaticStatus(on=False, camera="K1"), "the service is told")
     expect(switch).not_to_be_checked()
+    expect(page.locator(".snack")).to_contain_text("Recordings no longer begin by themselves")
+    page.locator(".snack").get_by_role("button", name="Undo").click()
+    expect(switch).to_be_checked()
+    assert service.automatic == AutomaticStatus(on=True, camera="K1")
+    expect(page.locator(".snack")).to_contain_text("Recordings begin by themselves")
     assert page.evaluate("document.documentElement.scrollWidth") == 360
 
 

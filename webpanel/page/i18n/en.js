@@ -69,6 +69,8 @@ export const en = {
   "actions.no_connection": "No connection to the service: nothing can be started or stopped from here.",
   "actions.nothing_held": "Nothing to save yet: no pulses have come.",
   "actions.automatic": "Records by itself when somebody comes into sight ({camera})",
+  "actions.automatic_on": "Recordings begin by themselves",
+  "actions.automatic_off": "Recordings no longer begin by themselves",
 
   "preview.label": "What the cameras see",
   "preview.alt": "Live picture of the cameras {cameras}, side by side",

@@ -69,6 +69,8 @@ export const nb = {
   "actions.no_connection": "Ingen forbindelse med tjenesten: herfra kan ingenting startes eller stoppes.",
   "actions.nothing_held": "Ingenting å lagre ennå: det har ikke kommet pulser.",
   "actions.automatic": "Tar opp av seg selv når noen kommer til syne ({camera})",
+  "actions.automatic_on": "Opptak begynner av seg selv",
+  "actions.automatic_off": "Opptak begynner ikke lenger av seg selv",
 
   "preview.label": "Det kameraene ser",
   "preview.alt": "Direktebilde fra kameraene {cameras}, side om side",

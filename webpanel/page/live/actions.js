@@ -198,10 +198,17 @@ function drawAutomatic() {
   setText($("automatic").querySelector("span"), t("actions.automatic", { camera: automatic.camera }));
 }
 
-/** @param {boolean} on */
-async function changeAutomatic(on) {
+/**
+ * Have recordings begin by themselves, or not.
+ *
+ * @param {boolean} on
+ * @param {boolean} [undoing] whether this takes back a change
+ */
+async function changeAutomatic(on, undoing = false) {
   try {
     update({ status: await call("PUT", "automatic", { on }), heard: Date.now() });
+    const undo = { words: t("undo"), action: () => void changeAutomatic(!on, true) };
+    tell("info", t(on ? "actions.automatic_on" : "actions.automatic_off"), undoing ? undefined : undo);
   } catch (error) {
     tellProblem(error);
     drawAutomatic();

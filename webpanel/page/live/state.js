@@ -1,4 +1,4 @@
-/** The state of the rig as colour, word and icon: large in the live view, small at the top of the other views. */
+/** The state of the rig as colour, word and icon: large in the live view, small at the top where that is not in sight. */
 
 import { say, t } from "../i18n/i18n.js";
 import { $, setIcon, setText } from "../shared/dom.js";
@@ -10,6 +10,8 @@ const ICONS = { idle: "idle", arming: "arming", armed: "armed", recording: "reco
 export function startState() {
   watch(draw);
   setInterval(drawTime, 250);
+  const belowTop = { rootMargin: `-${document.querySelector(".top")?.clientHeight ?? 0}px 0px 0px`, threshold: 0.4 };
+  new IntersectionObserver(([seen]) => document.body.classList.toggle("state-away", !seen.isIntersecting), belowTop).observe($("state"));
 }
 
 function draw() {

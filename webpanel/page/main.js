@@ -8,6 +8,7 @@ import { startSettings } from "./frame/settings.js";
 import { startSignals } from "./frame/signals.js";
 import { startLanguage } from "./i18n/i18n.js";
 import { startActions } from "./live/actions.js";
+import { startAutomatic } from "./live/automatic.js";
 import { startHealth } from "./live/health.js";
 import { startMeasured } from "./live/measured.js";
 import { startPreview } from "./live/preview.js";
@@ -67,7 +68,7 @@ function entered({ view, id }) {
 
 startSettings(redraw);
 startLanguage();
-for (const start of [startState, startSession, startStartList, startActions, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
+for (const start of [startState, startSession, startStartList, startActions, startAutomatic, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
 for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();

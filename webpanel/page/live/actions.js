@@ -45,7 +45,6 @@ export function startActions() {
   $("save-last").addEventListener("click", saveLast);
   $("arm-without").addEventListener("click", armWithout);
   $("disarm").addEventListener("click", disarm);
-  $("automatic-on").addEventListener("change", () => void changeAutomatic($("automatic-on").checked));
   onLongPress($("next-step"), () => known.status?.state === "recording" && possible(), () => void perform("actions.stopping", () => stop(true)));
   startTaps(draw);
   watch(draw);
@@ -166,7 +165,6 @@ function draw() {
   const nothingHeld = held() < LEAST_PREROLL_S;
   drawButton($("save-last"), "save", t("actions.save_last"), quantity(held(), 1, "s"));
   $("save-last").disabled = !possible() || nothingHeld || waits() > 0;
-  drawAutomatic();
   drawArmWithout();
   $("disarm").hidden = !mayDisarm();
   $("disarm").disabled = !possible();
@@ -186,33 +184,6 @@ function drawArmWithout() {
 function lackingCameras() {
   const statement = known.status?.statement;
   return statement?.code === "fault_too_few" ? statement.values : null;
-}
-
-/** Whether recordings begin by themselves, if the rig file lets a camera be watched for that. */
-function drawAutomatic() {
-  const automatic = known.status?.automatic;
-  $("automatic").hidden = !automatic;
-  if (!automatic) return;
-  $("automatic-on").checked = automatic.on;
-  $("automatic-on").disabled = !known.connected || known.role === "watch";
-  setText($("automatic").querySelector("span"), t("actions.automatic", { camera: automatic.camera }));
-}
-
-/**
- * Have recordings begin by themselves, or not.
- *
- * @param {boolean} on
- * @param {boolean} [undoing] whether this takes back a change
- */
-async function changeAutomatic(on, undoing = false) {
-  try {
-    update({ status: await call("PUT", "automatic", { on }), heard: Date.now() });
-    const undo = { words: t("undo"), action: () => void changeAutomatic(!on, true) };
-    tell("info", t(on ? "actions.automatic_on" : "actions.automatic_off"), undoing ? undefined : undo);
-  } catch (error) {
-    tellProblem(error);
-    drawAutomatic();
-  }
 }
 
 /**

@@ -1,4 +1,4 @@
-"""A video of the jumps with the overlay drawn into every triplet: VP9 for browsers, or FFV1 without loss.
+"""A video of the jumps with the overlay drawn into every triplet: H.264 for phones, VP9, or FFV1 without loss.
 
 Under the triplet, the jumper is enlarged.
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cameras.frames import camera_images
-from analysis.film.video_file import ENDINGS, FFV1, VP9, VideoFile
+from analysis.film.video_file import ENDINGS, FFV1, VP9, VideoFile, h264
 from analysis.film.whole import whole_file
 from analysis.film.words import write_outlined
 from analysis.measurements.model import Measurements
@@ -41,6 +41,8 @@ Progress = Callable[[int, int], None]
 _AROUND_S: Final = 0.5
 #: Wider triplets are made smaller, unless the video is without loss: phones show no more.
 _WIDEST_PX: Final = 1920
+#: Phones play H.264 in MP4.
+_CODECS: Final = {".mp4": h264(23), ".webm": VP9, ".mkv": VP9}
 _SHIFT: Final = 4  # bits of sub-pixels when lines are drawn
 _LETTERS: Final = 0.6  # size of words, in units of the font
 #: Blue, green, red.
@@ -80,7 +82,7 @@ def write_video(
         system: the oriented cameras.
         log: where the images are.
         out: the file; its ending chooses the container: .mp4 or .webm for browsers, .mkv.
-        lossless: FFV1 instead of VP9; needs .mkv.
+        lossless: FFV1; needs .mkv.
         progress: called with the number of frames done and to do.
 
     Returns:
@@ -104,7 +106,9 @@ def write_video(
                 scale = 1.0 if lossless else min(1.0, _WIDEST_PX / image.shape[1])
                 picture = _picture(tag, image, shown[int(tag.pulse)], windows, scale)
                 if video is None:
-                    video = VideoFile(part, out.suffix, picture, result.rate_hz, FFV1 if lossless else VP9)
+                    video = VideoFile(
+                        part, out.suffix, picture, result.rate_hz, FFV1 if lossless else _CODECS[out.suffix]
+                    )
                 video.add(picture, clock.at_us(tag))
                 done += 1
                 if progress is not None:

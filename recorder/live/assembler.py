@@ -348,7 +348,8 @@ class Assembler:
         It happens only where a camera's frames come much later than those of the others, which lost some: no memory is
         kept ready for it.
         """
-        for later in chain(reversed(self.pairer.open), reversed(self._decided)):
+        behind: Iterator[OpenPulse | ClosedPulse] = chain(reversed(self.pairer.open), reversed(self._decided))
+        for later in behind:
             if later.cargo is part:
                 break
             if isinstance(later.cargo, _Composition) and (slot := later.cargo.slot) is not None:

@@ -29,6 +29,24 @@ class MeasuringStep(StrEnum):
     NAMES = "names"  #: points and skis get their names
     COMPUTING = "computing"
     WRITING = "writing"
+    VIDEO = "video"
+    COPYING = "copying"
+
+
+class AfterStep(StrEnum):
+    """What is done with a log after its end, in this order."""
+
+    MEASURE = "measure"
+    VIDEO = "video"  #: an MP4 file with the stick figure
+    COPY = "copy"  #: of log and result, to the folder that the rig file names
+
+
+class StepState(Model):
+    """How far one of these is."""
+
+    step: AfterStep
+    state: MeasuringState
+    problem: Statement | None = Field(None, description="why it failed, and what to do")
 
 
 class Measurement(Model):
@@ -41,6 +59,7 @@ class Measurement(Model):
     share: float = Field(0.0, description="of this step that is done, 0 to 1")
     before: int = Field(0, description="logs that are measured before this one")
     problem: Statement | None = Field(None, description="why it could not be measured, and what to do")
+    steps: tuple[StepState, ...] = Field((), description="what is done with the log, in order, and how far each is")
     measured: datetime | None = Field(None, description="when the log was measured, UTC")
     version: str = Field("", description="of svev, that measured it")
     jumps: tuple[dict[str, Any], ...] | None = Field(

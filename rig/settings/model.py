@@ -119,7 +119,7 @@ class AutomaticSettings(StrictModel):
 
 
 class AnalysisSettings(StrictModel):
-    """The analysis that measures the jumper while recordings run; it needs either the survey or the poses."""
+    """The analysis that measures the jumper, live and in every log; it needs either the survey or the poses."""
 
     survey: Path | None = Field(
         None, description="survey of the balls and interior orientations (svev-network/1), relative to the rig file"
@@ -127,6 +127,23 @@ class AnalysisSettings(StrictModel):
     calibration: Path | None = Field(
         None, description="poses of the cameras (result of svev orient), relative to the rig file"
     )
+    after_recording: tuple[Literal["measure", "video", "copy"], ...] = Field(
+        ("measure",),
+        description="what is done with every log by itself after its end: measure, then video (MP4 with the stick "
+        "figure), then copy (of log and result, to copy_to); [] for nothing",
+    )
+    copy_to: Path | None = Field(None, description="folder that logs and results are copied to, e.g. on a second disk")
+
+    @model_validator(mode="after")
+    def _steps_fit_together(self) -> "AnalysisSettings":
+        steps = self.after_recording
+        if steps and "measure" not in steps:
+            raise ValueError(f"after_recording: {steps[0]} comes after measure: write measure too")
+        if len(set(steps)) < len(steps):
+            raise ValueError("after_recording: a step stands twice: write it once")
+        if ("copy" in steps) != (self.copy_to is not None):
+            raise ValueError('a copy needs both, after_recording with "copy" and copy_to with the folder: write both')
+        return self
 
     @model_validator(mode="after")
     def _one_source(self) -> "AnalysisSettings":

@@ -60,14 +60,15 @@ def serve(work: Callable[[dict[str, Any], Teller], dict[str, Any]]) -> None:
     try:
         end = work(asked, Teller())
     except SvevError as error:
-        end = {"problem": _plainly(error.said)}
+        end = {"problem": as_plain(error.said)}
     except OSError as error:
-        end = {"problem": _plainly(plain(str(error)))}
+        end = {"problem": as_plain(plain(str(error)))}
     _say({"end": end})
 
 
-def _plainly(said: Phrase) -> dict[str, Any]:
-    values = {name: _plainly(value) if isinstance(value, Phrase) else value for name, value in said.values.items()}
+def as_plain(said: Phrase) -> dict[str, Any]:
+    """A phrase as JSON holds it."""
+    values = {name: as_plain(value) if isinstance(value, Phrase) else value for name, value in said.values.items()}
     return {"code": said.code, "text": said.text, "values": values}
 
 

@@ -1,10 +1,11 @@
-"""The program that measures one log, started by `service.measuring.queue`."""
+"""The program that measures one log, started by `service.measuring.after_steps`."""
 
 from pathlib import Path
 from typing import Any, Final
 
 from rig.api.measuring import MeasuringStep
-from service.background.program import Teller, serve
+from rig.errors import SvevError
+from service.background.program import Teller, as_plain, serve
 
 #: What the steps of the analysis are called by those who translate them.
 _STEPS: Final = {
@@ -14,13 +15,19 @@ _STEPS: Final = {
     "computing": MeasuringStep.COMPUTING,
     "writing": MeasuringStep.WRITING,
 }
+#: MP4, which every phone plays.
+_VIDEO: Final = "overlay.mp4"
 
 
 def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
-    """Measure `log` by `survey` or `calibration` into the folder `out`; says the main figures of the jumps."""
+    """Measure `log` by `survey` or `calibration` into the folder `out`, with or without a `video`.
+
+    Says the main figures of the jumps, and of a video why there is none; null: there is one.
+    """
     from analysis.cameras.source import read_source  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.procedure.analyze import analyze  # noqa: PLC0415
     from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
+    from analysis.report.video import write_video  # noqa: PLC0415
     from analysis.worker.findings import summary  # noqa: PLC0415
 
     def progress(step: str, share: float) -> None:
@@ -34,7 +41,17 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     jumps = [
         summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
     ]
-    return {"jumps": [jump.model_dump(mode="json") for jump in jumps]}
+    end: dict[str, Any] = {"jumps": [jump.model_dump(mode="json") for jump in jumps]}
+    if asked["video"]:
+        try:
+            write_video(
+                result, found.measurements, found.system, log, out / _VIDEO,
+                progress=lambda done, of: tell(step=MeasuringStep.VIDEO, share=done / max(1, of)),
+            )  # fmt: skip
+            end["video"] = None
+        except SvevError as error:  # what was measured is worth more
+            end["video"] = as_plain(error.said)
+    return end
 
 
 if __name__ == "__main__":

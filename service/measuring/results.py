@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from recorder.log.measured_path import measured_path
 from rig.api.fields import Model
 from rig.api.jump import LastJump
-from rig.api.measuring import Measurement, MeasuringState
+from rig.api.measuring import AfterStep, Measurement, MeasuringState, StepState
 from rig.api.statement import Statement
 from rig.errors import StateForbidsError
 from rig.host.disk import replace_file, sync
@@ -34,12 +34,14 @@ class _Outcome(Model):
         version: of svev.
         jumps: main figures of the jumps of the result that lies in the folder.
         problem: why the last attempt failed; the result, if there is one, is of an attempt before.
+        further: what was tried with the log afterwards, and why it failed.
     """
 
     measured: datetime
     version: str
     jumps: tuple[LastJump, ...] = ()
     problem: Statement | None = None
+    further: tuple[tuple[AfterStep, Statement | None], ...] = ()
 
 
 def measurement_of(recording: str, log: Path) -> Measurement:
@@ -50,13 +52,21 @@ def measurement_of(recording: str, log: Path) -> Measurement:
         return Measurement(recording=recording, state=MeasuringState.NONE)
     return Measurement(
         recording=recording,
-        state=MeasuringState.DONE if found.problem is None else MeasuringState.FAILED,
+        state=_state(found.problem),
         problem=found.problem,
+        steps=tuple(
+            StepState(step=step, state=_state(problem), problem=problem)
+            for step, problem in ((AfterStep.MEASURE, found.problem), *found.further)
+        ),
         measured=found.measured,
         version=found.version,
         figures=tuple(jump.model_copy(update={"recording": recording}) for jump in found.jumps),
         files=tuple(sorted(each.name for each in _files(folder))),
     )
+
+
+def _state(problem: Statement | None) -> MeasuringState:
+    return MeasuringState.DONE if problem is None else MeasuringState.FAILED
 
 
 def result_file(log: Path, name: str) -> Path | None:
@@ -149,6 +159,19 @@ def keep_problem(log: Path, problem: Statement) -> None:
         ),
         folder,
     )
+
+
+def keep_step(log: Path, step: AfterStep, problem: Statement | None) -> None:
+    """Note that a log was measured, and what came of a step after that.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    folder = measured_path(log)
+    before = _outcome(folder)
+    if before is not None:
+        others = tuple(each for each in before.further if each[0] is not step)
+        _write(before.model_copy(update={"further": (*others, (step, problem))}), folder)
 
 
 def _write(outcome: _Outcome, folder: Path) -> None:

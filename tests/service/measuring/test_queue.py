@@ -7,8 +7,11 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import av
 import pytest
+from pydantic import ValidationError
 
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from recorder.catalogue.folder import Catalogue
@@ -18,7 +21,8 @@ from rig.api.measuring import Measurement, MeasuringState
 from rig.errors import StateForbidsError
 from rig.events import Event
 from rig.settings.model import AnalysisSettings
-from service.measuring.queue import NAME, Measurings
+from service.measuring.queue import Measurings
+from service.measuring.waiting import NAME
 from service.recordings import live_results
 from tests.analysis.simulated import training
 from tests.recorder.logs import write_log
@@ -43,19 +47,21 @@ class Bench:
         folder: it.
         busy: whether a recording runs.
         survey: what the rig file names; None: it has no `[analysis]`.
+        further: what else stands under `[analysis]`.
         found: recordings whose jumps were told.
         said: the events.
     """
 
     def __init__(self, folder: Path, survey: Path | None) -> None:
         self.folder, self.busy, self.survey = folder, False, survey
+        self.further: dict[str, Any] = {}
         self.found: list[str] = []
         self.said: list[str] = []
 
     @contextmanager
     def running(self) -> Iterator[Measurings]:
         """A service that measures."""
-        analysis = self.survey and AnalysisSettings(survey=self.survey)
+        analysis = self.survey and AnalysisSettings(survey=self.survey, **self.further)
         rig = SIM.model_copy(update={"analysis": analysis})
         with Measurings(self.folder, lambda: rig, lambda: self.busy, self._hear, self._know, lambda: None) as queue:
             yield queue
@@ -204,3 +210,75 @@ def test_a_queue_that_cannot_be_read_is_said(bench: Bench) -> None:
     with bench.running():
         wait_until(lambda: bench.said != [], "it is said")
     assert bench.said[0].startswith(f"{NAME}: cannot be read, so logs that waited to be measured are forgotten")
+
+
+def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Bench, tmp_path: Path) -> None:
+    other = tmp_path / "other disk"
+    bench.further = {"after_recording": ("measure", "video", "copy"), "copy_to": other}
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        seen = set()
+        while (now := bench.of(queue, "jump")).state not in OVER:
+            seen.add(tuple((each.step.value, each.state.value) for each in now.steps))
+            wait_until(lambda: bench.of(queue, "jump") != now, "it goes on", PATIENCE_S, 0.01)
+        without_a_disk = now
+        assert not list(tmp_path.glob("other disk*"))  # nothing is made where a disk is not connected
+        other.mkdir()
+        queue.want("jump", bench.log("jump"))
+        copied = bench.until_over(queue, "jump")
+    assert without_a_disk.state is MeasuringState.DONE
+    assert (("measure", "measuring"), ("video", "waiting"), ("copy", "waiting")) in seen
+    assert (("measure", "done"), ("video", "measuring"), ("copy", "waiting")) in seen
+    assert _states(without_a_disk) == [("measure", "done"), ("video", "done"), ("copy", "failed")]
+    problem = without_a_disk.steps[-1].problem
+    assert problem is not None
+    assert "other disk: the folder for copies is not there" in problem.text
+    assert any("jump is not copied" in said for said in bench.said)
+    assert _states(copied) == [("measure", "done"), ("video", "done"), ("copy", "done")]
+    assert (other / "jump.mcap").read_bytes() == bench.log("jump").read_bytes()
+    assert (other / "jump.measured" / "report.html").exists()
+    assert not list(other.glob(".*"))
+    with av.open(measured_path(bench.log("jump")) / "overlay.mp4") as video:
+        assert video.streams.video[0].codec_context.name == "h264"
+        assert sum(1 for _ in video.decode(video=0)) > 30
+
+
+def _states(measurement: Measurement) -> list[tuple[str, str]]:
+    return [(each.step.value, each.state.value) for each in measurement.steps]
+
+
+def test_another_log_of_the_same_name_is_not_written_over(bench: Bench, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "jump.mcap").write_bytes(b"of another computer")
+    bench.further, bench.survey = {"after_recording": ("measure", "copy"), "copy_to": other}, tmp_path / "none.json"
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        failed = bench.until_over(queue, "jump")
+    assert _states(failed) == [("measure", "failed"), ("copy", "failed")]
+    assert failed.steps[-1].problem is not None
+    assert "another log of this name" in failed.steps[-1].problem.text
+    assert (other / "jump.mcap").read_bytes() == b"of another computer"
+
+
+def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:
+    bench.further = {"after_recording": ()}
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        assert queue.view.waiting == 0
+        queue.want("jump", bench.log("jump"))
+        assert bench.until_over(queue, "jump").state is MeasuringState.DONE
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"after_recording": ("video",)}, "video comes after measure"),
+        ({"after_recording": ("measure", "measure")}, "a step stands twice"),
+        ({"after_recording": ("measure", "copy")}, "a copy needs both"),
+        ({"copy_to": Path("/x")}, "a copy needs both"),
+    ],
+)
+def test_steps_that_cannot_be_are_refused_with_what_to_write(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        AnalysisSettings(survey=Path("s.json"), **wrong)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from recorder.log.measured_path import measured_path
-from service.measuring.queue import NAME
+from service.measuring.waiting import NAME
 from simrig.world.survey import survey
 from tests.analysis.scene.hill import training
 from tests.capture.rigs import write_rig

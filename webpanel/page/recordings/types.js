@@ -13,12 +13,18 @@
  * @property {number} share
  * @property {number} before
  * @property {Statement|null} problem
+ * @property {StepState[]} steps
  * @property {string|null} measured
  * @property {string} version
  * @property {object[]|null} jumps
  * @property {LastJump[]} figures
  * @property {boolean} live
  * @property {string[]} files
+ *
+ * @typedef {object} StepState How far one of the things is that are done with a log after its end.
+ * @property {"measure"|"video"|"copy"} step
+ * @property {MeasuringQueue["state"]} state
+ * @property {Statement|null} problem
  */
 
 export {};

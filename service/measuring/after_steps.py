@@ -1,0 +1,145 @@
+"""Takes the steps with a log after its end: programs of their own measure and copy it; keeps what came of it."""
+
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from recorder.catalogue.trash import beside
+from rig.api.jump import LastJump
+from rig.api.measuring import AfterStep, MeasuringStep
+from rig.api.statement import Level, Statement
+from rig.events import Event
+from rig.events import Level as EventLevel
+from rig.host.files import make_folder
+from rig.phrase import Phrase, phrase, plain
+from rig.settings.model import AnalysisSettings
+from service.background.child import run_child
+from service.measuring.results import keep_problem, keep_result, keep_step
+
+#: Where results are made, before they are whole.
+_WORKSHOP: Final = ".measuring"
+
+
+class AfterSteps:
+    """Every step ends early if nobody wants it any more.
+
+    Args:
+        folder: of the recordings.
+        busy: whether a recording runs, so that the work has to stand still.
+        wanted: whether the steps of a recording are still wanted.
+        hear: takes how far the work is.
+        hold: called with True when it stands still, with False when it goes on.
+        tell: takes an event for the live log.
+        found: takes the main figures of the jumps of a log, when it is measured.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        busy: Callable[[], bool],
+        wanted: Callable[[str], bool],
+        hear: Callable[[dict[str, Any]], None],
+        hold: Callable[[bool], None],
+        tell: Callable[[Event], None],
+        found: Callable[[tuple[LastJump, ...]], None],
+    ) -> None:
+        self._folder, self._busy, self._wanted = folder, busy, wanted
+        self._hear, self._hold, self._tell, self._found = hear, hold, tell, found
+
+    def tidy(self) -> None:
+        """Remove what an earlier service left half made."""
+        shutil.rmtree(self._folder / _WORKSHOP, ignore_errors=True)
+
+    def measure(self, recording: str, log: Path, analysis: AnalysisSettings) -> None:
+        """Measure a log, with a video if the rig file asks for one; what failed is noted and told.
+
+        Args:
+            recording: its id.
+            log: it.
+            analysis: how.
+        """
+        made = self._folder / _WORKSHOP / recording
+        try:
+            make_folder(made.parent)
+            shutil.rmtree(made, ignore_errors=True)
+            asked = {
+                "log": str(log),
+                "out": str(made),
+                "survey": analysis.survey and str(analysis.survey),
+                "calibration": analysis.calibration and str(analysis.calibration),
+                "video": AfterStep.VIDEO in analysis.after_recording,
+            }
+            end = self._child(recording, "service.measuring.program", asked)
+            if end is not None and log.exists():
+                self._end(recording, log, made, end)
+        except (OSError, ValueError) as error:
+            self._fail(recording, log, plain(f"{log.name}: {error}"))
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+
+    def _end(self, recording: str, log: Path, made: Path, end: dict[str, Any]) -> None:
+        if "problem" in end:
+            self._fail(recording, log, _phrase(end["problem"]))
+            return
+        jumps = tuple(
+            LastJump.model_validate(jump).model_copy(update={"recording": recording}) for jump in end["jumps"]
+        )
+        keep_result(made, log, jumps)
+        if "video" in end:
+            self._note(recording, log, AfterStep.VIDEO, end["video"])
+        self._found(jumps)
+
+    def copy(self, recording: str, log: Path, to: Path) -> None:
+        """Copy a log, measured or not, with all that belongs to it."""
+        self._hear({"step": MeasuringStep.COPYING, "share": 0.0})
+        asked = {"paths": [str(path) for path in (log, *beside(log))], "to": str(to)}
+        try:
+            end = self._child(recording, "service.measuring.copying", asked)
+            if end is not None and log.exists():
+                self._note(recording, log, AfterStep.COPY, end.get("problem"))
+        except (OSError, ValueError) as error:
+            self._tell_of(recording, "event_log_not_copied", "{recording} is not copied: {why}", plain(str(error)))
+
+    def _child(self, recording: str, module: str, asked: dict[str, Any]) -> dict[str, Any] | None:
+        return run_child(
+            module,
+            asked,
+            busy=self._busy,
+            wanted=lambda: self._wanted(recording),
+            tell=self._hear,
+            hold=self._hold,
+        )
+
+    def _note(self, recording: str, log: Path, step: AfterStep, problem: dict[str, Any] | None) -> None:
+        """Note what came of a further step, and tell if it failed."""
+        why = None if problem is None else _phrase(problem)
+        keep_step(log, step, None if why is None else _warning(why))
+        if why is not None and step is AfterStep.COPY:
+            self._tell_of(recording, "event_log_not_copied", "{recording} is not copied: {why}", why)
+        elif why is not None:
+            self._tell_of(recording, "event_no_video", "{recording} has no video: {why}", why)
+
+    def _fail(self, recording: str, log: Path, why: Phrase) -> None:
+        """Note that a log cannot be measured."""
+        with suppress(FileNotFoundError):  # deleted meanwhile
+            try:
+                keep_problem(log, _warning(why))
+            except FileNotFoundError:
+                raise
+            except OSError as error:
+                why = plain(f"{log}: {error.strerror}")
+        self._tell_of(recording, "event_log_not_measured", "{recording} is not measured: {why}", why)
+
+    def _tell_of(self, recording: str, code: str, text: str, why: Phrase) -> None:
+        self._tell(Event.now(EventLevel.WARNING, "analysis", phrase(code, text, recording=recording, why=why)))
+
+
+def _warning(why: Phrase) -> Statement:
+    return Statement(level=Level.WARNING, code=why.code, text=why.text, values=why.values)
+
+
+def _phrase(plainly: dict[str, Any]) -> Phrase:
+    values = {name: _phrase(value) if isinstance(value, dict) else value for name, value in plainly["values"].items()}
+    return Phrase(plainly["code"], plainly["text"], values)

@@ -35,6 +35,7 @@ _COMMANDS: Final = {
     "rehearse": ("rig.rehearse", "rehearse_command", "Rehearse a recording to the real disk."),
     "serve": ("rig.serve", "serve", "Run the rig as a service, with a control panel."),
     "ctl": ("rig.ctl", "app", "Operate a running service: arm, record, stop, list."),
+    "setup": ("computer.hill", "setup", "Set up a hill: asks what it needs, writes its files."),
     "completion": ("computer.completion", "completion", "Have the shell complete commands and options."),
     "doctor": ("computer.setup", "doctor", "Examine computer, network, disk and cameras."),
     "cameras": ("computer.cameras", "app", "Find GigE Vision cameras, give them addresses."),

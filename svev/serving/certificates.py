@@ -1,5 +1,6 @@
 """Makes a certification authority (CA) of one's own and certificates of servers, with the program openssl."""
 
+import re
 import subprocess
 import tempfile
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ _SERVER_DAYS: Final = 825
 #: A subject has at most 64 characters (RFC 5280, A.1); the CA's has some more than the name.
 _NAME_MAX: Final = 58
 _OPENSSL_S: Final = 30.0
+_MONTH_S: Final = 30 * 86400
 _OWN: Final = ("localhost", "127.0.0.1")
 #: RFC 5280: 4.2.1.9 basic constraints, 4.2.1.10 name constraints, 4.2.1.12 extended key usage.
 _CONFIG: Final = """
@@ -77,8 +79,7 @@ def make_certificate(names: Sequence[str], folder: Path) -> CertificateFiles:
     """
     wanted = tuple(dict.fromkeys((*names, *_OWN)))
     for name in wanted:
-        if not _is_address(name) and not _is_host_name(name):
-            raise BadInputError(f"--name {name}: no name of a computer and no IP address; give one like hillpc.local")
+        check_name(name)
     files = CertificateFiles.within(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -98,6 +99,38 @@ def make_certificate(names: Sequence[str], folder: Path) -> CertificateFiles:
     except OSError as error:
         raise BadInputError(f"{folder}: cannot be written ({error.strerror}); choose another --out") from None
     return files
+
+
+def check_name(name: str) -> None:
+    """Check the name of a computer.
+
+    Raises:
+        BadInputError: it is none, and no IP address either.
+    """
+    if not _is_address(name) and not _is_host_name(name):
+        raise BadInputError(f"{name}: no name of a computer and no IP address; give one like hillpc.local")
+
+
+def is_signed_for(names: Sequence[str], certificate: Path) -> bool:
+    """Whether a certificate is for exactly these names, beside those of loopback, and lasts another month.
+
+    Raises:
+        ProcessDiedError: openssl is not installed.
+    """
+    command = [
+        "openssl",
+        "x509",
+        "-in",
+        str(certificate),
+        "-noout",
+        "-checkend",
+        str(_MONTH_S),
+        "-ext",
+        "subjectAltName",
+    ]
+    done = _run(command)
+    found = set(re.findall(r"(?:DNS|IP Address):([^,\s]+)", done.stdout))
+    return done.returncode == 0 and found == {*names, *_OWN}
 
 
 def _sign(certificate: Path, key: Path, names: Sequence[str], authority: CertificateFiles | None) -> None:
@@ -122,9 +155,7 @@ def _sign(certificate: Path, key: Path, names: Sequence[str], authority: Certifi
 
 def _check(certificate: Path, authority: Path, folder: Path) -> None:
     """Check that the CA may sign this certificate, as a client does."""
-    command = ["openssl", "verify", "-x509_strict", "-CAfile", str(authority), str(certificate)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=_OPENSSL_S, check=False)
-    if done.returncode:
+    if _run(["openssl", "verify", "-x509_strict", "-CAfile", str(authority), str(certificate)]).returncode:
         raise BadInputError(
             f"{folder}: its CA was made for other names, or has ended: make a new one with another --out, and install "
             "its ca.crt on the phones"
@@ -132,14 +163,17 @@ def _check(certificate: Path, authority: Path, folder: Path) -> None:
 
 
 def _openssl(*arguments: str) -> None:
-    try:
-        command = ["openssl", *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_OPENSSL_S, check=False)
-    except FileNotFoundError:
-        raise ProcessDiedError("the program openssl is missing: sudo apt install openssl") from None
+    done = _run(["openssl", *arguments])
     if done.returncode:
         reason = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
         raise ProcessDiedError(f"openssl failed ({reason}): look at the names, and try again")
+
+
+def _run(command: Sequence[str]) -> "subprocess.CompletedProcess[str]":
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=_OPENSSL_S, check=False)
+    except FileNotFoundError:
+        raise ProcessDiedError("the program openssl is missing: sudo apt install openssl") from None
 
 
 def _mask(name: str) -> str:

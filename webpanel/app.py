@@ -14,6 +14,7 @@ from service.seam.rig import RigService
 from webpanel.documentation import DESCRIPTION, serve_documentation
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard
+from webpanel.door.links import Links
 from webpanel.door.logins import Door
 from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
@@ -23,6 +24,7 @@ from webpanel.routes.contents import contents_router
 from webpanel.routes.events import Changes, events_router
 from webpanel.routes.exports import exports_router
 from webpanel.routes.files import files_router
+from webpanel.routes.links import links_router, visiting
 from webpanel.routes.login import login_router
 from webpanel.routes.measuring import measuring_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
@@ -39,12 +41,13 @@ _TYPES: Final = {
 }  # fmt: skip
 
 
-def create_app(service: RigService, access: Access) -> FastAPI:
+def create_app(service: RigService, access: Access, links: Links | None = None) -> FastAPI:
     """The panel of one running service.
 
     Args:
         service: operates the rig.
         access: who may reach the panel.
+        links: makes links that open single recordings; None: there are none.
 
     Returns:
         The application; `app.state.streams` are its `OpenStreams`. Serve it with `webpanel.server.make_server`.
@@ -62,7 +65,7 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )  # fmt: skip
     app.state.streams = streams
-    door = Door(access, warn=lambda said: service.tell("warning", "access", said))
+    door = Door(access, warn=lambda said: service.tell("warning", "access", said), links=links)
     routers = (
         rig_router(service),
         recordings_router(service, changes),
@@ -76,13 +79,16 @@ def create_app(service: RigService, access: Access) -> FastAPI:
         cameras_router(service, streams),
         events_router(service, changes, streams.events),
         login_router(door, service),
+        links_router(door, service),
         observing_router(service, metrics),
     )
     for router in routers:
         app.include_router(router)
     routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
     handle_errors(app, routes)
-    app.add_middleware(Guard, door=door, note=lambda said: service.tell("info", "access", said))
+    app.add_middleware(
+        Guard, door=door, note=lambda said: service.tell("info", "access", said), visit=visiting(service)
+    )
     app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
     app.add_middleware(CountRequests, metrics=metrics)
     serve_documentation(app, access)

@@ -36,7 +36,7 @@ _TAGS: Final = {
     "Exports": "Videos, pictures and tables of recordings, made by the service beside its work.",
     "Measurements": "What was measured in a recording, by itself after its end: figures, files, progress.",
     "Watching": "What happens now: events and live pictures.",
-    "Login": "Tokens, cookies and what one may do.",
+    "Login": "Tokens, cookies, links to single recordings, and what one may do.",
     "Observing": "For monitoring programs.",
 }
 #: Swagger UI draws its icons as data: images and sets styles from scripts.

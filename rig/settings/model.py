@@ -93,6 +93,15 @@ class ServiceSettings(StrictModel):
     """What the service does by itself."""
 
     arm_at_start: bool = Field(False, description="arm when the service starts, also after a power cut")
+    share_hours: float = Field(
+        24.0, gt=0, le=720, description="so long the QR code of a jump opens it on a phone without a token"
+    )
+    coach_delay_s: float = Field(
+        8.0,
+        ge=0,
+        le=60,
+        description="delay of the live picture on the coach's screen, so that a jump can be seen again",
+    )
     webhook: WebhookSettings | None = None
 
 

@@ -51,11 +51,13 @@ from svev.serving.panel_doctor import PanelDoctor
 from svev.serving.systemd import JournalHandler, Notify, write_line
 from webpanel.app import create_app
 from webpanel.door.access import Access
+from webpanel.door.links import Links, kept_secret
 from webpanel.door.tls import Tls
 from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
 _SOON_S: Final = 10.0
+_HOUR_S: Final = 3600.0
 #: The program that makes a rehearsal.
 REHEARSE: Final = (sys.executable, "-m", "svev.serving.rehearsal_program")
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
@@ -119,7 +121,7 @@ def serve(settings: ServiceSettings) -> None:
             supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot,
             rehearser, lights, trains, balls, PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
-        server = make_server(create_app(service, settings.access), settings.tls)
+        server = make_server(create_app(service, settings.access, _links(settings, rig, data, hub)), settings.tls)
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report
         if rig.service.webhook is not None:
@@ -145,6 +147,14 @@ def serve(settings: ServiceSettings) -> None:
                 supervisor.stop(_STOP_S)
         if supervisor.failure is not None:
             raise supervisor.failure
+
+
+def _links(settings: ServiceSettings, rig: RigSettings, data: Path, hub: EventHub) -> Links:
+    """The links that open single jumps on phones; says if they end with the service."""
+    secret = kept_secret(data)
+    if secret.problem is not None:
+        hub.tell(Event.now(Level.WARNING, "access", secret.problem))
+    return Links(secret.value, settings.access.tokens, rig.service.share_hours * _HOUR_S)
 
 
 def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:

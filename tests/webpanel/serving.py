@@ -12,6 +12,7 @@ from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from webpanel.app import create_app
 from webpanel.door.access import Access
+from webpanel.door.links import Links
 from webpanel.door.tls import Tls
 from webpanel.problems import Problem
 from webpanel.server import PanelServer, make_server
@@ -42,9 +43,11 @@ class Panel:
 
 
 @contextmanager
-def serving(service: MemoryService, access: Access, tls: Tls | None = None) -> Iterator[Panel]:
+def serving(
+    service: MemoryService, access: Access, tls: Tls | None = None, links: Links | None = None
+) -> Iterator[Panel]:
     """Serve meanwhile."""
-    server = make_server(create_app(service, access), tls)
+    server = make_server(create_app(service, access, links), tls)
     listener = socket.create_server((access.host, 0))
     port = listener.getsockname()[1]
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="panel")

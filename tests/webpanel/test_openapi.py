@@ -45,6 +45,7 @@ CALLS = {
     "GET /api/recordings/{recording_id}/measurement", "POST /api/recordings/{recording_id}/measurement",
     "DELETE /api/recordings/{recording_id}/measurement",
     "GET /api/recordings/{recording_id}/measurement/files/{name}",
+    "GET /api/recordings/{recording_id}/link", "POST /api/login/link",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 

@@ -25,7 +25,7 @@ HEAD_MAX: Final = 16 * 1024
 _HEADER_COST: Final = 32  # bytes that a header counts beside its text (RFC 9113, 6.5.2)
 #: Paths that need the token. The page's files do not: the page has to ask for the token.
 PROTECTED: Final = ("/api/", "/metrics", "/docs", "/openapi.json")
-OPEN: Final = frozenset({"/api/login", "/api/logout"})
+OPEN: Final = frozenset({"/api/login", "/api/login/link", "/api/logout"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +58,17 @@ class Guard:
         app: what it guards.
         door: decides who gets in.
         note: told who has changed what, in one line.
+        visit: asked, with recording and path, for each call of somebody who has a link; raises ProblemError if what he
+            asks for is not to be had now.
     """
 
-    def __init__(self, app: ASGIApp, door: Door, note: Callable[[Phrase], None]) -> None:
+    def __init__(
+        self, app: ASGIApp, door: Door, note: Callable[[Phrase], None], visit: Callable[[str, str], None]
+    ) -> None:
         self._app = app
         self._door = door
         self._note = note
+        self._visit = visit
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -90,6 +95,8 @@ class Guard:
 
         try:
             caller = self._check(HTTPConnection(scope))
+            if caller is not None and caller.recording:
+                await run_in_threadpool(self._visit, caller.recording, scope["path"])
         except ProblemError as error:
             await error.answer()(scope, receive, send_guarded)
         else:

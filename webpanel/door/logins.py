@@ -14,10 +14,13 @@ from starlette.requests import HTTPConnection
 
 from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access, site_of
-from webpanel.door.roles import Role, needed_role
+from webpanel.door.links import Links
+from webpanel.door.roles import Role, needed_role, recording_in, shown_by_link
 from webpanel.problems import ProblemError
 
 COOKIE: Final = "svev_session"
+#: Holds the key of a link; the browser sends it for the recording of the link alone.
+LINK_COOKIE: Final = "svev_link"
 SESSION_S = 12 * 3600.0
 _SESSIONS_MAX = 200
 _GUESSES_MAX = 10
@@ -90,10 +93,12 @@ class Caller:
     Attributes:
         role: what he may do.
         address: IP address.
+        recording: id of the only recording that he may see, because he has a link to it; empty: he has a token.
     """
 
     role: Role
     address: str
+    recording: str = ""
 
     def __str__(self) -> str:
         """For the live log, e.g. `operate, 192.168.1.7`."""
@@ -102,15 +107,17 @@ class Caller:
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """Decides which clients get in: by the rules of access, open sessions and the brake.
+    """Decides which clients get in: by the rules of access, open sessions, links and the brake.
 
     Attributes:
         access: the rules.
         warn: told of clients that send wrong tokens.
+        links: makes and checks links to single recordings; None: there are none.
     """
 
     access: Access
     warn: Callable[[Phrase], None]
+    links: Links | None = None
     sessions: Sessions = field(default_factory=Sessions)
     brake: Brake = field(default_factory=Brake)
 
@@ -140,10 +147,10 @@ class Door:
         raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")
 
     def admit(self, request: HTTPConnection) -> Caller:
-        """Check that a request carries a token or the cookie of an open session.
+        """Check that a request carries a token, the cookie of an open session, or that of a link to what it asks for.
 
         Raises:
-            ProblemError: 401 it carries neither, or a wrong token; 429 too many tokens were wrong.
+            ProblemError: 401 it carries none, a wrong token, or a link that has ended; 429 too many tokens were wrong.
         """
         client = self.access.client_of(request)
         if not self.access.tokens:
@@ -153,17 +160,41 @@ class Door:
             return Caller(self.check_token(candidate.strip(), client), client)
         role = self.sessions.role_of(request.cookies.get(COOKIE, ""))
         if role is None:
+            recording, key = recording_in(request.scope["path"]), request.cookies.get(LINK_COOKIE, "")
+            if recording and key:
+                self.check_link(recording, key)
+                return Caller(Role.WATCH, client, recording)
             text = "this needs the token: log in on the page, or send it as Authorization: Bearer TOKEN"
             raise _unauthorized("login_required", text)
         return Caller(role, client)
 
+    def check_link(self, recording: str, key: str) -> tuple[float, float]:
+        """Check the key of a link to a recording. It has too many bits to be guessed, which needs no brake.
+
+        Returns:
+            The UNIX time at which it ends, and the seconds until then.
+
+        Raises:
+            ProblemError: 401, it is none of this recording, or has ended.
+        """
+        ends = None if self.links is None else self.links.ends(recording, key)
+        if self.links is None or ends is None:
+            raise _unauthorized("wrong_link", "this link opens nothing, or no more: scan the code of the jump again")
+        left_s = self.links.left_s(ends)
+        if not left_s:
+            raise _unauthorized("link_ended", "this link has ended: scan the code of the jump again")
+        return ends, left_s
+
 
 def check_role(caller: Caller, method: str, path: str) -> None:
-    """Check that a caller's role allows a call.
+    """Check that a caller's role, or his link, allows a call.
 
     Raises:
         ProblemError: 403, it does not.
     """
+    if caller.recording and not shown_by_link(method, path, caller.recording):
+        text = "a link shows one jump, and nothing else: log in with a token"
+        raise ProblemError(HTTPStatus.FORBIDDEN, "link_forbids", text)
     needed = needed_role(method, path)
     if not caller.role.may(needed):
         text = f"your token may only {caller.role}, and this needs one that may {needed}: log in with another token"

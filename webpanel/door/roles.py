@@ -28,6 +28,10 @@ _ADMINISTERING: Final = (
     re.compile(r"POST /api/recordings/[^/]+/restore"),
     re.compile(r"[A-Z]+ /api/(rig|service)(/.*)?"),
 )
+#: What the link to a recording shows of it; neither the log itself nor what was noted about it.
+_SHOWN_BY_LINK: Final = re.compile(
+    r"/api/recordings/([^/]+)(?:/measurement|/measurement/files/[^/]+|/pulses|/pulses/[^/]+\.jpg|/moment|/thumbnail\.jpg)?"
+)
 #: What calls did, in words; a call about a recording has its id as the first group.
 _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     (r"POST /api/arm", lambda: phrase("act_armed", "armed the rig")),
@@ -111,6 +115,18 @@ def needed_role(method: str, path: str) -> Role:
         return Role.WATCH
     call = f"{method} {path}"
     return Role.ADMINISTER if any(pattern.fullmatch(call) for pattern in _ADMINISTERING) else Role.OPERATE
+
+
+def recording_in(path: str) -> str:
+    """Id of the recording that the path of a request is about; empty if it is about none."""
+    found = re.fullmatch(r"/api/recordings/([^/]+)(?:/.*)?", path)
+    return found[1] if found else ""
+
+
+def shown_by_link(method: str, path: str, recording: str) -> bool:
+    """Whether whoever has the link to a recording, and nothing else, may make a call."""
+    found = _SHOWN_BY_LINK.fullmatch(path)
+    return method in {"GET", "HEAD"} and found is not None and found[1] == recording
 
 
 def act(method: str, path: str) -> Phrase:

@@ -134,9 +134,10 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         return Response(body, media_type="application/json", headers=headers)
 
     @router.get("/recordings/{recording_id}", responses=refusals(404))
-    def get_recording(recording_id: RecordingId) -> Recording:
-        """One recording, in the trash or not."""
-        return service.recording(recording_id)
+    def get_recording(recording_id: RecordingId, request: Request) -> Recording:
+        """One recording, in the trash or not. A link to it shows who jumped, and nothing that was noted about him."""
+        recording, caller = service.recording(recording_id), request.state.caller
+        return _without_notes(recording) if caller.recording else recording
 
     @router.patch("/recordings/{recording_id}", responses=CHANGING | refusals(404))
     def change_recording(recording_id: RecordingId, change: SessionChange) -> Recording:
@@ -160,3 +161,8 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         return recording
 
     return router
+
+
+def _without_notes(recording: Recording) -> Recording:
+    session = recording.session.model_copy(update={"notes": "", "operator": ""})
+    return recording.model_copy(update={"session": session, "tags": (), "more": {}, "favourite": False})

@@ -109,6 +109,12 @@ export const statements = {
   no_preview: ["det finnes ikke noe bilde: gjør riggen klar"],
   unknown_host: ["tjenesten kjenner ikke dette navnet på datamaskinen: bruk adressen den ble startet med"],
   role_forbids: ["nøkkelen din gir ikke lov til det: logg inn med en annen"],
+  wrong_link: ["lenken åpner ingenting, eller ikke lenger: skann koden til hoppet på nytt"],
+  link_ended: ["lenken gjelder ikke lenger: skann koden til hoppet på nytt"],
+  link_forbids: ["en lenke viser ett hopp, og ingenting annet: logg inn med en nøkkel"],
+  no_phones: ["telefoner når ikke denne tjenesten, så en kode ville ikke åpne noe: start den med --host, en nøkkel og --allow-host, og åpne siden på adressen som telefonene bruker"],
+  deleted_jump: ["hoppet ligger i papirkurven: hent det tilbake, og vis koden så"],
+  recording_runs: ["bilder og filer venter mens det tas opp: de kommer når det er ferdig"],
   foreign_origin: ["kallet kom fra en fremmed side: åpne panelet på dets egen adresse"],
 
   undo_taken: ["{who} ble tatt opp"],

@@ -1,0 +1,149 @@
+"""Routes of the link that opens one recording on an athlete's phone: its QR code, and what the phone sends back."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from http import HTTPStatus
+from ipaddress import ip_address
+from typing import Final
+from urllib.parse import quote
+
+from fastapi import APIRouter, Request, Response
+from pydantic import Field
+
+from rig.api.fields import Model
+from rig.errors import UnknownRecordingError
+from rig.host.file_names import ID_PATTERN
+from service.seam.rig import RigService
+from webpanel.door.access import Access, is_loopback
+from webpanel.door.links import KEY_LENGTH
+from webpanel.door.logins import LINK_COOKIE, Door
+from webpanel.problems import ProblemError
+from webpanel.qr_code import qr_svg
+from webpanel.routes.common import RecordingId, refusals, strict_router
+
+#: What JavaScript's encodeURIComponent leaves as it is, and `quote` does not: the page and the cookie write ids alike.
+_UNQUOTED: Final = "!'()"
+#: So soon a phone may ask again for what it cannot have while a recording runs, s.
+_AGAIN_S: Final = 3
+
+
+class JumpLink(Model):
+    """A link that opens one recording without a token."""
+
+    link: str = Field(description="address to open on a phone")
+    ends: datetime = Field(description="when it ends, UTC")
+    code: str = Field(description="the address as a QR code, SVG")
+
+
+class LinkLogin(Model):
+    """What the link to a recording holds."""
+
+    recording: str = Field(pattern=f"^{ID_PATTERN}$", description="id of the recording", examples=["20260214-101530"])
+    key: str = Field(min_length=KEY_LENGTH, max_length=KEY_LENGTH, examples=["AcJp5q0mXb1c2d3e4f5g6h7i8j9"])
+
+
+class Visit(Model):
+    """What a link opens."""
+
+    recording: str = Field(description="id of the recording")
+    ends: datetime = Field(description="when the link ends, UTC")
+
+
+def links_router(door: Door, service: RigService) -> APIRouter:
+    """The routes that make links to recordings, and open them."""
+    router = strict_router("Login")
+
+    @router.get("/recordings/{recording_id}/link", responses=refusals(404, 409))
+    def get_link(recording_id: RecordingId, request: Request) -> JumpLink:
+        """A link that opens this recording, and nothing else, on a phone without a token, and its QR code.
+
+        It shows the page of the jump with its pictures, figures and files, not the log and the notes, until `ends`
+        (`service.share_hours` of the rig file), while the recording is not in the trash, and while the tokens of the
+        service are the same. 409 if phones cannot reach the service.
+        """
+        if service.recording(recording_id).deleted:
+            text = "the jump lies in the trash: restore it, then show its code"
+            raise ProblemError(HTTPStatus.CONFLICT, "deleted_jump", text)
+        address = address_for_phones(request, door.access)
+        if door.links is None or address is None:
+            text = (
+                "phones cannot reach this service, so that a code would open nothing: start it with --host, a token "
+                "and --allow-host, and open this page by the address that phones use"
+            )
+            raise ProblemError(HTTPStatus.CONFLICT, "no_phones", text)
+        key, ends = door.links.make(recording_id)
+        link = f"{address}/#/jump/{quote(recording_id, safe=_UNQUOTED)}/{key}"
+        return JumpLink(link=link, ends=datetime.fromtimestamp(ends, UTC), code=qr_svg(link))
+
+    @router.post("/login/link", responses=refusals(413, 415))
+    def log_in_by_link(request: Request, response: Response, given: LinkLogin) -> Visit:
+        """Give the key of a link, get a cookie that opens the recording of the link until it ends."""
+        ends, left_s = door.check_link(given.recording, given.key)
+        response.set_cookie(
+            LINK_COOKIE, given.key, max_age=int(left_s), httponly=True, samesite="strict",
+            path=f"/api/recordings/{quote(given.recording, safe=_UNQUOTED)}", secure=door.access.is_https(request),
+        )  # fmt: skip
+        return Visit(recording=given.recording, ends=datetime.fromtimestamp(ends, UTC))
+
+    return router
+
+
+def visiting(service: RigService) -> Callable[[str, str], None]:
+    """What is asked for each call of somebody who has a link: the recording, and the path.
+
+    A recording in the trash is shown to nobody; and the phones of a whole team read nothing large from the disk while
+    a recording runs, which comes first.
+    """
+
+    def visit(recording: str, path: str) -> None:
+        try:
+            deleted = service.recording(recording).deleted
+        except UnknownRecordingError:
+            deleted = True
+        if deleted:
+            raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_recording", "this jump was deleted: ask the coach")
+        own = f"/api/recordings/{recording}"
+        if path not in {own, f"{own}/measurement"} and service.status().recording is not None:
+            text = "pictures and files wait while a recording runs: they come when it has ended"
+            raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "recording_runs", text, {"Retry-After": str(_AGAIN_S)})
+
+    return visit
+
+
+def address_for_phones(request: Request, access: Access) -> str | None:
+    """Scheme, name and port by which phones reach the service, None: they cannot.
+
+    That is how whoever asks has reached it; or, if he sits at this computer, a name that the service was told.
+    """
+    if not access.tokens:
+        return None
+    scheme = "https" if access.is_https(request) else "http"
+    host = request.headers["host"]
+    name = request.url.hostname or ""
+    behind_proxy = bool(access.proxies)
+    if is_loopback(access.host) and not behind_proxy:
+        return None
+    if not is_loopback(name):
+        return f"{scheme}://{host}"
+    # At a proxy's name the port is the proxy's, which nobody has told.
+    named = (
+        [] if behind_proxy else sorted(filter(_is_for_others, access.names), key=lambda name: (_is_number(name), name))
+    )
+    port = (request.scope.get("server") or ("", None))[1]
+    return f"{scheme}://{_in_address(named[0])}:{port}" if named else None
+
+
+def _is_for_others(name: str) -> bool:
+    return not is_loopback(name) and name not in {"0.0.0.0", "::"}  # noqa: S104 - no address is bound here
+
+
+def _is_number(name: str) -> bool:
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _in_address(name: str) -> str:
+    return f"[{name}]" if ":" in name else name

@@ -16,6 +16,7 @@ from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.host.file_names import is_recording_id
+from rig.phrase import NOTHING, Phrase
 from rig.pulse import Pause
 from rig.topics import TAG
 
@@ -63,9 +64,9 @@ class Entry:
         cameras: names, left to right.
         shape: rows and columns of the triplets, None if there is no pulse.
         session: the session's fields, with later changes applied.
-        disk: frames that were lost because of the disk, in one line; empty if none.
+        disk: frames that were lost because of the disk; empty text: none.
         forgotten_s: after so many seconds it ended by itself, because nobody had stopped it; 0: otherwise.
-        ended_early: why it ends before the recording was to end, or that this is not known; empty: as was wanted.
+        ended_early: why it ends before the recording was to end, or that this is not known; empty text: as was wanted.
         trouble: what could not be read, and what to do, in one line; empty if all could be read.
         kind: of the trouble.
     """
@@ -86,9 +87,9 @@ class Entry:
     cameras: tuple[str, ...] = ()
     shape: tuple[int, int] | None = None
     session: Mapping[str, str] = field(default_factory=dict)
-    disk: str = ""
+    disk: Phrase = NOTHING
     forgotten_s: float = 0.0
-    ended_early: str = ""
+    ended_early: Phrase = NOTHING
     trouble: str = ""
     kind: Trouble = Trouble.NONE
 
@@ -127,7 +128,7 @@ def read_entry(path: Path) -> Entry:
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session,
-        disk=found.trouble, forgotten_s=found.forgotten_s, ended_early=found.ended_early,
+        disk=found.disk, forgotten_s=found.forgotten_s, ended_early=found.ended_early_said,
     )  # fmt: skip
 
 

@@ -83,5 +83,5 @@ def _head(rows: bytes) -> bytes:
 
 
 #: Counts up when entries of the same log become different ones.
-_FORMAT: Final = 4
+_FORMAT: Final = 5
 _DECODER: Final = wire.decoder(dict[str, KeptEntry])

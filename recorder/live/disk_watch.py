@@ -74,15 +74,17 @@ class DiskWatch:
         if not behind:
             self._behind_since = None
 
-    def trouble(self, lost: int) -> str:
-        """What the disk cost the recording, in one line; empty if nothing.
+    def trouble(self, lost: int) -> Phrase | None:
+        """What the disk cost the recording, in one line; None: nothing.
 
         Args:
             lost: frames of the recording that are lost, for whatever reason. Those that overflowed are more if pulses
                 came on after its end.
         """
         lost = min(lost, self.lost)
-        return f"{self._cause()}: {lost} frames were lost; {_REMEDY}" if lost else ""
+        if not lost:
+            return None
+        return phrase("disk_cost", "{cause}: {lost} frames were lost; " + _REMEDY, cause=self._cause(), lost=lost)
 
     def _look_for_hanging(self, stalled_s: float) -> Iterator[Event]:
         if stalled_s >= _HANGS_S:

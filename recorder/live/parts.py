@@ -93,7 +93,7 @@ class Parts:
             pauses=told.pauses,
             earlier=tuple(each.part() for each in self.earlier),
             failure=None if failure is None else RecorderFailed.of(failure),
-            trouble="; ".join(each.trouble for each in (*self.earlier, last) if each.trouble),
+            trouble="; ".join(str(each.trouble) for each in (*self.earlier, last) if each.trouble),
         )
         self.earlier.clear()
         return report

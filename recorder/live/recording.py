@@ -11,7 +11,16 @@ import msgspec
 from recorder.live.assembler import Assembler
 from recorder.live.opening import discard, in_background, open_log
 from recorder.live.preroll import Held
-from recorder.log.extent import CONTINUES, CONTINUES_AFTER, ENDED_EARLY, FORGOTTEN, extent
+from recorder.log.extent import (
+    CONTINUES,
+    CONTINUES_AFTER,
+    DISK_SAID,
+    ENDED_EARLY,
+    ENDED_EARLY_SAID,
+    FORGOTTEN,
+    as_field,
+    extent,
+)
 from recorder.log.tag_room import check_tag_fits
 from recorder.writing.log_writer import LogDescription, LogWriter
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor, UtcNs, host_now
@@ -59,7 +68,7 @@ class Recording:
         log: writes the log; None until it is open.
         failure: the error that ended the log before its time, None if there was none.
         early: why the log ends before the recording was to end, for the log; None: it does not.
-        trouble: what went wrong with the disk without ending the log, empty if nothing.
+        trouble: what went wrong with the disk without ending the log; None: nothing.
         continues: id of the recording that this one continues, empty if none.
         mishap: whether it was stopped as soon as it had begun: its pulses belong to the next recording too.
     """
@@ -71,7 +80,8 @@ class Recording:
         self._anchor = UtcAnchor.take()
         self.failure: StorageError | None = None
         self.early: Phrase | None = None
-        self.trouble = self.continues = ""
+        self.trouble: Phrase | None = None
+        self.continues = ""
         self.ledger = Ledger()
         self._handed = 0
         self._in_flight: deque[_InFlight] = deque()
@@ -343,12 +353,14 @@ class Recording:
         if self._account_until is not None:
             fields = extent(self.utc(self._account_from), self.utc(self._account_until))
             if self.early is not None:
-                fields |= {ENDED_EARLY: str(self.early)}
+                fields |= {ENDED_EARLY: str(self.early), ENDED_EARLY_SAID: as_field(self.early)}
             elif self._order.nobody_stops and not self._stopped:
                 fields |= {FORGOTTEN: f"{self._order.seconds or 0:.3f}"}
+            if self.trouble is not None:
+                fields |= {DISK_SAID: as_field(self.trouble)}
             self._writer.set_metadata(RECORDING_METADATA, fields)
-        if self.trouble:
-            self._writer.set_metadata(TROUBLE_METADATA, {"disk": self.trouble})
+        if self.trouble is not None:
+            self._writer.set_metadata(TROUBLE_METADATA, {"disk": str(self.trouble)})
         self._writer.begin_close()
 
     def continuation(self, path: Path) -> StartRecording:

@@ -9,15 +9,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+import msgspec
+
 from rig.clocks import NS_PER_S, UtcNs
+from rig.phrase import Phrase, plain
 from rig.pulse import PulseNumber
-from rig.topics import RECORDING_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA
+from rig.topics import RECORDING_METADATA, RECOVERY_METADATA, RIG_METADATA, SESSION_METADATA, TROUBLE_METADATA
+from rig.transport import wire
 from triggering.ledger.account import Ledger
 
 #: Field of the record: after so many seconds the recording ended by itself, because nobody had stopped it.
 FORGOTTEN: Final = "forgotten_s"
 #: Field of the record: why the log ends before the recording was to end.
 ENDED_EARLY: Final = "ended_early"
+#: Fields of the record: that, and what the disk cost the recording, as phrases in JSON, to be said in other languages.
+ENDED_EARLY_SAID: Final = "ended_early_said"
+DISK_SAID: Final = "disk_said"
 #: Field of the record of a recovery: what is not known of the end of the log that was recovered.
 END_UNKNOWN: Final = "end"
 #: Fields of the session: id of the log that this one continues, and the number of the last pulse in it.
@@ -75,6 +82,25 @@ def ended_early(metadata: Mapping[str, Mapping[str, str]]) -> str:
     return "; ".join(text for text in told if text)
 
 
+def ended_early_said(metadata: Mapping[str, Mapping[str, str]]) -> Phrase:
+    """The same with its code and values, where the log has them."""
+    return _said(metadata, ENDED_EARLY_SAID, ended_early(metadata))
+
+
+def disk_trouble(metadata: Mapping[str, Mapping[str, str]]) -> Phrase:
+    """What went wrong with the disk while a log was written; empty text: nothing.
+
+    Args:
+        metadata: fields of the metadata records by name.
+    """
+    return _said(metadata, DISK_SAID, "; ".join(metadata.get(TROUBLE_METADATA, {}).values()))
+
+
+def as_field(said: Phrase) -> str:
+    """A phrase as the text of a metadata field."""
+    return wire.encode(said).decode()
+
+
 def part_before(metadata: Mapping[str, Mapping[str, str]], log: Path) -> str:
     """Id of the log that this one continues, if it does not lie beside this one; empty otherwise.
 
@@ -90,6 +116,25 @@ def last_before(metadata: Mapping[str, Mapping[str, str]]) -> PulseNumber:
     """The last pulse in the log that this one continues; 0: it continues none, or there was no pulse in it."""
     text = metadata.get(SESSION_METADATA, {}).get(CONTINUES_AFTER, "")
     return PulseNumber(int(text) if re.fullmatch(r"\d{1,10}", text, re.ASCII) else 0)
+
+
+_PHRASES: Final = wire.decoder(Phrase)
+#: Records that may hold one.
+_TELLING: Final = (RECORDING_METADATA, RECOVERY_METADATA)
+#: No phrase of ours is longer in JSON.
+_SAID_MAX: Final = 10_000
+
+
+def _said(metadata: Mapping[str, Mapping[str, str]], field: str, text: str) -> Phrase:
+    """A phrase of the record, if it says what the text beside it says: whoever reads the text is told the same."""
+    written = next((metadata[name][field] for name in _TELLING if field in metadata.get(name, {})), "")
+    if not 0 < len(written) <= _SAID_MAX:
+        return plain(text)
+    try:
+        said: Phrase = _PHRASES.decode(written.encode())
+    except (msgspec.MsgspecError, ValueError, RecursionError):  # of a stranger
+        return plain(text)
+    return said if said.text == text else plain(text)
 
 
 def _time(fields: Mapping[str, str], name: str) -> UtcNs | None:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from recorder.log.extent import apply_extent, ended_early, forgotten_s, part_before
+from recorder.log.extent import apply_extent, disk_trouble, ended_early_said, forgotten_s, part_before
 from recorder.log.session_changes import session_changes
 from recorder.log.write_lock import is_being_written
 from recorder.reading.items import Chunk, Message
@@ -13,6 +13,7 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import health_of, tag_of
 from rig.host.utc_clock import UtcState
+from rig.phrase import Phrase
 from rig.tag import TripletTag
 from rig.topics import (
     HEALTH,
@@ -21,7 +22,6 @@ from rig.topics import (
     RIG_METADATA,
     SESSION_METADATA,
     TAG,
-    TROUBLE_METADATA,
 )
 from rig.transport import wire
 from triggering.ledger.account import Ledger, runs_from_text
@@ -46,9 +46,10 @@ class LogInfo:
         rig: fields of the last rig record.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         merged: of a log that was made of two: fields that say which, and how their clocks differed; empty otherwise.
-        trouble: what went wrong with the disk while the log was written, in one line; empty if nothing.
+        disk: what went wrong with the disk while the log was written; empty text if nothing.
         forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
-        ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
+        ended_early_said: why the log ends before its recording was to end, or that this is not known; empty text: as
+            was wanted.
         part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
         messages: number of messages per topic.
         library: the program that wrote the log.
@@ -69,13 +70,23 @@ class LogInfo:
     rig: dict[str, str]
     known_lost: tuple[tuple[int, int], ...]
     merged: dict[str, str]
-    trouble: str
+    disk: Phrase
     forgotten_s: float
-    ended_early: str
+    ended_early_said: Phrase
     part_before: str
     messages: dict[str, int]
     library: str
     source: SourceAccount | None = None
+
+    @property
+    def trouble(self) -> str:
+        """What went wrong with the disk while the log was written, in one line; empty if nothing."""
+        return self.disk.text
+
+    @property
+    def ended_early(self) -> str:
+        """Why the log ends before its recording was to end, in one line; empty: it ended as was wanted."""
+        return self.ended_early_said.text
 
     @property
     def recording(self) -> str:
@@ -178,8 +189,8 @@ def info(path: Path, *, original: bool = False, source: bool = False, links: boo
         return LogInfo(
             path, reader.size, reader.closed, being_written, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
-            "; ".join(reader.metadata.get(TROUBLE_METADATA, {}).values()), forgotten_s(reader.metadata),
-            ended_early(reader.metadata), part_before(reader.metadata, path), messages, reader.library,
+            disk_trouble(reader.metadata), forgotten_s(reader.metadata),
+            ended_early_said(reader.metadata), part_before(reader.metadata, path), messages, reader.library,
             None if told is None else told.finish(),
         )  # fmt: skip
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from recorder.log.extent import END_UNKNOWN, last_before
+from recorder.log.extent import END_UNKNOWN, ENDED_EARLY_SAID, as_field, last_before
 from recorder.log.session_changes import session_changes
 from recorder.log.write_lock import is_being_written
 from recorder.reading.items import Message
@@ -28,7 +28,7 @@ from rig.errors import BadInputError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.images.pixels import Stored
-from rig.phrase import plain
+from rig.phrase import Phrase, phrase, plain
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -80,7 +80,7 @@ class RecoverReport:
     @property
     def end_unknown(self) -> str:
         """What is not known of the end of the recording; empty: the source had been closed."""
-        return "" if self.was_closed else _end_unknown(self.ledger, was_written=self.was_written)
+        return "" if self.was_closed else _end_unknown(self.ledger, was_written=self.was_written).text
 
     def to_json(self) -> dict[str, Any]:
         """The report as one JSON object."""
@@ -211,9 +211,11 @@ class _Recovery:
         lost = {"lost_pulses": runs_to_text(self.ledger.missing), "lost_pixels": runs_to_text(self.lost_pixels)}
         name, time = self._reader.path.name, datetime.now(UTC).isoformat(timespec="seconds")
         words = _loss(self.ledger, self.lost_pixels, self.findings.lines())
-        end = {} if self._reader.closed else {END_UNKNOWN: _end_unknown(self.ledger, was_written=self._was_written)}
+        unknown = None if self._reader.closed else _end_unknown(self.ledger, was_written=self._was_written)
+        end = {} if unknown is None else {END_UNKNOWN: unknown.text, ENDED_EARLY_SAID: as_field(unknown)}
         kept = "no pulse up to the last one is lost" if end else "no pulse is lost"
-        told = "; ".join([f"this is lost: {words}" if words else kept, *end.values()])
+        told = f"this is lost: {words}" if words else kept
+        told += f"; {unknown}" if unknown is not None else ""
         event = Event.now(
             Level.WARNING if words or end else Level.INFO, "recover", plain(f"recovered from {name} on {time}: {told}")
         )
@@ -267,11 +269,14 @@ class _Recovery:
             self._next_other = next(self._others, None)
 
 
-def _end_unknown(ledger: Ledger, *, was_written: bool) -> str:
+def _end_unknown(ledger: Ledger, *, was_written: bool) -> Phrase:
     """Says of a log that was not closed that pulses are missing at its end, or may be."""
+    last = ledger.last_pulse or 0
     if was_written:
-        return f"it was still being written: more pulses came after pulse {ledger.last_pulse or 0}"
-    return f"it was never closed: nobody knows whether pulses came after pulse {ledger.last_pulse or 0}"
+        text = "it was still being written: more pulses came after pulse {last}"
+        return phrase("why_still_written", text, last=last)
+    text = "it was never closed: nobody knows whether pulses came after pulse {last}"
+    return phrase("why_never_closed", text, last=last)
 
 
 def _loss(ledger: Ledger, lost_pixels: Sequence[tuple[int, int]], findings: Sequence[str]) -> str:

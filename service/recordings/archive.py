@@ -31,6 +31,7 @@ from rig.api.statement import Level, Statement
 from rig.api.status import Status
 from rig.clocks import NS_PER_S
 from rig.errors import StateForbidsError, StillRecordingError, UnknownRecordingError
+from rig.phrase import Phrase, Value
 from rig.pulse import Pause
 from rig.tag import TripletTag
 from service.exports.jobs import Exports
@@ -59,7 +60,13 @@ _TROUBLES: Final = {
     Trouble.UNREADABLE: (Level.ERROR, "trouble", ""),
     Trouble.NONE: (Level.ERROR, "trouble", ""),
 }
+#: Verdicts on how a recording ended, which are followed by one on its pulses.
+_ENDS: Final = frozenset({"disk_full", "ended_early", "forgotten"})
 _ALL: Final = RecordingQuery()
+#: Reasons for the end of a log that mean that there was no room for more.
+_FULL: Final = frozenset({"disk_full", "disk_quota", "why_disk_reserve"})
+#: Reasons that stand behind the path of the log itself.
+_BEHIND_PATH: Final = frozenset({"why_disk_refuses", "why_reserve_reached"})
 #: What a list repeats of a session field, however long the log has it.
 _LONGEST_SHOWN: Final = 4000
 
@@ -365,18 +372,32 @@ def _as_trash(contents: TrashContents) -> Trash:
 def verdict(entry: Entry) -> Statement:
     """Say in one line what a recording is good for.
 
-    `values["failures"]` reads e.g. "K2 1 lost, 1 missed; K3 2 absent".
+    `values["failures"]` reads e.g. "K2 1 lost, 1 missed; K3 2 absent", `values["rest"]` says of a recording that ended
+    by itself what it is good for until then.
     """
     level, code, text, advice = _judge(entry)
-    values: dict[str, str | int | float] = {
+    values = _values(entry)
+    if code in _ENDS:
+        _, rest, words, _ = _judge_account(entry)
+        values["rest"] = Phrase(f"verdict_{rest}", words, dict(values))
+    return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
+
+
+def _values(entry: Entry) -> dict[str, Value]:
+    return {
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
         "failures": _failures(entry), "pauses": len(entry.pauses),
         "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1), "disk": entry.disk,
-        "longest_s": entry.forgotten_s, "why": entry.ended_early[:_LONGEST_SHOWN],
+        "longest_s": entry.forgotten_s, "why": _reason(entry.ended_early),
         "before": entry.session.get(CONTINUES, "")[:_LONGEST_SHOWN],
         "unrecorded": sum(pause.pulses for pause in entry.pauses if pause.between_logs),
     }  # fmt: skip
-    return Statement(level=level, code=f"verdict_{code}", text=text, advice=advice, values=values)
+
+
+def _reason(said: Phrase) -> Phrase:
+    """Why a log ended early, without its own path."""
+    why = said.values.get("why")
+    return why if said.code in _BEHIND_PATH and isinstance(why, Phrase) else said
 
 
 def _judge(entry: Entry) -> tuple[Level, str, str, str]:
@@ -397,11 +418,14 @@ def _judge(entry: Entry) -> tuple[Level, str, str, str]:
 
 def _judge_end(entry: Entry) -> tuple[Level, str, str, str]:
     """Judge a sound log: by how it ended, and by its pulses."""
-    if not entry.pulses and not entry.ended_early:
+    if not entry.pulses and not entry.ended_early.text:
         return Level.WARNING, "empty", "No pulse came", "Look at the trigger"
     level, code, text, advice = _judge_account(entry)
-    if entry.ended_early:
-        return Level.WARNING, "ended_early", f"Ended early: {entry.ended_early}. {text}", advice
+    if (why := _reason(entry.ended_early)).code in _FULL:
+        text = f"The disk was full, and the recording ended early. {text}"
+        return Level.WARNING, "disk_full", text, "Delete recordings and empty the trash, or record to another disk"
+    if why.text:
+        return Level.WARNING, "ended_early", f"Ended early: {why.text[:_LONGEST_SHOWN]}. {text}", advice
     if entry.forgotten_s:
         text = f"Ended by itself after {entry.forgotten_s:g} s, because nobody had stopped it. {text}"
         return Level.WARNING, "forgotten", text, advice
@@ -420,8 +444,8 @@ def _judge_account(entry: Entry) -> tuple[Level, str, str, str]:
         if entry.partial:
             return Level.WARNING, "partial_paused", f"{lacking}; {paused}", advice
         return Level.WARNING, "paused", f"{entry.pulses} pulses, all complete, but {paused}", advice
-    if entry.partial and entry.disk:
-        return Level.WARNING, "partial_disk", lacking, entry.disk
+    if entry.partial and entry.disk.text:
+        return Level.WARNING, "partial_disk", lacking, entry.disk.text
     if entry.partial:
         return Level.WARNING, "partial", lacking, ""
     return Level.GOOD, "complete", f"Complete: all {entry.pulses} pulses", ""

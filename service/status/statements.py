@@ -74,7 +74,10 @@ def about_camera(
 def _connected(camera: str, values: dict[str, Value], *, idle: bool) -> Statement:
     if idle:
         return Statement(
-            code="camera_waits", text=f"{camera} is connected, but no frames come at present", values=values
+            code="camera_waits",
+            text=f"{camera} is connected, but no frames come at present",
+            advice="they come with the pulses: see whether those run",
+            values=values,
         )
     return Statement(level=Level.GOOD, code="camera_ready", text=f"{camera} is ready", values=values)
 

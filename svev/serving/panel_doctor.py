@@ -55,7 +55,7 @@ class PanelDoctor:
             if idle or probe.name not in _ONLY_IDLE:
                 yield from run_probe(probe)
             elif probe.name == "cameras" and status.rehearsal is None:
-                yield from _cameras_of(status)
+                yield from look_at_armed_cameras(status)
             elif probe.name == "disk":
                 yield _room_of(status)
         if status.rehearsal is not None:
@@ -66,17 +66,20 @@ class PanelDoctor:
             yield passed(Topic.CAMERAS, "check_armed", what)
 
 
-def _cameras_of(status: Status) -> Iterator[Finding]:
-    """Findings on the cameras of an armed rig, which knows them better than any probe."""
+def look_at_armed_cameras(status: Status) -> Iterator[Finding]:
+    """Findings on the cameras of an armed rig, which knows them better than any probe, and on the computer for them.
+
+    Args:
+        status: of the service, whose words are given: *Check* and the live view name the same cause.
+    """
+    if status.statement.code.endswith("_overloaded"):
+        yield judged(Level.WARN, Topic.PROCESSOR, status.statement.said, status.statement.advice)
     for camera in status.cameras:
         said = camera.statement
-        match camera.state:
-            case CameraState.ABSENT:
-                yield judged(Level.FAIL, Topic.CAMERAS, said.said, said.advice)
-            case CameraState.SILENT:
-                yield judged(Level.WARN, Topic.CAMERAS, said.said, said.advice)
-            case _:
-                yield judged(Level.PASS, Topic.CAMERAS, said.said, "")
+        waits = said.code == "camera_waits" and status.pulses.running  # stopped pulses are nobody's fault
+        level = Level.WARN if waits or camera.state is CameraState.SILENT else Level.PASS
+        level = Level.FAIL if camera.state is CameraState.ABSENT else level
+        yield judged(level, Topic.CAMERAS, said.said, said.advice)
 
 
 def _room_of(status: Status) -> Finding:

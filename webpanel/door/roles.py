@@ -22,7 +22,9 @@ class Role(StrEnum):
 
 
 READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Calls that change something and are not the operator's: what is deleted and restored, and the rig itself.
+#: Calls that change something and are not the operator's: what is deleted and restored, and whatever may come to change
+#: the whole rig or the service. Light, regions and pulses are the operator's, also for good: what was set right on the
+#: hill must not be lost with the next start.
 _ADMINISTERING: Final = (
     re.compile(r"DELETE /api/(recordings|trash)(/[^/]*)?"),
     re.compile(r"POST /api/recordings/[^/]+/restore"),

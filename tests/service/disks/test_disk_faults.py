@@ -148,7 +148,8 @@ def test_a_failure_that_passes_is_known_after_a_restart(tmp_path: Path, loopback
     with serving(tmp_path, _rig(tmp_path, loopback), loopback, data=log.parent) as service:
         (listed,) = service.get("/api/recordings")
         assert listed["verdict"]["code"] == "verdict_ended_early"
-        assert "the disk fails" in listed["verdict"]["text"]
+        assert listed["verdict"]["text"].startswith("Ended early: the disk fails")
+        assert listed["verdict"]["values"]["why"]["code"] == "disk_fails"
 
 
 def _tells_the_truth(service: Serving, recording: str, told: dict[str, Any]) -> None:

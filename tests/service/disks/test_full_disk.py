@@ -41,6 +41,9 @@ def test_a_full_disk_ends_the_recording_and_the_service_lives_on(tmp_path: Path,
         assert "delete recordings" in problem["detail"]
         found = service.get(f"/api/recordings/{recording['id']}")
         assert found["counts"]["complete"] == found["counts"]["pulses"] > 100
+        assert found["verdict"]["code"] == "verdict_disk_full"
+        (listed,) = service.get("/api/recordings")
+        assert listed["verdict"] == found["verdict"]
         kept.write_bytes(Path(f"/proc/{service.pid}/root{small}/{recording['id']}.mcap").read_bytes())
         service.get("/api/doctor")
 

@@ -200,6 +200,8 @@ CALLS = [
     ("GET", "/api/status", Role.WATCH),
     ("GET", "/metrics", Role.WATCH),
     ("POST", "/api/arm", Role.OPERATE),
+    ("PATCH", "/api/cameras/K1", Role.OPERATE),  # whatever it says, `save` too
+    ("PATCH", "/api/trigger", Role.OPERATE),
     ("PATCH", "/api/next-jumper", Role.OPERATE),
     ("POST", "/api/recordings", Role.OPERATE),
     ("PATCH", "/api/recordings/jump", Role.OPERATE),

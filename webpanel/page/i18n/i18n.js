@@ -66,8 +66,8 @@ export function t(key, values = {}) {
  * @returns {{ text: string, advice: string }}
  */
 export function say({ code, text, advice = "", values = {} }) {
+  if (!Object.hasOwn(STATEMENTS[language], code)) return { text, advice }; // a stranger's log may name anything
   const translated = STATEMENTS[language][code];
-  if (!translated) return { text, advice };
   const names = [...translated.join(" ").matchAll(/\{(\w+)\}/g)].map((match) => match[1]);
   if (names.some((name) => values[name] === undefined)) return { text, advice };
   return { text: fill(translated[0], values), advice: fill(translated[1] ?? "", values) };

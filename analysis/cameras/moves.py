@@ -13,6 +13,8 @@ import numpy as np
 from scipy.special import stdtr
 
 from rig.arrays import Floats
+from rig.phrase import Phrase, phrase
+from rig.phrases import enumerated
 
 FAMILY_RISK: Final = 3e-4  #: chance that a recording with still cameras is said to have a moved one
 _FEWEST = 5  # blocks
@@ -114,7 +116,7 @@ def _tested(turns: Floats, design: Floats, known: Floats) -> _Test:
     return _Test(effect, float(((residual**2).sum(axis=0) / known).sum()) / freedom, float(p.min()))
 
 
-def move_message(camera: str, turn: Floats, shift: Floats, move: Move | None) -> str:
+def move_said(camera: str, turn: Floats, shift: Floats, move: Move | None) -> Phrase:
     """A move in words.
 
     Args:
@@ -125,20 +127,37 @@ def move_message(camera: str, turn: Floats, shift: Floats, move: Move | None) ->
     """
     size = float(np.degrees(np.linalg.norm(turn)))
     parts = turn_words(turn)
-    words = f"turned by {parts[0]}" if len(parts) == 1 else f"turned by {size:.3f} deg ({', '.join(parts)})"
+    if len(parts) == 1:
+        words = phrase("move_turned", "turned by {turn}", turn=parts[0])
+    else:
+        text = "turned by {size:.3f} deg ({parts})"
+        words = phrase("move_turned_parts", text, size=round(size, 3), parts=enumerated(parts))
     if shift.any():
-        words += f" and was shifted by {float(np.linalg.norm(shift)):.3f} m"
+        metres = round(float(np.linalg.norm(shift)), 3)
+        words = phrase("move_shifted", "{turned} and was shifted by {metres:.3f} m", turned=words, metres=metres)
     if move is None:
-        return f"camera {camera} {words} since the calibration"
+        return phrase("move_calibration", "camera {camera} {how} since the calibration", camera=camera, how=words)
     if move.drift:
-        return f"camera {camera} drifts: it {words} from pulse {move.before} to {move.after}"
-    return f"camera {camera} {words} between pulse {move.before} and {move.after}"
+        text = "camera {camera} drifts: it {how} from pulse {before} to {after}"
+        return phrase("move_drift", text, camera=camera, how=words, before=move.before, after=move.after)
+    text = "camera {camera} {how} between pulse {before} and {after}"
+    return phrase("move_between", text, camera=camera, how=words, before=move.before, after=move.after)
 
 
-def turn_words(turn: Floats) -> list[str]:
+#: By axis of the camera: where it turns to if the angle is positive, and if it is negative.
+_WAYS: Final = (
+    (phrase("way_up", "up"), phrase("way_down", "down")),
+    (phrase("way_left", "to the left"), phrase("way_right", "to the right")),
+    (phrase("way_counter", "counter-clockwise"), phrase("way_clockwise", "clockwise")),
+)
+
+
+def turn_words(turn: Floats) -> list[Phrase]:
     """The parts of a turn that matter, the largest first: "0.050 deg to the right"."""
-    pairs = (("up", "down"), ("to the left", "to the right"), ("counter-clockwise", "clockwise"))
     degrees = np.degrees(turn)
     order = sorted(range(3), key=lambda i: -abs(degrees[i]))
     named = [i for i in order if abs(degrees[i]) >= _SAID * abs(degrees[order[0]])]
-    return [f"{abs(degrees[i]):.3f} deg {pairs[i][int(degrees[i] < 0)]}" for i in named]
+    text = "{degrees:.3f} deg {way}"
+    return [
+        phrase("move_part", text, degrees=round(abs(degrees[i]), 3), way=_WAYS[i][int(degrees[i] < 0)]) for i in named
+    ]

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 
 from analysis.cameras.ball_tracker import BallTracker, FrameTurn
 from analysis.cameras.frames import FrameSource
-from analysis.cameras.moves import FAMILY_RISK, STEADY, Block, Move, find_moves, move_message
+from analysis.cameras.moves import FAMILY_RISK, STEADY, Block, Move, find_moves, move_said
 from analysis.cameras.oriented_scene import OrientedScene
 from analysis.cameras.pose_change import Displacements, PoseChange, changed, pose_change
 from analysis.cameras.standing import FrameShake, Standing
@@ -241,7 +241,7 @@ def _since_calibration(
 
 
 def _camera_move(name: str, turn: Floats, shift: Floats, p: float, move: Move | None) -> CameraMove:
-    return CameraMove(name, move_message(name, turn, shift, move), np.degrees(turn), shift, p)
+    return CameraMove(name, move_said(name, turn, shift, move), np.degrees(turn), shift, p)
 
 
 def _mean(turns: Iterable[Floats]) -> Floats:

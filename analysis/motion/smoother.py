@@ -31,6 +31,7 @@ from analysis.result.model import CameraOffset, Phase, RayTest, SmoothedState, T
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
 from rig.clocks import NS_PER_S, UtcNs
+from rig.phrase import Phrase, phrase
 
 _FREE_FRAMES: Final = 2.0  #: standard deviation of a camera's lateness before it is known, pulse intervals
 _TRIGGER_S: Final = 20e-6  #: of cameras that obey one trigger
@@ -76,7 +77,7 @@ class Motion:
     removed: Sequence[RayTest]
     table: TableMotion | None
     scale: Mapping[str, float] = field(default_factory=dict)
-    message: str | None = None
+    message: Phrase | None = None
 
 
 def smooth(
@@ -99,16 +100,16 @@ def smooth(
     sight = slice(int(measured[0]), int(measured[-1]) + 1) if len(measured) else slice(0, 0)
     start = start_values(everything.part(sight), system) if len(measured) >= FEWEST else None
     if start is None:
-        return _nothing(jump, f"fewer than {FEWEST} pulses have a point in two cameras: nothing to smooth")
+        text = "fewer than {least} pulses have a point in two cameras: nothing to smooth"
+        return _nothing(jump, phrase("jump_too_short", text, least=FEWEST))
     try:
         return _motion(jump, everything, sight, measurements.rate_hz, system, start, edge)
     except np.linalg.LinAlgError:
-        return _nothing(
-            jump, "the measurements contradict each other: check the calibration and the names of the cameras"
-        )
+        text = "the measurements contradict each other: check the calibration and the names of the cameras"
+        return _nothing(jump, phrase("jump_contradictory", text))
 
 
-def _nothing(jump: JumpMeasurements, message: str) -> Motion:
+def _nothing(jump: JumpMeasurements, message: Phrase) -> Motion:
     return Motion([None] * len(jump.pulses), None, {}, {}, [], None, message=message)
 
 

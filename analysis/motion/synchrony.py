@@ -12,6 +12,7 @@ from scipy.special import chdtri, ndtri
 
 from analysis.result.model import CameraOffset
 from rig.arrays import Flags, Floats
+from rig.phrase import Phrase, phrase
 
 #: Probability that cameras without fault give any alarm.
 FALSE_ALARM_P: Final = 0.002
@@ -62,8 +63,8 @@ def judged(
         value, sigma = float(contrast @ lateness), float(np.sqrt(contrast @ covariance @ contrast))
         relative[i] = value
         late[i] = i not in reference and abs(value) > max(limit * sigma, _LEAST_S)
-        message = _message(name, [names[k] for k in others], value, interval) if late[i] else None
-        offsets[name] = CameraOffset(value * _MS, sigma * _MS, message)
+        said = _said(name, [names[k] for k in others], value, interval) if late[i] else None
+        offsets[name] = CameraOffset(value * _MS, sigma * _MS, said)
     return Synchrony(offsets, late, relative)
 
 
@@ -94,9 +95,17 @@ def _weights(covariance: Floats, chosen: list[int]) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def _message(name: str, others: list[str], seconds: float, interval: float) -> str:
-    whom = "the others" if len(others) > 1 else f"camera {others[0]}"
-    which = "later" if seconds > 0 else "earlier"
-    advice = "check its trigger" if len(others) > 1 else "check the triggers of both"
-    size = f"{abs(seconds) * _MS:.1f} ms ({abs(seconds) / interval:.2f} frames)"
-    return f"camera {name} shows the jumper {size} {which} than {whom}: {advice}"
+def _said(name: str, others: list[str], seconds: float, interval: float) -> Phrase:
+    ms, frames = abs(seconds) * _MS, abs(seconds) / interval
+    which = phrase("offset_later", "later") if seconds > 0 else phrase("offset_earlier", "earlier")
+    if len(others) > 1:
+        text = (
+            "camera {camera} shows the jumper {ms:.1f} ms ({frames:.2f} frames) {which} than the others: check its "
+            "trigger"
+        )
+        return phrase("offset_of_one", text, camera=name, ms=ms, frames=frames, which=which)
+    text = (
+        "camera {camera} shows the jumper {ms:.1f} ms ({frames:.2f} frames) {which} than camera {other}: check the "
+        "triggers of both"
+    )
+    return phrase("offset_of_two", text, camera=name, ms=ms, frames=frames, which=which, other=others[0])

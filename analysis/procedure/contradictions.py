@@ -13,6 +13,7 @@ from scipy.special import chdtri
 
 from analysis.motion.adjustment.gross_errors import FALSE_REMOVAL_P
 from analysis.result.model import PointState, PulseState
+from rig.phrase import Phrase, phrase
 
 
 def with_contradictions(pulses: Sequence[PulseState]) -> tuple[PulseState, ...]:
@@ -27,8 +28,8 @@ def with_contradictions(pulses: Sequence[PulseState]) -> tuple[PulseState, ...]:
     return tuple(_marked(pulse, limit) for pulse in pulses)
 
 
-def told(pulses: Sequence[PulseState]) -> str | None:
-    """A line about the marked points, with the one that is the farthest off; None if there is none."""
+def told(pulses: Sequence[PulseState]) -> Phrase | None:
+    """A sentence about the marked points, with the one that is the farthest off; None if there is none."""
     found = [
         (_distance(point, smoothed), name, pulse.pulse)
         for pulse in pulses
@@ -38,10 +39,11 @@ def told(pulses: Sequence[PulseState]) -> str | None:
     if not found:
         return None
     distance, name, worst = max(found)
-    return (
-        f"raw points that the motion contradicts: {len(found)}, {name} at pulse {worst} the most ({distance:.2f} m); "
-        "take the smoothed values there"
+    text = (
+        "raw points that the motion contradicts: {count}, {point} at pulse {pulse} the most ({distance:.2f} m); take "
+        "the smoothed values there"
     )
+    return phrase("jump_contradicted", text, count=len(found), point=name, pulse=worst, distance=distance)
 
 
 def _marked(pulse: PulseState, limit: float) -> PulseState:

@@ -42,13 +42,13 @@ def compute_jump(
     """
     motion = smooth(jump, measurements, system)
     raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
-    troubles = [motion.message] if motion.message else []
+    troubles = [] if motion.message is None else [motion.message]
     told = told_names(raw.states)
     if (untold := untold_line(raw.states, told)) is not None:
         jump = only_told(jump, told)
         motion = smooth(jump, measurements, system)
         raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
-        troubles = [untold] if not told or not motion.message else [untold, motion.message]
+        troubles = [untold] if not told or motion.message is None else [untold, motion.message]
     pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion))
     frames = [pulse.images.keys() for pulse in jump.pulses]
     verdict = judge(

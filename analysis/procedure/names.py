@@ -17,11 +17,13 @@ from analysis.measurements.model import POINTS, SIDES, ImageMeasurements, JumpMe
 from analysis.motion.quantities import NEEDS
 from analysis.result.model import QUANTITIES, JumperState, SmoothedState, Status
 from rig.arrays import Floats
+from rig.phrase import Phrase, phrase
 
 #: What is said of a jump of which nothing is given.
-UNTOLD: Final = (
+UNTOLD: Final = phrase(
+    "jump_untold",
     "which marker is which cannot be told, so none is given: helmet and hip are hardly ever seen together, nor all "
-    "four, and no binding on its ski; look at the overlay, and give the markers more contrast"
+    "four, and no binding on its ski; look at the overlay, and give the markers more contrast",
 )
 _BODY: Final = ("P1", "P2")
 _BINDINGS: Final = (("P3", "right"), ("P4", "left"))
@@ -77,18 +79,22 @@ def _ahead_m(states: Sequence[JumperState]) -> float:
     return float(np.median(ahead)) if len(ahead) >= _FEWEST else 0.0
 
 
-def untold_line(states: Sequence[JumperState], told: Collection[str]) -> str | None:
+def untold_line(states: Sequence[JumperState], told: Collection[str]) -> Phrase | None:
     """What is said of the points that are not given; None if all that were measured are."""
     untold = [name for name in POINTS if name not in told and any(state.points[name] is not None for state in states)]
     if not untold:
         return None
     if not told:
         return UNTOLD
-    which = " and ".join((", ".join(untold[:-1]), untold[-1])) if len(untold) > 1 else untold[0]
-    return (
-        f"{which} {'are' if len(untold) > 1 else 'is'} not given: what was measured there may be something else on the "
-        "jumper; look at the overlay, and give the markers more contrast"
+    points = ", ".join(untold)
+    rest = (
+        "not given: what was measured there may be something else on the jumper; look at the overlay, and give the "
+        "markers more contrast"
     )
+    if len(untold) == 1:
+        return phrase("jump_untold_point", "{points} is " + rest, points=points)
+    which = " and ".join(points.rsplit(", ", 1))
+    return phrase("jump_untold_points", "{which} are " + rest, which=which, points=points)
 
 
 def only_told(jump: JumpMeasurements, told: Collection[str]) -> JumpMeasurements:

@@ -1,7 +1,7 @@
 """Says whether a measured jump can be trusted, in words for people, with the figures by phase that it rests on."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -23,6 +23,8 @@ from analysis.result.model import (
 )
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from rig.arrays import Flags, Floats
+from rig.phrase import NOTHING, Phrase, phrase
+from rig.phrases import enumerated, in_turn
 
 #: Share of the pulses in flight in which all points, and both skis, must be measured.
 _MEASURED: Final = 0.5
@@ -50,7 +52,7 @@ def judge(
     tests: Sequence[RayTest],
     synchrony: Mapping[str, CameraOffset],
     moved: Iterable[CameraMove] = (),
-    troubles: Iterable[str] = (),
+    troubles: Iterable[Phrase] = (),
     scale: Mapping[str, float] | None = None,
     cameras: Iterable[str] = (),
 ) -> Verdict:
@@ -64,7 +66,7 @@ def judge(
         tests: of all rays.
         synchrony: by camera.
         moved: cameras that moved and whose pose was not corrected for it.
-        troubles: what else speaks against the jump, one line each.
+        troubles: what else speaks against the jump.
         scale: by what factors the sigmas of points and skis in the images were too small; they were enlarged.
         cameras: all of the recording, those that are not oriented among them.
     """
@@ -72,47 +74,71 @@ def judge(
     delivered = [(pulse, there) for pulse, there in zip(pulses, frames, strict=True) if in_sight(pulse, system)]
     seen = [pulse for pulse, _ in delivered]
     phases = {phase: figures([pulse for pulse in seen if pulse.phase is phase]) for phase in Phase}
-    found += [offset.message for offset in synchrony.values() if offset.message is not None]
-    found += [move.message for move in moved]
+    found += [offset.said for offset in synchrony.values() if offset.said is not None]
+    found += [move.said for move in moved]
     if takeoff is None:
-        found.append("the take-off was not found, so times are counted from the first pulse")
-    unexplained = [name for name in system.names if name not in synchrony or synchrony[name].message is None]
+        text = "the take-off was not found, so times are counted from the first pulse"
+        found.append(phrase("jump_no_takeoff", text))
+    unexplained = [name for name in system.names if name not in synchrony or synchrony[name].said is None]
     found += _contradicting(delivered, {name: system[name] for name in unexplained}, tests)
     everything = figures(seen)
     # Without a take-off nobody knows which pulses are in flight: all are judged together.
-    flight, where = (everything, "") if takeoff is None else (phases[Phase.FLIGHT], " in flight")
-    found += _too_few(flight, "points", f"all points{where}")
-    found += _too_few(flight, "skis", f"both skis{where}")
+    flight = everything if takeoff is None else phases[Phase.FLIGHT]
+    where = NOTHING if takeoff is None else phrase("jump_in_flight", " in flight")
+    found += _too_few(flight, "points", phrase("jump_all_points", "all points"), where)
+    found += _too_few(flight, "skis", phrase("jump_both_skis", "both skis"), where)
     if everything["points_controlled"] < _CONTROLLED * len(seen):
-        found.append(
-            f"only in {everything['points_controlled']} of {len(seen)} pulses in sight do three cameras or more see "
-            "each point: elsewhere nothing controls what two see"
+        text = (
+            "only in {count} of {pulses} pulses in sight do three cameras or more see each point: elsewhere nothing "
+            "controls what two see"
         )
-    around = [] if takeoff is None else [(phases[Phase.EDGE], " around the edge")]
-    for of_phase, words in (*around, (flight, where)):
+        count = everything["points_controlled"]
+        found.append(phrase("jump_uncontrolled", text, count=count, pulses=len(seen)))
+    around = [] if takeoff is None else [(phases[Phase.EDGE], phrase("jump_around_edge", " around the edge"))]
+    for of_phase, there in (*around, (flight, where)):
         coarse, count = of_phase["coarse"], of_phase["pulses"]
         if coarse > _COARSE * count:
-            found.append(f"in {coarse} of {count} pulses{words} a point is uncertain by more than {REQUIRED_SIGMA_M} m")
+            text = "in {coarse} of {pulses} pulses{where} a point is uncertain by more than {limit} m"
+            found.append(phrase("jump_coarse", text, coarse=coarse, pulses=count, where=there, limit=REQUIRED_SIGMA_M))
     removed = sum(test.removed for test in tests)
     if tests and removed > _MANY_REMOVED * len(tests):
-        found.append(f"{removed} of {len(tests)} rays were taken out as gross errors; see the protocol")
+        text = "{removed} of {rays} rays were taken out as gross errors; see the protocol"
+        found.append(phrase("jump_gross_errors", text, removed=removed, rays=len(tests)))
     if not seen:
-        found.append("the jumper is never in sight of two cameras")
-    counted = f"all points in {everything['points']} of {len(seen)} pulses in sight"
-    if everything["points_controlled"]:
-        counted += f", controlled by a third camera in {everything['points_controlled']}"
-    contradicted = told(pulses)
-    if contradicted is not None:
-        counted += f"; {contradicted}"
-    enlarged = [f"{what} {factor:.1f} times" for what, factor in (scale or {}).items() if factor > _ENLARGED]
-    if enlarged:
-        counted += f"; sigmas in the images were too small and are enlarged: {', '.join(enlarged)}"
+        found.append(phrase("jump_never_in_sight", "the jumper is never in sight of two cameras"))
+    counted = [_counted(everything, len(seen)), *_noted(pulses, scale or {})]
     unused = _unused(cameras, system, delivered)
     if found:
-        message = f"{'; '.join((*unused, *found))} ({counted})"
+        message, said = f"{in_turn((*unused, *found))} ({in_turn(counted)})", (*unused, *found, *counted)
     else:
-        message = "; ".join((f"measured well: {counted}", *unused))
-    return Verdict(not found, message, phases)
+        said = (*counted, *unused)
+        message = f"measured well: {in_turn(said)}"
+    return Verdict(not found, message, phases, said)
+
+
+def _counted(everything: Mapping[str, Any], seen: int) -> Phrase:
+    """In how many pulses all points were measured, and controlled."""
+    count, controlled = everything["points"], everything["points_controlled"]
+    text = "all points in {count} of {pulses} pulses in sight"
+    if not controlled:
+        return phrase("jump_counted", text, count=count, pulses=seen)
+    text = "all points in {count} of {pulses} pulses in sight, controlled by a third camera in {controlled}"
+    return phrase("jump_counted_controlled", text, count=count, pulses=seen, controlled=controlled)
+
+
+def _noted(pulses: Sequence[PulseState], scale: Mapping[str, float]) -> Iterator[Phrase]:
+    """What whoever uses the figures should know, and what does not speak against them."""
+    contradicted = told(pulses)
+    if contradicted is not None:
+        yield contradicted
+    enlarged = []
+    if (factor := scale.get("points", 1.0)) > _ENLARGED:
+        enlarged.append(phrase("jump_enlarged_points", "points {factor:.1f} times", factor=float(factor)))
+    if (factor := scale.get("skis", 1.0)) > _ENLARGED:
+        enlarged.append(phrase("jump_enlarged_skis", "skis {factor:.1f} times", factor=float(factor)))
+    if enlarged:
+        text = "sigmas in the images were too small and are enlarged: {what}"
+        yield phrase("jump_enlarged", text, what=enumerated(enlarged))
 
 
 def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
@@ -162,8 +188,8 @@ def _contradicting(
     delivered: Sequence[tuple[PulseState, Collection[str]]],
     cameras: Mapping[str, PlacedCamera],
     tests: Sequence[RayTest],
-) -> list[str]:
-    """A line for each camera that has the jumper in its image and hardly any point where the others see it.
+) -> list[Phrase]:
+    """A sentence for each camera that has the jumper in its image and hardly any point where the others see it.
 
     Args:
         delivered: pulses with the cameras that delivered a frame: one that was gone contradicts nobody.
@@ -176,10 +202,11 @@ def _contradicting(
         places = [_places(pulse) for pulse, frames in delivered if name in frames]
         there = sum(int(_inside(placed, of_pulse).sum()) for of_pulse in places if len(of_pulse))
         if there >= _ENOUGH and used[name] < _FITTING * there:
-            lines.append(
-                f"camera {name} has the jumper's points in its images {there} times, and only {used[name]} times where "
-                "the other cameras see them: check its trigger, and whether it was moved"
+            text = (
+                "camera {camera} has the jumper's points in its images {there} times, and only {used} times where the "
+                "other cameras see them: check its trigger, and whether it was moved"
             )
+            lines.append(phrase("jump_contradicting", text, camera=name, there=there, used=used[name]))
     return lines
 
 
@@ -196,11 +223,13 @@ def _inside(placed: PlacedCamera, places: Floats) -> Flags:
         return np.asarray(((xy >= 0) & (xy <= placed.size - 1)).all(axis=1))
 
 
-def _too_few(of_phase: Mapping[str, Any], what: str, words: str) -> list[str]:
-    """A line if too few pulses of a phase show something."""
-    if of_phase[what] >= _MEASURED * of_phase["pulses"]:
+def _too_few(of_phase: Mapping[str, Any], what: str, words: Phrase, where: Phrase) -> list[Phrase]:
+    """A sentence if too few pulses of a phase show something."""
+    count, pulses = of_phase[what], of_phase["pulses"]
+    if count >= _MEASURED * pulses:
         return []
-    return [f"only {of_phase[what]} of {of_phase['pulses']} pulses show {words}"]
+    text = "only {count} of {pulses} pulses show {what}{where}"
+    return [phrase("jump_too_few", text, count=count, pulses=pulses, what=words, where=where)]
 
 
 def _controlled(parts: Mapping[str, PointState | None] | Mapping[str, SkiState | None]) -> bool:
@@ -210,20 +239,18 @@ def _controlled(parts: Mapping[str, PointState | None] | Mapping[str, SkiState |
 
 def _unused(
     cameras: Iterable[str], system: CameraSystem, delivered: Sequence[tuple[PulseState, Collection[str]]]
-) -> list[str]:
-    """A line for each camera that has no part in the jump.
+) -> list[Phrase]:
+    """A sentence for each camera that has no part in the jump.
 
     Args:
         cameras: all of the recording.
         system: those that are oriented.
         delivered: pulses in sight with the cameras that delivered a frame.
     """
-    lines = [
-        f"camera {name} is left out: it has no frames in this recording, or is not oriented; see the protocol"
-        for name in cameras
-        if name not in system.cameras
-    ]
+    out = "camera {camera} is left out: it has no frames in this recording, or is not oriented; see the protocol"
+    gone = "camera {camera} has no frame of this jump"
     there = {name for _, frames in delivered for name in frames}
-    return lines + [
-        f"camera {name} has no frame of this jump" for name in system.names if delivered and name not in there
+    return [
+        *(phrase("jump_left_out", out, camera=name) for name in cameras if name not in system.cameras),
+        *(phrase("jump_no_frame", gone, camera=name) for name in system.names if delivered and name not in there),
     ]

@@ -30,6 +30,7 @@ from analysis.result.model import (
 )
 from rig.arrays import Floats
 from rig.clocks import UtcNs
+from rig.phrase import Phrase, plain
 from rig.pulse import PulseNumber
 
 FORMAT: Final = "svev-jumper/1"
@@ -121,6 +122,7 @@ class VerdictEntry(Struct):
     ok: bool
     message: str
     phases: dict[Phase, dict[str, Any]]
+    said: tuple[Phrase, ...] = ()
 
 
 class RayTestEntry(Struct):
@@ -170,6 +172,7 @@ class MoveEntry(Struct):
     rotation_deg: Numbers
     shift_m: Numbers
     p: Number
+    said: Phrase | None = None
 
 
 class OrientationEntry(Struct):
@@ -192,6 +195,7 @@ class OffsetEntry(Struct):
     offset_ms: Number
     sigma_ms: Number
     message: str | None
+    said: Phrase | None = None
 
 
 class FileEntry(Struct):
@@ -223,11 +227,16 @@ def decoded(content: bytes) -> MeasuredRecording:
         entry.rate_hz,
         orientation,
         {
-            name: CameraOffset(_number(o.offset_ms), _number(o.sigma_ms), o.message)
+            name: CameraOffset(_number(o.offset_ms), _number(o.sigma_ms), _said(o))
             for name, o in entry.synchrony.items()
         },
         tuple(_jump(jump, count) for jump in entry.jumps),
     )
+
+
+def _said(entry: OffsetEntry) -> Phrase | None:
+    """What is said of a camera's lateness, with its code where the file has it."""
+    return entry.said or (None if entry.message is None else plain(entry.message))
 
 
 def _orientation(entry: OrientationEntry) -> OrientationResult:
@@ -249,7 +258,9 @@ def _orientation(entry: OrientationEntry) -> OrientationResult:
             for name, ball in entry.balls.items()
         },
         tuple(
-            CameraMove(m.camera, m.message, _numbers(m.rotation_deg), _numbers(m.shift_m), _number(m.p))
+            CameraMove(
+                m.camera, m.said or plain(m.message), _numbers(m.rotation_deg), _numbers(m.shift_m), _number(m.p)
+            )
             for m in entry.moved
         ),
         tuple(entry.messages),
@@ -272,7 +283,7 @@ def _jump(entry: JumpEntry, parameters: int) -> Jump:
     return Jump(
         entry.number,
         None if takeoff is None else TakeOff(takeoff.pulse, takeoff.sigma_pulses, UtcNs(takeoff.time_ns)),
-        Verdict(verdict.ok, verdict.message, verdict.phases),
+        Verdict(verdict.ok, verdict.message, verdict.phases, verdict.said),
         tuple(_pulse(pulse, parameters) for pulse in entry.pulses),
         tuple(
             RayTest(PulseNumber(t.pulse), t.camera, t.what, _number(t.residual_px), _number(t.w), t.removed)

@@ -33,6 +33,8 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
+from rig.phrase import Phrase
+from rig.transport import wire
 
 #: Name of the file in a folder of results.
 NAME: Final = "jumper.json"
@@ -87,7 +89,12 @@ def to_json(result: MeasuredRecording) -> dict[str, Any]:
         "angle_unit": "deg",
         "orientation": _orientation(result.orientation),
         "synchrony": {
-            name: {"offset_ms": _number(o.offset_ms), "sigma_ms": _number(o.sigma_ms), "message": o.message}
+            name: {
+                "offset_ms": _number(o.offset_ms),
+                "sigma_ms": _number(o.sigma_ms),
+                "message": o.message,
+                "said": _said(o.said),
+            }
             for name, o in result.synchrony.items()
         },
         "jumps": [_jump(jump) for jump in result.jumps],
@@ -124,10 +131,15 @@ def _orientation(orientation: OrientationResult) -> dict[str, Any]:
     }
 
 
+def _said(said: Phrase | None) -> Any:
+    return None if said is None else wire.to_builtins(said)
+
+
 def _move(move: CameraMove) -> dict[str, Any]:
     return {
         "camera": move.camera,
         "message": move.message,
+        "said": _said(move.said),
         "rotation_deg": _list(move.rotation_deg),
         "shift_m": _list(move.shift_m),
         "p": _number(move.p),
@@ -141,6 +153,7 @@ def _jump(jump: Jump) -> dict[str, Any]:
         "verdict": {
             "ok": bool(jump.verdict.ok),
             "message": jump.verdict.message,
+            "said": [_said(each) for each in jump.verdict.said],
             "phases": {str(phase): _plain(found) for phase, found in jump.verdict.phases.items()},
         },
         "pulses": [_pulse(pulse) for pulse in jump.pulses],

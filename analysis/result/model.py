@@ -12,6 +12,7 @@ import numpy as np
 
 from rig.arrays import Floats
 from rig.clocks import UtcNs
+from rig.phrase import Phrase
 from rig.pulse import PulseNumber
 
 #: The quantities that the report and comparisons judge, degrees, m, m/s: the rows of `SmoothedState.by_calibration`.
@@ -212,11 +213,14 @@ class Verdict:
         ok: whether it can.
         message: for people.
         phases: per phase what was judged, ready for JSON (counts, shares, chi-square per degree of freedom).
+        said: the same sentence by sentence, to be said in other languages: what speaks against the jump, then what was
+            counted; empty: of an earlier svev, which had words only.
     """
 
     ok: bool
     message: str
     phases: Mapping[Phase, Mapping[str, Any]]
+    said: tuple[Phrase, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,17 +248,22 @@ class CameraMove:
 
     Attributes:
         camera: its name.
-        message: in words, with direction and size.
+        said: in words, with direction and size.
         rotation_deg: (3,) about the camera's own axes.
         shift_m: (3,) in the object system.
         p: probability of such a difference in a camera that did not move.
     """
 
     camera: str
-    message: str
+    said: Phrase
     rotation_deg: Floats
     shift_m: Floats
     p: float
+
+    @property
+    def message(self) -> str:
+        """In words, in English."""
+        return self.said.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,12 +273,17 @@ class CameraOffset:
     Attributes:
         offset_ms: positive: the camera shows a later state.
         sigma_ms: its standard deviation.
-        message: None while the camera is synchronous.
+        said: that it does, in words; None while the camera is synchronous.
     """
 
     offset_ms: float
     sigma_ms: float
-    message: str | None
+    said: Phrase | None
+
+    @property
+    def message(self) -> str | None:
+        """That it does, in English; None while the camera is synchronous."""
+        return None if self.said is None else self.said.text
 
 
 @dataclass(frozen=True, slots=True, eq=False)

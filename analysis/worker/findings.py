@@ -68,6 +68,7 @@ def summary(recording: str, rate_hz: float, jump: Jump, perpendicular: Quantity 
         time=datetime.fromtimestamp(time / NS_PER_S, UTC),
         ok=jump.verdict.ok,
         verdict=jump.verdict.message,
+        said=jump.verdict.said,
         takeoff_speed=_value(course.at_time("speed", 0.0)),
         perpendicular=_value(perpendicular),
         speed_20_m=_value(course.at_distance("speed", FAR_M)),

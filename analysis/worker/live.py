@@ -40,7 +40,7 @@ from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
 from rig.images.picture import Grey, measurable
-from rig.phrase import phrase, plain
+from rig.phrase import Phrase, phrase, plain
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
@@ -88,7 +88,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         self._finder: Finder | None = None
         self._watch: LiveWatch | None = None
         self._recording: Streamed | None = None
-        self._said: tuple[str, ...] = ()
+        self._said: tuple[Phrase, ...] = ()
         self._refused = False
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="whole jump")
         self._computing: deque[Future[MeasuredJump | None]] = deque()
@@ -161,11 +161,11 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
         self._watch.begin(recording.waiting_frames(_BEGUN))
         self._findings.oriented(recording.id, (recording.last or recording.first).time, self._scene)
-        said = (*scene.messages, *(move.message for move in moved))
+        said = (*map(plain, scene.messages), *(move.said for move in moved))
         if said != self._said:
             self._said = said
-            for message in said:
-                self._findings.message(Level.INFO, plain(message))
+            for each in said:
+                self._findings.message(Level.INFO, each)
         while recording.waiting and (finder := self._finder) is not None:
             self._measure(recording, finder, *recording.waiting.popleft())
 
@@ -206,7 +206,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         recording.watched = pulse
         if moves := self._watch.moves():
             for move in moves:
-                said = phrase("event_camera_moved", "{what}; the cameras are oriented anew", what=move.message)
+                said = phrase("event_camera_moved", "{what}; the cameras are oriented anew", what=move.said)
                 self._findings.message(Level.WARNING, said)
             recording.wait_anew()
             self._finder = self._watch = None

@@ -13,6 +13,7 @@ from analysis.procedure.plumb import check_up
 from analysis.result.model import Jump, MeasuredRecording
 from analysis.worker.findings import MeasuredJump, summary
 from rig.api.jump import LastJump
+from rig.phrase import phrase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,14 +65,17 @@ class JumpTask:
 
 def _as_live(told: LastJump, seen: int, pulses: int) -> LastJump:
     """The figures of a jump of whose pulses so many were seen: what they are worth, the log alone tells."""
-    more = "what was measured well, the log tells" if told.ok else told.verdict
-    verdict = f"measured live, in {seen} of its {pulses} pulses; {more}"
-    return told.model_copy(update={"live": True, "ok": False, "verdict": verdict})
+    live = phrase("jump_live", "measured live, in {seen} of its {pulses} pulses", seen=seen, pulses=pulses)
+    waits = phrase("jump_live_waits", "what was measured well, the log tells")
+    verdict = f"{live}; {waits if told.ok else told.verdict}"
+    said = (live, waits) if told.ok else (live, *told.said)
+    return told.model_copy(update={"live": True, "ok": False, "verdict": verdict, "said": said})
 
 
 def _with_missing(jump: Jump, missing: int) -> Jump:
     """The jump; its verdict says how many of its pulses did not come."""
     if not missing:
         return jump
-    said = f"{missing} of its {len(jump.pulses)} pulses did not come to this worker: analyze the log"
-    return replace(jump, verdict=replace(jump.verdict, message=f"{jump.verdict.message}; {said}"))
+    text = "{missing} of its {pulses} pulses did not come to this worker: analyze the log"
+    said, verdict = phrase("jump_incomplete", text, missing=missing, pulses=len(jump.pulses)), jump.verdict
+    return replace(jump, verdict=replace(verdict, message=f"{verdict.message}; {said}", said=(*verdict.said, said)))

@@ -5,6 +5,7 @@ from datetime import datetime
 from pydantic import Field
 
 from rig.api.fields import Model
+from rig.phrase import Phrase
 
 
 class MeasuredValue(Model):
@@ -23,6 +24,9 @@ class LastJump(Model):
     live: bool = Field(False, description="measured while it was recorded: `ok` is false then, the log tells more")
     ok: bool = Field(description="whether the jump was measured well")
     verdict: str = Field(description="the verdict in words")
+    said: tuple[Phrase, ...] = Field(
+        (), description="the same sentence by sentence, for translation: what speaks against the jump stands first"
+    )
     takeoff_speed: MeasuredValue | None = None
     perpendicular: MeasuredValue | None = Field(None, description="velocity perpendicular to the table at the take-off")
     speed_20_m: MeasuredValue | None = Field(None, description="speed 20 m behind the edge")

@@ -11,7 +11,8 @@ from rig.api.jump import LastJump
 from rig.api.statement import Level, Statement
 from rig.api.status import CameraState, State
 from rig.errors import SvevError
-from rig.phrase import Phrase, Value, phrase
+from rig.phrase import Phrase, Value, phrase, plain
+from rig.phrases import in_turn
 from rig.pulse import Pause
 from rig.settings.camera import CameraSettings
 from rig.transport.recorder_reports import CameraNews
@@ -220,8 +221,11 @@ def moved(before: State, to: State, fault: Statement | None) -> Phrase:
 
 def measured(jump: LastJump) -> Phrase:
     """A jump was measured, live or in its log."""
+    verdict = in_turn(jump.said) if jump.said else plain(jump.verdict)
+    if jump.ok and jump.said:
+        verdict = phrase("jump_measured_well", "measured well: {what}", what=verdict)
     text = "jump {jump} of {recording}: {verdict}"
-    return phrase("event_jump", text, jump=jump.jump, recording=jump.recording, verdict=jump.verdict)
+    return phrase("event_jump", text, jump=jump.jump, recording=jump.recording, verdict=verdict)
 
 
 def too_slow(late: Sequence[str]) -> Phrase:

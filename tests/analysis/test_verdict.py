@@ -191,6 +191,16 @@ def test_a_camera_that_is_not_oriented_is_named_and_two_cameras_are_not_relied_o
     assert "only in 0 of" in jump.verdict.message
 
 
+def test_every_sentence_of_a_verdict_can_be_said_in_another_language() -> None:
+    doubtful = _computed(_without("K2", 0)).verdict
+    assert [each.code for each in doubtful.said] == ["jump_uncontrolled", "jump_counted"] or not doubtful.ok
+    assert all(each.code and each.text in doubtful.message for each in doubtful.said)
+    assert doubtful.message == "; ".join(map(str, doubtful.said[:-1])) + f" ({doubtful.said[-1]})"
+    good = _computed(lambda _, pulse: pulse).verdict
+    assert good.message == f"measured well: {'; '.join(map(str, good.said))}"
+    assert good.said[0].values.keys() == {"count", "pulses", "controlled"}
+
+
 def test_a_camera_without_a_frame_of_the_jump_is_named() -> None:
     jump = _computed(lambda _, pulse: replace(pulse, images={n: i for n, i in pulse.images.items() if n != "K2"}))
     assert not jump.verdict.ok

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, e
 
 from rig.api.jump import LastJump, MeasuredValue
 from rig.frame import FrameStatus
+from rig.phrase import phrase
 from service.measuring.results import keep_result
 from tests.recorder.logs import ALL_OK
 from tests.support.processes import shared_from_now_on
@@ -126,6 +127,7 @@ MEASURED = LastJump(
     time=datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC),
     ok=True,
     verdict="measured well: all points in 35 of 35 pulses in sight",
+    said=(phrase("jump_counted", "all points in {count} of {pulses} pulses in sight", count=35, pulses=35),),
     takeoff_speed=MeasuredValue(value=26.104, sigma=0.0151),
     perpendicular=MeasuredValue(value=2.1085, sigma=0.115),
     speed_20_m=MeasuredValue(value=25.489, sigma=0.004),

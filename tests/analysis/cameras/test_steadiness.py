@@ -151,8 +151,8 @@ def test_blocks_that_scatter_alike_show_no_move() -> None:
 
 
 def test_turns_are_said_in_directions() -> None:
-    assert turn_words(np.radians((0.0, 0.05, 0.001))) == ["0.050 deg to the left"]
-    assert turn_words(np.radians((-0.02, -0.05, 0.04))) == [
+    assert [str(each) for each in turn_words(np.radians((0.0, 0.05, 0.001)))] == ["0.050 deg to the left"]
+    assert [str(each) for each in turn_words(np.radians((-0.02, -0.05, 0.04)))] == [
         "0.050 deg to the right",
         "0.040 deg counter-clockwise",
         "0.020 deg down",

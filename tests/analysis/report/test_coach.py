@@ -20,6 +20,7 @@ from analysis.report.scrubbing import overlays_of
 from analysis.result.model import CameraMove, JumperState, MeasuredRecording, Quantity
 from photogrammetry.jumper.stick_model import ANGLES
 from rig.errors import BadInputError
+from rig.phrase import plain
 from tests.analysis.report.jumps import EVERY, measured_recording, measurements
 from tests.analysis.result.recordings import without_takeoff
 from tests.analysis.simulated import RATE_HZ, true_cameras
@@ -125,7 +126,7 @@ def test_a_bad_verdict_and_a_moved_camera_are_said_on_top(jump_log: Path) -> Non
         result.jumps[0], pulses=(), verdict=replace(result.jumps[0].verdict, ok=False, message="K2 & K3 <disagree>")
     )
     zero = true_cameras()["K1"].position
-    moved = CameraMove("K2", "camera K2 turned by 0.05° to the left", zero, zero, 1e-9)
+    moved = CameraMove("K2", plain("camera K2 turned by 0.05° to the left"), zero, zero, 1e-9)
     orientation = replace(result.orientation, moved=(moved,))
     text = _text(_page(jump_log, replace(result, jumps=(bad,), orientation=orientation)))
     assert "Do not rely on these numbers K2 & K3 <disagree>" in text

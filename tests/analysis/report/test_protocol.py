@@ -10,6 +10,7 @@ from analysis.report.protocol import WORST_RAYS, protocol, write_protocol
 from analysis.result.model import CameraMove, CameraOffset, MeasuredRecording, RayTest
 from photogrammetry.procedures.orientation import orient
 from photogrammetry.reports.document import as_text
+from rig.phrase import plain
 from rig.pulse import PulseNumber
 from tests.analysis.report.jumps import measured_recording, measurements
 from tests.photogrammetry.synthetic import hill
@@ -35,8 +36,8 @@ def test_cameras_balls_and_synchrony_are_listed() -> None:
 
 def test_faults_are_listed_with_their_words() -> None:
     result = measured_recording()
-    move = CameraMove("K2", "camera K2 turned by 0.05°", np.zeros(3), np.zeros(3), 1e-9)
-    late = CameraOffset(33.3, 0.2, "camera K3 is one frame late")
+    move = CameraMove("K2", plain("camera K2 turned by 0.05°"), np.zeros(3), np.zeros(3), 1e-9)
+    late = CameraOffset(33.3, 0.2, plain("camera K3 is one frame late"))
     text = _text(
         replace(
             result,

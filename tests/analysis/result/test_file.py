@@ -32,12 +32,12 @@ def test_has_all_members_of_the_contract(measured: MeasuredRecording) -> None:
     ball = next(iter(data["orientation"]["balls"].values()))
     assert ball.keys() == {"role", "X", "sigma", "images"}
     assert {len(xy) for xy in ball["images"].values()} == {4}
-    assert data["synchrony"]["K1"].keys() == {"offset_ms", "sigma_ms", "message"}
+    assert data["synchrony"]["K1"].keys() == {"offset_ms", "sigma_ms", "message", "said"}
     jump = data["jumps"][1]
     assert jump["number"] == 2
     assert jump["takeoff"].keys() == {"pulse", "sigma_pulses", "time_ns"}
     assert isinstance(jump["takeoff"]["time_ns"], str)
-    assert jump["verdict"].keys() == {"ok", "message", "phases"}
+    assert jump["verdict"].keys() == {"ok", "message", "phases", "said"}
     assert jump["verdict"]["phases"].keys() == {"table", "edge", "flight"}
     for pulse in jump["pulses"]:
         assert {"pulse", "since_takeoff_s", "phase", "points", "skis", "angles", "height", "speed"} <= pulse.keys()

@@ -41,3 +41,6 @@ def test_a_live_jump_is_never_measured_well_but_says_how_much_of_it_was_seen() -
     assert whole.verdict == f"measured live, in {count} of its {count} pulses; what was measured well, the log tells"
     assert half.verdict.startswith(f"measured live, in {-(-count // 2)} of its ")
     assert "measured well:" not in half.verdict
+    assert [each.code for each in whole.said] == ["jump_live", "jump_live_waits"]
+    assert half.said[0].code == "jump_live"
+    assert half.said[-1].code == "jump_incomplete"

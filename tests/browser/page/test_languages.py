@@ -21,6 +21,7 @@ def test_norwegian_from_the_browser_and_by_choice(
     enter(page, panel, "recordings/jump-2")
     expect(page.locator("#recording-verdict")).to_have_text("1 av 30 pulser mangler et bilde")
     expect(page.locator("#frame-fate")).to_contain_text("K2 tapt")
+    expect(page.locator("#measurement-jumps .measured-why")).to_have_text("alle punkter i 35 av 35 pulser i sikte")
     page.keyboard.press("?")
     page.get_by_label("Språk").select_option("en")
     expect(page.get_by_role("heading", name="Settings and keys")).to_be_visible()

@@ -2,6 +2,7 @@
 
 import { load, save } from "../shared/store.js";
 import { en } from "./en.js";
+import { analysis as nbAnalysis } from "./nb-analysis.js";
 import { events as nbEvents } from "./nb-events.js";
 import { findings as nbFindings } from "./nb-findings.js";
 import { statements as nbStatements } from "./nb-statements.js";
@@ -12,7 +13,7 @@ import { nb } from "./nb.js";
 
 const LANGUAGES = { en, nb };
 /** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents } };
+const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis } };
 
 /** @type {"en"|"nb"} */
 let language = "en";
@@ -81,6 +82,16 @@ function fill(words, values) {
   return words.replace(/\{(\w+)\}/g, (_, name) => {
     const value = values[name];
     if (typeof value === "object") return say(value).text;
-    return typeof value === "number" ? value.toLocaleString(language, { maximumFractionDigits: 1 }) : String(value);
+    return typeof value === "number" ? value.toLocaleString(language, digits(value)) : String(value);
   });
+}
+
+/**
+ * How many digits are said of a number: one after the point, or, of what is less than one, the first two.
+ *
+ * @param {number} value
+ * @returns {Intl.NumberFormatOptions}
+ */
+function digits(value) {
+  return Math.abs(value) < 1 ? { maximumSignificantDigits: 2 } : { maximumFractionDigits: 1 };
 }

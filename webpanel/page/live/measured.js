@@ -4,7 +4,7 @@ import { t } from "../i18n/i18n.js";
 import { call, recordingPath } from "../shared/api.js";
 import { hear } from "../shared/connection.js";
 import { $, setText } from "../shared/dom.js";
-import { fillFigures, levelOf, MARKS } from "../shared/figures.js";
+import { fillFigures, levelOf, MARKS, verdictOf } from "../shared/figures.js";
 import { timeOfDay, who } from "../shared/format.js";
 import { known, watch } from "../shared/store.js";
 
@@ -52,7 +52,7 @@ function draw() {
   const level = levelOf(shown);
   $("measured-verdict").dataset.level = level;
   setText($("measured-verdict"), t(MARKS[level]));
-  setText($("measured-why"), shown.ok ? "" : shown.verdict);
+  setText($("measured-why"), shown.ok ? "" : verdictOf(shown));
   fillFigures($("measured-figures"), shown);
 }
 

@@ -3,7 +3,7 @@
 import { languageInUse, say, t } from "../i18n/i18n.js";
 import { call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { $, icon, make, makeMark, setText } from "../shared/dom.js";
-import { fillFigures, levelOf, MARKS } from "../shared/figures.js";
+import { fillFigures, levelOf, MARKS, verdictOf } from "../shared/figures.js";
 import { day, number, timeOfDay } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
@@ -181,7 +181,7 @@ function makeJump(jump, live, several) {
   return make("section", {},
     several ? make("h3", {}, t("measurement.jump", { jump: jump.jump, time: timeOfDay(jump.time) })) : null,
     makeMark(level, level, t(MARKS[level])),
-    make("p", { class: "measured-why" }, jump.verdict.replace(/^measured well: /, "")), // the mark says so, in both languages
+    make("p", { class: "measured-why" }, verdictOf(jump)),
     figures);
 }
 

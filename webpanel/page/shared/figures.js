@@ -1,6 +1,6 @@
 /** The main figures of a measured jump, each with its standard deviation. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { fillList } from "./dom.js";
 import { number } from "./format.js";
 
@@ -23,6 +23,15 @@ export const MARKS = { good: "measured.ok", warning: "measured.doubtful", info: 
 export function levelOf(jump, live = false) {
   if (live || jump.live) return "info";
   return jump.ok ? "good" : "warning";
+}
+
+/**
+ * The verdict on a jump in words; that it was measured well, the mark says.
+ *
+ * @param {import("./types.js").LastJump} jump
+ */
+export function verdictOf(jump) {
+  return jump.said.length ? jump.said.map((each) => say(each).text).join("; ") : jump.verdict; // of an earlier svev: words only
 }
 
 /**

@@ -143,6 +143,7 @@
  * @property {boolean} live
  * @property {boolean} ok
  * @property {string} verdict
+ * @property {Phrase[]} said
  * @property {MeasuredValue|null} takeoff_speed
  * @property {MeasuredValue|null} perpendicular
  * @property {MeasuredValue|null} speed_20_m

@@ -8,7 +8,7 @@ from analysis.cameras.frames import LogFrames
 from analysis.cameras.helmet import with_helmet
 from analysis.cameras.oriented_scene import OrientedScene, orientation_result
 from analysis.cameras.source import Source
-from analysis.cameras.standing import SteadiedJump
+from analysis.cameras.standing import Standing, SteadiedJump
 from analysis.cameras.steadiness import Steadiness
 from analysis.candidates.finder import Finder, find_candidates
 from analysis.candidates.model import PulseCandidates
@@ -54,6 +54,7 @@ class Analysis:
         scene: cameras and balls.
         orientation: the adjustment of the balls; None where the poses were known.
         perpendicular: by jump, velocity perpendicular to the table at the take-off, m/s.
+        standings: by jump, how the cameras stood during it.
     """
 
     result: MeasuredRecording
@@ -61,6 +62,7 @@ class Analysis:
     scene: OrientedScene
     orientation: Orientation | None
     perpendicular: Mapping[int, Quantity]
+    standings: Mapping[int, Standing]
 
     @property
     def system(self) -> CameraSystem:
@@ -134,11 +136,11 @@ def analyze(
             f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording, "
             "or look whether the survey is in metres with Z up and the markers stand out"
         )
-    flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
+    standings, flights = _flights(measurements, steadiness)
     if helmet:
         scene, orientation = with_helmet(scene, flights, facts.cameras, facts.rate_hz)
         steadiness = steadiness.with_scene(scene)
-        flights = [_steadied(jump, steadiness) for jump in measurements.jumps]
+        standings, flights = _flights(measurements, steadiness)
     computed: list[ComputedJump] = []
     for flight in flights:
         tell("computing", len(computed) / len(flights))
@@ -153,7 +155,7 @@ def analyze(
     )
     tell("computing", 1.0)
     perpendicular = {c.jump.number: c.perpendicular for c in computed if c.perpendicular is not None}
-    return Analysis(result, measurements, scene, orientation, perpendicular)
+    return Analysis(result, measurements, scene, orientation, perpendicular, standings)
 
 
 def unread_pulses(candidates: Sequence[PulseCandidates]) -> list[str]:
@@ -168,8 +170,10 @@ def unread_pulses(candidates: Sequence[PulseCandidates]) -> list[str]:
     ]
 
 
-def _steadied(jump: JumpMeasurements, steadiness: Steadiness) -> SteadiedJump:
-    return steadiness.during([pulse.pulse for pulse in jump.pulses]).steadied(jump)
+def _flights(measurements: Measurements, steadiness: Steadiness) -> tuple[dict[int, Standing], list[SteadiedJump]]:
+    """How the cameras stood in each jump, by its number, and the jumps as cameras at rest would show them."""
+    standings = {jump.number: steadiness.during([pulse.pulse for pulse in jump.pulses]) for jump in measurements.jumps}
+    return standings, [standings[jump.number].steadied(jump) for jump in measurements.jumps]
 
 
 def _synchrony(jumps: list[ComputedJump]) -> dict[str, CameraOffset]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from analysis.export import motion_files
 from analysis.measurements.file import write_measurements
 from analysis.procedure.analyze import Analysis
+from analysis.report import overlay_file
 from analysis.report.coach import write_report
 from analysis.report.protocol import write_protocol
 from analysis.report.video import write_video
@@ -52,7 +53,12 @@ def write_folder(
     write_report(
         analysis.result, analysis.measurements, analysis.system, log, page, perpendicular=analysis.perpendicular
     )
-    written += [page, *write_protocol(analysis.result, analysis.measurements, folder, analysis.orientation)]
+    overlay = folder / overlay_file.NAME
+    try:
+        overlay_file.write_overlay(analysis.result, analysis.standings, overlay)
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from error
+    written += [page, overlay, *write_protocol(analysis.result, analysis.measurements, folder, analysis.orientation)]
     if video:
         film = folder / VIDEO
         write_video(

@@ -78,7 +78,7 @@ def frames_json(
                 "unsure": bool(course.unsure[i]),
                 "views": views,
                 "stick": {part: _rounded(line) for part, line in _own_frame(course, pulse).items()},
-                "numbers": [plus_minus(_quantity(course, name, i), unit) for name, _, unit in READOUT],
+                "numbers": [plus_minus(quantity_at(course, name, i), unit) for name, _, unit in READOUT],
             }
         )
     return frames
@@ -130,7 +130,8 @@ def _own_frame(course: Course, pulse: PulseState) -> dict[str, Floats]:
     return {part: line - middle for part, line in lines.items()}
 
 
-def _quantity(course: Course, name: str, i: int) -> Quantity | None:
+def quantity_at(course: Course, name: str, i: int) -> Quantity | None:
+    """A quantity at pulse `i` of a course: smoothed, else of the pulse alone; None where there is none."""
     for series in (course.smoothed[name], course.raw[name]):
         if np.isfinite(series.value[i]):
             return Quantity(float(series.value[i]), float(series.sigma[i]))

@@ -19,6 +19,7 @@ from webpanel.door.logins import Door
 from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
+from webpanel.routes.athletes import athletes_router
 from webpanel.routes.common import COMMON
 from webpanel.routes.contents import contents_router
 from webpanel.routes.events import Changes, events_router
@@ -75,6 +76,7 @@ def create_app(service: RigService, access: Access, links: Links | None = None) 
         files_router(service, streams.downloads),
         exports_router(service, streams.downloads),
         measuring_router(service, streams.downloads),
+        athletes_router(service),
         preview_router(service, streams),
         cameras_router(service, streams),
         events_router(service, changes, streams.events),

@@ -34,6 +34,7 @@ _TAGS: Final = {
     "Recordings": "Starting and stopping, and what was recorded: list, session fields, pictures, files, the trash.",
     "Jumpers": "The start list and the next jumper, whom every recording takes at its start.",
     "Exports": "Videos, pictures and tables of recordings, made by the service beside its work.",
+    "Athletes": "The measured jumps of all recordings, by athlete and day.",
     "Measurements": "What was measured in a recording, by itself after its end: figures, files, progress.",
     "Watching": "What happens now: events and live pictures.",
     "Login": "Tokens, cookies, links to single recordings, and what one may do.",

@@ -1,8 +1,9 @@
-"""Measures how long a service takes to list 2000 recordings by pages, just started and later, by clock and by CPU."""
+"""Measures how long a service takes to list 2000 recordings and their jumps, just started and later."""
 
 import os
 import shutil
 import time
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
@@ -10,23 +11,32 @@ from typing import Any, Final
 from bench.service.catalogue import write_jump
 from bench.service.serving import ServedRig, served_rig
 from recorder.reading.corrected_log import corrected_log
+from rig.api.jump import LastJump, MeasuredValue
 from rig.errors import BadInputError
+from service.measuring.results import keep_result
 
 _LOGS: Final = 2000
 _PULSES: Final = 30
 _SHAPE: Final = (24, 96)
 _ATHLETES: Final = ("Anna Berg", "Bjørn Lie", "Kari Moe", "Ola Nordmann")
 _REPEATS: Final = 20
+_FIRST_DAY: Final = datetime(2026, 1, 10, 10, tzinfo=UTC)
+_A_DAY: Final = 50  # jumps
+_ALL: Final = ("/api/recordings", "/api/jumps")
 _QUERIES: Final = {
-    "first page of 50": "limit=50",
-    "search, first page": "limit=50&search=berg%2017",
-    "by bib, last page": "limit=50&sort=bib&offset=1950",
-    "all": "",
+    "first page of 50": "/api/recordings?limit=50",
+    "search, first page": "/api/recordings?limit=50&search=berg%2017",
+    "by bib, last page": "/api/recordings?limit=50&sort=bib&offset=1950",
+    "all": _ALL[0],
+    "athletes": "/api/athletes",
+    "jumps of an athlete": "/api/jumps?athlete=anna%20berg",
+    "jumps of a day": "/api/jumps?since=2026-02-01T00:00:00Z&until=2026-02-02T00:00:00Z",
+    "all jumps": _ALL[1],
 }
 
 
 def run_listing(directory: Path) -> list[dict[str, Any]]:
-    """List 2000 logs of their own, each with its athlete and bib.
+    """List 2000 logs of their own, each with its athlete, bib and a measured jump.
 
     Returns:
         A case for each query: its median time by clock once the service has listed them before, beside that of the
@@ -40,8 +50,8 @@ def run_listing(directory: Path) -> list[dict[str, Any]]:
         folder.mkdir(parents=True, exist_ok=True)
         _write_logs(folder)
         with served_rig(folder) as service:  # reads all logs, and keeps what it read
-            _list(service, "")
-        return [_measure(folder, name, query) for name, query in _QUERIES.items()]
+            [_list(service, path) for path in _ALL]
+        return [_measure(folder, name, path) for name, path in _QUERIES.items()]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -52,13 +62,31 @@ def _write_logs(folder: Path) -> None:
     for number in range(_LOGS):
         fields = {"athlete": _ATHLETES[number % len(_ATHLETES)], "bib": str(number % 60)}
         with corrected_log(first, fields).open() as log:
-            (folder / f"jump-{number:04}.mcap").write_bytes(log.read())
+            path = folder / f"jump-{number:04}.mcap"
+            path.write_bytes(log.read())
+        _keep_jump(path, number)
 
 
-def _measure(folder: Path, name: str, query: str) -> dict[str, Any]:
+def _keep_jump(log: Path, number: int) -> None:
+    """Keep main figures beside a log, of a jump on its day."""
+    days, minutes = divmod(number, _A_DAY)
+    figures = {
+        name: MeasuredValue(value=25 + number % 7, sigma=0.05)
+        for name in ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body")
+    }
+    jump = LastJump(
+        recording=log.stem, jump=1, time=_FIRST_DAY + timedelta(days=days, minutes=minutes), ok=True,
+        verdict="measured well: all points in 35 of 35 pulses", **figures,
+    )  # fmt: skip
+    made = log.parent / "made"
+    made.mkdir()
+    keep_result(made, log, (jump,))
+
+
+def _measure(folder: Path, name: str, path: str) -> dict[str, Any]:
     with served_rig(folder) as service:
-        first = _list(service, query)
-        again = [_list(service, query) for _ in range(_REPEATS)]
+        first = _list(service, path)
+        again = [_list(service, path) for _ in range(_REPEATS)]
     return {
         "name": f"{name}, of {_LOGS}", "unit": "ms", "value": round(median(wall for wall, _ in again), 1),
         "cpu_ms": round(sum(cpu for _, cpu in again) / _REPEATS, 1),
@@ -66,12 +94,12 @@ def _measure(folder: Path, name: str, query: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _list(service: ServedRig, query: str) -> tuple[float, float]:
+def _list(service: ServedRig, path: str) -> tuple[float, float]:
     """Times of one answer by clock and by the service's processor, ms."""
     cpu, began = _cpu_ms(service.pid), time.perf_counter()
-    answer = service.call("GET", f"/api/recordings?{query}")
+    answer = service.call("GET", path)
     taken = (time.perf_counter() - began) * 1e3, _cpu_ms(service.pid) - cpu
-    if not query and len(answer.json()) != _LOGS:
+    if path in _ALL and len(answer.json()) != _LOGS:
         raise BadInputError(f"not all {_LOGS} recordings are listed: name an --out without a folder listing")
     return taken
 

@@ -112,6 +112,11 @@ def _own(folder: Path) -> list[Path]:
     return [] if _outcome(folder) is None else [folder / _NAME]
 
 
+def outcome_path(log: Path) -> Path:
+    """Where stands what the measuring of a log came to; the file is replaced as a whole."""
+    return measured_path(log) / _NAME
+
+
 def jumps_of(log: Path) -> tuple[LastJump, ...]:
     """The main figures of the jumps that were measured in a log; none if it was not measured."""
     found = _outcome(measured_path(log))

@@ -13,6 +13,7 @@ from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from recorder.log.extent import CONTINUES
+from rig.api.athletes import Athlete, AthleteJump, JumpQuery
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.looking import Moment, MomentKind, Note, VoiceNote
 from rig.api.measuring import Measurement
@@ -40,6 +41,7 @@ from service.measuring.results import jumps_in_full, result_downloads, result_fi
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
+from service.recordings.measured_jumps import MeasuredJumps, athletes, wanted
 from service.recordings.notes import check_voices, noted, notes_of, spoken, voice_file
 from service.seam.archive import Download, FoundRecordings
 from triggering.ledger.account import pauses_in_words
@@ -87,6 +89,7 @@ class Archive(ABC):
         self._catalogue, self.exports, self._measurings = catalogue, exports, measurings
         self._checksums: dict[str, str] = {}
         self._descriptions: dict[tuple[str, bool], tuple[Entry, Recording]] = {}
+        self._jumps = MeasuredJumps(catalogue.directory)
 
     @abstractmethod
     def status(self) -> Status:
@@ -173,6 +176,14 @@ class Archive(ABC):
         if known.figures or not (live := live_results.summaries(log)):
             return known
         return known.model_copy(update={"figures": tuple(live), "live": True})
+
+    def athletes(self) -> list[Athlete]:
+        """Whose jumps were measured, by name."""
+        return athletes(self._jumps.of(self._catalogue.entries()))
+
+    def measured_jumps(self, query: JumpQuery) -> list[AthleteJump]:
+        """The measured jumps that a query finds, newest first; none that lies in the trash."""
+        return wanted(self._jumps.of(self._catalogue.entries()), query)
 
     def measure(self, recording_id: str) -> Measurement:
         """Have the log of a recording measured, again if it was measured before.

@@ -8,6 +8,7 @@ from typing import BinaryIO, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.api.athletes import Athlete, AthleteJump, JumpQuery
 from rig.api.looking import Moment, Note, VoiceNote
 from rig.api.measuring import Measurement
 from rig.api.recordings import Pulses, Recording, RecordingQuery, SessionChange, Trash
@@ -122,6 +123,14 @@ class Archive(Protocol):
 
     def measurement(self, recording_id: str, *, jumps: bool) -> Measurement:
         """What is known of the jumps of a recording, in full if `jumps`, and how far its measuring is."""
+        ...
+
+    def athletes(self) -> list[Athlete]:
+        """Whose jumps were measured, by name."""
+        ...
+
+    def measured_jumps(self, query: JumpQuery) -> list[AthleteJump]:
+        """The measured jumps that a query finds, newest first; none that lies in the trash."""
         ...
 
     def measure(self, recording_id: str) -> Measurement:

@@ -1,5 +1,6 @@
 """What all routes share: routers that refuse unknown parameters, the documentation of refusals, common parameters."""
 
+import re
 from collections.abc import Callable, Coroutine
 from http import HTTPStatus
 from typing import Annotated, Any, Final
@@ -7,14 +8,34 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Body, Path, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
+from isal import igzip as gzip
+from pydantic import AwareDatetime, BeforeValidator
 
 from rig.api.fields import Model
 from rig.host.file_names import ID_PATTERN
 from webpanel.problems import MEDIA_TYPE
 
+_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[Tt ]")
+#: A long list repeats itself so much that compressing it thoroughly wins nothing.
+_LIGHTLY: Final = 1
+
 
 class Nothing(Model):
     """A body without fields."""
+
+
+def _written_out(text: object) -> object:
+    """Let no bare number pass for a time.
+
+    Raises:
+        ValueError: the text does not begin with a date.
+    """
+    if isinstance(text, str) and not _DATE.match(text):
+        raise ValueError("give date, time and zone, e.g. 2026-11-20T10:00:00Z")
+    return text
+
+
+Moment = Annotated[AwareDatetime, BeforeValidator(_written_out)]
 
 
 RecordingId = Annotated[
@@ -56,6 +77,14 @@ _MEANINGS: Final[dict[int, tuple[str, str, str]]] = {
 def refusals(*statuses: int) -> Responses:
     """Document that a route may answer with these problems."""
     return {status: _declare(status) for status in statuses}
+
+
+def compressed(request: Request, body: bytes, headers: dict[str, str] | None = None) -> Response:
+    """Answer with a long list in JSON, compressed if the client understands that."""
+    headers = {"Vary": "Accept-Encoding"} | (headers or {})
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        body, headers["Content-Encoding"] = gzip.compress(body, _LIGHTLY), "gzip"
+    return Response(body, media_type="application/json", headers=headers)
 
 
 def jpeg_answer(description: str) -> Responses:

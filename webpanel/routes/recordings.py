@@ -1,12 +1,10 @@
 """The routes of recordings: start and stop, list, change, delete and restore."""
 
-import re
 from http import HTTPStatus
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Body, Depends, Query, Request, Response
-from isal import igzip as gzip
-from pydantic import AwareDatetime, BeforeValidator, TypeAdapter
+from pydantic import TypeAdapter
 
 from rig.api.automatic import AutomaticChange, Mark, Marked
 from rig.api.fields import LONGEST_LINE, LONGEST_TAG
@@ -14,7 +12,16 @@ from rig.api.recordings import Recording, RecordingOrder, RecordingQuery, Sessio
 from rig.api.statement import Level
 from rig.api.status import Status
 from service.seam.rig import RigService
-from webpanel.routes.common import CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
+from webpanel.routes.common import (
+    CHANGING,
+    Moment,
+    NoFields,
+    RecordingId,
+    Responses,
+    compressed,
+    refusals,
+    strict_router,
+)
 from webpanel.routes.events import Changes
 
 _ALL_HELD: Final = RecordingOrder()
@@ -24,10 +31,7 @@ _ORDER: Final = Body(
         "what has just happened": {"value": {"bib": "17", "preroll_s": 5, "duration_s": 0}},
     }
 )
-_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[Tt ]")
 _RECORDINGS: Final = TypeAdapter(list[Recording])
-#: A list of recordings repeats itself so much that compressing it thoroughly wins nothing.
-_LIGHTLY: Final = 1
 _LISTED: Final[Responses] = {
     200: {
         "headers": {
@@ -37,20 +41,6 @@ _LISTED: Final[Responses] = {
     }
 }
 _LOCATED: Final = {"headers": {"Location": {"description": "address of the recording", "schema": {"type": "string"}}}}
-
-
-def _written_out(text: object) -> object:
-    """Let no bare number pass for a time.
-
-    Raises:
-        ValueError: the text does not begin with a date.
-    """
-    if isinstance(text, str) and not _DATE.match(text):
-        raise ValueError("give date, time and zone, e.g. 2026-11-20T10:00:00Z")
-    return text
-
-
-Moment = Annotated[AwareDatetime, BeforeValidator(_written_out)]
 
 
 def _query(
@@ -124,14 +114,11 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         next page is.
         """
         found = service.recordings(query)
-        headers = {"X-Total-Count": str(found.total), "Vary": "Accept-Encoding"}
+        headers = {"X-Total-Count": str(found.total)}
         if query.limit is not None and query.offset + query.limit < found.total:
             onward = request.url.include_query_params(offset=query.offset + query.limit)
             headers["Link"] = f'<{onward.path}?{onward.query}>; rel="next"'
-        body = _RECORDINGS.dump_json(found.recordings)
-        if "gzip" in request.headers.get("accept-encoding", ""):
-            body, headers["Content-Encoding"] = gzip.compress(body, _LIGHTLY), "gzip"
-        return Response(body, media_type="application/json", headers=headers)
+        return compressed(request, _RECORDINGS.dump_json(found.recordings), headers)
 
     @router.get("/recordings/{recording_id}", responses=refusals(404))
     def get_recording(recording_id: RecordingId, request: Request) -> Recording:

@@ -1,0 +1,98 @@
+"""All measured jumps by athlete, over the API."""
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from recorder.log.jumper_path import jumper_path
+from rig.api.jump import LastJump, MeasuredValue
+from service.measuring.results import keep_result
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import refused
+
+NOON = datetime(2026, 2, 14, 12, tzinfo=UTC)
+
+
+def jump(recording: str, number: int, time: datetime, speed: float, *, ok: bool = True) -> LastJump:
+    """Main figures of a jump."""
+    return LastJump(
+        recording=recording, jump=number, time=time, ok=ok, verdict="measured well" if ok else "not well",
+        takeoff_speed=MeasuredValue(value=speed, sigma=0.05),
+    )  # fmt: skip
+
+
+def measure(log: Path, *jumps: LastJump) -> None:
+    """Keep a result beside a log."""
+    made = log.parent / "made"
+    made.mkdir()
+    keep_result(made, log, jumps)
+
+
+@pytest.fixture
+def logs(service: MemoryService) -> dict[str, Path]:
+    """Recordings with measured jumps: of Ola in three spellings on two days, of Åse, of nobody; one only live."""
+    folder = service.catalogue.directory
+    names = {
+        "a": "Ola Nordmann",
+        "b": "OLA  nordmann ",
+        "c": "Ola Nordmann",
+        "d": "Åse / Ødegård?",
+        "e": "",
+        "f": "Kari",
+    }
+    found = {
+        name: write_recording(folder, name, session={"athlete": who, "bib": f"{number}"})
+        for number, (name, who) in enumerate(names.items(), 1)
+    }
+    measure(found["a"], jump("a", 1, NOON, 25.0), jump("a", 2, NOON + timedelta(minutes=9), 25.5, ok=False))
+    measure(found["b"], jump("b", 1, NOON + timedelta(days=1), 26.0))
+    measure(found["d"], jump("d", 1, NOON + timedelta(minutes=3), 24.0))
+    measure(found["e"], jump("e", 1, NOON + timedelta(minutes=4), 24.5))
+    live = jump("f", 1, NOON + timedelta(minutes=5), 23.0, ok=False).model_dump_json()
+    jumper_path(found["f"]).write_text(f'{{"summaries": [{live}]}}')
+    return found
+
+
+def _jumps(client: httpx.Client, **query: Any) -> list[tuple[str, int, str]]:
+    found = client.get("/api/jumps", params=query).raise_for_status().json()
+    return [(each["jump"]["recording"], each["jump"]["jump"], each["level"]) for each in found]
+
+
+@pytest.mark.usefixtures("logs")
+def test_names_that_differ_in_case_and_spaces_only_are_one_athlete(client: httpx.Client) -> None:
+    found = {each["name"]: each for each in client.get("/api/athletes").json()}
+    assert list(found) == ["Kari", "OLA nordmann", "Åse / Ødegård?"]
+    assert (found["OLA nordmann"]["jumps"], found["OLA nordmann"]["bib"]) == (3, "2")
+    assert found["OLA nordmann"]["first"].startswith("2026-02-14T12:00")
+    assert found["OLA nordmann"]["last"].startswith("2026-02-15T12:00")
+    assert _jumps(client, athlete=" ola nordmann") == [("b", 1, "good"), ("a", 2, "warning"), ("a", 1, "good")]
+    assert _jumps(client, athlete="Åse / Ødegård?") == [("d", 1, "good")]
+    assert _jumps(client, athlete="A\u030ase / \u00d8dega\u030ard?") == [("d", 1, "good")]
+    assert _jumps(client, athlete="Ola") == []
+
+
+@pytest.mark.usefixtures("logs")
+def test_jumps_of_a_span_with_their_figures(client: httpx.Client) -> None:
+    day = {"since": "2026-02-14T00:00:00Z", "until": "2026-02-15T00:00:00Z"}
+    assert [name for name, *_ in _jumps(client, **day)] == ["a", "f", "e", "d", "a"]
+    assert _jumps(client, limit=1) == [("b", 1, "good")]
+    assert _jumps(client, athlete="Kari") == [("f", 1, "info")]
+    newest = client.get("/api/jumps", params={"limit": 1}).json()[0]
+    assert (newest["athlete"], newest["bib"]) == ("OLA  nordmann", "2")
+    assert newest["jump"]["takeoff_speed"] == {"value": 26.0, "sigma": 0.05}
+    refused(client.get("/api/jumps", params={"since": "yesterday"}), 422)
+    refused(client.get("/api/jumps", params={"name": "Ola"}), 422)
+
+
+def test_a_corrected_name_a_new_result_and_the_trash_count_at_once(client: httpx.Client, logs: dict[str, Path]) -> None:
+    assert _jumps(client, athlete="kari") == [("f", 1, "info")]
+    client.patch("/api/recordings/f", json={"athlete": "Åse / Ødegård?"}).raise_for_status()
+    assert _jumps(client, athlete="kari") == []
+    assert [name for name, *_ in _jumps(client, athlete="åse / ødegård?")] == ["f", "d"]
+    measure(logs["f"], jump("f", 1, NOON, 23.1), jump("f", 2, NOON + timedelta(hours=1), 23.4))
+    assert _jumps(client, athlete="åse / ødegård?") == [("f", 2, "good"), ("d", 1, "good"), ("f", 1, "good")]
+    client.delete("/api/recordings/f").raise_for_status()
+    assert _jumps(client, athlete="åse / ødegård?") == [("d", 1, "good")]

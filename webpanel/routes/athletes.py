@@ -1,0 +1,47 @@
+"""Routes about all measured jumps of the folder, by athlete."""
+
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import TypeAdapter
+
+from rig.api.athletes import Athlete, AthleteJump, JumpQuery
+from rig.api.fields import LONGEST_LINE
+from service.seam.rig import RigService
+from webpanel.routes.common import Moment, compressed, strict_router
+
+_ATHLETES: Final = TypeAdapter(list[Athlete])
+_JUMPS: Final = TypeAdapter(list[AthleteJump])
+
+
+def _query(
+    *,
+    athlete: Annotated[
+        str, Query(max_length=LONGEST_LINE, description="the whole name; case and spaces do not matter")
+    ] = "",
+    since: Annotated[Moment | None, Query(description="taken off at this time or later, with its zone")] = None,
+    until: Annotated[Moment | None, Query(description="taken off before this time, with its zone")] = None,
+    limit: Annotated[int | None, Query(ge=1, le=100_000, description="at most so many; all if left out")] = None,
+) -> JumpQuery:
+    return JumpQuery.model_construct(athlete=athlete, since=since, until=until, limit=limit)
+
+
+def athletes_router(service: RigService) -> APIRouter:
+    """The routes about measured jumps by athlete."""
+    router = strict_router("Athletes")
+
+    @router.get("/athletes", response_model=list[Athlete])
+    def list_athletes(request: Request) -> Response:
+        """Everybody of whom jumps were measured, by name. Names that differ in case or spaces only are one athlete."""
+        return compressed(request, _ATHLETES.dump_json(service.athletes()))
+
+    @router.get("/jumps", response_model=list[AthleteJump])
+    def list_jumps(request: Request, query: Annotated[JumpQuery, Depends(_query)]) -> Response:
+        """The measured jumps of all recordings that fit everything that is given, newest first; all if nothing is.
+
+        A recording whose athlete is corrected has its jumps under the new name at once. What lies in the trash is left
+        out.
+        """
+        return compressed(request, _JUMPS.dump_json(service.measured_jumps(query)))
+
+    return router

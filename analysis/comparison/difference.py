@@ -108,7 +108,7 @@ def difference(alignment: Alignment, draws: int = DRAWS) -> Difference:
     times = common_times([a, b])
     one, other = series(a, times), series(b, times)
     calibration = shared_calibration([a.recording, b.recording])
-    shared = _calibration(one, other, calibration) + _takeoff(one, other, alignment.shared_sigma_s)
+    shared = shared_covariance(one, other, calibration, alignment.shared_sigma_s)
     noise = noise_covariance(one) + noise_covariance(other)
     known = np.isfinite(one.values + other.values).ravel()
     covariance = (shared + noise)[np.ix_(known, known)]
@@ -126,12 +126,22 @@ def difference(alignment: Alignment, draws: int = DRAWS) -> Difference:
         np.sqrt(stated),
         repeat,
         p,
-        -np.expm1(independent * np.log1p(-np.minimum(p, 1 - 1e-12))),
+        as_greatest(p, independent),
         independent,
         limit,
         calibration.common,
         _power(extremes, deviation, known, times, limit),
     )
+
+
+def as_greatest(p: Floats, independent: float) -> Floats:
+    """Probability that the greatest of so many independent differences is as large as one of probability p."""
+    return np.asarray(-np.expm1(independent * np.log1p(-np.minimum(p, 1 - 1e-12))))
+
+
+def shared_covariance(one: Series, other: Series, calibration: SharedCalibration, shared_sigma_s: float) -> Floats:
+    """Covariance (11 T, 11 T) of the difference by calibration and take-off; `calibration` has one `own` for each."""
+    return _calibration(one, other, calibration) + _takeoff(one, other, shared_sigma_s)
 
 
 def _calibration(one: Series, other: Series, calibration: SharedCalibration) -> Floats:

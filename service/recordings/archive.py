@@ -14,6 +14,7 @@ from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from recorder.log.extent import CONTINUES
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery
+from rig.api.comparison import Comparison, Span
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.looking import Moment, MomentKind, Note, VoiceNote
 from rig.api.measuring import Measurement
@@ -35,6 +36,7 @@ from rig.errors import StateForbidsError, StillRecordingError, UnknownRecordingE
 from rig.phrase import Phrase, Value
 from rig.pulse import Pause
 from rig.tag import TripletTag
+from service.comparing.asking import Comparisons
 from service.exports.jobs import Exports
 from service.measuring.queue import Measurings
 from service.measuring.results import jumps_in_full, result_downloads, result_file
@@ -90,6 +92,7 @@ class Archive(ABC):
         self._checksums: dict[str, str] = {}
         self._descriptions: dict[tuple[str, bool], tuple[Entry, Recording]] = {}
         self._jumps = MeasuredJumps(catalogue.directory)
+        self._comparisons = Comparisons(catalogue.directory, lambda: self.status().recording is not None)
 
     @abstractmethod
     def status(self) -> Status:
@@ -184,6 +187,16 @@ class Archive(ABC):
     def measured_jumps(self, query: JumpQuery) -> list[AthleteJump]:
         """The measured jumps that a query finds, newest first; none that lies in the trash."""
         return wanted(self._jumps.of(self._catalogue.entries()), query)
+
+    def compare_spans(self, athlete: str, first: Span, second: Span) -> Comparison:
+        """Whether an athlete's jumps of two spans of time differ by more than chance.
+
+        Raises:
+            StateForbidsError: a recording runs.
+            BadInputError: a span has no jump that was measured well, or they cannot be compared.
+        """
+        spans = [JumpQuery(athlete=athlete, since=span.since, until=span.until) for span in (first, second)]
+        return self._comparisons.groups(*(self.measured_jumps(span) for span in spans))
 
     def measure(self, recording_id: str) -> Measurement:
         """Have the log of a recording measured, again if it was measured before.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery
+from rig.api.comparison import Comparison, Span
 from rig.api.looking import Moment, Note, VoiceNote
 from rig.api.measuring import Measurement
 from rig.api.recordings import Pulses, Recording, RecordingQuery, SessionChange, Trash
@@ -131,6 +132,10 @@ class Archive(Protocol):
 
     def measured_jumps(self, query: JumpQuery) -> list[AthleteJump]:
         """The measured jumps that a query finds, newest first; none that lies in the trash."""
+        ...
+
+    def compare_spans(self, athlete: str, first: Span, second: Span) -> Comparison:
+        """Whether an athlete's jumps of two spans differ by more than chance. StateForbidsError: a recording runs."""
         ...
 
     def measure(self, recording_id: str) -> Measurement:

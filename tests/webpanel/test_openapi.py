@@ -46,7 +46,7 @@ CALLS = {
     "DELETE /api/recordings/{recording_id}/measurement",
     "GET /api/recordings/{recording_id}/measurement/files/{name}",
     "GET /api/recordings/{recording_id}/link", "POST /api/login/link",
-    "GET /api/athletes", "GET /api/jumps",
+    "GET /api/athletes", "GET /api/jumps", "GET /api/jumps/comparison",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 

@@ -6,9 +6,10 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import TypeAdapter
 
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery
+from rig.api.comparison import Comparison, Span
 from rig.api.fields import LONGEST_LINE
 from service.seam.rig import RigService
-from webpanel.routes.common import Moment, compressed, strict_router
+from webpanel.routes.common import Moment, compressed, refusals, strict_router
 
 _ATHLETES: Final = TypeAdapter(list[Athlete])
 _JUMPS: Final = TypeAdapter(list[AthleteJump])
@@ -43,5 +44,21 @@ def athletes_router(service: RigService) -> APIRouter:
         out.
         """
         return compressed(request, _JUMPS.dump_json(service.measured_jumps(query)))
+
+    @router.get("/jumps/comparison", responses=refusals(409, 422))
+    def compare_spans(
+        athlete: Annotated[str, Query(min_length=1, max_length=LONGEST_LINE, description="the whole name")],
+        first_since: Annotated[Moment, Query(description="beginning of the first span, with its zone")],
+        first_until: Annotated[Moment, Query(description="its end")],
+        second_since: Annotated[Moment, Query(description="beginning of the second span")],
+        second_until: Annotated[Moment, Query(description="its end")],
+    ) -> Comparison:
+        """Whether an athlete's jumps of two spans of time differ by more than chance: the second less the first.
+
+        Means are judged by how the jumps scatter within their spans, and the greatest of all differences as the
+        greatest of many; two single jumps as `svev compare` does. It takes some seconds, and gives way to a recording.
+        """
+        first, second = (first_since, first_until), (second_since, second_until)
+        return service.compare_spans(athlete, *(Span(since=since, until=until) for since, until in (first, second)))
 
     return router

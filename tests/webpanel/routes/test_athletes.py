@@ -7,9 +7,12 @@ from typing import Any
 import httpx
 import pytest
 
+from analysis.result import file as result_file
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump, MeasuredValue
+from rig.api.recordings import RecordingOrder
 from service.measuring.results import keep_result
+from tests.analysis.result.recordings import recording
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 
@@ -96,3 +99,33 @@ def test_a_corrected_name_a_new_result_and_the_trash_count_at_once(client: httpx
     assert _jumps(client, athlete="åse / ødegård?") == [("f", 2, "good"), ("d", 1, "good"), ("f", 1, "good")]
     client.delete("/api/recordings/f").raise_for_status()
     assert _jumps(client, athlete="åse / ødegård?") == [("d", 1, "good")]
+
+
+def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Client, service: MemoryService) -> None:
+    """Three jumps a day: the leg angle of the second day is greater by much more than jumps scatter."""
+    for number, angle in enumerate((-1.0, 1.0, -1.0, 9.0, 11.0, 9.0)):
+        log = write_recording(service.catalogue.directory, f"day-{number}", session={"athlete": "Ola"})
+        made = log.parent / "made"
+        made.mkdir()
+        result_file.write_json(result_file.to_json(recording(seed=number, leg_deg=angle)), made / "jumper.json")
+        keep_result(made, log, (jump(log.stem, 1, NOON + timedelta(days=number // 3, minutes=number), 25.0),))
+    measure(
+        write_recording(service.catalogue.directory, "bad", session={"athlete": "Ola"}),
+        jump("bad", 1, NOON, 25.0, ok=False),
+    )
+    spans = {
+        "first_since": "2026-02-14T00:00:00Z", "first_until": "2026-02-15T00:00:00Z",
+        "second_since": "2026-02-15T00:00:00Z", "second_until": "2026-02-16T00:00:00Z",
+    }  # fmt: skip
+    found = client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}).raise_for_status().json()
+    assert (found["first"], found["second"], found["left_out"], found["one_place"]) == (3, 3, 1, True)
+    assert found["different"] == ["alpha"]
+    by_name = {each["quantity"]: each for each in found["quantities"]}
+    assert by_name["alpha"]["difference"] == pytest.approx(10.0, abs=1.5)
+    assert by_name["alpha"]["p"] < 0.05 < by_name["gamma"]["p"]
+    assert by_name["alpha"]["needed"] < by_name["alpha"]["difference"]
+    refused(client.get("/api/jumps/comparison", params={"athlete": "Kari", **spans}), 422)
+    service.arm()
+    service.start_recording(RecordingOrder())
+    said = refused(client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}), 409)
+    assert said.detail == "jumps are not compared while a recording runs: try again when it has ended"

@@ -1,0 +1,1 @@
+"""Compares measured jumps when somebody asks for it: groups of an athlete's, or two of anybody's."""

@@ -1,6 +1,6 @@
 """Writes everything that an analysis found into a folder."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from analysis.export import motion_files
@@ -8,6 +8,8 @@ from analysis.measurements.file import write_measurements
 from analysis.procedure.analyze import Analysis
 from analysis.report import overlay_file
 from analysis.report.coach import write_report
+from analysis.report.kinogram.earlier import EarlierJump
+from analysis.report.kinogram.folder import write_kinograms
 from analysis.report.protocol import write_protocol
 from analysis.report.video import write_video
 from analysis.result import file as result_file
@@ -19,7 +21,13 @@ VIDEO = "overlay.webm"
 
 
 def write_folder(
-    analysis: Analysis, log: Path, folder: Path, *, video: bool = False, progress: Callable[[str, float], None] | None
+    analysis: Analysis,
+    log: Path,
+    folder: Path,
+    *,
+    earlier: Sequence[EarlierJump] = (),
+    video: bool = False,
+    progress: Callable[[str, float], None] | None,
 ) -> list[Path]:
     """Write the result, what it was computed from, and the pages for people.
 
@@ -27,6 +35,7 @@ def write_folder(
         analysis: what was found.
         log: where the images are.
         folder: made if it does not exist; files of an earlier analysis are replaced.
+        earlier: measured jumps of the same athlete, for the marks of the kinogram.
         video: write the overlay video too.
         progress: told what is being done.
 
@@ -46,6 +55,15 @@ def write_folder(
         write_measurements(analysis.measurements, written[1])
         write_network(analysis.scene.network, written[2])
         written += motion_files.write(analysis.result, folder)
+        written += write_kinograms(
+            analysis.result,
+            analysis.measurements,
+            analysis.system,
+            log,
+            folder,
+            perpendicular=analysis.perpendicular,
+            earlier=earlier,
+        )
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from error
     tell("writing", 0.5)

@@ -94,13 +94,23 @@ def report_page(
         shown = JumpShown(jump, course, pulses, overlays, crops, system.names, figures)
         parts.append(jump_section(shown, several=len(result.jumps) > 1))
     main = "\n".join(parts) or "<p>There is no jump in this recording.</p>"
-    return _page(_title(result), f"{_head(result)}\n<main>{_alarms(result)}{main}</main>\n{_notes(result)}")
+    body = f"{_head(result)}\n<main>{_alarms(result)}{main}</main>\n{_notes(result)}"
+    return lone_page(_title(result), body, "report.css", "report.js")
 
 
-def _page(title: str, body: str) -> str:
-    style, script = _resource("report.css"), _resource("report.js")
+def lone_page(title: str, body: str, style_name: str, script_name: str | None = None) -> str:
+    """A page that needs nothing from elsewhere, and may load nothing.
+
+    Args:
+        title: of the page, plain text.
+        body: of the page, HTML.
+        style_name: name of its style sheet below this folder.
+        script_name: likewise of its script; None: it has none.
+    """
+    style, script = _resource(style_name), "" if script_name is None else _resource(script_name)
+    scripts = f"'{_hash(script)}'" if script else "'none'"
     policy = (
-        f"default-src 'none'; img-src data:; style-src '{_hash(style)}'; script-src '{_hash(script)}'; "
+        f"default-src 'none'; img-src data:; style-src '{_hash(style)}'; script-src {scripts}; "
         "base-uri 'none'; form-action 'none'"
     )
     head = (
@@ -108,7 +118,7 @@ def _page(title: str, body: str) -> str:
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
         f"<title>{escape(title)}</title><style>{style}</style>"
     )
-    whole = f"{body}\n<script>{script}</script>"
+    whole = f"{body}\n<script>{script}</script>" if script else body
     return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n{whole}</body></html>\n'
 
 

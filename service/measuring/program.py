@@ -29,6 +29,7 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
     from analysis.report.video import write_video  # noqa: PLC0415
     from analysis.worker.findings import summary  # noqa: PLC0415
+    from service.measuring.earlier import earlier_jumps  # noqa: PLC0415
 
     def progress(step: str, share: float) -> None:
         tell(last=share in {0.0, 1.0}, step=_STEPS[step], share=share)
@@ -36,8 +37,9 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     log, out = Path(asked["log"]), Path(asked["out"])
     survey, calibration = (Path(asked[key]) if asked[key] else None for key in ("survey", "calibration"))
     found = analyze(log, read_source(survey, calibration), progress=progress)
-    write_folder(found, log, out, progress=progress)
     result = found.result
+    earlier = earlier_jumps(log, result.session.get("athlete", ""))
+    write_folder(found, log, out, earlier=earlier, progress=progress)
     jumps = [
         summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
     ]

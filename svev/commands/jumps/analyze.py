@@ -12,6 +12,7 @@ from analysis.procedure.analyze import Analysis, analyze
 from analysis.procedure.result_folder import write_folder
 from analysis.report.course import course_of
 from analysis.report.figures import five_figures, plus_minus
+from analysis.report.kinogram.earlier import read_earlier
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
 from svev.commands.logs.contents import AlsoJson, LogPath
@@ -39,13 +40,17 @@ def analyze_command(
     by_hand: Annotated[
         Path | None, typer.Option(metavar="FILE", help="use these measurements beside the automatic ones, first")
     ] = None,
+    earlier: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="DIR", help="result of an earlier jump of this athlete, for the marks of the kinogram"),
+    ] = None,
     video: Annotated[bool, typer.Option("--video", help="write the overlay video too")] = False,
     as_json: AlsoJson = False,
 ) -> None:
     """Measure the jumps of a recording: points, skis, angles, height and speed, each with its sigma.
 
     The balls in the log's own images and their survey orient the cameras; nothing is to be clicked. The folder gets
-    jumper.json and .csv, .c3d and .trc, report.html for the coach and protocol.html for the geodesist.
+    jumper.json and .csv, .c3d and .trc, report.html and the kinogram for the coach, protocol.html for the geodesist.
 
     Exit codes: 0 measured; 2 bad input; 3 nobody jumps in the log, or the balls do not determine the cameras; 4 the
     adjustment did not converge, or the disk refuses.
@@ -55,6 +60,7 @@ def analyze_command(
     source = read_source(survey, calibration)
     by_hand_only = None if measurements is None else read_measurements(measurements)
     more = None if by_hand is None else read_measurements(by_hand)
+    before = [jump for folder in earlier or () for jump in read_earlier(folder)]
     with console.steps() as tell:
         try:
             analysis = analyze(
@@ -68,7 +74,7 @@ def analyze_command(
         except (NotSolvableError, NotConvergedError) as error:
             console.complain(f"{log}: the balls do not determine the cameras: {error}")
             raise typer.Exit(NOT_CONVERGED if isinstance(error, NotConvergedError) else NOT_SOLVABLE) from None
-        files = write_folder(analysis, log, out, video=video, progress=tell)
+        files = write_folder(analysis, log, out, earlier=before, video=video, progress=tell)
     for line in _lines(analysis):
         console.say(line, aside=as_json)
     if as_json:

@@ -10,6 +10,7 @@ from analysis.result.model import MeasuredRecording
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription
 from rig.clocks import UtcNs
+from rig.frame import FrameStatus
 from rig.pulse import HillPulse
 from simrig.images.view import CameraView
 from tests.analysis.result.recordings import model, recording
@@ -27,10 +28,11 @@ def imaged_pulses(every: int = EVERY) -> list[int]:
     return list(range(pulses[0] - every, pulses[-1] + 2 * every, every))
 
 
-def write_jump_log(path: Path, every: int = EVERY) -> None:
-    """The log of a jump."""
+def write_jump_log(path: Path, every: int = EVERY, lost: str = "") -> None:
+    """The log of a jump; `lost`: a camera that never delivers a frame."""
     scenario = training().model_copy(update={"seed": JUMP_SEED})
     views = [CameraView(scenario, camera, *SIZE, RATE_HZ) for camera in range(3)]
+    statuses = [FrameStatus.LOST if camera.name == lost else FrameStatus.OK for camera in scenario.cameras]
     buffers = TripletBuffers(SHAPE, 4)
     with open_writer(path, buffers, LogDescription(SESSION, RIG, RIG_TOML)) as log:
         for pulse in imaged_pulses(every):
@@ -39,7 +41,7 @@ def write_jump_log(path: Path, every: int = EVERY) -> None:
             for camera, view in enumerate(views):
                 view.render_into(image[:, camera * SIZE[0] : (camera + 1) * SIZE[0]], HillPulse(pulse))
             time = UtcNs(START_NS + round(pulse * 1e9 / RATE_HZ))
-            log.write_pulse(make_tag(pulse, shape=SHAPE, time=time), slot, time)
+            log.write_pulse(make_tag(pulse, statuses, SHAPE, time), slot, time)
     buffers.close()
 
 

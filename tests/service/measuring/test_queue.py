@@ -21,6 +21,7 @@ from rig.api.measuring import Measurement, MeasuringState
 from rig.errors import StateForbidsError
 from rig.events import Event
 from rig.settings.model import AnalysisSettings
+from service.measuring.earlier import earlier_jumps
 from service.measuring.queue import Measurings
 from service.measuring.waiting import NAME
 from service.recordings import live_results
@@ -114,6 +115,8 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
     assert jump.takeoff_speed is not None
     assert abs(jump.takeoff_speed.value - 26.1) < 1.0
     assert {"report.html", "jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html"} <= set(done.files)
+    assert {"kinogram.html", "kinogram.jpg", "kinogram.json"} <= set(done.files)
+    assert [earlier.ok for earlier in earlier_jumps(bench.log("next"), "anna  berg")] == [True]
     assert live_results.latest(bench.folder) == jump
     assert live_results.takeoff_pulse(bench.log("jump")) == pytest.approx(30 - 16 + 1, abs=1)
     catalogue = Catalogue(bench.folder)

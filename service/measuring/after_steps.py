@@ -100,7 +100,7 @@ class AfterSteps:
             if end is not None and log.exists():
                 self._note(recording, log, AfterStep.COPY, end.get("problem"))
         except (OSError, ValueError) as error:
-            self._tell_of(recording, "event_log_not_copied", "{recording} is not copied: {why}", plain(str(error)))
+            self._warn(_not_copied(recording, plain(str(error))))
 
     def _child(self, recording: str, module: str, asked: dict[str, Any]) -> dict[str, Any] | None:
         return run_child(
@@ -117,9 +117,9 @@ class AfterSteps:
         why = None if problem is None else _phrase(problem)
         keep_step(log, step, None if why is None else _warning(why))
         if why is not None and step is AfterStep.COPY:
-            self._tell_of(recording, "event_log_not_copied", "{recording} is not copied: {why}", why)
+            self._warn(_not_copied(recording, why))
         elif why is not None:
-            self._tell_of(recording, "event_no_video", "{recording} has no video: {why}", why)
+            self._warn(phrase("event_no_video", "{recording} has no video: {why}", recording=recording, why=why))
 
     def _fail(self, recording: str, log: Path, why: Phrase) -> None:
         """Note that a log cannot be measured."""
@@ -130,10 +130,15 @@ class AfterSteps:
                 raise
             except OSError as error:
                 why = plain(f"{log}: {error.strerror}")
-        self._tell_of(recording, "event_log_not_measured", "{recording} is not measured: {why}", why)
+        text = "{recording} is not measured: {why}"
+        self._warn(phrase("event_log_not_measured", text, recording=recording, why=why))
 
-    def _tell_of(self, recording: str, code: str, text: str, why: Phrase) -> None:
-        self._tell(Event.now(EventLevel.WARNING, "analysis", phrase(code, text, recording=recording, why=why)))
+    def _warn(self, said: Phrase) -> None:
+        self._tell(Event.now(EventLevel.WARNING, "analysis", said))
+
+
+def _not_copied(recording: str, why: Phrase) -> Phrase:
+    return phrase("event_log_not_copied", "{recording} is not copied: {why}", recording=recording, why=why)
 
 
 def _warning(why: Phrase) -> Statement:

@@ -11,7 +11,7 @@ from rig.errors import StateForbidsError
 from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 
 NAME: Final = ".svev-measuring.json"
 _MOST: Final = 2000
@@ -68,7 +68,8 @@ class WaitingLogs:
             return
         except (OSError, ValidationError) as error:
             text = "{file}: cannot be read, so logs that waited to be measured are forgotten ({why})"
-            self._warn("event_no_queue", text, str(error).partition("\n")[0])
+            why = str(error).partition("\n")[0]
+            self._warn(phrase("event_no_queue", text, file=NAME, why=why))
             return
         with self._lock:
             self._ids = [*before[:_MOST], *(recording for recording in self._ids if recording not in before)]
@@ -83,7 +84,8 @@ class WaitingLogs:
             replace_file(self._file, _IDS.dump_json(ids), links=False)
         except OSError as error:
             text = "{file}: cannot be written ({why}): a service that starts again does not know what to measure"
-            self._warn("event_queue_not_kept", text, error.strerror or str(error))
+            why = error.strerror or str(error)
+            self._warn(phrase("event_queue_not_kept", text, file=NAME, why=why))
 
-    def _warn(self, code: str, text: str, why: str) -> None:
-        self._tell(Event.now(Level.WARNING, "analysis", phrase(code, text, file=NAME, why=why)))
+    def _warn(self, said: Phrase) -> None:
+        self._tell(Event.now(Level.WARNING, "analysis", said))

@@ -196,6 +196,7 @@ def test_the_page_needs_nothing_and_says_it_in_both_languages(log: Path, tmp_pat
     assert "Measured well Godt målt" in text
     assert "Take-off speed Fart på kanten" in text
     picture = cv2.imread(str(tmp_path / "kinogram.jpg"))
+    assert picture is not None
     assert picture.shape[1] == 1080
     assert (tmp_path / "kinogram.jpg").stat().st_size < 600_000
 
@@ -302,7 +303,7 @@ def test_marks_stand_on_the_page_and_a_doubtful_jump_has_none(log: Path, tmp_pat
         replace(
             own,
             time=own.time - timedelta(days=day),
-            figures=own.figures | {"takeoff_speed": Quantity(24.0 + 0.1 * day, 0.01)},
+            figures={**own.figures, "takeoff_speed": Quantity(24.0 + 0.1 * day, 0.01)},
         )
         for day in range(1, 4)
     ]

@@ -35,6 +35,8 @@ COMPOSED = (
     "export.",
     "log.is_",
     "log.of_",
+    "measurement.after_",
+    "measurement.state_",
     "measurement.step_",
 )
 #: The rooms whose sentences reach the page.

@@ -9,12 +9,12 @@ from playwright.sync_api import Page, expect
 
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump, MeasuredValue
-from rig.api.measuring import MeasuringQueue, MeasuringState, MeasuringStep
+from rig.api.measuring import AfterStep, MeasuringQueue, MeasuringState, MeasuringStep
 from rig.api.recordings import RecordingOrder
 from rig.api.statement import Level, Statement
 from rig.api.status import State
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import keep_problem
+from service.measuring.results import keep_problem, keep_step
 from tests.browser.conftest import Open, keep_measured
 from tests.browser.views import assert_fits_a_phone
 from tests.webpanel.memory_service import MemoryService
@@ -154,6 +154,19 @@ def test_an_earlier_result_stays_when_measuring_again_fails(
     )
     expect(page.locator("#measurement-jumps .figures")).to_be_visible()
     expect(page.locator("#measurement-files a").first).to_be_visible()
+
+
+def test_each_step_after_a_recording_is_shown_with_its_state(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open
+) -> None:
+    log = service.catalogue.file("jump-2")
+    missing = Statement(level=Level.WARNING, code="storage", text="/backup: the folder for copies is not there")
+    keep_step(log, AfterStep.VIDEO, None)
+    keep_step(log, AfterStep.COPY, missing)
+    page = open_page(f"{panel.url}/#/recordings/jump-2")
+    steps = page.locator("#measurement-steps li")
+    expect(steps).to_have_text(["Measured: done", "Video: done", re.compile("^Copy: failed.*/backup: the folder")])
+    expect(steps.nth(2).locator(".mark")).to_have_attribute("data-level", "warning")
 
 
 def test_a_recording_in_progress_and_one_in_the_trash_have_one_quiet_line(

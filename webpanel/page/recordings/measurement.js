@@ -8,6 +8,7 @@ import { day, number, timeOfDay } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
+import { makeSteps } from "./steps.js";
 
 /** @typedef {import("./types.js").Measurement} Measurement */
 /** @typedef {import("../shared/types.js").LastJump} LastJump */
@@ -123,6 +124,7 @@ function drawProgress(shown) {
   setText($("measurement-share"), begun ? `${number(100 * share)}\u202f%` : "");
   $("measurement-share").hidden = $("measurement-bar").hidden = !begun;
   $("measurement-bar").value = share;
+  $("measurement-steps").replaceChildren(...makeSteps(shown.steps));
 }
 
 /**

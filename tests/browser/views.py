@@ -17,6 +17,8 @@ READY = {
     "doctor": "#doctor-run",
     "aim": "#aim-cameras button",
     "rig": "#rig-facts div",
+    "coach": "#coach-replay[data-stage=ready]",
+    "jump/jump-2": "#visit-files a",
 }
 SMALLEST_TOUCH_PX = 44
 #: What a finger has to hit, and fails to have room for it.

@@ -356,7 +356,9 @@ class MemoryService(Archive):
         return lambda: self._listeners.discard(wake)
 
     def rig(self) -> RigView:
-        return RigView(name="memory", toml=RIG_TOML.decode(), settings={"name": "memory"})
+        return RigView(
+            name="memory", toml=RIG_TOML.decode(), settings={"name": "memory", "service": {"coach_delay_s": 1.0}}
+        )
 
     def doctor(self) -> DoctorReport:
         small = warning(Topic.NETWORK, "check_router", "{said}, but {subnet}", "do so", said=LINK, subnet="10.0.0.0/24")

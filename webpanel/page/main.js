@@ -7,10 +7,13 @@ import { startRole } from "./frame/role.js";
 import { startSettings } from "./frame/settings.js";
 import { startSignals } from "./frame/signals.js";
 import { startLanguage } from "./i18n/i18n.js";
+import { drawShare, enterShare, startShare } from "./jump/code.js";
+import { drawCoach, startCoach } from "./jump/coach.js";
+import { drawVisit, enterVisit, leaveVisit, startVisit } from "./jump/visit.js";
 import { startActions } from "./live/actions.js";
 import { startAutomatic } from "./live/automatic.js";
 import { startHealth } from "./live/health.js";
-import { startMeasured } from "./live/measured.js";
+import { drawMeasured, startMeasured } from "./live/measured.js";
 import { startPreview } from "./live/preview.js";
 import { startSession } from "./live/session.js";
 import { startStartList } from "./live/startlist.js";
@@ -21,7 +24,8 @@ import { startMeasurement } from "./recordings/measurement.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
 import { connect, startBanner } from "./shared/connection.js";
-import { startRouter } from "./shared/router.js";
+import { startLatest } from "./shared/latest.js";
+import { place, startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
 import { startAim } from "./system/aim.js";
 import * as doctor from "./system/doctor.js";
@@ -49,11 +53,24 @@ function redraw() {
   drawKeys();
   drawPulses();
   drawRegion();
+  drawMeasured();
+  drawShare();
+  drawCoach();
+  if (place().view === "jump") drawVisit();
 }
 
+let connected = false;
+
 /** @param {import("./shared/router.js").Place} place */
-function entered({ view, id }) {
+function entered({ view, id, key }) {
   scrubber.clearScrubber();
+  leaveVisit();
+  enterShare(view === "recording" ? id : "");
+  if (view === "jump") void enterVisit(id, key);
+  else if (!connected) { // a link opens its jump, and not what happens at the hill
+    connected = true;
+    connect();
+  }
   if (view === "recordings") recordings.enterRecordings();
   if (view === "recording") void recording.enterRecording(id);
   if (view === "doctor") {
@@ -68,8 +85,8 @@ function entered({ view, id }) {
 
 startSettings(redraw);
 startLanguage();
-for (const start of [startState, startSession, startStartList, startActions, startAutomatic, startPreview, startHealth, startMeasured, startBanner, startLog]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement]) start();
+for (const start of [startState, startSession, startStartList, startActions, startAutomatic, startPreview, startHealth, startMeasured, startBanner, startLog, startLatest]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement, startShare, startCoach, startVisit]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();
@@ -77,4 +94,3 @@ startAlarms();
 startLogin(() => location.reload());
 startRouter(entered, recordings.leaveRecordings);
 document.addEventListener("visibilitychange", () => update({ visible: !document.hidden }));
-connect();

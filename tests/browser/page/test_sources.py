@@ -48,7 +48,7 @@ SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 def _words(language: str) -> dict[str, str]:
     return {
         key: text
-        for name in (language, f"{language}-check", f"{language}-measuring")
+        for name in (language, f"{language}-check", f"{language}-jump", f"{language}-measuring")
         for key, text in WORDS.findall((PAGE / "i18n" / f"{name}.js").read_text())
     }
 
@@ -59,7 +59,9 @@ def _placeholders(text: str) -> set[str]:
 
 def _sources() -> str:
     own_words = {
-        PAGE / "i18n" / f"{language}{part}.js" for language in ("en", "nb") for part in ("", "-check", "-measuring")
+        PAGE / "i18n" / f"{language}{part}.js"
+        for language in ("en", "nb")
+        for part in ("", "-check", "-jump", "-measuring")
     }
     return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
 
@@ -220,9 +222,9 @@ def test_the_shapes_are_those_of_the_api(name: str) -> None:
 def test_modules_import_each_other_one_way() -> None:
     """Views see what is shared, never each other; only what is around them (`frame`, `main.js`) sees several."""
     sees = {
-        "": {"frame", "i18n", "live", "recordings", "shared", "system", "viewing"},
+        "": {"frame", "i18n", "jump", "live", "recordings", "shared", "system", "viewing"},
         "frame": {"frame", "i18n", "live", "recordings", "shared", "viewing"},
-        **{view: {view, "i18n", "shared"} for view in ("live", "system", "viewing")},
+        **{view: {view, "i18n", "shared"} for view in ("jump", "live", "system", "viewing")},
         "recordings": {"recordings", "viewing", "i18n", "shared"},
         "shared": {"i18n", "shared"},
         "i18n": {"i18n", "shared"},

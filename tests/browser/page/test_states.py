@@ -14,7 +14,7 @@ from rig.api.status import AutomaticStatus, State, Status
 from rig.errors import StateForbidsError
 from tests.browser.conftest import Open
 from tests.support.waiting import wait_until
-from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel
 
 HIDE = (
@@ -69,7 +69,7 @@ def test_a_key_acts_on_the_view_that_the_key_before_it_opened(
 
 
 def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
-    panel: Panel, service: MemoryService, jumps: None, open_page: Open
+    panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
     service.arm()
     page = open_page(panel.url)
@@ -81,6 +81,7 @@ def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
         "speed_20_m": MeasuredValue(value=25.489, sigma=0.004),
         "angle_of_attack": MeasuredValue(value=19.5121, sigma=0.5),
     }
+    write_recording(service.catalogue.directory, "jump-1")
     why = "only 3 of 17 pulses show both skis in flight (all points in 32 of 35 pulses in sight)"
     service.last_jump = LastJump(
         recording="jump-1", jump=1, time=datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC), ok=False, verdict=why, **values

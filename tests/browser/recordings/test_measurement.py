@@ -1,6 +1,7 @@
 """What was measured in a recording, on its page."""
 
 import re
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -187,29 +188,40 @@ def test_a_recording_in_progress_and_one_in_the_trash_have_one_quiet_line(
     _state(page, "Not measured yet.")
 
 
-def test_the_live_view_says_whose_jump_was_measured_and_how_many_wait(
-    panel: Panel, service: MemoryService, jumps: None, open_page: Open
+def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
+    panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
     service._become(State.ARMED)
     page = open_page(panel.url)
     card, queue, jumper = page.locator("#measured"), page.locator("#measured-queue"), page.locator("#measured-who")
     expect(page.locator("#state-word")).to_have_text("Armed")
     expect(card).to_be_hidden()
-    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.MEASURING, waiting=2)
-    service._wake()
-    expect(queue).to_have_text("measuring 1, waiting 2")
-    expect(card.get_by_role("heading")).to_have_text("Measurement ")
-    for hidden in ("#measured-who", "#measured-figures", "#measured-verdict"):
-        expect(page.locator(hidden)).to_be_hidden()
-    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.MEASURING, paused=True)
-    service.last_jump = LIVE
+    started = service.start_recording(RecordingOrder(bib="17", athlete="Anna Berg", preroll_s=0))
+    service.stop_recording(started.id)
+    service.measurings._append(started.id)
+    service.measurings._running = MeasuringQueue(recording=started.id, state=MeasuringState.MEASURING, waiting=2)
+    service.measuring = service.measurings._running
     service._wake()
     expect(jumper).to_have_text("17 · Anna Berg")
+    expect(page.locator("#measured-far")).to_have_text("Still measuring")
+    expect(queue).to_have_text("measuring 1, waiting 2")
+    for hidden in ("#measured-figures", "#measured-verdict", "#measured-why"):
+        expect(page.locator(hidden)).to_be_hidden()
+    card.scroll_into_view_if_needed()
+    replay = page.locator("#measured-replay")
+    expect(replay).to_have_attribute("data-stage", "ready")
+    first = replay.get_attribute("data-pulse")
+    expect(replay).not_to_have_attribute("data-pulse", str(first))
+    card.get_by_role("button", name="Stop").click()
+    expect(card.get_by_role("button", name="Play")).to_be_visible()
+
+    service.last_jump = LIVE.model_copy(update={"recording": started.id})
+    service._wake()
     expect(page.locator("#measured-verdict")).to_have_text("Measured live")
     expect(page.locator("#measured-why")).to_have_text("all points in 18 of 18 pulses in sight")
-    expect(queue).to_have_text("measuring 1 (waits while a recording runs)")
     expect(page.locator("#measured-figures")).to_be_visible()
-    service.measuring = MeasuringQueue()
+    service.measurings._waiting.clear()
+    service.measuring, service.measurings._running = None, None
     service._wake()
     expect(queue).to_be_hidden()
     jumper.click()
@@ -217,11 +229,27 @@ def test_the_live_view_says_whose_jump_was_measured_and_how_many_wait(
 
     page.goto(f"{panel.url}/#/live")
     with panel.client() as client:
-        assert client.patch("/api/recordings/jump-1", json={"athlete": "", "bib": ""}).is_success
-    expect(jumper).to_have_text("No name")
+        assert client.patch(f"/api/recordings/{started.id}", json={"athlete": ""}).is_success
+    expect(jumper).to_have_text("17 · name unknown")
     with panel.client() as client:
-        assert client.delete("/api/recordings/jump-1").is_success
+        assert client.delete(f"/api/recordings/{started.id}").is_success
     expect(card).to_be_hidden()
+
+
+def test_a_recording_without_a_jump_does_not_take_the_place_of_the_last_jump(
+    panel: Panel, service: MemoryService, log: Path, open_page: Open
+) -> None:
+    keep_measured(log, (LIVE.model_copy(update={"live": False, "ok": True}),))
+    nobody = service.catalogue.file("jump-2")
+    shutil.rmtree(nobody.with_name("jump-2.measured"))
+    keep_measured(nobody, ())
+    page = open_page(panel.url)
+    expect(page.locator("#measured-who")).to_have_text("4 · Ola <b>Nordmann</b>")
+    expect(page.locator("#measured-far")).to_have_text("No jump was found in it")
+    service.last_jump = LIVE.model_copy(update={"live": False, "ok": True})
+    service._wake()
+    expect(page.locator("#measured-who")).to_have_text("17 · Anna Berg")
+    expect(page.locator("#measured-figures")).to_be_visible()
 
 
 @pytest.mark.parametrize("part", ["live", "recordings/jump-2"])

@@ -3,6 +3,7 @@
 import { say } from "../i18n/i18n.js";
 import { call, onTokenNeeded } from "../shared/api.js";
 import { $, setText } from "../shared/dom.js";
+import { known } from "../shared/store.js";
 
 let needed = false;
 
@@ -17,6 +18,7 @@ export function startLogin(done) {
 }
 
 function show() {
+  if (known.view === "jump") return; // who has come by a link has no token; his page says what is wrong
   needed = true;
   if (!$("login").open) $("login").showModal();
 }

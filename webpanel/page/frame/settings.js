@@ -12,6 +12,7 @@ import { known, load, save } from "../shared/store.js";
 export function startSettings(redraw) {
   setLook(look());
   $("open-settings").addEventListener("click", openSettings);
+  $("settings-coach").addEventListener("click", () => $("settings").close());
   $("settings-close").addEventListener("click", () => $("settings").close());
   $("settings").addEventListener("click", (/** @type {MouseEvent} */ event) => {
     if (event.target === $("settings")) $("settings").close(); // the dimmed page around it

@@ -144,9 +144,13 @@ function play(context, pitch, at, length) {
   tone.stop(at + length);
 }
 
-/** Keep the display on while the rig is armed and the page is visible; the browser lets go when it is hidden. */
+/**
+ * Keep the display on while the page is visible: the coach's screen always, others while the rig is armed, if that is wished.
+ * The browser lets go when the page is hidden.
+ */
 async function keepAwake() {
-  const wanted = wants("awake") && known.visible && ["armed", "recording"].includes(known.status?.state ?? "");
+  const needed = known.view === "coach" || wants("awake") && ["armed", "recording"].includes(known.status?.state ?? "");
+  const wanted = needed && known.visible && "wakeLock" in navigator;
   if (locking || wanted === Boolean(lock && !lock.released)) return;
   locking = true;
   try {

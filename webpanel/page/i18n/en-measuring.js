@@ -1,6 +1,6 @@
 /** English words of what was measured. Every key stands in nb-measuring.js too (a test looks). */
 export const measuring = {
-  "measured.title": "Measured last",
+  "measured.title": "Last jump, figures",
   "measured.ok": "Measured well",
   "measured.doubtful": "Doubtful",
   "measured.takeoff_speed": "Take-off speed",

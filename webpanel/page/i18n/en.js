@@ -1,10 +1,12 @@
 /** English. Every key stands in nb.js too (a test looks). */
 
 import { check } from "./en-check.js";
+import { jump } from "./en-jump.js";
 import { measuring } from "./en-measuring.js";
 
 export const en = {
   ...check,
+  ...jump,
   ...measuring,
 
   "skip": "Skip to the content",

@@ -1,6 +1,6 @@
 /** Norske ord om det som ble målt. De samme nøklene som i en-measuring.js. */
 export const measuring = {
-  "measured.title": "Sist målt",
+  "measured.title": "Siste hopp, tall",
   "measured.ok": "Godt målt",
   "measured.doubtful": "Usikkert",
   "measured.takeoff_speed": "Fart på kanten",

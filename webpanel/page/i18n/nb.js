@@ -1,10 +1,12 @@
 /** Norsk bokmål. De samme nøklene som i en.js. */
 
 import { check } from "./nb-check.js";
+import { jump } from "./nb-jump.js";
 import { measuring } from "./nb-measuring.js";
 
 export const nb = {
   ...check,
+  ...jump,
   ...measuring,
 
   "skip": "Hopp til innholdet",

@@ -1,59 +1,54 @@
-/** The jump that was measured last: whose it is, its figures, whether they can be trusted; and how many logs are measured and wait. */
+/** The last jump: whose it is, its take-off again and again, its figures or how far their measuring is; and how many logs wait. */
 
 import { t } from "../i18n/i18n.js";
-import { call, recordingPath } from "../shared/api.js";
-import { hear } from "../shared/connection.js";
 import { $, setText } from "../shared/dom.js";
 import { fillFigures, levelOf, MARKS, verdictOf } from "../shared/figures.js";
-import { timeOfDay, who } from "../shared/format.js";
+import { timeOfDay } from "../shared/format.js";
+import { howFar, latest, latestFigures, named } from "../shared/latest.js";
+import { makeReplay } from "../shared/replay.js";
 import { known, watch } from "../shared/store.js";
 
-/** Id of the recording that was asked for last. */
-let asked = "";
-/** The recording of the jump; null: not known (yet), or deleted for good. @type {import("../shared/types.js").Recording|null} */
-let recording = null;
+/** @type {import("../shared/replay.js").Replay} */
+let replay;
+/** Whether the card is in sight, so that its pictures are worth fetching. */
+let near = false;
 
 export function startMeasured() {
-  hear({ recordings: () => void load(true) });
-  watch(() => {
-    void load(false);
-    draw();
-  });
+  replay = makeReplay($("measured-replay"), { may: () => near && known.view === "live" && known.connected && !known.status?.recording, button: true });
+  new IntersectionObserver((seen) => { near = Boolean(seen.at(-1)?.isIntersecting); draw(); }).observe($("measured"));
+  watch(draw);
 }
 
-/** @param {boolean} again also if it is known already: somebody may have changed it */
-async function load(again) {
-  const id = known.status?.last_jump?.recording ?? "";
-  if (!known.connected || (id === asked && !again)) return;
-  asked = id;
-  try {
-    const found = id ? await call("GET", recordingPath(id)) : null;
-    if (asked === id) recording = found;
-  } catch {
-    if (asked === id) recording = null; // it was deleted for good meanwhile, or the connection is lost, which the banner says
-  }
-  draw();
+/** Draw the words anew, in another language. */
+export function drawMeasured() {
+  replay.draw();
 }
 
 function draw() {
-  const jump = known.status?.last_jump ?? null;
-  const shown = jump && recording?.id === jump.recording && !recording.deleted ? jump : null; // no figures without a name
+  const { recording, measured } = latest;
+  const figures = latestFigures();
   const queue = queueInWords();
-  $("measured").hidden = !shown && !queue;
+  $("measured").hidden = !recording && !queue;
   setText($("measured-queue"), queue);
   $("measured-queue").hidden = !queue;
-  setText($("measured-title"), t(shown ? "measured.title" : "measurement.title"));
-  setText($("measured-time"), shown ? timeOfDay(shown.time) : "");
-  for (const part of ["measured-who", "measured-verdict", "measured-figures"]) $(part).hidden = !shown;
-  $("measured-why").hidden = !shown || shown.ok;
-  if (!shown || !recording) return;
-  setText($("measured-who"), who(recording.session, t("recordings.nobody")));
+  setText($("measured-title"), t(recording ? "measured.title" : "measurement.title"));
+  setText($("measured-time"), recording?.started ? timeOfDay(figures?.time ?? recording.started) : "");
+  for (const part of ["measured-who", "measured-replay"]) $(part).hidden = !recording;
+  for (const part of ["measured-verdict", "measured-figures"]) $(part).hidden = !figures;
+  const far = recording ? howFar(measured, Boolean(figures)) : "";
+  setText($("measured-far"), far);
+  $("measured-far").hidden = !far;
+  $("measured-why").hidden = !figures || figures.ok;
+  if (!recording) return replay.show("");
+  if (near) replay.show(recording.id, measured?.measured ?? "");
+  setText($("measured-who"), named(recording.session));
   $("measured-who").href = `#/recordings/${encodeURIComponent(recording.id)}`;
-  const level = levelOf(shown);
+  if (!figures) return;
+  const level = levelOf(figures);
   $("measured-verdict").dataset.level = level;
   setText($("measured-verdict"), t(MARKS[level]));
-  setText($("measured-why"), shown.ok ? "" : verdictOf(shown));
-  fillFigures($("measured-figures"), shown);
+  setText($("measured-why"), figures.ok ? "" : verdictOf(figures));
+  fillFigures($("measured-figures"), figures);
 }
 
 /** How many logs are being measured, and wait; empty if there are none. */

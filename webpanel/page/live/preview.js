@@ -71,7 +71,7 @@ function wanted() {
 function draw() {
   if (wanted() && !running) {
     running = true;
-    wantPicture(true);
+    wantPicture("live", true);
   } else if (!wanted() && running) {
     stop();
   }
@@ -80,7 +80,7 @@ function draw() {
 
 function stop() {
   running = false;
-  wantPicture(false);
+  wantPicture("live", false);
   viewer.image.removeAttribute("src");
 }
 

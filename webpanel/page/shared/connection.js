@@ -24,7 +24,8 @@ const hearers = [];
 let port = null;
 let watchdog = 0;
 let freshness = 0;
-let pictureWanted = false;
+/** Who wants live pictures. @type {Set<string>} */
+const viewers = new Set();
 let workerWorks = typeof SharedWorker !== "undefined";
 
 /**
@@ -60,19 +61,21 @@ export function renew() {
 }
 
 /**
- * Say whether this tab shows the live picture.
+ * Say whether a part of this tab shows the live picture.
  *
+ * @param {string} part
  * @param {boolean} wanted
  */
-export function wantPicture(wanted) {
-  pictureWanted = wanted;
+export function wantPicture(part, wanted) {
+  if (wanted) viewers.add(part);
+  else viewers.delete(part);
   wish();
 }
 
 /** Say what this tab shows. */
 function wish() {
   if (!document.hidden && Date.now() - known.heard > FRESH_MS) getOld(); // the tab or the whole device has slept
-  port?.postMessage({ type: "wish", visible: !document.hidden, picture: pictureWanted });
+  port?.postMessage({ type: "wish", visible: !document.hidden, picture: viewers.size > 0 });
 }
 
 function joinWorker() {

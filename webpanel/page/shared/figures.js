@@ -52,16 +52,43 @@ export function fillFigures(list, jump) {
 }
 
 /**
+ * The figures of a jump as one reads them from afar: speeds in km/h, value and standard deviation apart.
+ *
+ * @param {import("./types.js").LastJump} jump
+ * @returns {{ term: string, value: string, deviation: string, unit: string }[]}
+ */
+export function inLarge(jump) {
+  /** @type {(speed: MeasuredValue|null) => MeasuredValue|null} */
+  const inKmh = (speed) => speed && { value: KMH * speed.value, sigma: KMH * speed.sigma };
+  /** @type {[string, MeasuredValue|null, keyof typeof MOST_DIGITS][]} */
+  const rows = [
+    ["measured.takeoff_speed", inKmh(jump.takeoff_speed), "km/h"], ["measured.perpendicular", jump.perpendicular, "m/s"],
+    ["measured.speed_20_m", inKmh(jump.speed_20_m), "km/h"], ["measured.angle_of_attack", jump.angle_of_attack, "°"],
+    ["measured.ski_to_body", jump.ski_to_body, "°"],
+  ];
+  return rows.map(([key, measured, unit]) => ({ term: t(key), unit, ...inParts(measured, unit) ?? { value: "–", deviation: "" } }));
+}
+
+/**
  * A value with its standard deviation, both to the same place: the first digit of the standard deviation, if that is shown.
  *
  * @param {MeasuredValue|null} measured
  * @param {keyof typeof MOST_DIGITS} unit
  */
 function withSigma(measured, unit) {
-  if (!measured) return "–";
+  const parts = inParts(measured, unit);
+  return parts ? `${parts.value}\u202f±\u202f${parts.deviation}\u202f${unit}` : "–";
+}
+
+/**
+ * @param {MeasuredValue|null} measured
+ * @param {keyof typeof MOST_DIGITS} unit
+ */
+function inParts(measured, unit) {
+  if (!measured) return null;
   const { value, sigma } = measured;
   const digits = Math.min(MOST_DIGITS[unit], Math.max(0, -Math.floor(Math.log10(sigma))));
   const least = 10 ** -digits;
   const deviation = sigma < least / 2 ? `<\u202f${number(least, digits)}` : number(sigma, digits);
-  return `${number(value, digits)}\u202f±\u202f${deviation}\u202f${unit}`;
+  return { value: number(value, digits), deviation };
 }

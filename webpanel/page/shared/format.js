@@ -39,6 +39,11 @@ export function timeOfDay(time) {
 }
 
 /** @param {string} time ISO text */
+export function timeOfMinute(time) {
+  return new Date(time).toLocaleTimeString(languageInUse(), { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
+}
+
+/** @param {string} time ISO text */
 export function day(time) {
   const then = new Date(time);
   if (then.toDateString() === new Date().toDateString()) return t("today");

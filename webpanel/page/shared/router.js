@@ -3,19 +3,19 @@
 import { $ } from "./dom.js";
 import { update } from "./store.js";
 
-const VIEWS = ["live", "recordings", "recording", "log", "doctor", "aim", "rig"];
+const VIEWS = ["live", "recordings", "recording", "log", "doctor", "aim", "rig", "coach", "jump"];
 
 /** Views that one comes to from another, whose place in the navigation they share. @type {Record<string, string>} */
 const UNDER = { recording: "recordings", aim: "live" };
 
-/** @typedef {{ view: string, id: string, trash: boolean }} Place */
+/** @typedef {{ view: string, id: string, trash: boolean, key: string }} Place `key`: of the link by which an athlete came */
 
 /** @returns {Place} */
 export function place() {
-  const [name, id = ""] = location.hash.replace(/^#\//, "").split("/");
-  if (name === "trash") return { view: "recordings", id: "", trash: true };
-  if (name === "recordings" && id) return { view: "recording", id: decodeURIComponent(id), trash: false };
-  return { view: VIEWS.includes(name) ? name : "live", id: "", trash: false };
+  const [name, id = "", key = ""] = location.hash.replace(/^#\//, "").split("/");
+  if (name === "trash") return { view: "recordings", id: "", trash: true, key: "" };
+  if (["recordings", "jump"].includes(name) && id) return { view: name === "jump" ? name : "recording", id: decodeURIComponent(id), trash: false, key };
+  return { view: VIEWS.includes(name) && name !== "jump" ? name : "live", id: "", trash: false, key: "" };
 }
 
 let follow = () => {};
@@ -43,6 +43,7 @@ export function startRouter(entered, leaving) {
     address = location.hash;
     const now = place();
     for (const name of VIEWS) $(name).hidden = name !== now.view;
+    document.body.dataset.view = now.view;
     const tab = UNDER[now.view] ?? now.view;
     for (const link of document.querySelectorAll(".nav a")) {
       if (link.getAttribute("href") === `#/${tab}`) link.setAttribute("aria-current", "page");

@@ -1,0 +1,43 @@
+/** English words of the last jump, the coach's screen and the athlete's page. Every key stands in nb-jump.js too (a test looks). */
+export const jump = {
+  "jump.unnamed": "name unknown",
+  "jump.not_measured": "Not measured",
+  "jump.waiting": "Waits to be measured",
+  "jump.waiting_behind": "Waits to be measured, {before} before it",
+  "jump.measuring": "Still measuring",
+  "jump.paused": "Still measuring, waits while a recording runs",
+  "jump.nobody": "No jump was found in it",
+  "jump.failed": "Could not be measured",
+
+  "replay.alt": "The jump in slow motion",
+  "replay.takeoff": "Take-off, {times} times slower",
+  "replay.activity": "Where most moves, {times} times slower",
+  "replay.middle": "The middle of the recording, {times} times slower",
+  "replay.waits": "The pictures come when no recording runs.",
+  "replay.loading": "Fetching the pictures …",
+  "replay.none": "There are no pictures of it.",
+  "replay.play": "Play",
+  "replay.pause": "Stop",
+
+  "coach.title": "Coach's screen",
+  "coach.nothing": "No jump yet",
+  "coach.delayed": "{seconds} s ago",
+  "coach.now": "Now",
+  "coach.live_alt": "What the cameras saw some seconds ago",
+  "coach.when_armed": "The live picture comes when the rig is armed.",
+  "coach.soon": "The live picture comes in some seconds.",
+  "coach.lost": "No connection to Svev since {time}: it is tried again by itself.",
+  "coach.connecting": "Connecting to Svev …",
+
+  "share.title": "On a phone",
+  "share.lead": "A code that opens this jump on a phone, without a token, and nothing else.",
+  "share.show": "Show the code",
+  "share.hide": "Hide the code",
+  "share.alt": "QR code that opens this jump",
+  "share.until": "This jump on your phone: scan the code. It holds until {day}, {time}.",
+
+  "visit.until": "This page opens until {day}, {time}.",
+  "visit.lost": "No connection: are you still in the network of the hill? It is tried again by itself.",
+  "visit.kinogram": "Kinogram",
+  "visit.kinogram_picture": "Kinogram as a picture",
+};

@@ -1,0 +1,43 @@
+/** Norske ord om det siste hoppet, trenerens skjerm og hopperens side. De samme nøklene som i en-jump.js. */
+export const jump = {
+  "jump.unnamed": "ukjent navn",
+  "jump.not_measured": "Ikke målt",
+  "jump.waiting": "Venter på å bli målt",
+  "jump.waiting_behind": "Venter på å bli målt, {before} er foran",
+  "jump.measuring": "Måles ennå",
+  "jump.paused": "Måles ennå, venter mens det tas opp",
+  "jump.nobody": "Det ble ikke funnet noe hopp i det",
+  "jump.failed": "Kunne ikke måles",
+
+  "replay.alt": "Hoppet i sakte film",
+  "replay.takeoff": "Satsen, {times} ganger saktere",
+  "replay.activity": "Der det rører seg mest, {times} ganger saktere",
+  "replay.middle": "Midten av opptaket, {times} ganger saktere",
+  "replay.waits": "Bildene kommer når det ikke tas opp.",
+  "replay.loading": "Henter bildene …",
+  "replay.none": "Det finnes ingen bilder av det.",
+  "replay.play": "Spill av",
+  "replay.pause": "Stopp",
+
+  "coach.title": "Trenerens skjerm",
+  "coach.nothing": "Ingen hopp ennå",
+  "coach.delayed": "For {seconds} s siden",
+  "coach.now": "Nå",
+  "coach.live_alt": "Det kameraene så for noen sekunder siden",
+  "coach.when_armed": "Direktebildet kommer når riggen er klar.",
+  "coach.soon": "Direktebildet kommer om noen sekunder.",
+  "coach.lost": "Ingen forbindelse med Svev siden {time}: det prøves igjen av seg selv.",
+  "coach.connecting": "Kobler til Svev …",
+
+  "share.title": "På telefonen",
+  "share.lead": "En kode som åpner dette hoppet på en telefon, uten nøkkel, og ingenting annet.",
+  "share.show": "Vis koden",
+  "share.hide": "Skjul koden",
+  "share.alt": "QR-kode som åpner dette hoppet",
+  "share.until": "Dette hoppet på telefonen din: skann koden. Den gjelder til {day}, {time}.",
+
+  "visit.until": "Siden kan åpnes til {day}, {time}.",
+  "visit.lost": "Ingen forbindelse: er du fortsatt i nettverket i bakken? Det prøves igjen av seg selv.",
+  "visit.kinogram": "Kinogram",
+  "visit.kinogram_picture": "Kinogram som bilde",
+};

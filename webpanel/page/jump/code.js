@@ -1,0 +1,86 @@
+/** The QR code of a jump: on the coach's screen, and on the jump's page when somebody asks for it. */
+
+import { say, t } from "../i18n/i18n.js";
+import { call, Problem, recordingPath } from "../shared/api.js";
+import { $, setText } from "../shared/dom.js";
+import { day, timeOfMinute } from "../shared/format.js";
+
+/**
+ * Show the code of a recording in an image, and say until when it opens the jump.
+ *
+ * @param {string} id
+ * @param {HTMLImageElement} image hidden if there is no code
+ * @param {HTMLElement} words
+ * @param {() => boolean} wanted whether it is still to be shown when it comes
+ */
+export async function showCode(id, image, words, wanted) {
+  try {
+    const { code, ends } = await call("GET", recordingPath(id, "/link"));
+    if (!wanted()) return;
+    putImage(image, code);
+    image.alt = t("share.alt");
+    setText(words, t("share.until", { day: day(ends), time: timeOfMinute(ends) }));
+  } catch (error) {
+    if (!(error instanceof Problem)) throw error;
+    if (!wanted() || error.status === 0) return; // the code that is there is still good
+    clearCode(image, words);
+    setText(words, say({ code: error.code, text: error.message }).text);
+  }
+}
+
+/**
+ * @param {HTMLImageElement} image
+ * @param {HTMLElement} words
+ */
+export function clearCode(image, words) {
+  if (image.src) URL.revokeObjectURL(image.src);
+  image.removeAttribute("src");
+  image.hidden = true;
+  setText(words, "");
+}
+
+/**
+ * @param {HTMLImageElement} image
+ * @param {string} svg
+ */
+function putImage(image, svg) {
+  if (image.src) URL.revokeObjectURL(image.src);
+  image.src = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  image.hidden = false;
+}
+
+/** Id of the recording whose page is shown. */
+let page = "";
+
+export function startShare() {
+  $("share-show").addEventListener("click", () => void toggle());
+}
+
+/**
+ * The page of a recording is shown, or left (""): its code is not, until somebody asks for it.
+ *
+ * @param {string} id
+ */
+export function enterShare(id) {
+  page = id;
+  clearCode($("share-code"), $("share-words"));
+  draw();
+}
+
+/** Draw the words anew, in another language. */
+export function drawShare() {
+  if (page) enterShare(page);
+}
+
+async function toggle() {
+  const id = page;
+  if (!$("share-code").hidden) return enterShare(id);
+  await showCode(id, $("share-code"), $("share-words"), () => page === id);
+  draw();
+}
+
+function draw() {
+  const open = !$("share-code").hidden;
+  setText($("share-show"), t(open ? "share.hide" : "share.show"));
+  $("share-show").setAttribute("aria-expanded", String(open));
+}

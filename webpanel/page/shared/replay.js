@@ -1,0 +1,199 @@
+/**
+ * A jump again and again in slow motion, about its take-off or, if that was not measured, about where most moves.
+ *
+ * Its pictures are fetched once, few of them, one after the other, and only while no recording runs: the disk belongs to
+ * the recorder then. They are kept as they came and decoded one at a time, so that a small device can show them too.
+ *
+ * @typedef {object} Replay
+ * @property {(id: string, version?: string) => void} show a recording; "": none. Another version: its moment may be another one.
+ * @property {() => void} draw the words anew, in another language
+ */
+
+import { t } from "../i18n/i18n.js";
+import { asProblem, call, partOf, Problem, recordingPath } from "./api.js";
+import { icon, make, setIcon, setText } from "./dom.js";
+import { watch } from "./store.js";
+
+/** A loop begins so long before the moment and ends so long after it, s. */
+const [BEFORE_S, AFTER_S] = [0.5, 1];
+/** So many times slower than the jump. */
+const SLOWER = 4;
+/** The last picture stands for so long before the first one comes again, ms. */
+const REST_MS = 800;
+/** More pictures than these say no more at this speed. */
+const PICTURES_MAX = 45;
+const WIDTH = 960;
+/** So soon it is tried again after a failure, ms. */
+const AGAIN_MS = 3000;
+/** While nobody sees it, it looks so often whether somebody does, ms. */
+const IDLE_MS = 500;
+
+/** @typedef {{ pulse: number, time_s: number, image: Blob|null }} Frame */
+/** @typedef {""|"loading"|"waits"|"none"|"ready"} Stage */
+
+/**
+ * @param {HTMLElement} root
+ * @param {{ may: () => boolean, button: boolean }} options `may`: whether pictures may be fetched now; `button`: it can be stopped
+ * @returns {Replay}
+ */
+export function makeReplay(root, { may, button }) {
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches && button;
+  const canvas = make("canvas", { role: "img" });
+  const words = make("p", { class: "replay-words" });
+  const play = make("button", { type: "button", class: "square replay-play", onclick: () => { playing = !playing; draw(); } }, icon("pause"));
+  root.append(canvas, make("div", { class: "replay-foot" }, words, button ? play : null));
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+
+  let shown = "";
+  /** Number of the loading that began last: those before it are given up. */
+  let loads = 0;
+  /** @type {Frame[]} */
+  let frames = [];
+  let kind = "none";
+  /** Index of the frame of the moment. */
+  let moment = 0;
+  /** @type {Stage} */
+  let stage = "";
+  let playing = !still;
+  let wake = () => {};
+
+  /** @param {number} own */
+  async function load(own) {
+    const id = JSON.parse(shown)[0];
+    frames = [];
+    while (own === loads) {
+      try {
+        if (!may()) await waitFor(own);
+        if (own !== loads) return;
+        become("loading");
+        if (!frames.length) await choose(id, own);
+        for (const frame of frames.filter(({ image }) => !image)) {
+          if (own !== loads) return;
+          if (!may()) break;
+          frame.image = await fetchPicture(id, frame.pulse);
+        }
+        if (frames.some(({ image }) => !image)) continue;
+        if (own !== loads) return;
+        become(frames.length ? "ready" : "none");
+        if (frames.length) void run(own);
+        return;
+      } catch (error) {
+        if (!(error instanceof Problem)) throw error;
+        if (own !== loads) return;
+        if (error.status !== 0 && error.status !== 503) return become("none");
+        become(error.code === "recording_runs" ? "waits" : "loading");
+        await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+      }
+    }
+  }
+
+  /** @param {number} own */
+  async function waitFor(own) {
+    become("waits");
+    while (!may() && own === loads) await new Promise((resolve) => { wake = () => resolve(undefined); });
+  }
+
+  /**
+   * Choose the pictures.
+   *
+   * @param {string} id
+   * @param {number} own
+   */
+  async function choose(id, own) {
+    /** @type {{ pulses: import("./types.js").PulseSummary[] }} */
+    const { pulses } = await call("GET", recordingPath(id, "/pulses"));
+    const found = await call("GET", recordingPath(id, "/moment"));
+    if (own !== loads || !pulses.length) return;
+    kind = found.kind;
+    const at = Math.max(0, found.pulse === null ? Math.floor(pulses.length / 2) : pulses.findIndex(({ pulse }) => pulse === found.pulse));
+    const middle = pulses[at].time_s;
+    const near = pulses.filter(({ time_s }) => time_s >= middle - BEFORE_S && time_s <= middle + AFTER_S);
+    const every = Math.ceil(near.length / PICTURES_MAX);
+    const first = near.findIndex(({ pulse }) => pulse === pulses[at].pulse) % every; // the moment itself is one of them
+    frames = near.filter((_, index) => index % every === first).map(({ pulse, time_s }) => ({ pulse, time_s, image: null }));
+    moment = frames.findIndex(({ pulse }) => pulse === pulses[at].pulse);
+  }
+
+  /**
+   * Show the pictures, until others are loaded.
+   *
+   * @param {number} own
+   */
+  async function run(own) {
+    await paint(frames[moment]);
+    for (let index = 0; own === loads;) {
+      const seen = playing && !document.hidden && root.checkVisibility();
+      if (seen) await paint(frames[index]);
+      const [now, next] = [frames[index], frames[index + 1]];
+      await new Promise((resolve) => setTimeout(resolve, !seen ? IDLE_MS : next ? 1000 * SLOWER * (next.time_s - now.time_s) : REST_MS));
+      if (seen) index = next ? index + 1 : 0;
+    }
+  }
+
+  /** @param {Frame} frame */
+  async function paint({ pulse, image }) {
+    if (!image) return;
+    const picture = await createImageBitmap(image);
+    if (canvas.width !== picture.width || canvas.height !== picture.height) [canvas.width, canvas.height] = [picture.width, picture.height];
+    pen.drawImage(picture, 0, 0);
+    picture.close();
+    root.dataset.pulse = String(pulse);
+  }
+
+  /** @param {Stage} now */
+  function become(now) {
+    stage = now;
+    draw();
+  }
+
+  function draw() {
+    root.dataset.stage = stage;
+    canvas.hidden = stage !== "ready";
+    play.hidden = stage !== "ready";
+    canvas.setAttribute("aria-label", t("replay.alt"));
+    setIcon(play.querySelector("svg"), playing ? "pause" : "play");
+    play.setAttribute("aria-label", t(playing ? "replay.pause" : "replay.play"));
+    setText(words, inWords());
+  }
+
+  function inWords() {
+    if (stage === "waits") return t("replay.waits");
+    if (stage === "loading") return t("replay.loading");
+    if (stage === "none") return t("replay.none");
+    if (stage === "") return "";
+    return t({ takeoff: "replay.takeoff", activity: "replay.activity" }[kind] ?? "replay.middle", { times: SLOWER });
+  }
+
+  watch(() => { if (may()) wake(); });
+  draw();
+
+  return {
+    draw,
+    show(id, version = "") {
+      const now = id ? JSON.stringify([id, version]) : "";
+      if (now === shown) return;
+      shown = now;
+      loads += 1;
+      wake();
+      become("");
+      if (id) void load(loads);
+    },
+  };
+}
+
+/**
+ * @param {string} id
+ * @param {number} pulse
+ * @returns {Promise<Blob>}
+ * @throws {Problem}
+ */
+async function fetchPicture(id, pulse) {
+  let answer;
+  try {
+    answer = await fetch(partOf(id, `pulses/${pulse}.jpg?width=${WIDTH}`));
+    if (answer.ok) return await answer.blob();
+  } catch {
+    throw new Problem(0, "page_no_connection", "no connection to the service: check network and service, then try again");
+  }
+  throw await asProblem(answer);
+}

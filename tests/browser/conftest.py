@@ -1,6 +1,7 @@
 """Debian's Chromium without a window (its headless shell starts in half the time), and pages that must not complain."""
 
 import asyncio
+import json
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -11,6 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
@@ -136,11 +139,20 @@ MEASURED = LastJump(
 )
 
 
+def write_kinogram(folder: Path, bib: str, athlete: str) -> None:
+    """The files of a kinogram, with a grey picture of its size."""
+    content = {"format": "svev-kinogram/1", "recording": "jump", "athlete": athlete, "bib": bib, "jumps": []}
+    (folder / "kinogram.json").write_text(json.dumps(content), encoding="utf-8")
+    (folder / "kinogram.html").write_text("<!doctype html><title>Kinogram</title><h1>Five pictures</h1>")
+    (folder / "kinogram.jpg").write_bytes(cv2.imencode(".jpg", np.full((2019, 1080), 120, np.uint8))[1].tobytes())
+
+
 def keep_measured(log: Path, jumps: tuple[LastJump, ...]) -> None:
     """Keep a result beside a log, without measuring it: main figures, and files with little in them."""
     made = log.parent / "made"
     made.mkdir()
     (made / "report.html").write_text("<!doctype html><title>Report</title><h1>For the coach</h1>")
+    write_kinogram(made, "4", "Ola <b>Nordmann</b>")
     for name in ("jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html", "protocol.txt"):
         (made / name).write_text(name)
     keep_result(made, log, jumps)

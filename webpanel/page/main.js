@@ -19,6 +19,7 @@ import { startSession } from "./live/session.js";
 import { startStartList } from "./live/startlist.js";
 import { startState } from "./live/state.js";
 import { drawExports, startExports } from "./recordings/exports.js";
+import { startKinogram } from "./recordings/kinogram.js";
 import { startLast } from "./recordings/last.js";
 import { startMeasurement } from "./recordings/measurement.js";
 import * as recording from "./recordings/recording.js";
@@ -86,7 +87,7 @@ function entered({ view, id, key }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startAutomatic, startPreview, startHealth, startMeasured, startBanner, startLog, startLatest]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement, startShare, startCoach, startVisit]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement, startKinogram, startShare, startCoach, startVisit]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

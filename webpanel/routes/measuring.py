@@ -25,7 +25,12 @@ _FILE: Final[Responses] = {
     }
 }
 #: What a browser shows itself. A page among them runs as if it came from nowhere: it reaches nothing of the panel.
-_SHOWN: Final = {".html": "text/html; charset=utf-8", ".webm": "video/webm", ".txt": "text/plain; charset=utf-8"}
+_SHOWN: Final = {
+    ".html": "text/html; charset=utf-8",
+    ".jpg": "image/jpeg",
+    ".txt": "text/plain; charset=utf-8",
+    ".webm": "video/webm",
+}
 _ALONE: Final = "sandbox allow-scripts allow-popups allow-downloads"
 
 

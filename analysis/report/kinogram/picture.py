@@ -34,7 +34,7 @@ from analysis.result.model import MeasuredRecording
 
 _GAP: Final = 16
 _ACROSS: Final = 2 * WIDTH + 3 * _GAP
-_HEAD, _FIGURE, _FOOT = 116, 142, 62
+_HEAD, _FIGURE, _FOOT = 116, 164, 62
 _QUALITY: Final = 88
 _SURE, _BOLD = 450, 750  # weights of letters
 _GROUND: Final[Colour] = (238, 242, 247)
@@ -195,17 +195,18 @@ def _figure(sheet: _Sheet, kinogram: Kinogram, name: str, at: tuple[int, int]) -
         said, (ground, ink) = mark_words(name, mark), _MARKS[mark.word]
         wide = max(sheet.width(said.english, 21, 650), sheet.width(said.norwegian, 18)) + 28
         left = x + WIDTH - 16 - wide
-        sheet.box((left, y + 66), (wide, 62), ground)
-        sheet.write(said.english, (left + 14, y + 93), 21, 650, colour=ink, most=wide - 28)
-        sheet.write(said.norwegian, (left + 14, y + 117), 18, colour=ink, most=wide - 28)
+        sheet.box((left, y + 98), (wide, 58), ground)
+        sheet.write(said.english, (left + 14, y + 123), 21, 650, colour=ink, most=wide - 28)
+        sheet.write(said.norwegian, (left + 14, y + 146), 18, colour=ink, most=wide - 28)
     for line, down, size, weight in zip(
-        number_words(name, quantity), (95, 128), (34, 25), (_BOLD, _SURE), strict=False
+        number_words(name, quantity), (92, 132), (34, 25), (_BOLD, _SURE), strict=False
     ):
-        sheet.write(line, (x + 18, y + down), size, weight, most=WIDTH - 46 - wide)
+        beside = wide if down > 92 else 0
+        sheet.write(line, (x + 18, y + down), size, weight, most=WIDTH - 46 - beside)
 
 
 def _notes(sheet: _Sheet, kinogram: Kinogram, at: tuple[int, int]) -> None:
-    x, y = at[0] + 18, at[1] + 26
+    x, y = at[0] + 18, at[1] + 36
     reference = reference_words(kinogram.reference, ok=kinogram.jump.verdict.ok)
     for said in (reference, SIGMA):
         y = sheet.paragraph(said.english, (x, y), 18, colour=_INK, most=WIDTH - 36)

@@ -153,7 +153,10 @@ def _best(
     system: CameraSystem,
 ) -> _View | None:
     state = best_state(course.pulses[moment.index])
-    middle = np.mean([point.xyz for point in state.points.values() if point is not None], axis=0)
+    points = [point.xyz for point in state.points.values() if point is not None]
+    if not points:
+        return None
+    middle = np.mean(points, axis=0)
     views = []
     for name, camera in system.cameras.items():
         image, own = images.get(name), measured.get(name)

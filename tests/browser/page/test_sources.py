@@ -21,6 +21,8 @@ NPM = ROOT / "tests" / "browser" / "npm"
 MODULES = sorted(PAGE.rglob("*.js"))
 EVERYTHING = sorted(path for path in PAGE.rglob("*") if path.is_file())
 WORDS = re.compile(r'^  "([\w.]+)": "(.*)",$', re.MULTILINE)
+#: Words that stand in files of their own, by the ends of their names.
+PARTS = sorted(path.stem.removeprefix("en") for path in (PAGE / "i18n").glob("en-*.js"))
 #: Keys that are put together in the code, by their beginnings.
 COMPOSED = (
     "state.",
@@ -48,7 +50,7 @@ SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 def _words(language: str) -> dict[str, str]:
     return {
         key: text
-        for name in (language, f"{language}-check", f"{language}-jump", f"{language}-measuring")
+        for name in (language, *(f"{language}{part}" for part in PARTS))
         for key, text in WORDS.findall((PAGE / "i18n" / f"{name}.js").read_text())
     }
 
@@ -61,7 +63,7 @@ def _sources() -> str:
     own_words = {
         PAGE / "i18n" / f"{language}{part}.js"
         for language in ("en", "nb")
-        for part in ("", "-check", "-jump", "-measuring")
+        for part in ("", *PARTS)
     }
     return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
 

@@ -2,11 +2,13 @@
 
 import { check } from "./en-check.js";
 import { jump } from "./en-jump.js";
+import { kinogram } from "./en-kinogram.js";
 import { measuring } from "./en-measuring.js";
 
 export const en = {
   ...check,
   ...jump,
+  ...kinogram,
   ...measuring,
 
   "skip": "Skip to the content",

@@ -2,11 +2,13 @@
 
 import { check } from "./nb-check.js";
 import { jump } from "./nb-jump.js";
+import { kinogram } from "./nb-kinogram.js";
 import { measuring } from "./nb-measuring.js";
 
 export const nb = {
   ...check,
   ...jump,
+  ...kinogram,
   ...measuring,
 
   "skip": "Hopp til innholdet",

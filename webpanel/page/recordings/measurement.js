@@ -8,6 +8,7 @@ import { day, number, timeOfDay } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
+import { KINOGRAM, showKinogram } from "./kinogram.js";
 import { makeSteps } from "./steps.js";
 
 /** @typedef {import("./types.js").Measurement} Measurement */
@@ -97,6 +98,7 @@ async function order(method) {
 
 function draw() {
   $("measurement").hidden = !recording;
+  showKinogram(recording, isMeasurable() ? measured : null);
   if (!recording) return;
   const shown = isMeasurable() ? measured : null;
   $("measurement-known").hidden = !shown;
@@ -163,7 +165,7 @@ function drawResult({ recording: id, state, problem, figures, live, files }) {
   $("measurement-problem").hidden = !failed;
   $("measurement-problem").replaceChildren(...failed ? [makeMark(failed.level, failed.level, text), ...advice ? [make("p", { class: "advice" }, advice)] : []] : []);
   $("measurement-jumps").replaceChildren(...figures.map((jump) => makeJump(jump, live, figures.length > 1)));
-  const [first, rest] = sorted(files);
+  const [first, rest] = sorted(files.filter((name) => !KINOGRAM.test(name)));
   $("measurement-files").replaceChildren(...first.map((name) => makeFile(id, name)));
   $("measurement-more").hidden = !rest.length;
   $("measurement-others").replaceChildren(...rest.map((name) => makeFile(id, name)));

@@ -10,9 +10,11 @@ from rig.api.recordings import NextJumper, SessionChange, SessionFields
 from rig.api.statement import Statement
 
 #: As many lines and own columns as a start list may have, and the length of a column's name.
-LINES_MAX: Final = 500
+LINES_MAX: Final = 2000
 COLUMNS_MAX: Final = 12
 COLUMN_NAME_MAX: Final = 40
+#: The largest file that a start list is loaded from.
+TABLE_BYTES_MAX: Final = 2_000_000
 
 LineId = Annotated[int, Field(ge=1)]
 ColumnName = Annotated[str, Field(pattern=rf"^[^\x00-\x1f\x7f]{{1,{COLUMN_NAME_MAX}}}$")]
@@ -120,6 +122,28 @@ class StartList(Model):
     lines: tuple[StartLine, ...] = ()
     next: NextJumper = NextJumper()
     undo: Statement | None = Field(None, description="the last change, which can be undone; null: there is none")
+
+
+class ReadingChoice(Model):
+    """One way to read a file whose letters can be read in several."""
+
+    encoding: str = Field(examples=["mac-roman"])
+    words: tuple[str, ...] = Field(description="texts of the list that differ, as this way has them")
+
+
+class Preview(Model):
+    """What a file would make of the start list, before it does."""
+
+    jumpers: int = Field(description="how many it has; 0: a heading alone, which would empty the list")
+    lines: tuple[NewLine, ...] = Field(description="the first of them")
+    columns: tuple[str, ...] = Field(description="that its heading names, known ones by our names for them")
+    added: tuple[str, ...] = Field(description="columns that the present list has not")
+    removed: tuple[str, ...] = Field(description="columns that the present list has and this one has not")
+    heading: int = Field(description="number of the line of the heading; lines above it are skipped")
+    encoding: str | None = Field(description="of its letters; null: a workbook, or one has to be chosen")
+    sheet: str | None = Field(description="of a workbook; null: the file is none, or one has to be chosen")
+    readings: tuple[ReadingChoice, ...] = Field(description="choose one as `encoding`; empty: its letters are certain")
+    sheets: tuple[str, ...] = Field(description="choose one as `sheet`; empty: one alone holds a list")
 
 
 def who(fields: SessionFields | NewLine) -> str:

@@ -12,6 +12,7 @@ from rig.api.start_list import (
     JumperChange,
     LineChange,
     NewLine,
+    Preview,
     Rules,
     StartLine,
     StartList,
@@ -20,10 +21,11 @@ from rig.api.start_list import (
     who,
 )
 from rig.api.statement import Statement
-from rig.errors import ChangedMeanwhileError, StateForbidsError
+from rig.errors import BadInputError, ChangedMeanwhileError, StateForbidsError
 from service.jumpers import moves
 from service.jumpers.keeper import Change, Keeper
-from service.jumpers.table import Table, read_table
+from service.jumpers.preview import previewed
+from service.jumpers.table import Table, read_table, readings_of
 
 _UNDO_MAX: Final = 30
 #: How long a call waits until its change is on the disk; then it goes on, and an event says that it is not.
@@ -194,13 +196,28 @@ class JumperBook:
             self._put(moves.without_line(self._list, line), said)
         return self._done()
 
-    def import_table(self, content: bytes) -> StartList:
-        """Replace the list by a table of comma-separated values, or clear it by an empty one.
+    def preview(self, content: bytes, encoding: str | None = None, sheet: str | None = None) -> Preview:
+        """What a table would make of the list.
 
         Raises:
             BadInputError: the table cannot be read; the message names line and column.
         """
-        table = read_table(content) if content.strip() else Table((), ())
+        return previewed(readings_of(content, encoding, sheet), self._list)
+
+    def import_table(self, content: bytes, encoding: str | None = None, sheet: str | None = None) -> StartList:
+        """Replace the list by a table, or clear it by empty content.
+
+        Raises:
+            BadInputError: the table cannot be read, or not in one way only; or it is a heading alone. The message names
+                line and column.
+        """
+        table = Table((), ())
+        if content.strip():
+            table = read_table(content, encoding, sheet)
+            if not table.lines:
+                raise BadInputError(
+                    "the table is a heading alone, without a jumper: to empty the start list send empty content"
+                )
         with self._lock:
             said = Statement(
                 code="undo_import",

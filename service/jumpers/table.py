@@ -1,11 +1,10 @@
-"""Reads a start list from a table of comma-separated values, as spreadsheets and competition programs write it."""
+"""Reads a start list from a table as spreadsheets and competition programs write it: text, or an Excel workbook."""
 
 import csv
 import io
 import re
-from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,6 +12,8 @@ from pydantic import ValidationError
 
 from rig.api.start_list import COLUMN_NAME_MAX, COLUMNS_MAX, LINES_MAX, NewLine
 from rig.errors import BadInputError
+from service.jumpers.encodings import texts_of
+from service.jumpers.workbook import MAGIC, OLD_MAGIC, Row, Sheet, sheets_of
 
 _SEPARATORS: Final = (";", ",", "\t")
 #: Parts of the name, which no own column is called by.
@@ -28,8 +29,16 @@ _NAMES: Final = {
     _LAST: ("lastname", "etternavn", "surname", "familyname"),
 }
 _KNOWN: Final = {name: column for column, names in _NAMES.items() for name in names}
+#: Columns that hold numbers.
+_NUMBERS: Final = frozenset({"bib", "gate"})
+_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d")
 #: Names that a log's session record has for other things.
 _RESERVED: Final = frozenset({"session", "recording", "continues", "continues_after", "round", "wind", "operator"})
+
+
+#: A heading stands among so many first rows that hold something.
+_HEADING_WITHIN: Final = 30
+_EXAMPLE: Final = "e.g. bib;athlete;gate;club"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,75 +48,180 @@ class Table:
     Attributes:
         columns: names of its own columns.
         lines: the jumpers, in its order.
+        named: all columns that its heading names, known ones by our names for them.
+        heading: number of the line of the heading.
     """
 
     columns: tuple[str, ...]
     lines: tuple[NewLine, ...]
+    named: tuple[str, ...] = ()
+    heading: int = 0
 
 
-def read_table(content: bytes) -> Table:
-    """Read a table whose first line names the columns.
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One way to read a file.
 
-    The encoding is UTF-8, UTF-16 with a byte order mark, or else Latin-1; columns are separated by semicolons, commas
-    or tabs. `bib`, `athlete` (or first and last name), `gate`, `club` and `notes` are known, in any order; other
-    columns are kept under their names.
+    Attributes:
+        encoding: of its letters; "": a workbook, in which that is certain.
+        sheet: of a workbook; "": the file is none.
+        table: what it holds; None: of several sheets one has to be chosen first.
+    """
+
+    encoding: str
+    sheet: str
+    table: Table | None
+
+
+def readings_of(content: bytes, encoding: str | None = None, sheet: str | None = None) -> tuple[Reading, ...]:
+    """The ways in which a file can be read: one if that is certain, several if a person has to look.
+
+    Lines above the heading are skipped: the heading is the first line that names most of the columns `bib`, `athlete`
+    (or first and last name), `gate`, `club` and `notes`, in any order. Other columns are kept under their names.
+
+    Args:
+        content: an Excel workbook, or text whose columns semicolons, commas or tabs separate.
+        encoding: of the text, as a person has said; None: nobody has.
+        sheet: of the workbook, likewise.
 
     Raises:
         BadInputError: columns are missing, named twice or of names that are taken; a line does not fit the columns; a
             bib stands there twice. The message names column and line.
     """
-    rows = list(_rows(_decoded(content)))
-    if not rows:
-        raise BadInputError("the start list is empty: its first line names the columns, e.g. bib;athlete;gate;club")
-    (_, header), rest = rows[0], rows[1:]
-    columns = _columns(header)
-    lines = tuple(_line(number, row, columns) for number, row in rest)
-    if len(lines) > LINES_MAX:
-        raise BadInputError(f"the start list has {len(lines)} jumpers: {LINES_MAX} at most, so make several of it")
-    _check_bibs([number for number, _ in rest], lines)
-    return Table(tuple(name for name in columns if name and name not in _NAMES), lines)
-
-
-def _decoded(content: bytes) -> str:
-    if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
-        text = content.decode("utf-16", errors="replace")
-    else:
+    if content.startswith(MAGIC):
+        return _sheets(sheets_of(content), sheet)
+    if content.startswith(OLD_MAGIC):
+        raise BadInputError("the start list is a workbook of an old Excel (.xls): save it as .xlsx, and load that")
+    found: list[Reading] = []
+    problem: BadInputError | None = None
+    for text in texts_of(content, encoding):
         try:
-            text = content.removeprefix(BOM_UTF8).decode("utf-8")
-        except UnicodeDecodeError:
-            text = content.decode("cp1252", errors="replace")  # Latin-1 as Windows writes it
-    if "\0" in text:
-        raise BadInputError("the start list is no text: save it as CSV (comma-separated values), then load that")
-    return text
+            table = _table(_separated(text.text))
+        except BadInputError as error:
+            problem = problem or error
+            continue
+        if all(table != other.table for other in found):  # letters that differ may stand above the heading alone
+            found.append(Reading(text.encoding, "", table))
+    if not found and problem is not None:
+        raise problem
+    return tuple(found)
 
 
-def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
-    """The rows that hold something, with the numbers of their lines."""
+def read_table(content: bytes, encoding: str | None = None, sheet: str | None = None) -> Table:
+    """Read a file that can be read in one way only; arguments and errors as for `readings_of`.
+
+    Raises:
+        BadInputError: also if it can be read in several ways; the message names them.
+    """
+    found = readings_of(content, encoding, sheet)
+    if len(found) == 1 and found[0].table is not None:
+        return found[0].table
+    if found[0].sheet:
+        raise BadInputError(
+            f"several sheets hold a list ({', '.join(each.sheet for each in found)}): say which `sheet`"
+        )
+    raise BadInputError(
+        f"its letters can be read in several ways ({', '.join(each.encoding for each in found)}): give the `encoding`, "
+        'or save the list as "CSV UTF-8" or as an Excel workbook'
+    )
+
+
+def _sheets(sheets: tuple[Sheet, ...], wanted: str | None) -> tuple[Reading, ...]:
+    if not sheets:
+        raise BadInputError(f"the workbook is empty: a line of it names the columns, {_EXAMPLE}")
+    if wanted is not None:
+        sheets = tuple(sheet for sheet in sheets if sheet.name == wanted)
+        if not sheets:
+            raise BadInputError(f'the workbook has no sheet "{wanted}" that holds something: name another one')
+    headed = [sheet for sheet in sheets if _heading(sheet.rows) is not None] or list(sheets[:1])
+    if len(headed) > 1:
+        return tuple(Reading("", sheet.name, None) for sheet in headed)
+    return (Reading("", headed[0].name, _table(headed[0].rows)),)
+
+
+def _separated(text: str) -> Sequence[Row]:
+    """The rows of a text, by the separator that finds most columns in a heading."""
+    if not text.strip(' \r\n\t;,"'):
+        return ()
     lines = text.splitlines(keepends=True)
-    skipped = 0
-    separator = ""
     if lines and (told := re.fullmatch(r'"?sep=(.)"?\s*', lines[0], re.IGNORECASE)):
-        separator, skipped, lines = told[1], 1, lines[1:]  # a line for spreadsheets
-    head = next((line for line in lines if line.strip()), "")
-    separator = separator or max(_SEPARATORS, key=head.count)
+        return _rows(lines[1:], told[1], 1)  # a line for spreadsheets
+    best: Sequence[Row] = ()
+    problem: BadInputError | None = None
+    for separator in _SEPARATORS:
+        try:
+            rows = _rows(lines, separator, 0)
+        except BadInputError as error:
+            problem = problem or error
+            continue
+        if not best or _merit(rows) > _merit(best):
+            best = rows
+    if not best and problem is not None:
+        raise problem
+    return best
+
+
+def _merit(rows: Sequence[Row]) -> tuple[int, int]:
+    """How many columns a heading names: known ones, and all."""
+    heading = _heading(rows)
+    first = rows[0][1] if rows else []
+    return (0, len(first)) if heading is None else (_known(rows[heading][1]), len(rows[heading][1]))
+
+
+def _rows(lines: Sequence[str], separator: str, skipped: int) -> Sequence[Row]:
+    """The rows that hold something, with the numbers of their lines."""
     reader = csv.reader(io.StringIO("".join(lines), newline=""), delimiter=separator, skipinitialspace=True)
+    rows = []
     try:
         for row in reader:
             fields = [field.strip() for field in row]
             if any(fields):
-                yield reader.line_num + skipped, fields
+                rows.append((reader.line_num + skipped, fields))
     except csv.Error as error:
         raise BadInputError(f"line {reader.line_num + skipped}: {error}; look at its quotation marks") from None
+    return rows
+
+
+def _heading(rows: Sequence[Row]) -> int | None:
+    """Index of the heading: of the first rows the one that names most columns; None: none says who jumps."""
+    known = [_known(row) for _, row in rows[:_HEADING_WITHIN]]
+    most = max(known, default=0)
+    return known.index(most) if most else None
+
+
+def _known(row: Sequence[str]) -> int:
+    """How many known columns a row names; 0 if it does not name who jumps."""
+    names = {name for field in row if (name := _KNOWN.get(_bare(field)))}
+    return len(names) if names & {"bib", "athlete", _FIRST, _LAST} else 0
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"[\W_]", "", name.lower())
+
+
+def _table(rows: Sequence[Row]) -> Table:
+    if not rows:
+        raise BadInputError(f"the start list is empty: a line of it names the columns, {_EXAMPLE}")
+    heading = _heading(rows)
+    number, header = rows[heading or 0]
+    columns = _columns(header)
+    rest = rows[(heading or 0) + 1 :]
+    lines = tuple(_line(number, row, columns) for number, row in rest)
+    if len(lines) > LINES_MAX:
+        raise BadInputError(f"the start list has {len(lines)} jumpers: {LINES_MAX} at most, so make several of it")
+    _check_bibs([number for number, _ in rest], lines)
+    named = tuple(name.replace("\0", "") for name in columns if name)
+    return Table(tuple(name for name in columns if name and name not in _NAMES), lines, named, number)
 
 
 def _columns(header: Sequence[str]) -> list[str]:
     """The columns by their known or own names; "" for one without a name and content."""
-    columns = [_KNOWN.get(re.sub(r"[\W_]", "", name.lower()), name) for name in header]
+    columns = [_KNOWN.get(_bare(name), name) for name in header]
     listed = ", ".join(f'"{name}"' for name in header)
     if not {"bib", "athlete", _FIRST, _LAST} & set(columns):
         raise BadInputError(
-            f'the first line names no column "bib" or "athlete", but {listed}: name the columns there, e.g. '
-            "bib;athlete;gate;club"
+            f'no line names a column "bib" or "athlete"; the first one has {listed}: name the columns above the '
+            f"jumpers, {_EXAMPLE}"
         )
     for name, count in Counter(columns).items():
         if name and count > 1:
@@ -127,11 +241,15 @@ def _line(number: int, row: Sequence[str], columns: Sequence[str]) -> NewLine:
         row = row[:-1]
     if len(row) > len(columns):
         raise BadInputError(
-            f"line {number} has {len(row)} fields, and the first line names {len(columns)} columns: correct it"
+            f"line {number} has {len(row)} fields, and the heading names {len(columns)} columns: correct it"
         )
     fields = {name: text for name, text in zip(columns, row, strict=False) if text}
+    for name in _NUMBERS & fields.keys():
+        fields[name] = re.sub(r"(\d+)\.0+", r"\1", fields[name])  # as programs write whole numbers
+    if _DATE.fullmatch(fields.get("bib", "")):
+        raise BadInputError(f"line {number}: the bib {fields['bib']} is a date: give the column the format of a number")
     if unnamed := fields.pop("", ""):
-        raise BadInputError(f'line {number} has "{unnamed[:40]}" in a column without a name: name it in the first line')
+        raise BadInputError(f'line {number} has "{unnamed[:40]}" in a column without a name: name it in the heading')
     names = [fields.pop(name, "") for name in (_FIRST, _LAST)]
     fields.setdefault("athlete", " ".join(name for name in names if name))
     more = {name: fields.pop(name) for name in list(fields) if name not in _NAMES}

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
+from rig.api.start_list import JumperChange, LineChange, NewLine, Preview, Rules, StartList, Turn, UndoOrder
 
 
 class Jumpers(Protocol):
@@ -43,8 +43,12 @@ class Jumpers(Protocol):
         """Remove a line."""
         ...
 
-    def import_table(self, content: bytes) -> StartList:
-        """Replace the list by a table of comma-separated values; an empty one clears it."""
+    def preview(self, content: bytes, encoding: str | None = None, sheet: str | None = None) -> Preview:
+        """What a table would make of the list; letters and sheet as a person has said, None: nobody has."""
+        ...
+
+    def import_table(self, content: bytes, encoding: str | None = None, sheet: str | None = None) -> StartList:
+        """Replace the list by a table; empty content clears it."""
         ...
 
     def change_rules(self, rules: Rules) -> StartList:

@@ -32,6 +32,7 @@ CALLS = {
     "GET /api/recordings/{recording_id}/file.sha256", "GET /api/recordings.zip",
     "GET /api/next-jumper", "PATCH /api/next-jumper", "POST /api/next-jumper/skip",
     "GET /api/start-list", "PUT /api/start-list", "PATCH /api/start-list", "POST /api/start-list/undo",
+    "POST /api/start-list/preview",
     "POST /api/start-list/round", "POST /api/start-list/lines", "PATCH /api/start-list/lines/{line}",
     "GET /api/recordings/{recording_id}/pulses/{pulse}.png", "GET /api/recordings/{recording_id}/moment",
     "GET /api/recordings/{recording_id}/notes", "PUT /api/recordings/{recording_id}/notes/{pulse}",

@@ -14,6 +14,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.api.looking import VOICE_BYTES_MAX
+from rig.api.start_list import TABLE_BYTES_MAX
 from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access
 from webpanel.door.logins import Caller, Door, check_role
@@ -46,7 +47,12 @@ class _Body:
 _JSON: Final = _Body(re.compile(".*"), "application/json")
 #: Bodies that are something else than JSON; the routes look which call takes what.
 _OTHERS: Final = (
-    _Body(re.compile("/api/start-list"), "text/csv"),
+    _Body(re.compile("/api/start-list(?:/preview)?"), "text/csv", TABLE_BYTES_MAX),
+    _Body(
+        re.compile("/api/start-list(?:/preview)?"),
+        "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
+        TABLE_BYTES_MAX,
+    ),
     _Body(re.compile("/api/recordings/[^/]+/voice-notes"), "audio/webm", VOICE_BYTES_MAX),
 )
 

@@ -102,6 +102,7 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     ),
     (r"DELETE /api/exports/[^/]+", lambda: phrase("act_export_ended", "ended or removed an export")),
     (r"[A-Z]+ /api/next-jumper(?:/.*)?", lambda: phrase("act_next_jumper", "edited the next jumper")),
+    (r"POST /api/start-list/preview", lambda: phrase("act_list_looked", "looked at a start list before loading it")),
     (r"[A-Z]+ /api/start-list(?:/.*)?", lambda: phrase("act_start_list", "edited the start list")),
 )
 

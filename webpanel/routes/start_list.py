@@ -1,13 +1,13 @@
 """The routes of the next jumper and the start list: one for all devices, and for every recording."""
 
 from http import HTTPStatus
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Path, Request
+from fastapi import APIRouter, Path, Query, Request
 from starlette.concurrency import run_in_threadpool
 
 from rig.api.recordings import NextJumper
-from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, StartList, Turn, UndoOrder
+from rig.api.start_list import JumperChange, LineChange, NewLine, Preview, Rules, StartList, Turn, UndoOrder
 from service.seam.rig import RigService
 from service.seam.start_list import Jumpers
 from webpanel.problems import ProblemError
@@ -15,6 +15,14 @@ from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 
 LineNumber = Annotated[int, Path(ge=1, le=10**9, description="id of a line of the start list", examples=[3])]
 _CSV: Final = "text/csv"
+_XLSX: Final = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
+Encoding = Annotated[
+    Literal["utf-8", "utf-16-le", "utf-16-be", "windows-1252", "mac-roman", "cp850"] | None,
+    Query(description="of its letters, where they can be read in several ways", examples=[None]),
+]
+SheetName = Annotated[
+    str | None, Query(max_length=100, description="of a workbook with several lists", examples=[None])
+]
 _TABLE: Final = {
     "requestBody": {
         "required": False,
@@ -22,7 +30,8 @@ _TABLE: Final = {
             _CSV: {
                 "schema": {"type": "string"},
                 "example": "bib;athlete;gate;club\n17;Ola Nordmann;12;Lyn\n18;Kari Hansen;12;Koll\n",
-            }
+            },
+            _XLSX: {"schema": {"type": "string", "format": "binary"}},
         },
     }
 }
@@ -65,18 +74,24 @@ def _add_list(router: APIRouter, jumpers: Jumpers) -> None:
         return jumpers.view()
 
     @router.put("/start-list", responses=CHANGING, openapi_extra=_TABLE)
-    async def import_start_list(request: Request) -> StartList:
-        """Replace the start list by a table (CSV) whose first line names the columns; the first jumper is next.
+    async def import_start_list(request: Request, encoding: Encoding = None, sheet: SheetName = None) -> StartList:
+        """Replace the start list by a table, a line of which names the columns; the first jumper is next.
 
         Columns are `bib`, `athlete` (or first and last name), `gate`, `club`, `notes` in any order, and own ones, which
-        are written into the logs too. Semicolons, commas or tabs; UTF-8, UTF-16 or Latin-1. What is wrong is refused
-        with the line and the column. `undo` brings the old list back. An empty table clears the list.
+        are written into the logs too; lines above them are skipped. CSV with semicolons, commas or tabs in UTF-8,
+        UTF-16, Windows-1252 or Mac Roman, or an Excel workbook; the content tells which. What is wrong is refused with
+        the line and the column, and so are letters that can be read in several ways. `undo` brings the old list back.
+        A heading alone is refused; empty content clears the list.
         """
-        content = await request.body()
-        if content and not request.headers.get("content-type", "").startswith(_CSV):
-            text = f"the body must be a table: send Content-Type: {_CSV}"
-            raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
-        return await run_in_threadpool(jumpers.import_table, content)
+        return await run_in_threadpool(jumpers.import_table, await _table_in(request), encoding, sheet)
+
+    @router.post("/start-list/preview", responses=CHANGING, openapi_extra=_TABLE)
+    async def preview_start_list(request: Request, encoding: Encoding = None, sheet: SheetName = None) -> Preview:
+        """What a table would make of the start list, before `PUT` replaces it; nothing is changed.
+
+        Where letters can be read in several ways, or several sheets hold a list, it says which there are to choose.
+        """
+        return await run_in_threadpool(jumpers.preview, await _table_in(request), encoding, sheet)
 
     @router.patch("/start-list", responses=CHANGING)
     def change_rules(rules: Rules) -> StartList:
@@ -92,6 +107,14 @@ def _add_list(router: APIRouter, jumpers: Jumpers) -> None:
     def begin_round(_: NoFields = None) -> StartList:
         """Begin the next round: everybody waits, and the first of the list is next."""
         return jumpers.begin_round()
+
+
+async def _table_in(request: Request) -> bytes:
+    content = await request.body()
+    if content and not request.headers.get("content-type", "").startswith((_CSV, _XLSX)):
+        text = f"the body must be a table: send Content-Type: {_CSV}, or that of an Excel workbook, {_XLSX}"
+        raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
+    return content
 
 
 def _add_lines(router: APIRouter, jumpers: Jumpers) -> None:

@@ -262,7 +262,11 @@ def show_start_list(context: typer.Context, as_json: Json = False) -> None:
 @start_list_app.command("load")
 def load_start_list(
     context: typer.Context,
-    table: Annotated[Path, typer.Argument(help="table (CSV) whose first line names the columns: bib, athlete, …")],
+    table: Annotated[Path, typer.Argument(help="CSV file or Excel workbook, with a line that names the columns")],
+    encoding: Annotated[
+        str | None, typer.Option(help="of its letters, if they can be read in several ways, e.g. mac-roman")
+    ] = None,
+    sheet: Annotated[str | None, typer.Option(help="of a workbook with several lists")] = None,
     as_json: Json = False,
 ) -> None:
     """Replace the start list by a table with the columns bib, athlete, gate, club and own ones.
@@ -273,7 +277,9 @@ def load_start_list(
         content = read_whole(table, TEXT_MAX, links=True)
     except OSError as error:
         raise BadInputError(f"{table}: cannot be read ({error.strerror}); correct the path") from None
-    show(call(context, "PUT", "/api/start-list", content), start_list_lines, as_json)
+    chosen = {name: value for name, value in (("encoding", encoding), ("sheet", sheet)) if value is not None}
+    path = f"/api/start-list?{urllib.parse.urlencode(chosen)}" if chosen else "/api/start-list"
+    show(call(context, "PUT", path, content), start_list_lines, as_json)
 
 
 @start_list_app.command("undo")

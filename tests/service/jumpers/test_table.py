@@ -35,17 +35,20 @@ def test_norwegian_names_any_order_and_own_columns() -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("17;Anna;12\n18;Berit;12\n", 'names no column "bib" or "athlete", but "17", "Anna", "12"'),
+        (
+            "17;Anna;12\n18;Berit;12\n",
+            'no line names a column "bib" or "athlete"; the first one has "17", "Anna", "12"',
+        ),
         ("bib;athlete;Name\n1;A;B\n", 'column "athlete" is there twice in "bib", "athlete", "Name"'),
         ("bib;athlete;session\n1;A;B\n", 'column "session" has a name that every jump uses'),
-        ("bib;athlete\n1;A\n\n2;B;C\n", "line 4 has 3 fields, and the first line names 2 columns"),
+        ("bib;athlete\n1;A\n\n2;B;C\n", "line 4 has 3 fields, and the heading names 2 columns"),
         ("bib;athlete;\n1;A;x\n", 'line 2 has "x" in a column without a name'),
         ("bib;athlete\n7;A\n8;B\n7;C\n", "bib 7 stands in lines 2 and 4"),
         (f"bib;athlete\n1;{'x' * 300}\n", "line 2, column athlete: String should have at most 200 characters"),
-        ("bib;athlete\n" + "".join(f"{n};x\n" for n in range(600)), "600 jumpers: 500 at most"),
+        ("bib;athlete\n" + "".join(f"{n};x\n" for n in range(2100)), "2100 jumpers: 2000 at most"),
         ("bib;" + ";".join(f"c{n}" for n in range(20)) + "\n", "20 own columns: 12 at most"),
         (";;\n", "the start list is empty"),
-        ("PK\x03\x04\0\0", "is no text: save it as CSV"),
+        ("PK\x03\x04\0\0", "the workbook cannot be unpacked"),
     ],
 )
 def test_what_is_wrong_is_named(content: str, said: str) -> None:

@@ -5,11 +5,13 @@ from typing import Any
 
 import httpx
 
+from tests.service.jumpers.test_workbook import book
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import refused
 
 TABLE = "bib;athlete;gate\n17;Åse Bjørk;12\n18;Berit;\n"
 CSV = {"Content-Type": "text/csv"}
+XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
 def load(client: httpx.Client, content: bytes) -> httpx.Response:
@@ -57,9 +59,11 @@ def test_what_cannot_be_is_refused_with_what_to_do(client: httpx.Client) -> None
     assert refused(client.post("/api/start-list/undo", json={"version": 0}), 409).code == "changed_meanwhile"
     assert refused(client.post("/api/start-list/lines", json={"bib": "17"}), 409).code == "state_forbids"
     assert refused(client.post("/api/start-list/lines/9/choose"), 404).code == "unknown_line"
-    assert refused(client.put("/api/start-list", json={}), 415).detail.endswith("Content-Type: text/csv")
+    assert refused(client.put("/api/start-list", json={}), 415).detail.startswith(
+        "the body must be a table: send Content-Type: text/csv"
+    )
     assert refused(client.post("/api/recordings", content=b"x", headers=CSV), 415).code == "unsupported_media_type"
-    assert refused(load(client, b"bib\n" + b"x" * 70_000), 413).code == "request_entity_too_large"
+    assert refused(load(client, b"bib\n" + b"x" * 2_000_000), 413).code == "request_entity_too_large"
     for wrong in ({"line": 1}, {"carry": ["club"]}, {"bib": "a\nb"}):
         refused(client.patch("/api/next-jumper", json=wrong), 422)
 
@@ -73,3 +77,42 @@ def test_everybody_who_watches_sees_the_next_jumper_at_once(client: httpx.Client
             seen.append(json.loads(next(lines))["next_jumper"]["session"]["bib"])
     assert seen[0] == ""
     assert seen[-1] == "42"
+
+
+def test_a_list_is_looked_at_before_it_replaces_another(client: httpx.Client) -> None:
+    load(client, b"bib;athlete;gate;class\n1;Old;12;J18\n")
+    before = client.get("/api/start-list").json()
+
+    def look(content: bytes, **choice: str) -> Any:
+        answer = client.post("/api/start-list/preview", content=content, headers=CSV, params=choice)
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+    seen = look(b"Startliste\nStartnr;Navn;Klubb\n" + b"".join(b"%d;A;B\n" % n for n in range(1, 31)))
+    assert (seen["jumpers"], len(seen["lines"]), seen["heading"], seen["encoding"]) == (30, 8, 2, "utf-8")
+    assert (seen["added"], seen["removed"]) == (["club"], ["gate", "class"])
+    letters = "bib;athlete\n1;Anže Lanišek\n".encode("cp1252")
+    seen = look(letters)
+    choices = {each["encoding"]: each["words"] for each in seen["readings"]}
+    assert (seen["encoding"], choices["windows-1252"], choices["mac-roman"]) == (
+        None,
+        ["Anže Lanišek"],
+        ["Anûe Laniöek"],
+    )
+    assert refused(load(client, letters), 422).detail.startswith("its letters can be read in several ways")
+    assert look(letters, encoding="windows-1252")["lines"][0]["athlete"] == "Anže Lanišek"
+    workbook = book(("Gutter", [["bib", "athlete"], [1, "Åse"]]), ("Jenter", [["bib", "athlete"], [2, "Eva"]]))
+    seen = look(workbook)
+    assert (seen["sheets"], seen["lines"]) == (["Gutter", "Jenter"], [])
+    assert refused(load(client, b"bib;athlete\n"), 422).detail.startswith("the table is a heading alone")
+    assert look(b"bib;athlete\n")["jumpers"] == 0
+    assert client.get("/api/start-list").json() == before
+    answer = client.put("/api/start-list", content=workbook, headers={"Content-Type": XLSX}, params={"sheet": "Jenter"})
+    assert bibs(answer) == ["2"]
+    assert client.put("/api/start-list", content=workbook, headers=CSV, params={"encoding": "x"}).status_code == 422
+
+
+def test_two_thousand_jumpers_are_loaded_and_go_on(client: httpx.Client) -> None:
+    table = "bib;athlete;club\n" + "".join(f"{n};Åse Bjørk {n};Lyn\n" for n in range(1, 2001))
+    assert len(bibs(load(client, table.encode()))) == 2000
+    assert client.post("/api/next-jumper/skip").json()["next"]["session"]["bib"] == "2"

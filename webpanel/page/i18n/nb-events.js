@@ -135,6 +135,7 @@ export const events = {
   act_not_measured: ["ga opp å måle opptak {recording}"],
   act_export_ended: ["avbrøt eller fjernet en eksport"],
   act_next_jumper: ["endret neste hopper"],
+  act_list_looked: ["så på en startliste før den leses inn"],
   act_start_list: ["endret startlisten"],
   act_called: ["gjorde kallet {call}"],
 

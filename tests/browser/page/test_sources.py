@@ -60,11 +60,7 @@ def _placeholders(text: str) -> set[str]:
 
 
 def _sources() -> str:
-    own_words = {
-        PAGE / "i18n" / f"{language}{part}.js"
-        for language in ("en", "nb")
-        for part in ("", *PARTS)
-    }
+    own_words = {PAGE / "i18n" / f"{language}{part}.js" for language in ("en", "nb") for part in ("", *PARTS)}
     return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
 
 

@@ -198,7 +198,7 @@ def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
     expect(card).to_be_hidden()
     started = service.start_recording(RecordingOrder(bib="17", athlete="Anna Berg", preroll_s=0))
     service.stop_recording(started.id)
-    service.measurings._append(started.id)
+    service.measurings._waiting.add(started.id)
     service.measurings._running = MeasuringQueue(recording=started.id, state=MeasuringState.MEASURING, waiting=2)
     service.measuring = service.measurings._running
     service._wake()
@@ -220,7 +220,7 @@ def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
     expect(page.locator("#measured-verdict")).to_have_text("Measured live")
     expect(page.locator("#measured-why")).to_have_text("all points in 18 of 18 pulses in sight")
     expect(page.locator("#measured-figures")).to_be_visible()
-    service.measurings._waiting.clear()
+    service.measurings._waiting.remove(started.id)
     service.measuring, service.measurings._running = None, None
     service._wake()
     expect(queue).to_be_hidden()

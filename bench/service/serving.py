@@ -51,6 +51,16 @@ class ServedRig:
         """Call the API, and return the JSON of the answer."""
         return self.call(method, path, body).json()
 
+    def put_table(self, path: str, content: bytes) -> None:
+        """Send a table, CSV.
+
+        Raises:
+            ProcessDiedError: the service refuses.
+        """
+        answer = self._client.put(path, content=content, headers={"Content-Type": "text/csv"})
+        if answer.is_error:
+            raise ProcessDiedError(f"PUT {path}: {answer.status_code} {answer.text}")
+
     def await_state(self, state: str) -> None:
         """Wait until the rig is in a state.
 
@@ -69,8 +79,12 @@ class ServedRig:
 
 
 @contextmanager
-def served_rig(folder: Path) -> Iterator[ServedRig]:
+def served_rig(folder: Path, tables: str = "") -> Iterator[ServedRig]:
     """Start a service, and stop it when the context ends. The caller removes the recordings.
+
+    Args:
+        folder: of rig file and recordings.
+        tables: of the rig file, with `[simulation]` among them; left out: those of the rig that comes with Svev.
 
     Raises:
         ProcessDiedError: the service ends, or does not answer within 60 s.
@@ -83,7 +97,10 @@ def served_rig(folder: Path) -> Iterator[ServedRig]:
     text = (CONFIG / "rigs" / "sim-gige.toml").read_text(encoding="utf-8")
     text = text.replace("../scenarios", str(CONFIG / "scenarios"))
     text = text.replace("127.0.0.", f"127.77.{os.getpid() % 250}.")  # other runs use other addresses
-    rig.write_text(text.replace("[simulation]", f'[network]\npublish = "{free_address()}"\n\n[simulation]'))
+    head, _, rest = text.partition("[simulation]\n")
+    scenario, _, cameras = rest.partition("\n\n")
+    tables = tables or f"[simulation]\n{scenario}\n"
+    rig.write_text(f'{head}[network]\npublish = "{free_address()}"\n\n{tables}\n{cameras}')
     command = [sys.executable, "-m", "svev", "serve", "--rig", str(rig), "--port", str(port), "--data", str(folder)]
     with (folder / "service.log").open("w") as log, subprocess.Popen(command, stdout=log, stderr=log) as process:
         service = ServedRig(process.pid, port, folder)

@@ -89,13 +89,31 @@ def _angles_are_true(measured: dict[str, Any], truth: dict[int, dict[str, Any]])
 
 def _the_same_from_the_measurements(jump: HillLog, out: Path, again: Path) -> None:
     """What was measured can be computed again without looking at the jumper."""
-    given = ("--survey", jump.survey, "--measurements", out / "measurements.json")
+    given: list[str | Path] = ["--survey", jump.survey, "--measurements", out / "measurements.json"]
+    for day in (1, 2, 3):
+        earlier = _kinogram_of(out, slower=0.1 * day)
+        (again / f"day{day}").mkdir(parents=True)
+        (again / f"day{day}" / "kinogram.json").write_text(json.dumps(earlier))
+        given += ["--earlier", again / f"day{day}"]
     svev("analyze", jump.path, *given, "--out", again, "--json")
+    (told,) = json.loads((again / "kinogram.json").read_text())["jumps"]
+    assert told["marks"]["v_angle"]["word"] == "within noise"
+    assert told["marks"]["takeoff_speed"]["jumps"] == 3
+    assert [place["missing"] for place in told["places"]] == [None] * 5
     first, second = (json.loads((folder / "jumper.json").read_text())["jumps"][0] for folder in (out, again))
     for before, after in zip(first["pulses"], second["pulses"], strict=True):
         assert (before["points"]["P1"] is None) == (after["points"]["P1"] is None)
         if before["points"]["P1"] is not None:
             assert after["points"]["P1"]["X"] == pytest.approx(before["points"]["P1"]["X"], abs=1e-4)
+
+
+def _kinogram_of(out: Path, slower: float) -> dict[str, Any]:
+    """The kinogram of a result as if it were of an earlier jump."""
+    content: dict[str, Any] = json.loads((out / "kinogram.json").read_text())
+    (jump,) = content["jumps"]
+    jump["time"] = "2026-01-02T10:00:00Z"
+    jump["figures"]["takeoff_speed"]["value"] -= slower
+    return content
 
 
 def _the_example_of_the_documentation_runs(

@@ -17,7 +17,6 @@ from analysis.report.kinogram.words import (
     BODY,
     DOUBTFUL,
     GOOD,
-    JUMP,
     LEFT,
     METRE,
     MISSING,
@@ -63,10 +62,7 @@ def page_text(kinograms: Sequence[Kinogram], result: MeasuredRecording, hill: st
 
 
 def _jump(kinogram: Kinogram, pictures: Iterator[str], result: MeasuredRecording, hill: str) -> str:
-    facts = facts_words(result, hill, kinogram.time)
-    if len(result.jumps) > 1:
-        number = kinogram.jump.number
-        facts.insert(0, Said(f"{JUMP.english} {number}", f"{JUMP.norwegian} {number}"))
+    facts = facts_words(kinogram, result, hill)
     head = f"<header><h1>{_both(name_words(result))}</h1><p>{' &ensp; '.join(map(_both, facts))}</p></header>"
     shots = "".join(_shot(shot, pictures) for shot in kinogram.shots)
     figures = "".join(_figure(name, own, kinogram.marks.get(name)) for name, own in kinogram.figures.items())

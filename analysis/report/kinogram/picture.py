@@ -117,10 +117,7 @@ def _head(sheet: _Sheet, kinogram: Kinogram, result: MeasuredRecording, hill: st
     name = name_words(result)
     who = name.english if name.english == name.norwegian else f"{name.english} · {name.norwegian}"
     sheet.write(who, (_GAP + 4, 56), 46, _BOLD, most=_ACROSS - 3 * _GAP)
-    facts = facts_words(result, hill, kinogram.time)
-    if len(result.jumps) > 1:
-        facts.insert(0, Said(f"jump {kinogram.jump.number}", f"hopp {kinogram.jump.number}"))
-    line = "   ".join(_both(fact) for fact in facts)
+    line = "   ".join(_both(fact) for fact in facts_words(kinogram, result, hill))
     sheet.write(line, (_GAP + 4, 94), 24, colour=_SOFT, most=_ACROSS - 3 * _GAP)
 
 

@@ -23,6 +23,7 @@ PLACES_M: Final = (0.0, 5.0, 10.0, 15.0, 20.0)
 WIDTH, HEIGHT = 516, 387
 _MARGIN: Final = 1.2  # around the largest of the five: helmet and hands reach beyond the marked points
 _BESIDE: Final = 24  # grey value beside an image
+_UNEVEN: Final = 1.1  # the way from pulse to pulse changes by less than a tenth in a jump
 
 
 class Missing(StrEnum):
@@ -130,7 +131,7 @@ def shots_of(course: Course, measured: JumpMeasurements | None, system: CameraSy
 
 def _moment(course: Course, known: np.ndarray, place: float, step: float) -> Moment | None:
     off = np.abs(course.distance[known] - place)
-    if not off.min() <= abs(step) / 2 * 1.01:  # the way from pulse to pulse is not quite even
+    if not off.min() <= abs(step) / 2 * _UNEVEN:
         return None
     index = int(known[off.argmin()])
     pulse = course.pulses[index]

@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Final
 
 from analysis.report.figures import EARLY_S, FAR_M, fixed
 from analysis.report.kinogram.figures import UNITS, Mark, Reference, Word
+from analysis.report.kinogram.model import Kinogram
 from analysis.report.kinogram.shots import Missing, Shot
 from analysis.result.model import MeasuredRecording, Quantity
 
@@ -118,10 +118,12 @@ def name_words(result: MeasuredRecording) -> Said:
     return Said(name, name) if name else NO_NAME
 
 
-def facts_words(result: MeasuredRecording, hill: str, time: datetime) -> list[Said]:
-    """Bib, date, hill, gate and wind, as far as they are known."""
-    when = f"{time.astimezone():%Y-%m-%d %H:%M}"
-    facts = [Said(when, when)] + ([Said(hill, hill)] if hill else [])
+def facts_words(kinogram: Kinogram, result: MeasuredRecording, hill: str) -> list[Said]:
+    """Bib, number of the jump where there are several, date, hill, gate and wind, as far as they are known."""
+    when = f"{kinogram.time.astimezone():%Y-%m-%d %H:%M}"
+    number = kinogram.jump.number
+    facts = [Said(f"{JUMP.english} {number}", f"{JUMP.norwegian} {number}")] if len(result.jumps) > 1 else []
+    facts += [Said(text, text) for text in (when, hill) if text]
     for field, said in (("gate", GATE), ("wind", WIND)):
         if text := result.session.get(field, "").strip():
             facts.append(Said(f"{said.english} {text}", f"{said.norwegian} {text}"))

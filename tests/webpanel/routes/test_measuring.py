@@ -74,6 +74,10 @@ def test_a_page_among_the_files_reaches_nothing_of_the_panel(client: httpx.Clien
     table = client.get(f"{PATH}/files/jumper.csv")
     assert "attachment" in table.headers["content-disposition"]
     assert "jump-jumper.csv" in table.headers["content-disposition"]
+    (log.with_suffix(".measured") / "kinogram.jpg").write_bytes(b"\xff\xd8")
+    picture = client.get(f"{PATH}/files/kinogram.jpg")
+    assert picture.headers["content-type"] == "image/jpeg"
+    assert "content-disposition" not in picture.headers
 
 
 @pytest.mark.parametrize("name", ["measurement.json", "nothing.html", "..%2F..%2Fjump.mcap", "link.html"])

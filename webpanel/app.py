@@ -3,6 +3,7 @@
 import mimetypes
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Final
@@ -15,7 +16,7 @@ from webpanel.documentation import DESCRIPTION, serve_documentation
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard
 from webpanel.door.links import Links
-from webpanel.door.logins import Door
+from webpanel.door.logins import Door, Sessions
 from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
@@ -42,13 +43,16 @@ _TYPES: Final = {
 }  # fmt: skip
 
 
-def create_app(service: RigService, access: Access, links: Links | None = None) -> FastAPI:
+def create_app(
+    service: RigService, access: Access, links: Links | None = None, sessions: Sessions | None = None
+) -> FastAPI:
     """The panel of one running service.
 
     Args:
         service: operates the rig.
         access: who may reach the panel.
         links: makes links that open single recordings; None: there are none.
+        sessions: of who has logged in; None: they end with the panel.
 
     Returns:
         The application; `app.state.streams` are its `OpenStreams`. Serve it with `webpanel.server.make_server`.
@@ -66,7 +70,8 @@ def create_app(service: RigService, access: Access, links: Links | None = None) 
         generate_unique_id_function=lambda route: route.name,
     )  # fmt: skip
     app.state.streams = streams
-    door = Door(access, warn=lambda said: service.tell("warning", "access", said), links=links)
+    warn = partial(service.tell, "warning", "access")
+    door = Door(access, warn, links, Sessions() if sessions is None else sessions)
     routers = (
         rig_router(service),
         recordings_router(service, changes),

@@ -20,7 +20,7 @@ from rig.errors import ProcessDiedError
 from rig.events import Event, Level
 from rig.host.disk import free_bytes
 from rig.host.endings import ENDINGS
-from rig.phrase import phrase, plain
+from rig.phrase import Phrase, phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.settings.webhook import WebhookSettings
@@ -52,12 +52,16 @@ from svev.serving.systemd import JournalHandler, Notify, write_line
 from webpanel.app import create_app
 from webpanel.door.access import Access
 from webpanel.door.links import Links, kept_secret
+from webpanel.door.logins import Sessions
+from webpanel.door.session_file import SessionFile
 from webpanel.door.tls import Tls
 from webpanel.server import PanelServer, make_server
 
 _STOP_S: Final = 15.0
 _SOON_S: Final = 10.0
 _HOUR_S: Final = 3600.0
+#: At the end the disk gets so long to take the last login or logout.
+_KEEP_S: Final = 1.0
 #: The program that makes a rehearsal.
 REHEARSE: Final = (sys.executable, "-m", "svev.serving.rehearsal_program")
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
@@ -121,7 +125,9 @@ def serve(settings: ServiceSettings) -> None:
             supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot,
             rehearser, lights, trains, balls, PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
-        server = make_server(create_app(service, settings.access, _links(settings, rig, data, hub)), settings.tls)
+        server = make_server(
+            create_app(service, settings.access, *_door(settings, rig, data, hub, stack)), settings.tls
+        )
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report
         if rig.service.webhook is not None:
@@ -149,12 +155,20 @@ def serve(settings: ServiceSettings) -> None:
             raise supervisor.failure
 
 
-def _links(settings: ServiceSettings, rig: RigSettings, data: Path, hub: EventHub) -> Links:
-    """The links that open single jumps on phones; says if they end with the service."""
-    secret = kept_secret(data)
+def _door(
+    settings: ServiceSettings, rig: RigSettings, data: Path, hub: EventHub, stack: ExitStack
+) -> tuple[Links, Sessions]:
+    """The links that open single jumps on phones, and who has logged in; says if they end with the service."""
+
+    def warn(said: Phrase) -> None:
+        hub.tell(Event.now(Level.WARNING, "access", said))
+
+    secret, tokens = kept_secret(data), settings.access.tokens
     if secret.problem is not None:
-        hub.tell(Event.now(Level.WARNING, "access", secret.problem))
-    return Links(secret.value, settings.access.tokens, rig.service.share_hours * _HOUR_S)
+        warn(secret.problem)
+    file = SessionFile(data, tokens.mark(secret.value, b"svev sessions 1").hex(), warn)
+    stack.callback(file.wait, _KEEP_S)
+    return Links(secret.value, tokens, rig.service.share_hours * _HOUR_S), Sessions(file=file)
 
 
 def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:

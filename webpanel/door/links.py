@@ -8,7 +8,6 @@ nobody who has a link can try out tokens against it.
 
 import base64
 import binascii
-import hashlib
 import hmac
 import math
 import os
@@ -37,7 +36,7 @@ _MINUTE_S: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class Secret:
-    """What links are signed with.
+    """What links are signed with, and what shows that the tokens are the same.
 
     Attributes:
         value: random bytes.
@@ -86,9 +85,7 @@ class Links:
     """
 
     def __init__(self, secret: bytes, tokens: Tokens, share_s: float, clock: Callable[[], float] = time.time) -> None:
-        # A token holds no space and no line end, so that no two sets of tokens are written alike.
-        written = b"".join(sorted(role.encode() + b" " + token + b"\n" for token, role in tokens.roles.items()))
-        self._signing = hmac.digest(secret, b"svev link 1\n" + written, hashlib.sha256)
+        self._signing = tokens.mark(secret, b"svev link 1")
         self._share_s, self._clock = share_s, clock
 
     def make(self, recording: str) -> tuple[str, float]:
@@ -114,7 +111,7 @@ class Links:
 
     def _sign(self, recording: str, ends: bytes) -> bytes:
         signed = ends + recording.encode("utf-8", "surrogatepass")
-        return hmac.digest(self._signing, signed, hashlib.sha256)[:_SIGNATURE_BYTES]
+        return hmac.digest(self._signing, signed, "sha256")[:_SIGNATURE_BYTES]
 
 
 def _as_text(content: bytes) -> str:

@@ -16,12 +16,15 @@ from rig.phrase import Phrase, phrase
 from webpanel.door.access import Access, site_of
 from webpanel.door.links import Links
 from webpanel.door.roles import Role, needed_role, recording_in, shown_by_link
+from webpanel.door.session_file import SessionFile
 from webpanel.problems import ProblemError
 
 COOKIE: Final = "svev_session"
 #: Holds the key of a link; the browser sends it for the recording of the link alone.
 LINK_COOKIE: Final = "svev_link"
 SESSION_S = 12 * 3600.0
+#: So far a clock that is kept right may step back, s.
+_CLOCK_S: Final = 60.0
 _SESSIONS_MAX = 200
 _GUESSES_MAX = 10
 _GUESSES_S = 60.0
@@ -29,11 +32,17 @@ _CLIENTS_MAX = 1000
 
 
 class Sessions:
-    """Session keys: random, valid for 12 hours, each with a role. Only their hashes are kept."""
+    """Session keys: random, valid for 12 hours, each with a role. Only their hashes are kept.
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._open: OrderedDict[bytes, tuple[Role, float]] = OrderedDict()
+    Args:
+        clock: UNIX time, s.
+        file: keeps them beyond the end of the service; None: they end with it.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.time, file: SessionFile | None = None) -> None:
+        self._clock, self._file = clock, file
+        kept = () if file is None else file.load()
+        self._open = OrderedDict((bytes.fromhex(digest), (role, ends)) for digest, role, ends in kept)
 
     def begin(self, role: Role) -> str:
         """Begin a session, and return its key. If there are too many sessions, the oldest one ends."""
@@ -41,16 +50,24 @@ class Sessions:
         while len(self._open) >= _SESSIONS_MAX:
             self._open.popitem(last=False)
         self._open[_digest(key)] = role, self._clock() + SESSION_S
+        self._keep()
         return key
 
     def role_of(self, key: str) -> Role | None:
         """The role of the session of this key, None if there is none or it has ended."""
         role, ends = self._open.get(_digest(key), (None, 0.0))
-        return role if ends > self._clock() else None
+        # One with more time than a new one has was begun before the clock was set back: nobody knows how old it is.
+        return role if 0 < ends - self._clock() <= SESSION_S + _CLOCK_S else None
 
     def end(self, key: str) -> None:
         """End the session of this key, if there is one."""
-        self._open.pop(_digest(key), None)
+        if self._open.pop(_digest(key), None) is not None:
+            self._keep()
+
+    def _keep(self) -> None:
+        if self._file is not None:
+            now = self._clock()
+            self._file.keep((key.hex(), role, ends) for key, (role, ends) in self._open.items() if ends > now)
 
 
 class Brake:

@@ -41,6 +41,15 @@ class Tokens:
         found = [role for token, role in self.roles.items() if hmac.compare_digest(given, token)]
         return found[0] if found else None
 
+    def mark(self, secret: bytes, purpose: bytes) -> bytes:
+        """32 bytes that follow from a secret and the tokens, and are others for other tokens and for another purpose.
+
+        The secret keeps whoever sees something made with them from trying out tokens against it.
+        """
+        # A token holds no space and no line end, so that no two sets of tokens are written alike.
+        written = b"".join(sorted(role.encode() + b" " + token + b"\n" for token, role in self.roles.items()))
+        return hmac.digest(secret, purpose + b"\n" + written, "sha256")
+
 
 def read_tokens(file: Path | None, environment: Mapping[str, str] = os.environ) -> Tokens:
     """The tokens of a file, or the one of the variable SVEV_TOKEN, which may do everything.

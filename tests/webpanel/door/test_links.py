@@ -104,8 +104,8 @@ def shared(service: MemoryService, loopback: Loopback) -> Iterator[Shared]:
 
 
 #: What the page of a jump needs.
-SHOWN = ("", "/measurement", "/measurement/files/report.html", "/pulses", "/pulses/1.jpg?width=64", "/moment",
-         "/thumbnail.jpg")  # fmt: skip
+SHOWN = ("", "/measurement?jumps=false", "/measurement/files/report.html", "/pulses", "/pulses/1.jpg?width=64",
+         "/moment", "/thumbnail.jpg")  # fmt: skip
 #: What a link does not open of its own recording.
 HIDDEN = ("/file", "/file.sha256", "/notes", "/voice-notes", "/pulses/1.png", "/link", "/exports")
 
@@ -250,7 +250,7 @@ def test_phones_read_no_pictures_while_a_recording_runs(shared: Shared) -> None:
         assert refused(answer, 503).code == "recording_runs"
         assert int(answer.headers["retry-after"]) > 0
         refused(phone.get("/api/recordings/jump-1/measurement/files/report.html"), 503)
-        assert phone.get("/api/recordings/jump-1/measurement").status_code == 200
+        assert phone.get("/api/recordings/jump-1/measurement?jumps=false").status_code == 200
         assert coach.get("/api/recordings/jump-1/pulses/1.jpg").status_code == 200
         coach.post(f"/api/recordings/{started}/stop", json={})
         assert phone.get("/api/recordings/jump-1/pulses/1.jpg").status_code == 200

@@ -1,9 +1,13 @@
 """Sessions end, and guessing is slowed down, by the clock."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from rig.phrase import Phrase
 from webpanel.door.logins import SESSION_S, Brake, Sessions
 from webpanel.door.roles import Role
+from webpanel.door.session_file import NAME, SessionFile
+from webpanel.door.tokens import Tokens
 
 
 @dataclass
@@ -25,6 +29,53 @@ def test_a_session_ends_after_its_time() -> None:
     assert sessions.role_of(key) is Role.OPERATE
     clock.now += 2
     assert not sessions.role_of(key)
+
+
+def test_a_session_from_before_the_clock_was_set_back_ends() -> None:
+    clock = Clock()
+    sessions = Sessions(clock)
+    key = sessions.begin(Role.WATCH)
+    clock.now -= 1
+    assert sessions.role_of(key) is Role.WATCH
+    clock.now -= 60
+    assert not sessions.role_of(key)
+
+
+def test_sessions_outlive_the_service_but_not_their_end_nor_the_tokens(tmp_path: Path) -> None:
+    clock, told = Clock(), list[Phrase]()
+    tokens = Tokens({b"one-token-of-16-letters": Role.WATCH})
+    mark = tokens.mark(b"secret", b"sessions").hex()
+    file = SessionFile(tmp_path, mark, told.append)
+    sessions = Sessions(clock, file)
+    keys = [sessions.begin(role) for role in (Role.WATCH, Role.OPERATE, Role.WATCH)]
+    sessions.end(keys[2])
+    assert file.wait(20)
+    written = (tmp_path / NAME).read_text()
+    assert not [key for key in keys if key in written]
+
+    again = Sessions(clock, SessionFile(tmp_path, mark, told.append))
+    assert [again.role_of(key) for key in keys] == [Role.WATCH, Role.OPERATE, None]
+    clock.now += SESSION_S
+    assert not again.role_of(keys[0])
+    clock.now -= SESSION_S
+    other = Tokens({b"one-token-of-16-letters": Role.OPERATE}).mark(b"secret", b"sessions").hex()
+    assert not Sessions(clock, SessionFile(tmp_path, other, told.append)).role_of(keys[0])
+    (tmp_path / NAME).chmod(0o666)
+    assert not Sessions(clock, SessionFile(tmp_path, mark, told.append)).role_of(keys[0])
+    (tmp_path / NAME).write_text("[")
+    assert not Sessions(clock, SessionFile(tmp_path, mark, told.append)).role_of(keys[0])
+    assert not told
+
+
+def test_who_cannot_keep_sessions_says_so_once_and_goes_on(tmp_path: Path) -> None:
+    told = list[Phrase]()
+    file = SessionFile(tmp_path / "gone", "", told.append)
+    sessions = Sessions(Clock(), file)
+    for _ in range(2):
+        assert sessions.role_of(sessions.begin(Role.WATCH)) is Role.WATCH
+        assert file.wait(20)
+    (said,) = told
+    assert "everybody logs in again" in said.text
 
 
 def test_no_two_sessions_have_one_key() -> None:

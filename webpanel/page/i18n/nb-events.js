@@ -54,6 +54,7 @@ export const events = {
   event_supervisor_failed: ["tjenestens hovedtråd sviktet: {error}"],
   event_systemd: ["systemd leser ikke det tjenesten melder: den kan starte svev på nytt"],
   event_secret: ["{path} kan ikke tas vare på ({why}): lenker til hopp slutter å virke når tjenesten startes på nytt"],
+  event_sessions_not_kept: ["{path} kan ikke skrives ({why}): når tjenesten startes på nytt, må alle logge inn igjen"],
   event_unlisted: ["{count} opptak i {folder} vises ikke i listen, for eksempel {name}: gi dem navn som begynner med en bokstav eller et tall"],
   event_other_folder: ["opptakene legges i {given} slik --data sier, ikke i {named} slik {rig} sier: fjern --data eller recorder.directory"],
   event_webhook_fails: ["varslene kommer ikke fram: {why}"],

@@ -21,7 +21,7 @@ const FILES = [
   [/^report\.html$/, "measurement.report"], [/^overlay\.(webm|mp4)$/, "measurement.video"],
 ];
 /** What the browser shows itself instead of keeping it. */
-const SHOWN = /\.(html|txt|webm|png|jpg)$/;
+const SHOWN = /\.(html|txt|webm)$/;
 
 /** @type {import("../shared/replay.js").Replay} */
 let replay;

@@ -1,4 +1,4 @@
-"""A training that nobody touches: recorded by motion, named by the start list, measured by itself, with and without that.
+"""A training that nobody touches: recorded by motion, named by the start list, measured by itself, or not measured.
 
 Run it on a quiet machine: `python -m bench.service.training --jumpers 20 --out FOLDER`. It writes `training.json`:
 whether every jump has its log, its name and its result, how long after the take-off the figures are there, and which

@@ -21,6 +21,7 @@ import { startState } from "./live/state.js";
 import { drawExports, startExports } from "./recordings/exports.js";
 import { startKinogram } from "./recordings/kinogram.js";
 import { startLast } from "./recordings/last.js";
+import { drawJump } from "./recordings/jump.js";
 import { startMeasurement } from "./recordings/measurement.js";
 import * as recording from "./recordings/recording.js";
 import * as recordings from "./recordings/recordings.js";
@@ -37,8 +38,10 @@ import { drawRegion, enterRegion, startRegion } from "./system/region.js";
 import * as rehearsal from "./system/rehearsal.js";
 import * as rig from "./system/rig.js";
 import { drawChoices, startComparing } from "./viewing/comparing.js";
+import { drawCurves, startCurves } from "./viewing/curves.js";
 import { drawNotes, startNotes } from "./viewing/notes.js";
 import * as scrubber from "./viewing/scrubber.js";
+import { startStick } from "./viewing/stick.js";
 import { drawVoices, startVoice } from "./viewing/voice.js";
 
 /** Draw every part anew, after the language was changed. */
@@ -50,6 +53,8 @@ function redraw() {
   drawVoices();
   drawChoices();
   drawExports();
+  drawJump();
+  drawCurves();
   drawEarlier();
   drawKeys();
   drawPulses();
@@ -87,7 +92,7 @@ function entered({ view, id, key }) {
 startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startAutomatic, startPreview, startHealth, startMeasured, startBanner, startLog, startLatest]) start();
-for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement, startKinogram, startShare, startCoach, startVisit]) start();
+for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement, startKinogram, startStick, startCurves, startShare, startCoach, startVisit]) start();
 for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
 startRole();
 startSignals();

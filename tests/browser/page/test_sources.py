@@ -40,6 +40,7 @@ COMPOSED = (
     "measurement.after_",
     "measurement.state_",
     "measurement.step_",
+    "curves.",
 )
 #: The rooms whose sentences reach the page.
 SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")

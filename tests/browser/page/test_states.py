@@ -90,10 +90,10 @@ def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
     figures = page.locator("#measured-figures > div")
     expect(figures).to_have_text(
         [
-            "Take-off speed26.10\u202f±\u202f0.02\u202fm/s\n93.97\u202f±\u202f0.05\u202fkm/h",
-            "Perpendicular to the table2.1\u202f±\u202f0.1\u202fm/s",
-            "Speed at 20 m25.489\u202f±\u202f0.004\u202fm/s",
-            "Angle of attack, 0.5 s19.5\u202f±\u202f0.5\u202f°",
+            "Take-off speed26.104 ± 0.015\u202fm/s\n94.0\u202fkm/h",
+            "Perpendicular to the table2.11 ± 0.12\u202fm/s",
+            "Speed at 20 m25.489 ± 0.004\u202fm/s\n91.8\u202fkm/h",
+            "Angle of attack, 0.5 s19.5° ± 0.5°",
             "Ski to body, 0.5 s\N{EN DASH}",
         ]
     )
@@ -104,7 +104,7 @@ def test_the_jump_that_was_measured_last_is_shown_with_its_sigmas(
     expect(norwegian.locator("#measured-verdict")).to_have_text("Godt målt")
     expect(norwegian.locator("#measured-why")).to_be_hidden()
     expect(norwegian.locator("#measured-figures > div").first).to_have_text(
-        "Fart på kanten26,10\u202f±\u202f0,02\u202fm/s\n93,97\u202f±\u202f0,05\u202fkm/h"
+        "Fart på kanten26,104 ± 0,015\u202fm/s\n94,0\u202fkm/h"
     )
     wide = (
         "[...document.querySelectorAll('#measured *')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth)"

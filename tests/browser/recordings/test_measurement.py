@@ -55,11 +55,11 @@ def test_figures_verdict_and_files_of_a_measured_jump(panel: Panel, jumps: None,
     expect(jump.locator(".measured-why")).to_have_text("all points in 35 of 35 pulses in sight")
     expect(jump.locator(".figures > div")).to_have_text(
         [
-            "Take-off speed26.10\u202f±\u202f0.02\u202fm/s\n93.97\u202f±\u202f0.05\u202fkm/h",
-            "Perpendicular to the table2.1\u202f±\u202f0.1\u202fm/s",
-            "Speed at 20 m25.489\u202f±\u202f0.004\u202fm/s",
-            "Angle of attack, 0.5 s19.5\u202f±\u202f0.5\u202f°",
-            "Ski to body, 0.5 s9.1\u202f±\u202f<\u202f0.1\u202f°",
+            "Take-off speed26.104 ± 0.015\u202fm/s\n94.0\u202fkm/h",
+            "Perpendicular to the table2.11 ± 0.12\u202fm/s",  # as many digits as the report has
+            "Speed at 20 m25.489 ± 0.004\u202fm/s\n91.8\u202fkm/h",
+            "Angle of attack, 0.5 s19.5° ± 0.5°",
+            "Ski to body, 0.5 s9.1° ± 0.04°",
         ]
     )
     files = page.locator("#measurement-files a")

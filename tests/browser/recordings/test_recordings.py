@@ -170,6 +170,7 @@ def test_a_jump_opens_at_its_take_off_is_played_slowly_in_a_loop_noted_and_expor
     expect(where).to_have_text(re.compile("^31 / 60"))
     page.keyboard.press("End")
     expect(where).to_have_text(re.compile("^60 / 60"))
+    page.locator("#frame-more").click()
     page.locator("#frame-moment").click()
     expect(where).to_have_text(re.compile("^31 / 60"))
     expect(page.locator("#frame-png")).to_have_attribute("href", re.compile("pulses/31.png"))
@@ -181,10 +182,12 @@ def test_a_jump_opens_at_its_take_off_is_played_slowly_in_a_loop_noted_and_expor
     page.keyboard.press("-")
     expect(page.locator("#frame-speed")).to_have_value("2")
     page.keyboard.press("o")
+    expect(page.locator("#frame-play")).to_have_attribute("aria-label", "Pause")
+    expect(page.locator("#frame-speed")).to_have_value("2")  # slow already: as chosen
     page.keyboard.press("End")
     page.keyboard.press(" ")  # in a loop the beginning of the stretch follows its end
     expect(page.locator("#frame-play")).to_have_attribute("aria-label", "Pause")
-    expect(where).to_have_text(re.compile("^[1-5] / 60"))
+    expect(where).to_have_text(re.compile("^(1[6-9]|2[0-9]) / 60"))
     page.keyboard.press("Home")
     page.locator("#notes .note").click()
     expect(where).to_have_text(re.compile("^31 / 60"))
@@ -245,6 +248,7 @@ def test_a_stretch_that_is_marked_is_exported(
     expect(mark).to_be_hidden()
     for _ in range(4):
         page.locator("#frame-on").click()
+    page.locator("#frame-more").click()
     page.locator("#mark-first").click()
     for _ in range(3):
         page.locator("#frame-on").click()
@@ -283,6 +287,7 @@ def test_a_note_is_spoken_listened_to_and_removed(
     expect(page.locator("#frame-where")).to_have_text(re.compile("/ 30"))
     for _ in range(4):
         page.locator("#frame-on").click()
+    page.locator("#frame-more").click()
     page.get_by_role("button", name="Voice note").click()
     expect(page.locator("#voice")).to_have_text(re.compile(r"Stop \([1-9] s\)"))
     page.locator("#voice").click()

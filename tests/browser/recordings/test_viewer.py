@@ -20,7 +20,7 @@ def test_looking_through_a_jump(panel: Panel, jumps: None, open_page: Open) -> N
     page.get_by_role("button", name="Play").click()
     expect(page.get_by_role("button", name="Pause")).to_be_visible()
     page.get_by_role("button", name="Pause").click()
-    speed.select_option(label="Full speed")
+    speed.select_option(label="1/1")
     page.locator("#frame-where").click()
     page.keyboard.press("Space")
     expect(where).to_have_text(re.compile("^30 / 30"))

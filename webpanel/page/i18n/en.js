@@ -4,12 +4,14 @@ import { check } from "./en-check.js";
 import { jump } from "./en-jump.js";
 import { kinogram } from "./en-kinogram.js";
 import { measuring } from "./en-measuring.js";
+import { viewing } from "./en-viewing.js";
 
 export const en = {
   ...check,
   ...jump,
   ...kinogram,
   ...measuring,
+  ...viewing,
 
   "skip": "Skip to the content",
   "close": "Close",

@@ -4,12 +4,14 @@ import { check } from "./nb-check.js";
 import { jump } from "./nb-jump.js";
 import { kinogram } from "./nb-kinogram.js";
 import { measuring } from "./nb-measuring.js";
+import { viewing } from "./nb-viewing.js";
 
 export const nb = {
   ...check,
   ...jump,
   ...kinogram,
   ...measuring,
+  ...viewing,
 
   "skip": "Hopp til innholdet",
   "close": "Lukk",

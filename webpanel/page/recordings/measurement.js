@@ -10,6 +10,7 @@ import { attempt, tell, tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
 import { KINOGRAM, showKinogram } from "./kinogram.js";
 import { makeSteps } from "./steps.js";
+import { showJump } from "./jump.js";
 
 /** @typedef {import("./types.js").Measurement} Measurement */
 /** @typedef {import("../shared/types.js").LastJump} LastJump */
@@ -99,9 +100,11 @@ async function order(method) {
 function draw() {
   $("measurement").hidden = !recording;
   showKinogram(recording, isMeasurable() ? measured : null);
-  if (!recording) return;
+  $("jump-verdict").hidden = !recording;
+  if (!recording) return void attempt(() => showJump(null));
   const shown = isMeasurable() ? measured : null;
-  $("measurement-known").hidden = !shown;
+  void attempt(() => showJump(shown));
+  $("measurement-known").hidden = $("jump-verdict").hidden = !shown;
   if (!shown) {
     setText($("measurement-state"), isMeasurable() ? "" : t(recording.deleted ? "measurement.trash" : "measurement.after"));
     for (const part of ["measurement-share", "measurement-bar"]) $(part).hidden = true;
@@ -164,6 +167,8 @@ function drawResult({ recording: id, state, problem, figures, live, files }) {
   const { text, advice } = failed ? say(failed) : { text: "", advice: "" };
   $("measurement-problem").hidden = !failed;
   $("measurement-problem").replaceChildren(...failed ? [makeMark(failed.level, failed.level, text), ...advice ? [make("p", { class: "advice" }, advice)] : []] : []);
+  const levels = figures.map((jump) => levelOf(jump, live));
+  $("jump-verdict").replaceChildren(...levels.map((level) => makeMark(level, level, t(MARKS[level]))));
   $("measurement-jumps").replaceChildren(...figures.map((jump) => makeJump(jump, live, figures.length > 1)));
   const [first, rest] = sorted(files.filter((name) => !KINOGRAM.test(name)));
   $("measurement-files").replaceChildren(...first.map((name) => makeFile(id, name)));

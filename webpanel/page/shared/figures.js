@@ -7,8 +7,8 @@ import { number } from "./format.js";
 /** @typedef {import("./types.js").MeasuredValue} MeasuredValue */
 
 const KMH = 3.6; // km/h in one m/s
-/** Digits after the decimal point: of a speed what its standard deviation allows, of an angle no more than coaches say. */
-const MOST_DIGITS = { "m/s": 4, "km/h": 4, "°": 1 };
+/** Most digits of a value after the decimal point. */
+const MOST_DIGITS = { "m/s": 4, "km/h": 2, m: 4, "°": 1 };
 
 /** What is said of a jump of each level. */
 export const MARKS = { good: "measured.ok", warning: "measured.doubtful", info: "measurement.live_jump" };
@@ -41,14 +41,19 @@ export function verdictOf(jump) {
  * @param {import("./types.js").LastJump} jump
  */
 export function fillFigures(list, jump) {
-  const speed = jump.takeoff_speed;
+  const speed = (/** @type {MeasuredValue|null} */ of) => (of ? `${withSigma(of, "m/s")}\n${inKmh(of.value)}` : "–");
   fillList(list, [
-    [t("measured.takeoff_speed"), speed ? `${withSigma(speed, "m/s")}\n${withSigma({ value: KMH * speed.value, sigma: KMH * speed.sigma }, "km/h")}` : "–"],
+    [t("measured.takeoff_speed"), speed(jump.takeoff_speed)],
     [t("measured.perpendicular"), withSigma(jump.perpendicular, "m/s")],
-    [t("measured.speed_20_m"), withSigma(jump.speed_20_m, "m/s")],
+    [t("measured.speed_20_m"), speed(jump.speed_20_m)],
     [t("measured.angle_of_attack"), withSigma(jump.angle_of_attack, "°")],
     [t("measured.ski_to_body"), withSigma(jump.ski_to_body, "°")],
   ]);
+}
+
+/** @param {number} speed m/s, as coaches say it */
+export function inKmh(speed) {
+  return `${number(KMH * speed, 1)}\u202fkm/h`;
 }
 
 /**
@@ -59,36 +64,39 @@ export function fillFigures(list, jump) {
  */
 export function inLarge(jump) {
   /** @type {(speed: MeasuredValue|null) => MeasuredValue|null} */
-  const inKmh = (speed) => speed && { value: KMH * speed.value, sigma: KMH * speed.sigma };
+  const faster = (speed) => speed && { value: KMH * speed.value, sigma: KMH * speed.sigma };
   /** @type {[string, MeasuredValue|null, keyof typeof MOST_DIGITS][]} */
   const rows = [
-    ["measured.takeoff_speed", inKmh(jump.takeoff_speed), "km/h"], ["measured.perpendicular", jump.perpendicular, "m/s"],
-    ["measured.speed_20_m", inKmh(jump.speed_20_m), "km/h"], ["measured.angle_of_attack", jump.angle_of_attack, "°"],
+    ["measured.takeoff_speed", faster(jump.takeoff_speed), "km/h"], ["measured.perpendicular", jump.perpendicular, "m/s"],
+    ["measured.speed_20_m", faster(jump.speed_20_m), "km/h"], ["measured.angle_of_attack", jump.angle_of_attack, "°"],
     ["measured.ski_to_body", jump.ski_to_body, "°"],
   ];
   return rows.map(([key, measured, unit]) => ({ term: t(key), unit, ...inParts(measured, unit) ?? { value: "–", deviation: "" } }));
 }
 
 /**
- * A value with its standard deviation, both to the same place: the first digit of the standard deviation, if that is shown.
+ * A value with its standard deviation as the report has them.
  *
  * @param {MeasuredValue|null} measured
  * @param {keyof typeof MOST_DIGITS} unit
  */
-function withSigma(measured, unit) {
+export function withSigma(measured, unit) {
   const parts = inParts(measured, unit);
-  return parts ? `${parts.value}\u202f±\u202f${parts.deviation}\u202f${unit}` : "–";
+  if (!parts) return "–";
+  const { value, deviation } = parts;
+  return unit === "°" ? `${value}° ± ${deviation}°` : `${value} ± ${deviation}\u202f${unit}`;
 }
 
 /**
+ * The standard deviation has one digit, two if the first is a one, and the value as many decimals; angles no more than coaches say.
+ *
  * @param {MeasuredValue|null} measured
  * @param {keyof typeof MOST_DIGITS} unit
  */
 function inParts(measured, unit) {
   if (!measured) return null;
   const { value, sigma } = measured;
-  const digits = Math.min(MOST_DIGITS[unit], Math.max(0, -Math.floor(Math.log10(sigma))));
-  const least = 10 ** -digits;
-  const deviation = sigma < least / 2 ? `<\u202f${number(least, digits)}` : number(sigma, digits);
-  return { value: number(value, digits), deviation };
+  const [leading, power] = sigma.toExponential(1).split("e").map(Number);
+  const digits = Math.max(0, Number(leading < 2) - power);
+  return { value: number(value, Math.min(MOST_DIGITS[unit], digits)), deviation: number(sigma, digits) };
 }

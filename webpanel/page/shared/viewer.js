@@ -8,6 +8,7 @@
  * @typedef {object} Viewer
  * @property {HTMLImageElement} image
  * @property {HTMLElement} plane what zoom and pan move
+ * @property {SVGSVGElement} over lies on the image; its units are px of the image, (0, 0) is the outer corner
  * @property {(blocks: Block[], rows: number) => void} layOut
  * @property {(index: number|null) => void} select one camera, or all
  * @property {() => number|null} selected
@@ -24,7 +25,10 @@ import { make, setText } from "./dom.js";
  */
 export function makeViewer(root, chosen) {
   const image = make("img", { alt: "", draggable: false });
-  const plane = make("div", { class: "plane" }, image);
+  const over = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  over.setAttribute("preserveAspectRatio", "none");
+  over.setAttribute("aria-hidden", "true");
+  const plane = make("div", { class: "plane" }, image, over);
   const labels = make("div", { class: "labels" });
   root.append(plane, labels);
   /** @type {Block[]} */
@@ -38,8 +42,11 @@ export function makeViewer(root, chosen) {
     const [left, right] = one === null ? [0, all] : blocks[one].columns;
     root.style.aspectRatio = `${right - left} / ${rows}`;
     root.classList.toggle("single", one !== null);
-    image.style.width = `${(100 * all) / (right - left)}%`;
-    image.style.left = `${(-100 * left) / (right - left)}%`;
+    over.setAttribute("viewBox", `0 0 ${all} ${rows}`);
+    for (const { style } of [image, over]) {
+      style.width = `${(100 * all) / (right - left)}%`;
+      style.left = `${(-100 * left) / (right - left)}%`;
+    }
     blocks.forEach((block, index) => {
       const label = labels.children[index];
       label.hidden = one !== null && one !== index;
@@ -53,6 +60,7 @@ export function makeViewer(root, chosen) {
   return {
     image,
     plane,
+    over,
     layOut(newBlocks, newRows) {
       if (newBlocks.map((block) => block.name).join() !== blocks.map((block) => block.name).join()) {
         one = null;

@@ -30,6 +30,7 @@ export function makePan(frame, plane) {
     y = Math.min(0, Math.max(frame.clientHeight * (1 - scale), y));
     plane.style.transform = `translate(${x}px, ${y}px) scale(${scale})`;
     frame.classList.toggle("zoomed", scale > 1);
+    frame.style.setProperty("--zoom", String(scale));
   }
 
   /**

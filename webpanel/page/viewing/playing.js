@@ -11,7 +11,7 @@
  * @typedef {object} Player
  * @property {() => void} toggle
  * @property {() => void} pause
- * @property {() => void} toggleLoop
+ * @property {() => void} toggleLoop plays in a loop from its beginning, in slow motion; or ends that
  * @property {(direction: 1|-1) => void} changeSpeed 1: slower
  * @property {() => void} draw the words anew, in another language
  */
@@ -22,7 +22,9 @@ import { $, make, setIcon } from "../shared/dom.js";
 /** How many times slower than the jump. */
 const SLOWER = [1, 2, 3, 5, 10];
 /** A loop begins so long before the moment that matters and ends so long after it, s. */
-const [BEFORE_S, AFTER_S] = [1, 2];
+const [BEFORE_S, AFTER_S] = [0.5, 1];
+/** How many times slower than the jump a loop begins, unless somebody has chosen. */
+const LOOP_SLOWER = 5;
 
 /**
  * @param {Scene} scene
@@ -90,6 +92,11 @@ export function makePlayer(scene) {
     toggleLoop() {
       looping = !looping;
       $("frame-loop").setAttribute("aria-pressed", String(looping));
+      if (!looping || !scene.pulses().length) return pause();
+      if (Number($("frame-speed").value) === 1) $("frame-speed").value = String(LOOP_SLOWER);
+      if (!playing) requestAnimationFrame(playOn);
+      playFrom(stretch()[0]);
+      drawPlay();
     },
     changeSpeed(direction) {
       const next = SLOWER[SLOWER.indexOf(Number($("frame-speed").value)) + direction];
@@ -99,7 +106,7 @@ export function makePlayer(scene) {
     },
     draw() {
       const chosen = $("frame-speed").value || "1";
-      $("frame-speed").replaceChildren(...SLOWER.map((factor) => make("option", { value: String(factor) }, factor === 1 ? t("scrub.normal") : `1/${factor}`)));
+      $("frame-speed").replaceChildren(...SLOWER.map((factor) => make("option", { value: String(factor) }, `1/${factor}`)));
       $("frame-speed").value = chosen;
       drawPlay();
     },

@@ -2,10 +2,12 @@
 
 import { t } from "../i18n/i18n.js";
 import { partOf } from "../shared/api.js";
-import { $, make, setText } from "../shared/dom.js";
+import { $, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { makeViewer } from "../shared/viewer.js";
+import { makeChoice } from "./choice.js";
 import { makePan } from "./pan.js";
+import { makePicture } from "./picture.js";
 import { makePlayer } from "./playing.js";
 import { drawStrip, makeStrip } from "./strip.js";
 
@@ -18,21 +20,28 @@ let at = 0;
 let viewer;
 /** @type {import("./pan.js").Pan} */
 let pan;
-let loading = false;
+/** @type {import("./choice.js").Choice} */
+let choice;
+/** @type {import("./picture.js").Picture} */
+let picture;
 /** @type {import("./playing.js").Player} */
 let player;
 
 /** Index of the pulse at which the recording begins to matter. @type {number|null} */
 let moment = null;
-/** Called whenever another pulse or camera is in sight. @type {() => void} */
-let whenShown = () => {};
+/** Called whenever another pulse or camera is in sight. @type {(() => void)[]} */
+const whenShown = [];
+/** Called whenever another picture is shown. @type {(() => void)[]} */
+const whenPictured = [];
 /** Whether somebody has moved in the recording; then it stays where it is. */
 let touched = false;
 
 export function startScrubber() {
   viewer = makeViewer($("frames"), chooseCamera);
   pan = makePan($("frames"), viewer.plane);
-  player = makePlayer({ pulses: () => recording?.pulses ?? [], at: () => at, moment: () => moment, ready: () => !loading, show: showIndex });
+  choice = makeChoice(viewer, $("frames"), () => { pan.reset(); drawPng(); tellAll(whenShown); });
+  picture = makePicture(viewer.image, () => (recording?.pulses[at] ? { id: recording.id, pulse: recording.pulses[at].pulse } : null), () => tellAll(whenPictured));
+  player = makePlayer({ pulses: () => recording?.pulses ?? [], at: () => at, moment: () => moment, ready: picture.ready, show: showIndex });
   makeStrip($("frame-strip"), (index) => { touched = true; showIndex(index); });
   $("frame-slider").addEventListener("input", () => { touched = true; player.pause(); showIndex(Number($("frame-slider").value)); });
   $("frame-back").addEventListener("click", () => step(-1));
@@ -44,8 +53,6 @@ export function startScrubber() {
   player.draw();
   $("zoom-in").addEventListener("click", () => pan.zoom(1.5));
   $("zoom-out").addEventListener("click", () => pan.zoom(1 / 1.5));
-  viewer.image.addEventListener("load", loaded);
-  viewer.image.addEventListener("error", () => { loading = false; });
 }
 
 /** Show nothing until the next `scrub`. */
@@ -53,10 +60,9 @@ export function clearScrubber() {
   player.pause();
   recording = null;
   moment = null;
-  loading = touched = false;
+  touched = false;
   for (const button of ["frame-moment", "frame-gap"]) $(button).hidden = true; // until the pulses have come
-  viewer.image.removeAttribute("src");
-  viewer.image.alt = "";
+  picture.clear();
   for (const words of ["frame-where", "frame-fate"]) setText($(words), "");
   $("frame-strip").hidden = true;
 }
@@ -68,12 +74,11 @@ export function clearScrubber() {
  */
 export function scrub(pulses) {
   recording = pulses;
-  viewer.layOut(pulses.cameras.map((name, index) => ({ name, columns: pulses.columns[index] })), pulses.shape[0]);
+  viewer.layOut(blocksOf(pulses), pulses.shape[0]);
   $("frame-slider").max = String(Math.max(0, pulses.pulses.length - 1));
   $("frame-strip").hidden = false;
   $("frame-gap").hidden = gaps().length === 0;
-  makeCameraChoice(pulses.cameras);
-  chooseCamera(null);
+  choice.offer(pulses.cameras);
   drawStrip($("frame-strip"), pulses);
   showIndex(0);
 }
@@ -101,7 +106,17 @@ export function toMoment() {
 
 /** @param {() => void} action called whenever another pulse or camera is in sight */
 export function onShown(action) {
-  whenShown = action;
+  whenShown.push(action);
+}
+
+/** @param {() => void} action called whenever another picture is shown */
+export function onPictured(action) {
+  whenPictured.push(action);
+}
+
+/** The picture that is shown: where to draw over it, its pulse (null: none is shown), its cameras and rows. */
+export function pictured() {
+  return { over: viewer.over, pulse: picture.pulse(), blocks: recording ? blocksOf(recording) : [], rows: recording?.shape[0] ?? 1 };
 }
 
 /** How long after the pulse that matters the one in sight is, and which camera is large. */
@@ -115,10 +130,11 @@ export function pulseShown() {
   return recording?.pulses[at]?.pulse ?? null;
 }
 
-/** Go to a pulse. @param {number} pulse */
+/** Go to a pulse, or to the next one if the recording lacks it. @param {number} pulse */
 export function showPulse(pulse) {
+  touched = true;
   player.pause();
-  const index = recording?.pulses.findIndex((each) => each.pulse === pulse) ?? -1;
+  const index = recording?.pulses.findIndex((each) => each.pulse >= pulse) ?? -1;
   if (index >= 0) showIndex(index);
 }
 
@@ -152,13 +168,7 @@ export function nextGap(direction) {
 
 /** @param {number|null} index one camera large, or all */
 export function chooseCamera(index) {
-  viewer.select(index);
-  pan.reset();
-  drawPng();
-  whenShown();
-  [...$("frame-cameras").children].forEach((button, place) => {
-    button.setAttribute("aria-pressed", String(place === (viewer.selected() ?? -1) + 1));
-  });
+  choice.choose(index);
 }
 
 export function togglePlay() {
@@ -173,7 +183,7 @@ export function playerInUse() {
 
 /** Draw the words anew, in another language. */
 export function drawWords() {
-  if (recording) makeCameraChoice(recording.cameras);
+  if (recording) choice.draw();
   drawMoment();
   player.draw();
   if (recording) drawPlace();
@@ -185,21 +195,17 @@ function showIndex(index) {
   at = Math.min(Math.max(0, index), recording.pulses.length - 1);
   $("frame-slider").value = String(at);
   drawPlace();
-  if (!loading) loadImage();
+  picture.load();
 }
 
-/** Load the image of the pulse. One image is loaded at a time; pulses passed meanwhile are never asked for. */
-function loadImage() {
-  if (!recording) return;
-  const address = new URL(partOf(recording.id, `pulses/${recording.pulses[at].pulse}.jpg`), document.baseURI).href;
-  if (viewer.image.src === address) return;
-  loading = true;
-  viewer.image.src = address;
+/** @param {Pulses} pulses */
+function blocksOf({ cameras, columns }) {
+  return cameras.map((name, index) => ({ name, columns: columns[index] }));
 }
 
-function loaded() {
-  loading = false;
-  if (recording) loadImage();
+/** @param {(() => void)[]} listeners */
+function tellAll(listeners) {
+  for (const tell of listeners) tell();
 }
 
 function drawPlace() {
@@ -212,7 +218,7 @@ function drawPlace() {
   $("frame-strip").style.setProperty("--at", String((at + 0.5) / recording.pulses.length));
   viewer.image.alt = t("scrub.alt", { pulse });
   drawPng();
-  whenShown();
+  tellAll(whenShown);
   statuses.forEach((status, index) => {
     const fine = status === "ok";
     viewer.cover(index, "warning", fine ? "" : t(`status.${status}`), fine ? "" : t(`status.${status}.means`), "");
@@ -235,12 +241,4 @@ function drawMoment() {
 function gaps() {
   const pulses = recording?.pulses ?? [];
   return pulses.flatMap(({ statuses }, index) => (statuses.every((status) => status === "ok") ? [] : [index]));
-}
-
-/** @param {string[]} cameras */
-function makeCameraChoice(cameras) {
-  const shown = viewer.selected();
-  $("frame-cameras").replaceChildren(...[t("scrub.all"), ...cameras].map((name, place) => make(
-    "button", { type: "button", "aria-pressed": String(place === (shown ?? -1) + 1), onclick: () => chooseCamera(place ? place - 1 : null) }, name,
-  )));
 }

@@ -2,15 +2,16 @@
 
 Two jumps differ by more than errors of measurement as soon as the athlete is a human being. So the means of two groups
 are judged by how jumps scatter about the mean of their own group, errors of measurement included, with the t
-distribution; errors of calibration and take-off that all jumps of a group have in common come on top. The greatest of
-all differences is judged as in `analysis.comparison.difference`, as that of as many independent differences: their
-number is that of two measurements of one jump, which scatter more freely over time than jumps do, so that chance is
-rather given too much than too little.
+distribution (further groups of the athlete tell of that scatter, too); errors of calibration and take-off that all
+jumps of a group have in common come on top. The greatest of all differences is judged as in
+`analysis.comparison.difference`, as that of as many independent differences: their number is that of two measurements
+of one jump, which scatter more freely over time than jumps do, so that chance is rather given too much than too little.
 """
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -26,37 +27,54 @@ from analysis.comparison.difference import (
     difference,
     shared_covariance,
 )
-from analysis.comparison.scatter import scatter_within
+from analysis.comparison.scatter import Scatter, scatter_within
 from analysis.comparison.shared_calibration import SharedCalibration, shared_calibration
 from analysis.result.model import QUANTITIES
 from rig.arrays import Floats
 
 
-def group_difference(alignment: Alignment, first: int, draws: int = DRAWS) -> Difference:
-    """Compare two groups of jumps: mean of the second minus mean of the first. Two single jumps are compared as such.
+@dataclass(frozen=True, slots=True, eq=False)
+class GroupDifference:
+    """What was found.
+
+    Attributes:
+        difference: mean of the second group minus mean of the first.
+        scatter: how the jumps scatter about the means of their groups; None: there are two single jumps and no others,
+            which are compared as such.
+    """
+
+    difference: Difference
+    scatter: Scatter | None
+
+
+def group_difference(alignment: Alignment, sizes: Sequence[int], draws: int = DRAWS) -> GroupDifference:
+    """Compare two groups of jumps.
 
     Args:
-        alignment: of all jumps; the `first` ones are the one group, the rest the other.
-        first: how many are in the first group.
+        alignment: of all jumps, group by group.
+        sizes: of the groups. The first two are compared; further ones tell how the athlete's jumps scatter, as far as
+            they are measured at the same times.
         draws: of the distribution of the greatest difference.
 
     Raises:
-        BadInputError: the jumps are not all measured at the same times since the take-off.
+        BadInputError: the jumps of the first two groups are not all measured at the same times since the take-off.
     """
-    groups = alignment.jumps[:first], alignment.jumps[first:]
+    jumps = iter(alignment.jumps)
+    groups = [list(islice(jumps, size)) for size in sizes]
     pair = difference(replace(alignment, jumps=[groups[0][0], groups[1][0]]), draws)
-    times = common_times(alignment.jumps)
-    found = [[series(jump, times) for jump in group] for group in groups]
-    within = scatter_within([[each.values for each in group] for group in found])
+    times = common_times([*groups[0], *groups[1]])
+    found = [[series(jump, times) for jump in group] for group in groups[:2]]
+    others = [[series(jump, times) for jump in group if _covers(jump, times)] for group in groups[2:]]
+    within = scatter_within([[each.values for each in group] for group in (*found, *others)])
     if within is None:
-        return pair
+        return GroupDifference(pair, None)
     one, other = (_mean(group) for group in found)
-    shared = shared_covariance(one, other, _calibration(groups), alignment.shared_sigma_s)
-    parts = sum(1 / len(group) for group in groups)
+    shared = shared_covariance(one, other, _calibration(groups[:2]), alignment.shared_sigma_s)
+    parts = sum(1 / len(group) for group in groups[:2])
     sigma = np.sqrt(within.deviation**2 * parts + shared.diagonal().reshape(one.values.shape))
     p = within.p(other.values - one.values, sigma)
     alone = -np.expm1(np.log1p(-LEVEL) / pair.independent)
-    return Difference(
+    compared = Difference(
         times=times,
         a=one.values,
         b=other.values,
@@ -69,6 +87,7 @@ def group_difference(alignment: Alignment, first: int, draws: int = DRAWS) -> Di
         common=pair.common,
         power=dict.fromkeys(QUANTITIES),
     )
+    return GroupDifference(compared, within)
 
 
 def greatest_differences(found: Difference) -> list[dict[str, Any]]:
@@ -87,6 +106,11 @@ def greatest_differences(found: Difference) -> list[dict[str, Any]]:
         for row, name, at in places
         if at is not None
     ]
+
+
+def _covers(jump: MeasuredJump, times: Floats) -> bool:
+    known = jump.since_takeoff()
+    return bool(known[0] <= times[0] and times[-1] <= known[-1])
 
 
 def _mean(group: Sequence[Series]) -> Series:

@@ -32,6 +32,10 @@ class Comparison(Model):
     first: int = Field(description="jumps of the first group")
     second: int = Field(description="jumps of the second group")
     left_out: int = Field(description="jumps of the spans that cannot be compared: not measured well, or only live")
+    scatter_jumps: int = Field(
+        description="jumps that tell how the athlete scatters, those of other days among them; 0: two single jumps are "
+        "judged by errors of measurement alone"
+    )
     different: tuple[str, ...] = Field(description="quantities that differ by more than chance")
     quantities: tuple[QuantityDifference, ...]
     one_place: bool = Field(description="whether all take-offs are at one place; otherwise each jump has its own")

@@ -2,13 +2,15 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Any, Final
 
 from recorder.catalogue.entry import SUFFIX
 from rig.api.athletes import AthleteJump
-from rig.api.comparison import Comparison
+from rig.api.comparison import Comparison, Span
 from rig.api.statement import Level
 from rig.errors import BadInputError, StateForbidsError
 from service.background.child import run_child
@@ -16,8 +18,9 @@ from service.measuring.results import result_file
 
 #: Two jumps take some two seconds, a season of one athlete some ten.
 _DEADLINE_S: Final = 60.0
-#: So many jumps of a group are compared, the newest ones.
-_MOST: Final = 200
+#: So many jumps of a span are compared, and so many of other days tell the scatter: the newest ones.
+_MOST: Final = 100
+_MOST_OTHERS: Final = 60
 
 
 class Comparisons:
@@ -32,19 +35,31 @@ class Comparisons:
         self._directory, self._busy = directory, busy
         self._turn = threading.Lock()
 
-    def groups(self, first: Sequence[AthleteJump], second: Sequence[AthleteJump]) -> Comparison:
-        """Compare two groups of jumps.
+    def spans(self, jumps: Sequence[AthleteJump], first: Span, second: Span) -> Comparison:
+        """Compare an athlete's jumps of two spans; those of other days tell how his jumps scatter.
+
+        Args:
+            jumps: all of his, newest first.
+            first: a span.
+            second: another one.
 
         Raises:
             StateForbidsError: a recording runs.
-            BadInputError: there are too few jumps, or they cannot be compared.
+            BadInputError: there are too few jumps, the spans overlap, or the jumps cannot be compared.
         """
-        groups = [self._comparable(group) for group in (first, second)]
+        if first.since < second.until and second.since < first.until:
+            raise BadInputError("the spans overlap: choose two that have no day in common")
+        compared = [[each for each in jumps if span.since <= each.jump.time < span.until] for span in (first, second)]
+        groups = [self._comparable(group)[:_MOST] for group in compared]
         used = [len(group) for group in groups]
         if not all(used):
             raise BadInputError("a span has no jump that was measured well: choose another one")
-        end = self._ask({"first": groups[0], "second": groups[1]})
-        left_out = len(first) + len(second) - sum(used)
+        days: dict[date, list[AthleteJump]] = defaultdict(list)
+        for each in (each for each in jumps if not any(each in group for group in compared)):
+            days[each.jump.time.date()].append(each)
+        others = [self._comparable(day) for day in days.values()]
+        end = self._ask({"groups": groups + list(_up_to(_MOST_OTHERS, others))})
+        left_out = sum(len(group) for group in compared) - sum(used)
         return Comparison.model_validate(end | {"first": used[0], "second": used[1], "left_out": left_out})
 
     def _comparable(self, jumps: Sequence[AthleteJump]) -> list[dict[str, Any]]:
@@ -54,7 +69,7 @@ class Comparisons:
             log = self._directory / f"{each.jump.recording}{SUFFIX}"
             if each.level is Level.GOOD and (file := result_file(log, "jumper.json")) is not None:
                 found.append({"file": str(file), "jump": each.jump.jump, "name": each.athlete or each.jump.recording})
-        return found[:_MOST]
+        return found
 
     def _ask(self, what: dict[str, Any]) -> dict[str, Any]:
         deadline = time.monotonic() + _DEADLINE_S
@@ -78,3 +93,13 @@ class Comparisons:
         if "problem" in end:
             raise BadInputError(end["problem"]["text"])
         return end
+
+
+def _up_to(most: int, groups: Iterable[list[dict[str, Any]]]) -> Iterator[list[dict[str, Any]]]:
+    """Groups of two or more, as long as they have no more than `most` together."""
+    for group in groups:
+        most -= len(group)
+        if most < 0:
+            return
+        if len(group) > 1:
+            yield group

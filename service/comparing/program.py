@@ -10,16 +10,17 @@ if TYPE_CHECKING:
 
 
 def _compare(asked: dict[str, Any], _: Teller) -> dict[str, Any]:
-    """Compare the jumps `first` with the jumps `second`, each with `file`, `jump` and `name`."""
+    """Compare the first two of `groups` of jumps, each with `file`, `jump` and `name`; the others tell the scatter."""
     from analysis.comparison.alignment import align  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.comparison.groups import greatest_differences, group_difference  # noqa: PLC0415
 
-    first, second = ([_jump(each) for each in asked[group]] for group in ("first", "second"))
-    alignment = align([*first, *second])
-    found = group_difference(alignment, len(first))
+    groups = [[_jump(each) for each in group] for group in asked["groups"]]
+    alignment = align([jump for group in groups for jump in group])
+    found = group_difference(alignment, [len(group) for group in groups])
     return {
-        "different": found.found(),
-        "quantities": greatest_differences(found),
+        "different": found.difference.found(),
+        "quantities": greatest_differences(found.difference),
+        "scatter_jumps": 0 if found.scatter is None else found.scatter.jumps,
         "one_place": alignment.at_one_place,
     }
 

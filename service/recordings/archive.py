@@ -193,10 +193,9 @@ class Archive(ABC):
 
         Raises:
             StateForbidsError: a recording runs.
-            BadInputError: a span has no jump that was measured well, or they cannot be compared.
+            BadInputError: the spans overlap, one has no jump that was measured well, or they cannot be compared.
         """
-        spans = [JumpQuery(athlete=athlete, since=span.since, until=span.until) for span in (first, second)]
-        return self._comparisons.groups(*(self.measured_jumps(span) for span in spans))
+        return self._comparisons.spans(self.measured_jumps(JumpQuery(athlete=athlete)), first, second)
 
     def measure(self, recording_id: str) -> Measurement:
         """Have the log of a recording measured, again if it was measured before.

@@ -13,6 +13,8 @@ READY = {
     "recordings": "#recordings-list li",
     "trash": "#recordings-empty",
     "recordings/jump-2": "#measurement-files a",
+    "athlete/Ola%20%3Cb%3ENordmann%3C%2Fb%3E": "#athlete-table td",
+    "jumps": "#day-table td",
     "log": "#log-list li, #log-empty",
     "doctor": "#doctor-run",
     "aim": "#aim-cameras button",

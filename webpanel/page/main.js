@@ -1,5 +1,7 @@
 /** Puts the page together. Each part draws itself from what store.js holds; connection.js keeps that up to date. */
 
+import { drawAthlete, enterAthlete, startAthlete } from "./athletes/athlete.js";
+import { drawDay, enterDay, startDay } from "./athletes/day.js";
 import { startAlarms } from "./frame/alarms.js";
 import { drawKeys, startKeys } from "./frame/keys.js";
 import { startLogin } from "./frame/login.js";
@@ -58,6 +60,8 @@ function redraw() {
   drawEarlier();
   drawKeys();
   drawPulses();
+  drawAthlete();
+  drawDay();
   drawRegion();
   drawMeasured();
   drawShare();
@@ -79,6 +83,8 @@ function entered({ view, id, key }) {
   }
   if (view === "recordings") recordings.enterRecordings();
   if (view === "recording") void recording.enterRecording(id);
+  if (view === "athlete") void enterAthlete();
+  if (view === "jumps") void enterDay();
   if (view === "doctor") {
     doctor.draw();
     rehearsal.enterRehearsal();
@@ -93,7 +99,7 @@ startSettings(redraw);
 startLanguage();
 for (const start of [startState, startSession, startStartList, startActions, startAutomatic, startPreview, startHealth, startMeasured, startBanner, startLog, startLatest]) start();
 for (const start of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion, startAim, startEarlier, recordings.startRecordings, startLast, scrubber.startScrubber, startComparing, startNotes, startVoice, startExports, startMeasurement, startKinogram, startStick, startCurves, startShare, startCoach, startVisit]) start();
-for (const start of [recording.startRecording, rig.startRig, startKeys]) start();
+for (const start of [recording.startRecording, startAthlete, startDay, rig.startRig, startKeys]) start();
 startRole();
 startSignals();
 startAlarms();

@@ -27,7 +27,7 @@ def group(first: int, *leg_deg: float) -> list[MeasuredJump]:
 
 def test_two_single_jumps_are_compared_as_by_the_comparison_of_jumps() -> None:
     aligned = align([jump(1), jump(2, leg_deg=3.0)])
-    found, expected = group_difference(aligned, 1, FEW), difference(aligned, FEW)
+    found, expected = group_difference(aligned, (1, 1), FEW).difference, difference(aligned, FEW)
     assert found.found() == expected.found() == ["alpha"]
     assert found.p_greatest == pytest.approx(expected.p_greatest, nan_ok=True)
 
@@ -36,8 +36,9 @@ def test_a_change_within_the_athletes_own_scatter_is_chance_and_a_greater_one_is
     """Single jumps 4 degrees apart are found different: not so the means of four each that scatter by 3 degrees."""
     assert "alpha" in difference(align([jump(100, -1.0), jump(200, 3.0)]), FEW).found()
     one, other = group(100, -3, -1, 1, 3), group(200, 1, 3, 5, 7)
-    assert group_difference(align([*one, *other]), 4, FEW).found() == []
-    greater = group_difference(align([*group(100, -1, -1, 1, 1), *group(200, 9, 9, 11, 11)]), 4, FEW)
+    assert group_difference(align([*one, *other]), (4, 4), FEW).difference.found() == []
+    one, other = group(100, -1, -1, 1, 1), group(200, 9, 9, 11, 11)
+    greater = group_difference(align([*one, *other]), (4, 4), FEW).difference
     assert "alpha" in greater.found()
     at = greater.greatest(ALPHA)
     assert at is not None
@@ -45,13 +46,29 @@ def test_a_change_within_the_athletes_own_scatter_is_chance_and_a_greater_one_is
     assert greater.sigma[ALPHA, at] == pytest.approx(np.sqrt(4 / 3) * np.sqrt(2 / 4), rel=0.3)
 
 
+def test_further_jumps_tell_how_the_athlete_scatters() -> None:
+    """Two against two leave two degrees of freedom: 10 degrees may be chance. With ten further jumps they are not."""
+    few = [*group(100, -1, 1), *group(200, 9, 11)]
+    alone = group_difference(align(few), (2, 2), FEW)
+    assert alone.difference.found() == []
+    further = [*group(300, -1, 1, -1, 1, 1, -1), *group(400, 9, 11, 9, 11)]
+    helped = group_difference(align([*few, *further]), (2, 2, 6, 4), FEW)
+    assert "alpha" in helped.difference.found()
+    assert alone.scatter is not None
+    assert helped.scatter is not None
+    assert (alone.scatter.freedom, helped.scatter.freedom, helped.scatter.jumps) == (2, 10, 14)
+    at = helped.difference.greatest(ALPHA)
+    assert at is not None
+    assert helped.difference.value[ALPHA, at] == pytest.approx(10.0, abs=1.5)  # of the first two groups
+
+
 def test_an_error_that_a_whole_group_has_by_its_calibration_is_not_taken_for_a_change() -> None:
     """Without calibrations in common their errors count, however many jumps there are: the mean has them all."""
     errors = [calibration_error(number) for number in (1, 2)]
-    same = group_difference(align([jump(seed, error=errors[0]) for seed in range(8)]), 4, FEW)
+    same = group_difference(align([jump(seed, error=errors[0]) for seed in range(8)]), (4, 4), FEW).difference
     one = [jump(seed, error=errors[0], source="a") for seed in range(4)]
     other = [jump(seed, error=errors[1], source="b") for seed in range(4, 8)]
-    apart = group_difference(align([*one, *other]), 4, FEW)
+    apart = group_difference(align([*one, *other]), (4, 4), FEW).difference
     height = QUANTITIES.index("height")
     middle = len(apart.times) // 2
     assert apart.sigma[height, middle] > 1.5 * same.sigma[height, middle]
@@ -65,5 +82,5 @@ def test_chance_is_rarely_taken_for_a_change() -> None:
     for number in range(12):
         angles = (2 * np.random.default_rng(number).normal(size=6)).round() / 2
         one, other = group(1000 + 20 * number, *angles[:3]), group(1010 + 20 * number, *angles[3:])
-        false += bool(group_difference(align([*one, *other]), 3, FEW).found())
+        false += bool(group_difference(align([*one, *other]), (3, 3), FEW).difference.found())
     assert false <= 3

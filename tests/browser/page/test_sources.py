@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import jump, measuring, recordings, rehearsal, start_list, statement, status
+from rig.api import athletes, comparison, jump, measuring, recordings, rehearsal, start_list, statement, status
 from rig.api.cameras import aids, balls, light
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -41,6 +41,8 @@ COMPOSED = (
     "measurement.state_",
     "measurement.step_",
     "curves.",
+    "measured.",
+    "spans.q_",
 )
 #: The rooms whose sentences reach the page.
 SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
@@ -198,7 +200,7 @@ def _types() -> dict[str, list[str]]:
     types: dict[str, list[str]] = {}
     name = ""
     for line in "".join(
-        (PAGE / room / "types.js").read_text() for room in ("shared", "system", "recordings")
+        (PAGE / room / "types.js").read_text() for room in ("shared", "system", "recordings", "athletes")
     ).splitlines():
         if found := re.search(r"@typedef \{object\} (\w+)", line):
             name = found[1]
@@ -210,7 +212,20 @@ def _types() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
-    rooms = (aids, balls, light, start_list, recordings, rehearsal, statement, jump, measuring, status)
+    rooms = (
+        athletes,
+        comparison,
+        aids,
+        balls,
+        light,
+        start_list,
+        recordings,
+        rehearsal,
+        statement,
+        jump,
+        measuring,
+        status,
+    )
     model: type[Any] = next(getattr(room, name) for room in rooms if hasattr(room, name))
     fields = (
         list(model.model_fields) if issubclass(model, BaseModel) else [each.name for each in dataclasses.fields(model)]
@@ -221,9 +236,9 @@ def test_the_shapes_are_those_of_the_api(name: str) -> None:
 def test_modules_import_each_other_one_way() -> None:
     """Views see what is shared, never each other; only what is around them (`frame`, `main.js`) sees several."""
     sees = {
-        "": {"frame", "i18n", "jump", "live", "recordings", "shared", "system", "viewing"},
+        "": {"athletes", "frame", "i18n", "jump", "live", "recordings", "shared", "system", "viewing"},
         "frame": {"frame", "i18n", "live", "recordings", "shared", "viewing"},
-        **{view: {view, "i18n", "shared"} for view in ("jump", "live", "system", "viewing")},
+        **{view: {view, "i18n", "shared"} for view in ("athletes", "jump", "live", "system", "viewing")},
         "recordings": {"recordings", "viewing", "i18n", "shared"},
         "shared": {"i18n", "shared"},
         "i18n": {"i18n", "shared"},

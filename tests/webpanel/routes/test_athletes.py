@@ -103,7 +103,7 @@ def test_a_corrected_name_a_new_result_and_the_trash_count_at_once(client: httpx
 
 def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Client, service: MemoryService) -> None:
     """Three jumps a day: the leg angle of the second day is greater by much more than jumps scatter."""
-    for number, angle in enumerate((-1.0, 1.0, -1.0, 9.0, 11.0, 9.0)):
+    for number, angle in enumerate((0.0, 1.0, 0.0, 10.0, 11.0, 10.0)):
         log = write_recording(service.catalogue.directory, f"day-{number}", session={"athlete": "Ola"})
         made = log.parent / "made"
         made.mkdir()
@@ -118,13 +118,15 @@ def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Clien
         "second_since": "2026-02-15T00:00:00Z", "second_until": "2026-02-16T00:00:00Z",
     }  # fmt: skip
     found = client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}).raise_for_status().json()
-    assert (found["first"], found["second"], found["left_out"], found["one_place"]) == (3, 3, 1, True)
+    assert (found["first"], found["second"], found["left_out"], found["scatter_jumps"]) == (3, 3, 1, 6)
     assert found["different"] == ["alpha"]
     by_name = {each["quantity"]: each for each in found["quantities"]}
     assert by_name["alpha"]["difference"] == pytest.approx(10.0, abs=1.5)
     assert by_name["alpha"]["p"] < 0.05 < by_name["gamma"]["p"]
     assert by_name["alpha"]["needed"] < by_name["alpha"]["difference"]
     refused(client.get("/api/jumps/comparison", params={"athlete": "Kari", **spans}), 422)
+    overlapping = spans | {"second_since": "2026-02-14T23:00:00Z"}
+    refused(client.get("/api/jumps/comparison", params={"athlete": "ola", **overlapping}), 422)
     service.arm()
     service.start_recording(RecordingOrder())
     said = refused(client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}), 409)

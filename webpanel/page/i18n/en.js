@@ -1,5 +1,6 @@
 /** English. Every key stands in nb.js too (a test looks). */
 
+import { athletes } from "./en-athletes.js";
 import { check } from "./en-check.js";
 import { jump } from "./en-jump.js";
 import { kinogram } from "./en-kinogram.js";
@@ -7,6 +8,7 @@ import { measuring } from "./en-measuring.js";
 import { viewing } from "./en-viewing.js";
 
 export const en = {
+  ...athletes,
   ...check,
   ...jump,
   ...kinogram,

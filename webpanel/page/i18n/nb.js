@@ -1,5 +1,6 @@
 /** Norsk bokmål. De samme nøklene som i en.js. */
 
+import { athletes } from "./nb-athletes.js";
 import { check } from "./nb-check.js";
 import { jump } from "./nb-jump.js";
 import { kinogram } from "./nb-kinogram.js";
@@ -7,6 +8,7 @@ import { measuring } from "./nb-measuring.js";
 import { viewing } from "./nb-viewing.js";
 
 export const nb = {
+  ...athletes,
   ...check,
   ...jump,
   ...kinogram,

@@ -121,7 +121,7 @@ function isRunning() {
 export function draw() {
   if (!recording) return;
   const { id, session, verdict } = recording;
-  setText($("recording-title"), who(session, t("recordings.nobody")));
+  drawTitle(session);
   const { text, advice } = isRunning() ? { text: t("recording.running"), advice: "" } : say(verdict);
   const empty = !isRunning() && !recording.counts.pulses;
   $("player").hidden = isRunning() || empty;
@@ -142,6 +142,18 @@ export function draw() {
     make("a", { class: "button primary", href: partOf(id, "file"), download: "" }, icon("download"), make("span", {}, t("recording.download"))),
     recording.deleted ? makeButton("restore", t("trash.restore"), restoreShown) : makeButton("trash", t("recording.delete"), deleteShown),
   ]);
+}
+
+/**
+ * Bib and name; the name leads to all jumps of its owner.
+ *
+ * @param {import("../shared/types.js").SessionFields} session
+ */
+function drawTitle(session) {
+  const name = session.athlete.trim();
+  if (!name) return setText($("recording-title"), who(session, t("recordings.nobody")));
+  const link = make("a", { class: "name-link", href: `#/athlete/${encodeURIComponent(name)}`, title: t("athletes.of", { athlete: name }) }, session.athlete);
+  $("recording-title").replaceChildren(...session.bib ? [`${session.bib} · `] : [], link);
 }
 
 /** @param {Recording} shown */

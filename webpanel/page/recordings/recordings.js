@@ -147,7 +147,11 @@ function byDay(those) {
 /** @param {Recording} recording */
 function makeRow(recording) {
   const row = make("li", { class: "row" }, makeBox(recording, who(recording.session, recording.id)), makeLink(recording));
-  if (!place().trash) return row;
+  const name = recording.session.athlete.trim();
+  if (!place().trash) {
+    if (name) row.append(make("a", { class: "button square plain", href: `#/athlete/${encodeURIComponent(name)}`, "aria-label": t("athletes.of", { athlete: name }), title: t("athletes.of", { athlete: name }) }, icon("athlete")));
+    return row;
+  }
   row.classList.add("deleted");
   row.append(
     make("button", { type: "button", "data-needs": "administer", onclick: () => void restore(recording) }, icon("restore"), make("span", {}, t("trash.restore"))),

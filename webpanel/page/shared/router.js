@@ -3,19 +3,27 @@
 import { $ } from "./dom.js";
 import { update } from "./store.js";
 
-const VIEWS = ["live", "recordings", "recording", "log", "doctor", "aim", "rig", "coach", "jump"];
+const VIEWS = ["live", "recordings", "recording", "athlete", "jumps", "log", "doctor", "aim", "rig", "coach", "jump"];
 
 /** Views that one comes to from another, whose place in the navigation they share. @type {Record<string, string>} */
-const UNDER = { recording: "recordings", aim: "live" };
+const UNDER = { recording: "recordings", athlete: "recordings", jumps: "recordings", aim: "live" };
+
+/** Views of one of several: which, whose, or of which day stands behind the view's name. */
+const BY_ID = ["athlete", "jumps"];
+
+/** Views that show nothing without an id. */
+const ONLY_BY_ID = ["recording", "jump"];
 
 /** @typedef {{ view: string, id: string, trash: boolean, key: string }} Place `key`: of the link by which an athlete came */
 
 /** @returns {Place} */
 export function place() {
   const [name, id = "", key = ""] = location.hash.replace(/^#\//, "").split("/");
-  if (name === "trash") return { view: "recordings", id: "", trash: true, key: "" };
-  if (["recordings", "jump"].includes(name) && id) return { view: name === "jump" ? name : "recording", id: decodeURIComponent(id), trash: false, key };
-  return { view: VIEWS.includes(name) && name !== "jump" ? name : "live", id: "", trash: false, key: "" };
+  const found = { view: VIEWS.includes(name) && !ONLY_BY_ID.includes(name) ? name : "live", id: "", trash: false, key: "" };
+  if (name === "trash") return { ...found, view: "recordings", trash: true };
+  if (name === "recordings" && id) return { ...found, view: "recording", id: decodeURIComponent(id) };
+  if (name === "jump" && id) return { ...found, view: "jump", id: decodeURIComponent(id), key };
+  return BY_ID.includes(name) ? { ...found, id: decodeURIComponent(id) } : found;
 }
 
 let follow = () => {};

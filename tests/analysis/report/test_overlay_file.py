@@ -15,6 +15,7 @@ from analysis.report.overlay import SKI_LENGTH_M
 from analysis.report.scrubbing import quantity_at
 from analysis.result.model import MeasuredRecording
 from photogrammetry.geometry.rotation import rotation_from_vector
+from rig.arrays import Floats
 from rig.pulse import PulseNumber
 from tests.analysis.report.jumps import JUMP_SEED, measured_recording
 from tests.analysis.result.recordings import model, without_takeoff
@@ -31,19 +32,22 @@ def test_points_and_skis_lie_on_the_true_jumper_in_every_image(tmp_path: Path) -
     content = _written(measured_recording(), Standing(true_cameras(), {}), tmp_path)
     (jump,) = content["jumps"]
     truth, cameras = model(JUMP_SEED).truth, {camera.name: camera for camera in training().cameras}
-    looked = 0
+    off: list[Floats] = []
     for pulse in jump["pulses"]:
         pose = truth.pose(pulse["pulse"])
         ends = [pose.markers[2] + sign * SKI_LENGTH_M / 2 * pose.skis[0] for sign in (-1, 1)]
         for name, image in pulse["images"].items():
             hill = cameras[name].projection(*SIZE)
-            for k, point in enumerate(("P1", "P2", "P3", "P4")):
-                assert image["points"][point] == pytest.approx(hill.pixels(pose.markers[k][None])[0], abs=2.0)
+            points = np.array([image["points"][point] for point in ("P1", "P2", "P3", "P4")])
+            off.append(points - hill.pixels(pose.markers))
             right = image["lines"]["right"]
-            assert [right[0], right[-1]] == [pytest.approx(hill.pixels(end[None])[0], abs=4.0) for end in ends]
+            assert [right[0], right[-1]] == [pytest.approx(hill.pixels(end[None])[0], abs=1.0) for end in ends]
             assert np.allclose(image["lines"]["feet"][0], image["points"]["P3"], atol=0.11)
-            looked += 1
-    assert looked > len(jump["pulses"])
+    assert len(off) > len(jump["pulses"])
+    assert np.abs(off).max() < 1.0
+    assert (
+        np.abs(np.mean(off, axis=(0, 1))).max() < 0.05
+    )  # a pixel frame that began elsewhere would be half a pixel off
     assert len((tmp_path / "overlay.json").read_bytes()) < 3000 * len(jump["pulses"])
 
 

@@ -188,6 +188,12 @@ def test_a_phone_shows_one_camera_in_full_width_with_two_rows_of_controls(
     expect(names.nth(0)).to_be_hidden()
     _swipe(page, picture, 120)
     expect(names.nth(0)).to_be_visible()
+    plot = page.locator("[data-curve=speed] .plot")
+    plot.scroll_into_view_if_needed()
+    where = plot.bounding_box()
+    assert where is not None
+    page.touchscreen.tap(where["x"] + 0.52 * where["width"], where["y"] + 20)
+    _shows(page, 41)
     page.locator("#curves-all").click()
     expect(page.locator(".curve:visible")).to_have_count(8)
     page.locator("#frame-more").click()

@@ -17,6 +17,8 @@ const ORDER = ["speed", "height", "alpha", "beta", "gamma", "dphi", "phi", "angl
 const ROOM = 0.06;
 /** Bands wider than so many times the usual one are cut off rather than flatten the curve. */
 const WIDE = 4;
+/** A touch that moves less than this across a curve is a tap, or scrolls the page. */
+const TAP_PX = 6;
 
 /** @type {Jump[]} */
 let jumps = [];
@@ -124,8 +126,18 @@ function startDragging(plot, { pulses }) {
     const nearest = pulses.reduce((best, each) => (Math.abs(each.since_s - time) < Math.abs(best.since_s - time) ? each : best));
     showPulse(nearest.pulse);
   };
-  plot.addEventListener("pointerdown", (event) => { plot.setPointerCapture(event.pointerId); seek(event); });
-  plot.addEventListener("pointermove", (event) => { if (plot.hasPointerCapture(event.pointerId)) seek(event); });
+  let [dragging, begun] = [false, 0];
+  plot.addEventListener("pointerdown", (event) => {
+    plot.setPointerCapture(event.pointerId);
+    [dragging, begun] = [event.pointerType === "mouse", event.clientX];
+    if (dragging) seek(event);
+  });
+  plot.addEventListener("pointermove", (event) => {
+    if (!plot.hasPointerCapture(event.pointerId)) return;
+    dragging ||= Math.abs(event.clientX - begun) > TAP_PX; // a finger may only want to scroll the page
+    if (dragging) seek(event);
+  });
+  plot.addEventListener("pointerup", seek);
   plot.addEventListener("keydown", (event) => {
     const at = pulses.findIndex(({ pulse }) => pulse >= (pulseShown() ?? 0));
     const steps = /** @type {Record<string, number>} */ ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10, Home: -Infinity, End: Infinity })[event.key];

@@ -29,6 +29,7 @@ class Moment(Model):
 
     pulse: int | None = Field(description="null: nothing moves")
     kind: MomentKind
+    exact: float | None = Field(None, description="the moment between two pulses, if it was measured")
 
 
 class NewNote(Model):

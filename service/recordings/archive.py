@@ -266,11 +266,16 @@ class Archive(ABC):
         """The pulse to show a recording by: the middle of the stretch in which most moves."""
         return liveliest_pulse(self._catalogue.file(recording_id))
 
-    def moment(self, recording_id: str) -> Moment:
-        """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves."""
+    def moment(self, recording_id: str, *, by_motion: bool = False) -> Moment:
+        """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves.
+
+        Args:
+            recording_id: id of the recording.
+            by_motion: where most moves, in any case: to be compared with a recording that was not measured.
+        """
         log = self._catalogue.file(recording_id)
-        if (pulse := live_results.takeoff_pulse(log)) is not None:
-            return Moment(pulse=pulse, kind=MomentKind.TAKEOFF)
+        if not by_motion and (exact := live_results.takeoff_pulse(log)) is not None:
+            return Moment(pulse=round(exact), kind=MomentKind.TAKEOFF, exact=exact)
         pulse = busiest_pulse(log)
         return Moment(pulse=pulse, kind=MomentKind.NONE if pulse is None else MomentKind.ACTIVITY)
 

@@ -23,12 +23,13 @@ def summaries(log: Path) -> list[LastJump]:
     return _read(jumper_path(log))
 
 
-def takeoff_pulse(log: Path) -> int | None:
-    """The pulse of the take-off in the first jump of a log; None if there is none, or it was not measured."""
+def takeoff_pulse(log: Path) -> float | None:
+    """The take-off in the first jump of a log, in pulses; None if there is none, or it was not measured."""
     for path in (measured_path(log) / "jumper.json", jumper_path(log)):
         with suppress(OSError, ValueError, KeyError, IndexError, TypeError, OverflowError):
-            pulse: float = _content(path)["jumps"][0]["takeoff"]["pulse"]
-            return round(pulse)
+            pulse = float(_content(path)["jumps"][0]["takeoff"]["pulse"])
+            round(pulse)
+            return pulse
     return None
 
 

@@ -1,5 +1,6 @@
 """Routes that look into a recording: its pulses, its images, notes about them, written and spoken."""
 
+from functools import partial
 from http import HTTPStatus
 from typing import Annotated, Final
 
@@ -83,9 +84,12 @@ def contents_router(service: RigService, changes: Changes) -> APIRouter:
         return Response(png, media_type="image/png", headers=_KEPT | offered)
 
     @router.get("/recordings/{recording_id}/moment", responses=refusals(404))
-    async def get_moment(recording_id: RecordingId) -> Moment:
+    async def get_moment(
+        recording_id: RecordingId,
+        by_motion: Annotated[bool, Query(description="where most moves, even if the take-off was measured")] = False,
+    ) -> Moment:
         """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves."""
-        return await run_sync(service.moment, recording_id, limiter=readers)
+        return await run_sync(partial(service.moment, by_motion=by_motion), recording_id, limiter=readers)
 
     @router.get("/recordings/{recording_id}/notes", responses=refusals(404))
     def list_notes(recording_id: RecordingId) -> list[Note]:

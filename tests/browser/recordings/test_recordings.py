@@ -201,25 +201,60 @@ def test_a_jump_opens_at_its_take_off_is_played_slowly_in_a_loop_noted_and_expor
     expect(page.locator("#exports li")).to_have_count(0)
 
 
-def test_two_jumps_stand_side_by_side_aligned_at_their_take_offs(
+def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
-    for name, athlete, takeoff in (("one", "Anna Berg", 20), ("two", "Anna Berg", 31), ("three", "Ola Lie", 5)):
+    takeoffs = {"one": ("Anna Berg", 20.4), "two": ("Anna Berg", 31.3), "three": ("Ola Lie", None)}
+    for name, (athlete, takeoff) in takeoffs.items():
         log = write_recording(service.catalogue.directory, name, (ALL_OK,) * 40, {"athlete": athlete})
-        log.with_suffix(".jumper.json").write_text(json.dumps({"jumps": [{"takeoff": {"pulse": takeoff}}]}))
+        if takeoff is not None:
+            log.with_suffix(".jumper.json").write_text(json.dumps({"jumps": [{"takeoff": {"pulse": takeoff}}]}))
     page = open_page(f"{panel.url}/#/recordings/one")
     expect(page.locator("#frame-where")).to_have_text(re.compile("^20 / 40"))
     expect(page.locator("#compare option")).to_have_count(3)
     assert page.locator("#compare option").nth(1).get_attribute("value") == "two"  # of the same athlete
     page.locator("#compare").select_option("two")
-    expect(page.locator("#other-where")).to_have_text(re.compile("^31 .* 0.000 s"))
+    how, where, picture = page.locator("#compare-how"), page.locator("#other-where"), page.locator("#other-frames img")
+    expect(how).to_have_text("Aligned at the measured take-off of both.")
+    expect(where).to_have_text(re.compile("^31 .* -0.010 s"))  # 0.3 pulses before its take-off
     page.locator("#frame-on").click()
-    expect(page.locator("#other-where")).to_have_text(re.compile("^32 .* 0.033 s"))
-    expect(page.locator("#other-frames img")).to_have_attribute("src", re.compile("two/pulses/32.jpg"))
-    page.keyboard.press("End")  # the other one ends earlier after its take-off, and stands still
-    expect(page.locator("#other-where")).to_have_text(re.compile("^40 "))
+    expect(where).to_have_text(re.compile("^32 .* 0.023 s"))
+    expect(picture).to_have_attribute("src", re.compile("two/pulses/32.jpg"))
+    ghost = page.locator("#frames .ghost")
+    expect(ghost).to_be_hidden()
+    page.get_by_role("button", name="Ghost").click()
+    expect(page.locator("#other")).to_be_hidden()
+    expect(ghost).to_have_attribute("src", re.compile("two/pulses/32.jpg"))
+    page.locator("#frame-on").click()
+    expect(ghost).to_have_attribute("src", re.compile("two/pulses/33.jpg"))
     page.keyboard.press("2")
+    expect(ghost).to_have_css(
+        "left", page.locator("#frames .plane img").first.evaluate("e => getComputedStyle(e).left")
+    )
+    page.get_by_role("button", name="Side by side").click()
     expect(page.locator("#other-frames")).to_have_class(re.compile("single"))
+    page.keyboard.press("End")  # the other one ends earlier after its take-off, and stands still
+    expect(where).to_have_text(re.compile("^40 "))
+
+    # Of one the take-off is not measured: then both are aligned by motion, which noise alone has not.
+    page.locator("#compare").select_option("three")
+    expect(how).to_have_text("Both from their beginning: nothing moves in one of them.")
+    expect(where).to_have_text(re.compile("^40 .* 1.300 s"))
+    page.route(
+        "**/moment?by_motion=true",
+        lambda route: route.fulfill(
+            json={"pulse": 12 if "one" in route.request.url else 7, "kind": "activity", "exact": None}
+        ),
+    )
+    page.locator("#compare").select_option("")
+    expect(page.locator("#comparing")).to_be_hidden()
+    page.keyboard.press("Home")
+    page.locator("#compare").select_option("three")
+    expect(how).to_have_text("Aligned where most moves in each: the take-off was not measured of both.")
+    for _ in range(10):
+        page.locator("#frame-on").click()
+    expect(page.locator("#frame-where")).to_have_text(re.compile("^11 / 40"))
+    expect(where).to_have_text(re.compile("^6 .* -0.033 s"))  # one pulse before that moment, as 11 is before 12
     page.locator("#compare").select_option("")
     expect(page.locator("#other")).to_be_hidden()
 

@@ -24,6 +24,14 @@ export const athletes = {
   "athletes.legend": "Dots: jumps, each with its standard deviation; hollow ones are doubtful or only measured live. Line and band: mean of the day, and how its well measured jumps scatter.",
   "athletes.of": "All jumps of {athlete}",
 
+  "compare.view": "How two jumps are shown",
+  "compare.beside": "Side by side",
+  "compare.ghost": "Ghost",
+  "compare.by_takeoff": "Aligned at the measured take-off of both.",
+  "compare.by_motion": "Aligned where most moves in each: the take-off was not measured of both.",
+  "compare.by_beginning": "Both from their beginning: nothing moves in one of them.",
+  "compare.no_ghost": "No ghost: they have not the same cameras.",
+
   "spans.title": "Better than chance?",
   "spans.lead": "Compares all well measured jumps of two days or spans, by the same test as two jumps are compared with: the greatest of many differences must be greater than chance makes it.",
   "spans.first": "First span",

@@ -24,6 +24,14 @@ export const athletes = {
   "athletes.legend": "Prikker: hopp med standardavvik; de hule er usikre eller bare målt direkte. Strek og bånd: dagens middel, og hvordan de godt målte hoppene sprer seg.",
   "athletes.of": "Alle hopp av {athlete}",
 
+  "compare.view": "Hvordan to hopp vises",
+  "compare.beside": "Side om side",
+  "compare.ghost": "Skygge",
+  "compare.by_takeoff": "Stilt etter målt sats i begge.",
+  "compare.by_motion": "Stilt der det er mest bevegelse i hvert: satsen er ikke målt i begge.",
+  "compare.by_beginning": "Begge fra begynnelsen: i ett av dem beveger ingenting seg.",
+  "compare.no_ghost": "Ingen skygge: de har ikke de samme kameraene.",
+
   "spans.title": "Mer enn tilfeldig?",
   "spans.lead": "Sammenligner alle godt målte hopp fra to dager eller perioder, med samme test som to hopp sammenlignes med: den største av mange forskjeller må være større enn tilfeldigheter gjør den.",
   "spans.first": "Første periode",

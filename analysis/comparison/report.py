@@ -1,4 +1,4 @@
-"""A comparison for people and programs: lines for the terminal, a page with drawings, and JSON."""
+"""A comparison as lines for the terminal and as JSON; its page is in `analysis.report.compared`."""
 
 import math
 from dataclasses import dataclass
@@ -12,9 +12,6 @@ from analysis.comparison.difference import LEVEL, Difference, Power
 from analysis.comparison.scatter import Scatter
 from analysis.comparison.shared_calibration import Common
 from analysis.result.model import QUANTITIES
-from photogrammetry.reports.document import Drawing, Report, Section, Table
-from photogrammetry.reports.drawing.svg import Colour
-from photogrammetry.reports.drawing.to_scale import Chart, rounded_up
 from rig.arrays import Floats
 
 FORMAT: Final = "svev-comparison/1"
@@ -39,14 +36,6 @@ _CALIBRATION: Final = {
     Common.SURVEY: "both recordings were oriented with the same survey: its errors cancel",
     Common.NOTHING: "the jumps have different calibrations: the errors of both count",
 }
-#: The athlete's own scatter is left out of a chart that it would make so many times higher.
-_MOST_SCATTER: Final = 3.0
-_LEGEND: Final = (
-    (Colour.BLUE, "difference"),
-    (Colour.SOFT, "limit"),
-    (Colour.AMBER, "own scatter, 2 sigma"),
-    (Colour.RED, "different"),
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,8 +106,8 @@ def _greatest(comparison: Comparison, name: str) -> str:
     if at is None:
         return f"{words}: not known"
     return (
-        f"{words}: {_pm(name, d.value[row, at], d.sigma[row, at])} {unit} at {_signed(d.times[at], 2)} s "
-        f"({_p(d.p_greatest[row, at])}){_own(comparison, row, at)}"
+        f"{words}: {plus_minus(name, d.value[row, at], d.sigma[row, at])} {unit} at {signed(d.times[at], 2)} s "
+        f"({in_words(d.p_greatest[row, at])}){_own(comparison, row, at)}"
     )
 
 
@@ -126,7 +115,7 @@ def _own(comparison: Comparison, row: int, at: int) -> str:
     d, scatter = comparison.difference, comparison.scatter
     if scatter is None or not np.isfinite(scatter.deviation[row, at]):
         return ""
-    return f"; two of the athlete's own jumps differ as much with {_p(float(scatter.p(d.value)[row, at]))}"
+    return f"; two of the athlete's own jumps differ as much with {in_words(float(scatter.p(d.value)[row, at]))}"
 
 
 def _chances(name: str, power: Power) -> tuple[str, str]:
@@ -136,114 +125,11 @@ def _chances(name: str, power: Power) -> tuple[str, str]:
     return f"{power.change:g} {unit} in {percent}", f"{power.change_80:.{decimals + 1}f} {unit} in 80 %"
 
 
-def report(comparison: Comparison) -> Report:
-    """The page."""
-    d = comparison.difference
-    found = set(d.found())
-    order = sorted(QUANTITIES, key=lambda name: name not in found)
-    return Report(
-        f"Comparison: {comparison.a.name} and {comparison.b.name}",
-        (
-            Section("Summary", tuple(line.strip() for line in _verdict(comparison))),
-            Section("At instants", _instants(comparison)),
-            Section("What would have been found", _powers(d)),
-            Section("Differences", tuple(_difference_chart(comparison, name) for name in order if _known(d, name))),
-            Section("Values", tuple(_value_chart(d, name) for name in order if _known(d, name))),
-        ),
-    )
-
-
-def _known(d: Difference, name: str) -> bool:
-    return bool(np.isfinite(d.value[QUANTITIES.index(name)]).any())
-
-
-def _instants(comparison: Comparison) -> tuple[str | Table | Drawing, ...]:
-    d, own = comparison.difference, comparison.scatter
-    times = instants(d.times)
-    marks = tuple(f"{_signed(d.times[at], 2)} s" for at in times)
-    rows = tuple(
-        (f"{WORDS[name][1]} ({WORDS[name][2]})", *(_cell(d, name, row, at) for at in times))
-        for row, name in enumerate(QUANTITIES)
-    )
-    words = (
-        "Differences with their standard deviations; * where the greatest of all differences would be as large "
-        f"by chance in less than {100 * LEVEL:.0f} % of comparisons of equal jumps. Times count from the take-off."
-    )
-    table = Table(("B minus A", *marks), rows)
-    if own is None:
-        return (words, table)
-    scatter = tuple(
-        (row[0], *(_plain(own.deviation[index, at], WORDS[name][3] + 1) for at in times))
-        for index, (name, row) in enumerate(zip(QUANTITIES, rows, strict=True))
-    )
-    return (words, table, "Standard deviation of one of the athlete's own jumps:", Table(("scatter", *marks), scatter))
-
-
-def _powers(d: Difference) -> tuple[str | Table | Drawing, ...]:
-    rows = tuple((WORDS[name][1], *_chances(name, power)) for name, power in d.power.items() if power)
-    return ("A change that lasts over the flight is found:", Table(("quantity", "such a change", "and this one"), rows))
-
-
-def _cell(d: Difference, name: str, row: int, at: int) -> str:
-    if not np.isfinite(d.value[row, at]):
-        return ""
-    return _pm(name, d.value[row, at], d.sigma[row, at]) + ("*" if d.p_greatest[row, at] < LEVEL else "")
-
-
 def instants(times: Floats) -> list[int]:
     """Indices of the times nearest to `INSTANTS`, as far as they are within the times."""
     step = float(times[1] - times[0])
     nearest = [(int(np.argmin(np.abs(times - instant))), instant) for instant in INSTANTS]
     return [at for at, instant in nearest if abs(times[at] - instant) <= step]
-
-
-def _difference_chart(comparison: Comparison, name: str) -> Drawing:
-    d, row = comparison.difference, QUANTITIES.index(name)
-    words, symbol, unit, _ = WORDS[name]
-    known = np.isfinite(d.value[row])
-    times, value, limit = d.times[known], d.value[row, known], d.limit * d.repeat[row, known]
-    least = float(np.concatenate((np.abs(value), limit)).max())
-    own = _twice_scatter(comparison, row)[known]
-    top = rounded_up(1.1 * max([least, *own[own < _MOST_SCATTER * least]]))
-    chart = Chart((float(times[0]), float(times[-1])), (-top, top), "s since take-off", f"B minus A ({unit})")
-    chart.rule(0.0, Colour.SOFT)
-    drawn, different = own < top, d.p_greatest[row, known] < LEVEL
-    for sign in (-1, 1):
-        chart.curve(times, sign * limit, Colour.SOFT)
-        chart.curve(times[drawn], sign * own[drawn], Colour.AMBER)
-    chart.curve(times, value, Colour.BLUE)
-    chart.dots(times[different], value[different], Colour.RED, 2.5)
-    shown = (True, True, bool(drawn.any()), bool(different.any()))
-    for colour, legend in (entry for entry, there in zip(_LEGEND, shown, strict=True) if there):
-        chart.legend(colour, legend)
-    large = bool((own >= top).any())
-    caption = (
-        f"{_capital(words)} ({symbol}), B minus A: {'different' if different.any() else 'no difference found'}"
-        + ("; the athlete's own scatter is larger than the chart." if large else ".")
-    )
-    return Drawing(caption, chart.svg.rendered(caption))
-
-
-def _twice_scatter(comparison: Comparison, row: int) -> Floats:
-    """Twice the standard deviation (T,) of the difference of two of the athlete's own jumps; NaN if not known."""
-    if comparison.scatter is None:
-        return np.full(len(comparison.difference.times), np.nan)
-    return np.asarray(2 * np.sqrt(2) * comparison.scatter.deviation[row])
-
-
-def _value_chart(d: Difference, name: str) -> Drawing:
-    row = QUANTITIES.index(name)
-    words, symbol, unit, _ = WORDS[name]
-    known = np.isfinite(d.value[row])
-    times, a, b = d.times[known], d.a[row, known], d.b[row, known]
-    low, high = float(min(a.min(), b.min())), float(max(a.max(), b.max()))
-    room = max(0.05 * (high - low), 1e-6)
-    chart = Chart((float(times[0]), float(times[-1])), (low - room, high + room), "s since take-off", unit)
-    for values, colour, legend in ((a, Colour.AMBER, "A"), (b, Colour.BLUE, "B")):
-        chart.curve(times, values, colour)
-        chart.legend(colour, legend)
-    caption = f"{_capital(words)} ({symbol}) of both jumps."
-    return Drawing(caption, chart.svg.rendered(caption))
 
 
 def to_json(comparison: Comparison) -> dict[str, Any]:
@@ -309,23 +195,28 @@ def _list(values: Floats) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def _pm(name: str, value: float, sigma: float) -> str:
+def plus_minus(name: str, value: float, sigma: float) -> str:
+    """A difference of a quantity with its standard deviation."""
+    return f"{signed(value, WORDS[name][3])} ± {deviation(name, sigma)}"
+
+
+def deviation(name: str, sigma: float) -> str:
+    """A standard deviation of a quantity; one that its digits cannot show is less than the last one."""
     decimals = WORDS[name][3]
-    return f"{_signed(value, decimals)} ± {sigma:.{decimals}f}"
+    return f"{sigma:.{decimals}f}" if round(sigma, decimals) else f"< {10.0**-decimals:.{decimals}f}"
 
 
-def _signed(value: float, decimals: int) -> str:
+def signed(value: float, decimals: int) -> str:
+    """A number with its sign."""
     rounded = round(value, decimals)
     return f"{rounded:+.{decimals}f}".replace("-", "\N{MINUS SIGN}") if rounded else f"{0:.{decimals}f}"
 
 
-def _plain(value: float, decimals: int) -> str:
+def plain(value: float, decimals: int) -> str:
+    """A number; nothing if it is not known."""
     return f"{value:.{decimals}f}" if math.isfinite(value) else ""
 
 
-def _p(p: float) -> str:
+def in_words(p: float) -> str:
+    """A probability."""
     return "p < 0.0001" if p < 1e-4 else f"p = {p:.2g}"
-
-
-def _capital(words: str) -> str:
-    return words[0].upper() + words[1:]

@@ -29,6 +29,7 @@ class Moment(Model):
 
     pulse: int | None = Field(description="null: nothing moves")
     kind: MomentKind
+    from_log: bool = Field(False, description="measured in the whole log, whose jumps can be compared")
     exact: float | None = Field(None, description="the moment between two pulses, if it was measured")
 
 

@@ -62,14 +62,36 @@ class Comparisons:
         left_out = sum(len(group) for group in compared) - sum(used)
         return Comparison.model_validate(end | {"first": used[0], "second": used[1], "left_out": left_out})
 
+    def page(self, jumps: Sequence[AthleteJump], others: Sequence[AthleteJump], language: str) -> str:
+        """The page that shows two jumps side by side.
+
+        Args:
+            jumps: two.
+            others: further jumps of the athlete, if it is one and the same: they tell how his jumps scatter.
+            language: that the page shows first.
+
+        Raises:
+            StateForbidsError: a recording runs.
+            BadInputError: one was not measured in the whole log, or they cannot be compared.
+        """
+        shown = [self._with_result(each) for each in jumps]
+        if None in shown:
+            raise BadInputError("one of the jumps was not measured in its log: measure it, then compare")
+        return str(self._ask({"jumps": shown + self._comparable(others)[:_MOST_OTHERS], "language": language})["page"])
+
     def _comparable(self, jumps: Sequence[AthleteJump]) -> list[dict[str, Any]]:
         """Those that were measured well in the whole log, with the file of their result."""
-        found = []
-        for each in jumps:
-            log = self._directory / f"{each.jump.recording}{SUFFIX}"
-            if each.level is Level.GOOD and (file := result_file(log, "jumper.json")) is not None:
-                found.append({"file": str(file), "jump": each.jump.jump, "name": each.athlete or each.jump.recording})
-        return found
+        good = [self._with_result(each) for each in jumps if each.level is Level.GOOD]
+        return [each for each in good if each is not None]
+
+    def _with_result(self, jump: AthleteJump) -> dict[str, Any] | None:
+        """A jump with the file of its result, if its log was measured."""
+        log = self._directory / f"{jump.jump.recording}{SUFFIX}"
+        file = None if jump.level is Level.INFO else result_file(log, "jumper.json")
+        if file is None:
+            return None
+        who = {"athlete": jump.athlete.strip(), "bib": jump.bib}
+        return {"log": str(log), "file": str(file), "jump": jump.jump.jump, **who}
 
     def _ask(self, what: dict[str, Any]) -> dict[str, Any]:
         deadline = time.monotonic() + _DEADLINE_S

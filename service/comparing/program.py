@@ -1,5 +1,6 @@
 """The program that compares measured jumps, started by `service.comparing.asking`."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +10,12 @@ if TYPE_CHECKING:
     from analysis.comparison.aligned import MeasuredJump
 
 
-def _compare(asked: dict[str, Any], _: Teller) -> dict[str, Any]:
-    """Compare the first two of `groups` of jumps, each with `file`, `jump` and `name`; the others tell the scatter."""
+def _answer(asked: dict[str, Any], _: Teller) -> dict[str, Any]:
+    return _page(asked) if "language" in asked else _compare(asked)
+
+
+def _compare(asked: dict[str, Any]) -> dict[str, Any]:
+    """Compare the first two of `groups` of jumps; the others tell the scatter."""
     from analysis.comparison.alignment import align  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.comparison.groups import greatest_differences, group_difference  # noqa: PLC0415
 
@@ -25,12 +30,32 @@ def _compare(asked: dict[str, Any], _: Teller) -> dict[str, Any]:
     }
 
 
+def _page(asked: dict[str, Any]) -> dict[str, Any]:
+    """The page in `language` that shows the first two of `jumps`; the others tell the athlete's own scatter."""
+    from analysis.comparison.alignment import align  # noqa: PLC0415 - as above
+    from analysis.comparison.difference import difference  # noqa: PLC0415
+    from analysis.comparison.report import Comparison  # noqa: PLC0415
+    from analysis.comparison.scatter import scatter  # noqa: PLC0415
+    from analysis.report.compared.page import comparison_page  # noqa: PLC0415
+    from analysis.report.compared.places import images_beside  # noqa: PLC0415
+    from analysis.report.compared.words import Language  # noqa: PLC0415
+
+    alignment = align([_jump(each) for each in asked["jumps"]])
+    found = difference(alignment)
+    comparison = Comparison(alignment, found, scatter(alignment.jumps[2:], found.times))
+    one, other = (images_beside(Path(each["log"]), Path(each["file"]).parent) for each in asked["jumps"][:2])
+    return {"page": comparison_page(comparison, (one, other), Language(asked["language"]))}
+
+
 def _jump(asked: dict[str, Any]) -> "MeasuredJump":
+    """A jump by `file` and number (`jump`), with `athlete` and `bib` as they are at present."""
     from analysis.comparison.aligned import measured_jump  # noqa: PLC0415
     from analysis.result.file import read  # noqa: PLC0415
 
-    return measured_jump(read(Path(asked["file"])), asked["jump"], asked["name"])
+    recording = read(Path(asked["file"]))
+    session = {**recording.session, "athlete": asked["athlete"], "bib": asked["bib"]}
+    return measured_jump(replace(recording, session=session), asked["jump"], asked["athlete"] or recording.recording)
 
 
 if __name__ == "__main__":
-    serve(_compare)
+    serve(_answer)

@@ -13,7 +13,7 @@ from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from recorder.log.extent import CONTINUES
-from rig.api.athletes import Athlete, AthleteJump, JumpQuery
+from rig.api.athletes import Athlete, AthleteJump, JumpQuery, folded
 from rig.api.comparison import Comparison, Span
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.looking import Moment, MomentKind, Note, VoiceNote
@@ -32,7 +32,7 @@ from rig.api.recordings import (
 from rig.api.statement import Level, Statement
 from rig.api.status import Status
 from rig.clocks import NS_PER_S
-from rig.errors import StateForbidsError, StillRecordingError, UnknownRecordingError
+from rig.errors import BadInputError, StateForbidsError, StillRecordingError, UnknownRecordingError
 from rig.phrase import Phrase, Value
 from rig.pulse import Pause
 from rig.tag import TripletTag
@@ -197,6 +197,25 @@ class Archive(ABC):
         """
         return self._comparisons.spans(self.measured_jumps(JumpQuery(athlete=athlete)), first, second)
 
+    def comparison_page(self, first: tuple[str, int], second: tuple[str, int], language: str) -> str:
+        """The page that compares two measured jumps, each given by recording and number.
+
+        Raises:
+            UnknownRecordingError: there is no such measured jump.
+            StateForbidsError: a recording runs.
+            BadInputError: it is one and the same, or they cannot be compared.
+        """
+        if first == second:
+            raise BadInputError("this is one jump: choose another one to compare it with")
+        known = self.measured_jumps(JumpQuery())
+        by_id = {(each.jump.recording, each.jump.jump): each for each in known}
+        if missing := [jump for jump in (first, second) if jump not in by_id]:
+            raise UnknownRecordingError(f"recording {missing[0][0][:100]!r} has no measured jump {missing[0][1]}")
+        shown = [by_id[first], by_id[second]]
+        names = {folded(each.athlete) for each in shown}
+        others = [each for each in known if {folded(each.athlete)} == names and each not in shown] if all(names) else []
+        return self._comparisons.page(shown, others, language)
+
     def measure(self, recording_id: str) -> Measurement:
         """Have the log of a recording measured, again if it was measured before.
 
@@ -275,7 +294,8 @@ class Archive(ABC):
         """
         log = self._catalogue.file(recording_id)
         if not by_motion and (exact := live_results.takeoff_pulse(log)) is not None:
-            return Moment(pulse=round(exact), kind=MomentKind.TAKEOFF, exact=exact)
+            whole = result_file(log, "jumper.json") is not None
+            return Moment(pulse=round(exact), kind=MomentKind.TAKEOFF, exact=exact, from_log=whole)
         pulse = busiest_pulse(log)
         return Moment(pulse=pulse, kind=MomentKind.NONE if pulse is None else MomentKind.ACTIVITY)
 

@@ -138,6 +138,10 @@ class Archive(Protocol):
         """Whether an athlete's jumps of two spans differ by more than chance. StateForbidsError: a recording runs."""
         ...
 
+    def comparison_page(self, first: tuple[str, int], second: tuple[str, int], language: str) -> str:
+        """The page that compares two measured jumps, each given by recording and number."""
+        ...
+
     def measure(self, recording_id: str) -> Measurement:
         """Have a recording measured, again if it was. StateForbidsError: it is deleted, or nobody says by what."""
         ...

@@ -57,8 +57,27 @@ def test_the_page_needs_nothing_else(measured: Path, tmp_path: Path) -> None:
     page = (tmp_path / "comparison.html").read_text(encoding="utf-8")
     assert set(re.findall(r"https?://[^\"' ]*", page)) == {"http://www.w3.org/2000/svg"}
     assert not re.search(r"<script|<link|<img|@import|url\(", page)
-    assert page.count("<svg") == 22
+    assert page.count("<svg") == 2 * 22 + 5  # charts in two languages, stick figures at five places
     assert "nan" not in page.lower().replace("nanos", "")
+    assert "so there are no pictures" in page
+
+
+def test_the_page_speaks_to_a_coach(measured: Path, tmp_path: Path) -> None:
+    folders = [str(measured / name) for name in ("monday", "tuesday")]
+    assert main(["compare", *folders, "--language", "nb", "--out", str(tmp_path)]) == 0
+    page = (tmp_path / "comparison.html").read_text(encoding="utf-8")
+    assert '<html lang="nb">' in page
+    assert 'id="in-nb" checked' in page
+    assert re.search(r"<title>A\. Jumper \(7\) . A\. Jumper \(7\)</title>", page)
+    assert not re.search(rf"{measured}|monday|tuesday|simulated|--also|svev ", page)
+    assert re.search(
+        r'<span lang="en">Leg angle: \d\.\d ± \d\.\d ° more in B, \d\.\d\d s after the take-off</span>', page
+    )
+    assert re.search(r'<span lang="nb">Leggvinkel: \d,\d ± \d,\d ° mer i B, \d,\d\d s etter satsen</span>', page)
+    english, norwegian = (
+        len(re.findall(f'lang="{language}"', page.partition("<body>")[2])) for language in ("en", "nb")
+    )
+    assert english == norwegian > 100
 
 
 def test_json_is_the_last_thing_said(measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,6 +48,7 @@ CALLS = {
     "GET /api/recordings/{recording_id}/measurement/files/{name}",
     "GET /api/recordings/{recording_id}/link", "POST /api/login/link",
     "GET /api/athletes", "GET /api/jumps", "GET /api/jumps/comparison",
+    "GET /api/comparison.html",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 

@@ -3,13 +3,15 @@
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.responses import HTMLResponse
 from pydantic import TypeAdapter
 
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery
-from rig.api.comparison import Comparison, Span
+from rig.api.comparison import Comparison, PageLanguage, Span
 from rig.api.fields import LONGEST_LINE
+from rig.host.file_names import ID_PATTERN
 from service.seam.rig import RigService
-from webpanel.routes.common import Moment, compressed, refusals, strict_router
+from webpanel.routes.common import ALONE, Moment, compressed, refusals, strict_router
 
 _ATHLETES: Final = TypeAdapter(list[Athlete])
 _JUMPS: Final = TypeAdapter(list[AthleteJump])
@@ -60,5 +62,20 @@ def athletes_router(service: RigService) -> APIRouter:
         """
         first, second = (first_since, first_until), (second_since, second_until)
         return service.compare_spans(athlete, *(Span(since=since, until=until) for since, until in (first, second)))
+
+    @router.get("/comparison.html", response_class=HTMLResponse, responses=refusals(404, 409, 422))
+    def compare_jumps(
+        first: Annotated[str, Query(pattern=f"^{ID_PATTERN}$", description="id of a recording")],
+        second: Annotated[str, Query(pattern=f"^{ID_PATTERN}$", description="id of a recording, or the same")],
+        first_jump: Annotated[int, Query(ge=1, le=100_000, description="number of its jump")] = 1,
+        second_jump: Annotated[int, Query(ge=1, le=100_000, description="number of its jump")] = 1,
+        language: Annotated[PageLanguage, Query(description="that the page shows first")] = PageLanguage.EN,
+    ) -> HTMLResponse:
+        """A page that compares two measured jumps, as that of `svev compare`: names, what differs, pictures, curves.
+
+        It needs no other file. It takes some seconds, and gives way to a recording.
+        """
+        page = service.comparison_page((first, first_jump), (second, second_jump), language.value)
+        return HTMLResponse(page, headers=ALONE)
 
     return router

@@ -20,6 +20,14 @@ _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[Tt ]")
 _LIGHTLY: Final = 1
 
 
+#: A page of a result runs as if it came from nowhere: it reaches nothing of the panel.
+ALONE: Final = {
+    "Content-Security-Policy": "sandbox allow-scripts allow-popups allow-downloads",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-cache",
+}
+
+
 class Nothing(Model):
     """A body without fields."""
 

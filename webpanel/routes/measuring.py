@@ -9,7 +9,7 @@ from fastapi.responses import FileResponse
 from rig.api.measuring import Measurement
 from service.seam.rig import RigService
 from webpanel.door.streams import Streams
-from webpanel.routes.common import CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
+from webpanel.routes.common import ALONE, CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.files import attachment
 
 FileName = Annotated[
@@ -24,14 +24,13 @@ _FILE: Final[Responses] = {
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     }
 }
-#: What a browser shows itself. A page among them runs as if it came from nowhere: it reaches nothing of the panel.
+#: What a browser shows itself.
 _SHOWN: Final = {
     ".html": "text/html; charset=utf-8",
     ".jpg": "image/jpeg",
     ".txt": "text/plain; charset=utf-8",
     ".webm": "video/webm",
 }
-_ALONE: Final = "sandbox allow-scripts allow-popups allow-downloads"
 
 
 def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
@@ -70,9 +69,7 @@ def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
         """A file of the result: the coach's page `report.html`, tables, C3D, TRC, the protocol, the network."""
         file = service.measured_file(recording_id, name)
         shown = _SHOWN.get(file.suffix)
-        headers = {"Content-Security-Policy": _ALONE, "X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
-        if shown is None:
-            headers["Content-Disposition"] = attachment(f"{recording_id}-{name}")
-        return FileResponse(file, headers=headers, media_type=shown or "application/octet-stream")
+        offered = {} if shown else {"Content-Disposition": attachment(f"{recording_id}-{name}")}
+        return FileResponse(file, headers=ALONE | offered, media_type=shown or "application/octet-stream")
 
     return router

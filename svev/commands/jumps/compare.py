@@ -9,11 +9,13 @@ import typer
 from analysis.comparison.aligned import MeasuredJump, comparable, measured_jump
 from analysis.comparison.alignment import align
 from analysis.comparison.difference import difference
-from analysis.comparison.report import Comparison, report, summary, to_json
+from analysis.comparison.report import Comparison, summary, to_json
 from analysis.comparison.scatter import scatter
+from analysis.report.compared.page import comparison_page
+from analysis.report.compared.places import Images, images_beside
+from analysis.report.compared.words import Language
 from analysis.result.file import read
 from analysis.result.model import MeasuredRecording
-from photogrammetry.reports.document import as_html
 from rig.errors import BadInputError
 from svev import console
 
@@ -29,11 +31,16 @@ def compare(
     also: Annotated[
         list[Path] | None, typer.Option("--also", help="further jumps, for the athlete's own scatter; may be repeated")
     ] = None,
+    language: Annotated[
+        Language, typer.Option("--language", help="that the page shows first; a reader can choose the other one")
+    ] = Language.EN,
     as_json: Annotated[
         bool, typer.Option("--json", help="end with one JSON object: the result without series")
     ] = False,
 ) -> None:
     """Compare two measured jumps: aligned at the take-off, differences with their significance.
+
+    The page has pictures of both if their logs are beside the folders of the results.
 
     Exit codes: 0 compared, whether they differ or not; 2 bad input.
 
@@ -48,14 +55,26 @@ def compare(
     found = difference(alignment)
     comparison = Comparison(alignment, found, scatter(alignment.jumps[2:], found.times))
     result = to_json(comparison)
+    page = comparison_page(comparison, (_images(dir_a, a), _images(dir_b, b)), language)
     out.mkdir(parents=True, exist_ok=True)
     written = json.dumps(result, allow_nan=False, ensure_ascii=False) + "\n"
     (out / "comparison.json").write_text(written, encoding="utf-8")
-    (out / "comparison.html").write_text(as_html(report(comparison)), encoding="utf-8")
+    (out / "comparison.html").write_text(page, encoding="utf-8")
     for line in [*summary(comparison), f"result in {out / 'comparison.json'} and {out / 'comparison.html'}"]:
         console.say(line, aside=as_json)
     if as_json:
         console.print_json(_without_series(result))
+
+
+def _images(result: Path, jump: MeasuredJump) -> Images | None:
+    """The images of a jump, if its log is where it is wanted: beside the folder of the result, or in it."""
+    folder = result if result.is_dir() else result.parent
+    beside = folder.resolve()
+    logs = [
+        beside.with_suffix(".mcap"),
+        *(place / f"{jump.recording.recording}.mcap" for place in (beside.parent, beside)),
+    ]
+    return next((images_beside(log, folder) for log in logs if log.is_file()), None)
 
 
 def _others(recordings: dict[Path, MeasuredRecording], *compared: MeasuredJump) -> list[MeasuredJump]:

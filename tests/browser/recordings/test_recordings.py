@@ -12,6 +12,7 @@ from playwright.sync_api import expect
 
 from recorder.reading.corrected_log import corrected_log
 from rig.frame import FrameStatus
+from service.measuring.results import keep_result
 from tests.browser.conftest import Open
 from tests.browser.views import enter
 from tests.recorder.logs import ALL_OK
@@ -208,7 +209,9 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     for name, (athlete, takeoff) in takeoffs.items():
         log = write_recording(service.catalogue.directory, name, (ALL_OK,) * 40, {"athlete": athlete})
         if takeoff is not None:
-            log.with_suffix(".jumper.json").write_text(json.dumps({"jumps": [{"takeoff": {"pulse": takeoff}}]}))
+            (made := log.with_name("made")).mkdir()
+            (made / "jumper.json").write_text(json.dumps({"jumps": [{"takeoff": {"pulse": takeoff}}]}))
+            keep_result(made, log, ())
     page = open_page(f"{panel.url}/#/recordings/one")
     expect(page.locator("#frame-where")).to_have_text(re.compile("^20 / 40"))
     expect(page.locator("#compare option")).to_have_count(3)
@@ -216,6 +219,9 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     page.locator("#compare").select_option("two")
     how, where, picture = page.locator("#compare-how"), page.locator("#other-where"), page.locator("#other-frames img")
     expect(how).to_have_text("Aligned at the measured take-off of both.")
+    expect(page.get_by_role("link", name="What differs")).to_have_attribute(
+        "href", "./api/comparison.html?first=one&second=two&language=en"
+    )
     expect(where).to_have_text(re.compile("^31 .* -0.010 s"))  # 0.3 pulses before its take-off
     page.locator("#frame-on").click()
     expect(where).to_have_text(re.compile("^32 .* 0.023 s"))
@@ -240,6 +246,7 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     page.locator("#compare").select_option("three")
     expect(how).to_have_text("Both from their beginning: nothing moves in one of them.")
     expect(where).to_have_text(re.compile("^40 .* 1.300 s"))
+    expect(page.get_by_role("link", name="What differs")).to_be_hidden()
     page.route(
         "**/moment?by_motion=true",
         lambda route: route.fulfill(

@@ -1,18 +1,30 @@
 """All measured jumps by athlete, over the API."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
+from analysis.measurements.file import write_measurements
+from analysis.measurements.model import (
+    ImageMeasurements,
+    JumpMeasurements,
+    MeasuredCamera,
+    Measurements,
+    PointMeasurement,
+    PulseMeasurements,
+)
 from analysis.result import file as result_file
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump, MeasuredValue
 from rig.api.recordings import RecordingOrder
 from service.measuring.results import keep_result
 from tests.analysis.result.recordings import recording
+from tests.recorder.logs import ALL_OK
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 
@@ -99,6 +111,44 @@ def test_a_corrected_name_a_new_result_and_the_trash_count_at_once(client: httpx
     assert _jumps(client, athlete="åse / ødegård?") == [("f", 2, "good"), ("d", 1, "good"), ("f", 1, "good")]
     client.delete("/api/recordings/f").raise_for_status()
     assert _jumps(client, athlete="åse / ødegård?") == [("d", 1, "good")]
+
+
+def _measured_in_images(log: Path, seed: int, leg_deg: float) -> None:
+    """Keep the whole result of a simulated jump beside a log whose images have nothing but noise."""
+    made = log.parent / "made"
+    made.mkdir()
+    found = recording(seed=seed, leg_deg=leg_deg)
+    result_file.write_json(result_file.to_json(found), made / "jumper.json")
+    point = PointMeasurement(np.array((80.0, 60.0)), np.eye(2))
+    image = ImageMeasurements({"P1": point, "P2": replace(point, xy=point.xy + 30)}, {})
+    pulses = tuple(PulseMeasurements(each.pulse, each.time, {"K2": image}) for each in found.jumps[0].pulses)
+    cameras = {"K2": MeasuredCamera((160, 120), 0.002)}
+    write_measurements(
+        Measurements(log.stem, found.rate_hz, cameras, (JumpMeasurements(1, pulses),)), made / "measurements.json"
+    )
+    keep_result(made, log, (jump(log.stem, 1, NOON + timedelta(minutes=seed), 25.0),))
+
+
+def test_a_page_compares_two_jumps_under_their_present_names(client: httpx.Client, service: MemoryService) -> None:
+    for seed, name in enumerate(("one", "two", "three")):
+        log = write_recording(
+            service.catalogue.directory, name, (ALL_OK,) * 80, session={"athlete": "Kari", "bib": "5"}
+        )
+        _measured_in_images(log, seed, 3.0 * seed)
+    client.patch("/api/recordings/two", json={"athlete": "Åse <b>Moe</b>"}).raise_for_status()
+    assert client.get("/api/recordings/two/moment").json()["from_log"] is True
+    query = {"first": "one", "second": "two", "language": "nb"}
+    answer = client.get("/api/comparison.html", params=query).raise_for_status()
+    assert answer.headers["content-type"] == "text/html; charset=utf-8"
+    assert answer.headers["content-security-policy"].startswith("sandbox ")
+    assert "allow-same-origin" not in answer.headers["content-security-policy"]
+    assert "<title>Kari (5) / Åse &lt;b&gt;Moe&lt;/b&gt; (5)</title>" in answer.text
+    assert "Leggvinkel: 3," in answer.text
+    assert answer.text.count('src="data:image/webp;base64,') == 2 * 5
+    assert str(service.catalogue.directory) not in answer.text
+    refused(client.get("/api/comparison.html", params=query | {"second": "one"}), 422)
+    refused(client.get("/api/comparison.html", params=query | {"second_jump": 2}), 404)
+    refused(client.get("/api/comparison.html", params=query | {"second": "nobody"}), 404)
 
 
 def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Client, service: MemoryService) -> None:

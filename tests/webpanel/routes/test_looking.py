@@ -31,10 +31,20 @@ def log(service: MemoryService) -> Path:
 
 
 def test_a_recording_opens_at_the_take_off_if_it_was_measured(client: httpx.Client, log: Path) -> None:
-    assert client.get("/api/recordings/jump/moment").json() == {"pulse": None, "kind": "none", "exact": None}
+    assert client.get("/api/recordings/jump/moment").json() == {
+        "pulse": None,
+        "kind": "none",
+        "from_log": False,
+        "exact": None,
+    }
     beside = log.with_suffix(".jumper.json")
     beside.write_text(json.dumps({"jumps": [{"takeoff": {"pulse": 16.8}}]}))
-    assert client.get("/api/recordings/jump/moment").json() == {"pulse": 17, "kind": "takeoff", "exact": 16.8}
+    assert client.get("/api/recordings/jump/moment").json() == {
+        "pulse": 17,
+        "kind": "takeoff",
+        "from_log": False,
+        "exact": 16.8,
+    }
     assert client.get("/api/recordings/jump/moment?by_motion=true").json()["kind"] == "none"
     for broken in ("", "[]", '{"jumps": [{"takeoff": null}]}', '{"jumps": [{"takeoff": {"pulse": 1e999}}]}'):
         beside.write_text(broken)

@@ -27,6 +27,7 @@ export const athletes = {
   "compare.view": "How two jumps are shown",
   "compare.beside": "Side by side",
   "compare.ghost": "Ghost",
+  "compare.page": "What differs",
   "compare.by_takeoff": "Aligned at the measured take-off of both.",
   "compare.by_motion": "Aligned where most moves in each: the take-off was not measured of both.",
   "compare.by_beginning": "Both from their beginning: nothing moves in one of them.",

@@ -27,6 +27,7 @@ export const athletes = {
   "compare.view": "Hvordan to hopp vises",
   "compare.beside": "Side om side",
   "compare.ghost": "Skygge",
+  "compare.page": "Hva er ulikt",
   "compare.by_takeoff": "Stilt etter målt sats i begge.",
   "compare.by_motion": "Stilt der det er mest bevegelse i hvert: satsen er ikke målt i begge.",
   "compare.by_beginning": "Begge fra begynnelsen: i ett av dem beveger ingenting seg.",

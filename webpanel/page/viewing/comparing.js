@@ -1,6 +1,6 @@
 /** A second jump beside the one shown, or over it as a ghost: both aligned at their take-offs, or both where most moves. */
 
-import { t } from "../i18n/i18n.js";
+import { languageInUse, t } from "../i18n/i18n.js";
 import { call, callForPage, partOf, recordingPath } from "../shared/api.js";
 import { $, make, setText } from "../shared/dom.js";
 import { day, number, who } from "../shared/format.js";
@@ -10,7 +10,7 @@ import { onShown, pulseShown, sinceMoment } from "./scrubber.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 /** @typedef {import("../shared/types.js").Pulses} Pulses */
-/** @typedef {{ pulse: number|null, kind: "takeoff"|"activity"|"none", exact: number|null }} Moment */
+/** @typedef {{ pulse: number|null, kind: "takeoff"|"activity"|"none", from_log: boolean, exact: number|null }} Moment */
 /** @typedef {{ pulses: Pulses, zero_s: number }} Aligned a jump, and the time in it that the other's answers to */
 
 /** So many jumps can be chosen among, the newest. */
@@ -18,7 +18,7 @@ const CHOICES = 100;
 
 /** @type {import("../shared/viewer.js").Viewer} */
 let viewer;
-/** The jump shown and the other one; null: no other is shown. @type {{ own: Aligned, other: Aligned, kind: Moment["kind"] }|null} */
+/** The jump shown and the other one; null: no other is shown. @type {{ own: Aligned, other: Aligned, kind: Moment["kind"], measured: boolean }|null} */
 let pair = null;
 /** The picture of the other jump over that of the one shown. @type {HTMLImageElement} */
 let ghost;
@@ -67,7 +67,10 @@ export function drawChoices() {
   );
   $("compare").value = choices.some(({ id }) => id === chosen) ? chosen : "";
   $("compare-choice").hidden = choices.length === 0;
-  if (pair) setText($("compare-how"), inWords(pair));
+  if (!pair) return;
+  setText($("compare-how"), inWords(pair));
+  $("compare-page").hidden = !pair.measured;
+  $("compare-page").href = `./api/comparison.html?${new URLSearchParams({ first: pair.own.pulses.id, second: pair.other.pulses.id, language: languageInUse() })}`;
 }
 
 function leave() {
@@ -115,7 +118,7 @@ async function align(own, other) {
   if (moments.some(({ kind }) => kind !== "takeoff")) moments = await Promise.all(both.map((id) => call("GET", recordingPath(id, "/moment?by_motion=true"))));
   const kind = moments.some((moment) => moment.kind === "none") ? "none" : moments[0].kind;
   const [one, two] = both.map((_, place) => ({ pulses: pulses[place], zero_s: kind === "none" ? 0 : timeAt(pulses[place], moments[place]) }));
-  return { own: one, other: two, kind };
+  return { own: one, other: two, kind, measured: moments.every(({ from_log }) => from_log) };
 }
 
 /**

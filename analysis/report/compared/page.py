@@ -1,0 +1,220 @@
+"""The page of a comparison: needs no other file, runs no script, and has all words in both languages."""
+
+import base64
+import hashlib
+from datetime import UTC, datetime
+from html import escape
+from importlib.resources import files
+from typing import Final
+
+import numpy as np
+
+from analysis.comparison.aligned import MeasuredJump
+from analysis.comparison.difference import LEVEL, Difference, Power
+from analysis.comparison.report import WORDS, Comparison, deviation, in_words, instants, plain, plus_minus, signed
+from analysis.comparison.shared_calibration import Common
+from analysis.report.compared.charts import difference_chart, value_chart
+from analysis.report.compared.places import Images, at_places
+from analysis.report.compared.words import Language, both, date, first_letter_large, quantity, said, text
+from analysis.report.course import course_of
+from analysis.result.model import QUANTITIES
+from rig.clocks import NS_PER_S
+
+#: So many charts of what differs are shown at once; the others are unfolded.
+_SHOWN: Final = 2
+#: As much is said to be more than 99 %.
+_NEARLY: Final = 0.995
+_COMMON: Final = {Common.CALIBRATION: "calibration", Common.SURVEY: "survey", Common.NOTHING: "nothing"}
+_NAMES: Final = {Language.EN: "English", Language.NB: "Norsk"}
+
+
+def comparison_page(
+    comparison: Comparison, images: tuple[Images | None, Images | None], language: Language = Language.EN
+) -> str:
+    """The page as HTML.
+
+    Args:
+        comparison: two jumps.
+        images: of both; None where they are not there.
+        language: that is shown until a reader chooses the other one.
+
+    Raises:
+        BadInputError: a log cannot be read.
+    """
+    jumps = comparison.a, comparison.b
+    courses = tuple(course_of(jump.jump, jump.recording.rate_hz) for jump in jumps)
+    found = comparison.difference.found()
+    known = sorted(
+        (name for name in QUANTITIES if _known(comparison.difference, name)), key=lambda name: name not in found
+    )
+    folded = [difference_chart(comparison, name) for name in known if name not in found[:_SHOWN]]
+    folded += [value_chart(comparison, name) for name in known]
+    places = at_places(courses, [jump.jump.number for jump in jumps], images)
+    body = [
+        _head(jumps, language),
+        "<main>",
+        _verdict(comparison, found),
+        _section("places", places + text("over_how", "p")),
+        _charts([difference_chart(comparison, name) for name in found[:_SHOWN]]),
+        _folded("curves", _charts(folded)),
+        _folded("numbers", _numbers(comparison)),
+        _folded("method", _method(comparison)),
+        "</main>",
+    ]
+    title = f"{_who(jumps[0], language)} / {_who(jumps[1], language)}"
+    return _whole(title, "\n".join(filter(None, body)), language)
+
+
+def _known(d: Difference, name: str) -> bool:
+    return bool(np.isfinite(d.value[QUANTITIES.index(name)]).any())
+
+
+def _whole(title: str, body: str, language: Language) -> str:
+    style = files("analysis.report.compared").joinpath("compared.css").read_text(encoding="utf-8")
+    sha = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode("ascii")
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{sha}'; base-uri 'none'; form-action 'none'"
+    head = (
+        f'<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{style}</style>"
+    )
+    return f'<!doctype html>\n<html lang="{language}"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
+
+
+def _head(jumps: tuple[MeasuredJump, MeasuredJump], language: Language) -> str:
+    choices = "".join(
+        f'<label><input type="radio" name="language" id="in-{each}"{" checked" if each is language else ""}>'
+        f"{_NAMES[each]}</label>"
+        for each in Language
+    )
+    rows = "".join(_heading(letter, jump) for letter, jump in zip("AB", jumps, strict=True))
+    switch = f'<fieldset><legend class="unseen">{text("language")}</legend>{choices}</fieldset>'
+    return f'<header><div>{text("title", "h1")}{switch}</div><ul class="jumps">{rows}</ul></header>'
+
+
+def _heading(letter: str, jump: MeasuredJump) -> str:
+    who, when = both(lambda language: _who(jump, language)), both(lambda language: _when(jump, language), "small")
+    return f'<li class="{letter.lower()}"><b>{letter}</b> {who} {when}</li>'
+
+
+def _who(jump: MeasuredJump, language: Language) -> str:
+    """Name and bib."""
+    bib = jump.recording.session.get("bib", "").strip()
+    name = jump.athlete.strip() or said(language, "nobody")
+    return f"{name} ({bib})" if bib else name
+
+
+def _when(jump: MeasuredJump, language: Language) -> str:
+    """Date and time of the take-off here, and which jump of its recording it is, if there are several."""
+    takeoff = jump.jump.takeoff
+    if takeoff is None:
+        return ""
+    then = datetime.fromtimestamp(takeoff.time / NS_PER_S, UTC).astimezone()
+    day = date(language, then)
+    several = len(jump.recording.jumps) > 1
+    return f"{day}, {said(language, 'jump', number=jump.jump.number)}" if several else day
+
+
+def _section(key: str, content: str) -> str:
+    return f"<section>{text(key, 'h2')}{content}</section>"
+
+
+def _folded(key: str, content: str) -> str:
+    return f"<details><summary>{text(key)}</summary>{content}</details>"
+
+
+def _charts(figures: list[str]) -> str:
+    return f'<div class="charts">{"".join(figures)}</div>' if figures else ""
+
+
+def _verdict(comparison: Comparison, found: list[str]) -> str:
+    scatter = comparison.scatter
+    own = text("no_scatter", "p") if scatter is None else text("scatter", "p", jumps=scatter.jumps)
+    if not found:
+        return _section("same", text("same_how", "p") + own)
+    lines = "".join(f"<li>{_greatest_of(comparison, name)}</li>" for name in found)
+    return _section("different", f'<ul class="found">{lines}</ul>{text("found_how", "p")}{own}')
+
+
+def _greatest_of(comparison: Comparison, name: str) -> str:
+    return both(lambda language: _greatest(comparison, name, language))
+
+
+def _greatest(comparison: Comparison, name: str, language: Language) -> str:
+    d, row = comparison.difference, QUANTITIES.index(name)
+    at = d.greatest(row)
+    if at is None:
+        return ""
+    value, since = float(d.value[row, at]), float(d.times[at])
+    _, _, unit, decimals = WORDS[name]
+    when = said(language, "before" if since < 0 else "after", at=f"{abs(since):.2f}")
+    size = f"{abs(value):.{decimals}f} ± {deviation(name, d.sigma[row, at])}"
+    words = said(
+        language, "less" if value < 0 else "more", quantity=quantity(language, name), size=size, unit=unit, when=when
+    )
+    scatter = comparison.scatter
+    if scatter is not None and np.isfinite(scatter.deviation[row, at]):
+        words += said(language, "own", p=in_words(float(scatter.p(d.value)[row, at])))
+    return first_letter_large(words)
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    """A table of elements; the first of each row is its heading."""
+    lines = ["".join(f"<th>{cell}</th>" for cell in head)]
+    lines += [f"<th>{row[0]}</th>" + "".join(f"<td>{cell}</td>" for cell in row[1:]) for row in rows]
+    return f'<div class="table" tabindex="0"><table>{"".join(f"<tr>{line}</tr>" for line in lines)}</table></div>'
+
+
+def _numbers(comparison: Comparison) -> str:
+    d, own = comparison.difference, comparison.scatter
+    times = instants(d.times)
+    head = ["", *(_figure(f"{signed(d.times[at], 2)} s") for at in times)]
+    names = [f"{_named(name)} ({WORDS[name][2]})" for name in QUANTITIES]
+    rows = [[names[row], *(_figure(_cell(d, name, row, at)) for at in times)] for row, name in enumerate(QUANTITIES)]
+    parts = [text("instants", "p"), _table(head, rows)]
+    if own is not None:
+        deviations = [
+            [names[row], *(_figure(plain(own.deviation[row, at], WORDS[name][3] + 1)) for at in times)]
+            for row, name in enumerate(QUANTITIES)
+        ]
+        parts += [text("own_scatter", "p"), _table(head, deviations)]
+    powers = [_power_row(name, power) for name, power in d.power.items() if power is not None]
+    if powers:
+        parts += [text("power", "p"), _table([text("quantity"), text("such"), text("this")], powers)]
+    return "".join(parts)
+
+
+def _named(name: str) -> str:
+    return both(lambda language: quantity(language, name))
+
+
+def _figure(number: str) -> str:
+    return both(lambda _: number)
+
+
+def _power_row(name: str, power: Power) -> list[str]:
+    _, _, unit, decimals = WORDS[name]
+
+    def chance(language: Language) -> str:
+        percent = said(language, "nearly") if power.probability >= _NEARLY else f"{100 * power.probability:.0f} %"
+        return said(language, "chance", change=f"{power.change:g}", unit=unit, percent=percent)
+
+    found = text("chance", change=f"{power.change_80:.{decimals + 1}f}", unit=unit, percent="80 %")
+    return [_named(name), both(chance), found]
+
+
+def _cell(d: Difference, name: str, row: int, at: int) -> str:
+    if not np.isfinite(d.value[row, at]):
+        return ""
+    return plus_minus(name, d.value[row, at], d.sigma[row, at]) + ("*" if d.p_greatest[row, at] < LEVEL else "")
+
+
+def _method(comparison: Comparison) -> str:
+    d = comparison.difference
+    count = int(np.isfinite(d.value).sum())
+    lines = [
+        text("greatest_of", "p", count=count, independent=f"{d.independent:.0f}", limit=f"{d.limit:.1f}"),
+        text(_COMMON[d.common], "p"),
+        "" if comparison.alignment.at_one_place else text("two_places", "p"),
+    ]
+    return "".join(lines)

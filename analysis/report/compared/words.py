@@ -1,0 +1,146 @@
+# ruff: noqa: E501 - a text stands beside its translation
+"""What the page of a comparison says, in English and Norwegian; a reader switches between them on the page."""
+
+import re
+from collections.abc import Callable
+from datetime import datetime
+from enum import StrEnum
+from html import escape
+from typing import Final
+
+from analysis.comparison.report import WORDS
+
+
+class Language(StrEnum):
+    """Languages of the page, as in the attribute `lang`."""
+
+    EN = "en"
+    NB = "nb"
+
+
+_NORWEGIAN: Final = {
+    "alpha": "leggvinkel",
+    "beta": "hoftevinkel",
+    "gamma": "åpning av V-en",
+    "dphi": "forskjell i skienes helning",
+    "phi": "skienes helning",
+    "angle_of_attack": "angrepsvinkel",
+    "height": "høyde",
+    "speed": "fart",
+    "velocity_x": "fart langs X",
+    "velocity_y": "fart langs Y",
+    "velocity_z": "fart langs Z",
+}
+_MONTHS: Final = (
+    "januar", "februar", "mars", "april", "mai", "juni", "juli", "august", "september", "oktober", "november", "desember",
+)  # fmt: skip
+#: English and Norwegian, with `{name}` filled in.
+TEXTS: Final = {
+    "title": ("Two jumps compared", "To hopp sammenlignet"),
+    "language": ("Language", "Språk"),
+    "jump": ("jump {number}", "hopp {number}"),
+    "nobody": ("No name", "Uten navn"),
+    "different": ("What differs", "Hva som er ulikt"),
+    "same": ("No difference found", "Ingen forskjell funnet"),
+    "more": ("{quantity}: {size} {unit} more in B, {when}", "{quantity}: {size} {unit} mer i B, {when}"),
+    "less": ("{quantity}: {size} {unit} less in B, {when}", "{quantity}: {size} {unit} mindre i B, {when}"),
+    "after": ("{at} s after the take-off", "{at} s etter satsen"),
+    "before": ("{at} s before the take-off", "{at} s før satsen"),
+    "own": ("; two of the athlete's own jumps differ as much with {p}", "; to av utøverens egne hopp er så ulike med {p}"),
+    "found_how": (
+        "Where it differs most, with its standard deviation. More than errors of measurement make of equal jumps in 1 of 20 cases.",
+        "Der forskjellen er størst, med standardavvik. Mer enn målefeil gjør av like hopp i 1 av 20 tilfeller.",
+    ),
+    "same_how": (
+        "Errors of measurement alone may have made all of what differs. How large a change would have been found is said below.",
+        "Målefeil alene kan ha gjort alt som er ulikt. Hvor stor endring som ville vært funnet, står lenger ned.",
+    ),
+    "no_scatter": (
+        "How much the athlete's own jumps differ from each other is not known here.",
+        "Hvor mye utøverens egne hopp skiller seg fra hverandre, er ikke kjent her.",
+    ),
+    "scatter": (
+        "How much jumps of one athlete differ from each other is known from {jumps} further jumps.",
+        "Hvor mye hopp av én utøver skiller seg fra hverandre, er kjent fra {jumps} andre hopp.",
+    ),
+    "places": ("At the same places", "På samme sted"),
+    "place": ("{metres} m", "{metres} m"),
+    "edge": ("edge", "kant"),
+    "over": ("A and B", "A og B"),
+    "over_how": (
+        "Distances from the take-off. The stick figures are seen from the side, each by its own height above the take-off.",
+        "Avstander fra satsen. Strekfigurene er sett fra siden, hver i sin egen høyde over satsen.",
+    ),
+    "no_pictures": ("The recordings are not beside the results, so there are no pictures.", "Opptakene ligger ikke ved resultatene, så det er ingen bilder."),
+    "curves": ("All curves", "Alle kurver"),
+    "numbers": ("Numbers", "Tall"),
+    "method": ("How it was judged", "Hvordan det er bedømt"),
+    "instants": (
+        "B minus A with standard deviations; * where the greatest of all differences would be as large by chance in less than 1 of 20 comparisons of equal jumps. Times count from the take-off.",
+        "B minus A med standardavvik; * der den største av alle forskjeller ville vært så stor ved tilfeldighet i færre enn 1 av 20 sammenligninger av like hopp. Tider regnes fra satsen.",
+    ),
+    "own_scatter": ("Standard deviation of one of the athlete's own jumps:", "Standardavvik for ett av utøverens egne hopp:"),
+    "power": ("A change that lasts over the flight would have been found:", "En endring som varer hele svevet, ville vært funnet:"),
+    "quantity": ("quantity", "størrelse"),
+    "such": ("such a change", "en slik endring"),
+    "this": ("and this one", "og denne"),
+    "chance": ("{change} {unit} in {percent}", "{change} {unit} i {percent}"),
+    "nearly": ("more than 99 %", "mer enn 99 %"),
+    "greatest_of": (
+        "The greatest of {count} differences is judged as the greatest of {independent} independent ones: its limit is {limit} times the standard deviation of repeated measurements.",
+        "Den største av {count} forskjeller bedømmes som den største av {independent} uavhengige: grensen er {limit} ganger standardavviket for gjentatte målinger.",
+    ),
+    "calibration": ("Both jumps have the same calibration: its errors cancel.", "Begge hopp har samme kalibrering: feilene i den faller bort."),
+    "survey": ("Both recordings were oriented with the same survey: its errors cancel.", "Begge opptak er orientert med samme innmåling: feilene i den faller bort."),
+    "nothing": ("The jumps have different calibrations: the errors of both count.", "Hoppene har ulike kalibreringer: feilene i begge teller med."),
+    "two_places": (
+        "The take-offs are not at one place, so each jump has its own: do both recordings show one hill?",
+        "Satsene er ikke på samme sted, så hvert hopp har sin egen: viser begge opptak samme bakke?",
+    ),
+    "seconds": ("s since take-off", "s siden satsen"),
+    "minus": ("B minus A ({unit})", "B minus A ({unit})"),
+    "line": ("difference", "forskjell"),
+    "limit": ("limit", "grense"),
+    "own_line": ("own scatter, 2 sigma", "egen spredning, 2 sigma"),
+    "red": ("different", "ulikt"),
+    "chart": ("{quantity} ({symbol}), B minus A.", "{quantity} ({symbol}), B minus A."),
+    "large": ("The athlete's own scatter is larger than the chart.", "Utøverens egen spredning er større enn figuren."),
+    "values": ("{quantity} ({symbol}) of both jumps.", "{quantity} ({symbol}) i begge hopp."),
+}  # fmt: skip
+
+
+def said(language: Language, key: str, **values: object) -> str:
+    """A text in a language, with its values."""
+    return TEXTS[key][list(Language).index(language)].format(**values)
+
+
+def quantity(language: Language, name: str) -> str:
+    """The name of a quantity."""
+    return WORDS[name][0] if language is Language.EN else _NORWEGIAN[name]
+
+
+def date(language: Language, then: datetime) -> str:
+    """Day and time."""
+    if language is Language.EN:
+        return f"{then.day} {then:%b %Y, %H:%M}"
+    return f"{then.day}. {_MONTHS[then.month - 1]} {then:%Y, %H:%M}"
+
+
+def both(words: Callable[[Language], str], tag: str = "span") -> str:
+    """An element with text in each language, of which the page shows one."""
+    return "".join(f'<{tag} lang="{each}">{escape(localised(each, words(each)))}</{tag}>' for each in Language)
+
+
+def text(key: str, tag: str = "span", **values: object) -> str:
+    """A text as an element in each language."""
+    return both(lambda language: said(language, key, **values), tag)
+
+
+def localised(language: Language, written: str) -> str:
+    """Numbers as the language writes them: a Norwegian one has a comma before its decimals."""
+    return written if language is Language.EN else re.sub(r"(?<=\d)\.(?=\d)", ",", written)
+
+
+def first_letter_large(written: str) -> str:
+    """The text with its first letter as a capital."""
+    return written[0].upper() + written[1:]

@@ -111,6 +111,10 @@ class UnknownExportError(SvevError):
     """The service has no such export, or has removed it."""
 
 
+class UnknownAlarmError(SvevError):
+    """There is no alarm of this number any more."""
+
+
 class UnknownCameraError(SvevError):
     """The rig has no such camera."""
 

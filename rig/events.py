@@ -12,6 +12,8 @@ from rig.phrase import Phrase, Value
 
 #: Name of events that say what is wrong with clocks, trigger or rate.
 PAIRING: Final = "pairing"
+#: Name of events that say whether the computer is fast enough.
+COMPUTER: Final = "computer"
 #: Name of events that say what the source of the pulses is good for.
 TRIGGER: Final = "trigger"
 

@@ -132,6 +132,11 @@ class Service(Archive):
     def _begin_to_arm(self, order: ArmOrder) -> Status:
         return self._supervisor.commands.ask(at_once(partial(self._supervisor.arm, order.min_cameras)), _SOON_S)
 
+    def acknowledge(self, alarm: int) -> Status:
+        """Note that somebody has seen an alarm."""
+        self._supervisor.commands.ask(at_once(partial(self._supervisor.acknowledge, alarm)), _SOON_S)
+        return self.status()
+
     def rehearsals(self) -> Rehearsals:
         """The rehearsal that runs, and what the last one showed."""
         return self._rehearser.view()

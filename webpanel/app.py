@@ -20,6 +20,7 @@ from webpanel.door.logins import Door, Sessions
 from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
+from webpanel.routes.alarms import alarms_router
 from webpanel.routes.athletes import athletes_router
 from webpanel.routes.common import COMMON
 from webpanel.routes.contents import contents_router
@@ -74,6 +75,7 @@ def create_app(
     door = Door(access, warn, links, Sessions() if sessions is None else sessions)
     routers = (
         rig_router(service),
+        alarms_router(service),
         recordings_router(service, changes),
         start_list_router(service),
         trash_router(service, changes),

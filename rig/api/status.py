@@ -185,7 +185,10 @@ class Alarm(Model):
     number: int = Field(description="counts up with every alarm of this run of the service, also if it gets worse")
     topic: str = Field(description="what may be wrong; of each topic there is one alarm at a time")
     since: datetime = Field(description="when it began, UTC")
-    statement: Statement = Field(description="what is wrong and what to do; `level` is warning or error")
+    statement: Statement = Field(
+        description="what is wrong and what to do, with figures of the last seconds; `level` is warning or error"
+    )
+    acknowledged: bool = Field(False, description="somebody has seen it: it is silent until it ends and comes anew")
 
 
 class Status(Model):

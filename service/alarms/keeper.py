@@ -7,6 +7,7 @@ from typing import Final
 
 from rig.api.statement import Level, Statement
 from rig.api.status import Alarm
+from rig.errors import UnknownAlarmError
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.health import Health
@@ -28,7 +29,7 @@ class AlarmKeeper:
         tell: takes an event for the live log and for the log of a recording.
 
     Attributes:
-        present: the alarms at present, the worst first.
+        present: the alarms at present, the worst first, those that somebody has seen last.
     """
 
     def __init__(self, rig: RigSettings, tell: Callable[[Event], None]) -> None:
@@ -39,9 +40,12 @@ class AlarmKeeper:
 
     @property
     def present(self) -> tuple[Alarm, ...]:
-        """The alarms at present, the worst first, and of these the latest."""
-        known = self._known.values()
-        return tuple(sorted(known, key=lambda alarm: (alarm.statement.level is not Level.ERROR, -alarm.number)))
+        """The alarms at present, the worst first, and of these the latest; those that somebody has seen last."""
+
+        def order(alarm: Alarm) -> tuple[bool, bool, int]:
+            return alarm.acknowledged, alarm.statement.level is not Level.ERROR, -alarm.number
+
+        return tuple(sorted(self._known.values(), key=order))
 
     def look(self, health: Health, overloaded: Sequence[int], *, still: bool = False) -> None:
         """Enter a health record.
@@ -61,6 +65,20 @@ class AlarmKeeper:
         for alarm in over:
             del self._known[alarm.topic]
             self._tell(Event.now(EventLevel.INFO, alarm.name, alarm.over))
+        for alarm in self._watch.present:
+            self._renew(alarm.topic, pairing_alarm(alarm.said, _LEVELS[alarm.level]))
+
+    def acknowledge(self, number: int) -> None:
+        """Note that somebody has seen an alarm; it stays until it is over.
+
+        Raises:
+            UnknownAlarmError: it is over, or there never was one of this number.
+        """
+        for topic, alarm in self._known.items():
+            if alarm.number == number:
+                self._known[topic] = alarm.model_copy(update={"acknowledged": True})
+                return
+        raise UnknownAlarmError(f"there is no alarm {number} any more: it is over, or has got worse and a new number")
 
     def measuring(self, refused: Phrase | None) -> None:
         """Enter whether jumps can be measured; that they cannot stays whatever becomes of the recorder.
@@ -95,6 +113,11 @@ class AlarmKeeper:
         """Forget everything: no process of the rig is left."""
         self._watch = None
         self._known.clear()
+
+    def _renew(self, topic: str, statement: Statement) -> None:
+        """Say an alarm with the figures of now."""
+        if self._known[topic].statement != statement:
+            self._known[topic] = self._known[topic].model_copy(update={"statement": statement})
 
     def _enter(self, topic: str, statement: Statement) -> None:
         self._numbers += 1

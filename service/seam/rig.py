@@ -38,6 +38,10 @@ class RigService(Archive, Cameras, Protocol):
         """
         ...
 
+    def acknowledge(self, alarm: int) -> Status:
+        """Note that somebody has seen an alarm. UnknownAlarmError: it is over."""
+        ...
+
     def rehearsals(self) -> Rehearsals:
         """The rehearsal that runs, and what the last one showed."""
         ...

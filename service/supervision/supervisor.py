@@ -191,6 +191,15 @@ class Supervisor:
         """Command: tell an event, also to the log of a recording that runs or begins soon."""
         self._session.tell(event)
 
+    def acknowledge(self, alarm: int) -> Status:
+        """Command: note that somebody has seen an alarm.
+
+        Raises:
+            UnknownAlarmError: it is over.
+        """
+        self._watch.alarms.acknowledge(alarm)
+        return self._refresh()
+
     def look(self) -> WarmUp:
         """Command: say how far the rig has come since it was armed."""
         processes = self._session.processes

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from rig.api.statement import Statement
-from rig.events import Event, Level
+from rig.events import COMPUTER, Event, Level
 from rig.health import Health
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
@@ -104,7 +104,7 @@ class RecorderWatch:
         self.overload.look(health, fetching, time.monotonic())
         if self.overload.cameras and not before:
             late = [self._rig.cameras[index].name for index in self.overload.cameras]
-            self._tell(Event.now(Level.WARNING, "computer", too_slow(late)))
+            self._tell(Event.now(Level.WARNING, COMPUTER, too_slow(late)))
         self.alarms.look(health, self.overload.cameras, still=still)
 
     def expect_nothing(self) -> None:

@@ -47,7 +47,7 @@ from rig.api.status import (
 )
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerControl, TriggerView
 from rig.clocks import NS_PER_S, UtcNs
-from rig.errors import StateForbidsError, UnknownCameraError, UnknownRecordingError
+from rig.errors import StateForbidsError, UnknownAlarmError, UnknownCameraError, UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, phrase, plain
 from rig.pulse import RigPulse
@@ -185,6 +185,15 @@ class MemoryService(Archive):
         if self.state is State.IDLE or (order is not None and order.min_cameras):
             self.rehearsal, self._armed_at = None, time.monotonic()
             self._become(State.ARMED)
+        return self.status()
+
+    def acknowledge(self, alarm: int) -> Status:
+        if alarm not in {each.number for each in self.alarms}:
+            raise UnknownAlarmError(f"there is no alarm {alarm} any more")
+        self.alarms = tuple(
+            each.model_copy(update={"acknowledged": each.acknowledged or each.number == alarm}) for each in self.alarms
+        )
+        self._wake()
         return self.status()
 
     def rehearsals(self) -> Rehearsals:

@@ -21,6 +21,7 @@ CALLS = {
     "GET /api/cameras/{camera}/aids", "GET /api/cameras/{camera}/balls",
     "GET /api/cameras/{camera}/picture.jpg",
     "GET /api/rehearsal", "POST /api/rehearsal", "DELETE /api/rehearsal",
+    "POST /api/alarms/{number}/acknowledge",
     "GET /api/status", "POST /api/arm", "POST /api/disarm", "GET /api/rig", "GET /api/doctor", "GET /api/events",
     "GET /api/preview.jpg", "GET /api/preview.mjpg", "GET /api/recordings", "POST /api/recordings",
     "GET /api/recordings/{recording_id}", "PATCH /api/recordings/{recording_id}",

@@ -7,11 +7,14 @@ the other way round. So a camera that loses every second frame is told of after 
 some hundred, and no number of clean pulses gives an alarm.
 """
 
+from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
 from math import log
 from typing import Final
 
+from rig.events import COMPUTER, TRIGGER
 from rig.health import Health
 from rig.phrase import Phrase, phrase
 
@@ -25,10 +28,30 @@ _FAILED: Final = log(_BAD / _GOOD)
 _CAME: Final = log((1 - _BAD) / (1 - _GOOD))
 #: With a longer exposure than this share of the period there is hardly time to read a frame out.
 _LONG_EXPOSURE: Final = 0.8
+#: The figures of an alarm are of so many records, about as many seconds.
+_RECORDS: Final = 10
 
 #: Counts of a camera's pairing and of its grabber that tell of causes.
 _PAIRED: Final = ("ok", "missed", "lost", "damaged", "late", "overruns", "silences")
 _FETCHED: Final = ("missing_packets", "underruns", "queue_overflows", "reconnects")
+
+
+class Cause(Enum):
+    """Why cameras miss pulses."""
+
+    COMPUTER = "computer"
+    BANDWIDTH = "bandwidth"
+    ALIKE = "missed alike"
+    EXPOSURE = "exposure"
+    MISSED = "missed"
+    SLOW_LINK = "slow link"
+    LINK = "link"
+
+
+#: Causes that cameras share: one alarm names all of them.
+_SHARED: Final = frozenset({Cause.COMPUTER, Cause.BANDWIDTH, Cause.ALIKE})
+#: What looked like a camera's own trouble, until others had it too.
+_OWN: Final = {Cause.LINK: Cause.BANDWIDTH, Cause.SLOW_LINK: Cause.BANDWIDTH, Cause.MISSED: Cause.ALIKE}
 
 
 @dataclass(slots=True)
@@ -37,17 +60,21 @@ class _Camera:
 
     Attributes:
         counts: of the last record.
-        evidence: what was counted since the sum was last zero.
+        lately: what the last records counted, since the sum was zero.
         against: sum for a camera that fails.
         for_it: sum for one that does not, while there is an alarm.
-        said: the alarm.
+        cause: why it fails; None: it does not.
     """
 
-    counts: dict[str, int] | None
-    evidence: dict[str, int]
+    counts: dict[str, int] | None = None
+    lately: deque[dict[str, int]] = field(default_factory=lambda: deque(maxlen=_RECORDS))
     against: float = 0.0
     for_it: float = 0.0
-    said: Phrase | None = None
+    cause: Cause | None = None
+
+    def counted(self, *names: str) -> int:
+        """How often any of these was counted lately."""
+        return sum(record[name] for record in self.lately for name in names)
 
 
 class Missing:
@@ -60,9 +87,9 @@ class Missing:
 
     def __init__(self, names: Sequence[str], exposures_us: Sequence[float]) -> None:
         self._names, self._exposures_us = names, exposures_us
-        self._cameras = [_Camera(None, {}) for _ in names]
+        self._cameras = [_Camera() for _ in names]
 
-    def look(self, health: Health, overloaded: Sequence[int]) -> list[Phrase | None]:
+    def look(self, health: Health, overloaded: Sequence[int]) -> list[tuple[str, str, Phrase]]:
         """Enter a record.
 
         Args:
@@ -70,14 +97,31 @@ class Missing:
             overloaded: indices of the cameras that suffer from a computer that is too slow.
 
         Returns:
-            For each camera, that it fails and why, until it is good again; None: it is good.
+            For each cause of missed pulses: a name of it that stays, whom it is about, and what is wrong, with figures
+            of the last records.
         """
         for camera in range(len(self._cameras)):
             self._enter(camera, health)
         for camera, test in enumerate(self._cameras):
-            if test.said is None and test.against > _LIMIT:
-                test.said, test.for_it = self._say(camera, health, overloaded), 0.0
-        return [test.said for test in self._cameras]
+            if test.cause is None and test.against > _LIMIT:
+                test.cause, test.for_it = self._cause(camera, health, overloaded), 0.0
+            elif test.cause is not None and self._starved(camera, overloaded):
+                test.cause = Cause.COMPUTER  # no cable is accused any more
+        causes = {test.cause for test in self._cameras}
+        found: dict[str, list[int]] = {}
+        for camera, test in enumerate(self._cameras):
+            if test.cause is not None:
+                shared = _OWN.get(test.cause)
+                test.cause = shared if shared in causes and shared is not None else test.cause
+                topic = test.cause.value if test.cause in _SHARED else f"camera {self._names[camera]}"
+                found.setdefault(topic, []).append(camera)
+        return [(topic, self._about(cameras), self._say(cameras)) for topic, cameras in found.items()]
+
+    def _about(self, cameras: list[int]) -> str:
+        """Which part the events of an alarm are about."""
+        if self._cameras[cameras[0]].cause is Cause.COMPUTER:
+            return COMPUTER
+        return self._names[cameras[0]] if len(cameras) == 1 else TRIGGER
 
     def _enter(self, camera: int, health: Health) -> None:
         test, paired, fetched = self._cameras[camera], health.pairing.cameras[camera], health.cameras[camera]
@@ -94,63 +138,82 @@ class Missing:
         failed = new["missed"] + new["lost"] + new["damaged"]
         evidence = failed * _FAILED + new["ok"] * _CAME
         test.against = max(0.0, test.against + evidence)
-        test.evidence = {name: test.evidence.get(name, 0) + new[name] for name in new} if test.against else {}
-        if test.said is not None:
+        test.lately.append(new)
+        if test.cause is not None:
             test.for_it = max(0.0, test.for_it - evidence)
             if test.for_it > _LIMIT:
-                test.said, test.against, test.evidence = None, 0.0, {}
+                test.cause, test.against = None, 0.0
+        if not test.against:
+            test.lately.clear()
 
-    def _say(self, camera: int, health: Health, overloaded: Sequence[int]) -> Phrase:
-        evidence, name = self._cameras[camera].evidence, self._names[camera]
-        failed = evidence["missed"] + evidence["lost"] + evidence["damaged"]
-        pulses = failed + evidence["ok"]
-        others = [
-            other for index, other in enumerate(self._names)
-            if index != camera and self._cameras[index].against > _LIMIT / 2
-        ]  # fmt: skip
-        if camera in overloaded or evidence["underruns"] or evidence["queue_overflows"]:
-            text = (
-                "frames of {camera} get lost, {failed} of {pulses}, since this computer is too slow: close other "
-                "programs on it, or lower trigger.rate_hz"
-            )
-            return phrase("alarm_computer", text, camera=name, failed=failed, pulses=pulses)
-        if evidence["missed"] >= evidence["lost"] + evidence["damaged"]:
-            return self._missed(camera, health.pairing.period_us, failed, pulses, others)
+    def _starved(self, camera: int, overloaded: Sequence[int]) -> bool:
+        """Whether this computer did not fetch the frames of a camera in time."""
+        return camera in overloaded or self._cameras[camera].counted("underruns", "queue_overflows") > 0
+
+    def _cause(self, camera: int, health: Health, overloaded: Sequence[int]) -> Cause:
+        test = self._cameras[camera]
+        missed, lost = test.counted("missed"), test.counted("lost", "damaged")
+        others = any(other.against > _LIMIT / 2 for index, other in enumerate(self._cameras) if index != camera)
+        if self._starved(camera, overloaded):
+            return Cause.COMPUTER
+        if missed >= lost:  # the camera did not take the frames: it was busy, or did not see the pulses
+            busy = 2 * test.counted("overruns") >= missed
+            if busy or self._exposures_us[camera] > _LONG_EXPOSURE * health.pairing.period_us:
+                return Cause.EXPOSURE
+            return Cause.ALIKE if others else Cause.MISSED
         if others:
-            text = (
-                "frames of {camera} get lost, {failed} of {pulses}, like those of {others}, since the link that they "
-                "share is too slow or bad: check its cable and switch, lower trigger.rate_hz or make regions smaller"
-            )
-            return phrase("alarm_bandwidth", text, camera=name, failed=failed, pulses=pulses, others=", ".join(others))
-        if evidence["late"] > failed / 2:
-            text = (
-                "frames of {camera} come too late, {failed} of {pulses}, since its link is too slow: look for a port "
-                "of lower speed, or make its region smaller"
-            )
-            return phrase("alarm_slow_link", text, camera=name, failed=failed, pulses=pulses)
+            return Cause.BANDWIDTH
+        return Cause.SLOW_LINK if test.counted("late") > (missed + lost) / 2 else Cause.LINK
+
+    def _say(self, cameras: list[int]) -> Phrase:
+        """What is wrong with cameras of one cause."""
+        tests = [self._cameras[camera] for camera in cameras]
+        names = ", ".join(self._names[camera] for camera in cameras)
+        failed = sum(test.counted("missed", "lost", "damaged") for test in tests)
+        pulses = failed + sum(test.counted("ok") for test in tests)
+        cause = tests[0].cause
+        if cause in {Cause.ALIKE, Cause.EXPOSURE, Cause.MISSED}:
+            return _missed(cause, names, failed, pulses)
+        return _lost(cause, names, failed, pulses)
+
+
+def _missed(cause: Cause | None, camera: str, failed: int, pulses: int) -> Phrase:
+    """Cameras did not take the frames."""
+    if cause is Cause.ALIKE:
+        text = "{camera} miss pulses, {failed} of {pulses}: check what makes the pulses, and the cable that they share"
+        return phrase("alarm_missed_alike", text, camera=camera, failed=failed, pulses=pulses)
+    if cause is Cause.EXPOSURE:
         text = (
-            "frames of {camera} get lost on their way, {failed} of {pulses}: check the cable and the plug that they "
-            "come by, and the port of the switch"
+            "{camera} cannot follow the pulses, {failed} of {pulses} missed: make its exposure shorter, or lower "
+            "trigger.rate_hz"
         )
-        return phrase("alarm_link", text, camera=name, failed=failed, pulses=pulses)
+        return phrase("alarm_exposure", text, camera=camera, failed=failed, pulses=pulses)
+    text = "{camera} misses pulses, {failed} of {pulses}: check its trigger cable and the plug"
+    return phrase("alarm_missed", text, camera=camera, failed=failed, pulses=pulses)
 
-    def _missed(self, camera: int, period_us: float, failed: int, pulses: int, others: list[str]) -> Phrase:
-        """The camera did not take the frames: it was busy, or did not see the pulses."""
-        name, evidence = self._names[camera], self._cameras[camera].evidence
-        busy = 2 * evidence["overruns"] >= evidence["missed"]
-        if busy or self._exposures_us[camera] > _LONG_EXPOSURE * period_us:
-            text = (
-                "{camera} cannot follow the pulses, {failed} of {pulses} missed: make its exposure shorter, or lower "
-                "trigger.rate_hz"
-            )
-            return phrase("alarm_exposure", text, camera=name, failed=failed, pulses=pulses)
-        if others:
-            text = (
-                "{camera} misses pulses, {failed} of {pulses}, like {others}: check what makes the pulses, and the "
-                "cable that they share"
-            )
-            return phrase(
-                "alarm_missed_alike", text, camera=name, failed=failed, pulses=pulses, others=", ".join(others)
-            )
-        text = "{camera} misses pulses, {failed} of {pulses}: check its trigger cable and the plug"
-        return phrase("alarm_missed", text, camera=name, failed=failed, pulses=pulses)
+
+def _lost(cause: Cause | None, camera: str, failed: int, pulses: int) -> Phrase:
+    """Cameras took the frames, which did not arrive."""
+    if cause is Cause.COMPUTER:
+        text = (
+            "frames of {camera} get lost, {failed} of {pulses}, since this computer is too slow: close other programs "
+            "on it, or lower trigger.rate_hz"
+        )
+        return phrase("alarm_computer", text, camera=camera, failed=failed, pulses=pulses)
+    if cause is Cause.BANDWIDTH:
+        text = (
+            "frames of {camera} get lost, {failed} of {pulses}, since the link that they share is too slow or bad: "
+            "check its cable and switch, lower trigger.rate_hz or make regions smaller"
+        )
+        return phrase("alarm_bandwidth", text, camera=camera, failed=failed, pulses=pulses)
+    if cause is Cause.SLOW_LINK:
+        text = (
+            "frames of {camera} come too late, {failed} of {pulses}, since its link is too slow: look for a port of "
+            "lower speed, or make its region smaller"
+        )
+        return phrase("alarm_slow_link", text, camera=camera, failed=failed, pulses=pulses)
+    text = (
+        "frames of {camera} get lost on their way, {failed} of {pulses}: check the cable and the plug that they come "
+        "by, and the port of the switch"
+    )
+    return phrase("alarm_link", text, camera=camera, failed=failed, pulses=pulses)

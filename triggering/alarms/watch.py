@@ -19,7 +19,6 @@ from triggering.sources.choice import trigger_source
 
 #: What has been seen at one moment is over when so many pulses have come without it.
 _CALM_PULSES: Final = 128
-#: That pulses have stopped is over when they are back.
 _STOPPED: Final = "stopped"
 #: With a larger spread frames may be paired wrongly (`triggering.timeline.pulse_train`).
 _WRONG: Final = "pairing_spread"
@@ -52,6 +51,7 @@ class AlarmWatch:
         self._drift = Drift()
         self._missing = Missing(self._names, [camera.exposure_us for camera in rig.cameras])
         self._present: dict[str, _Present] = {}
+        self._remembered = {_STOPPED}  # topics of tests with a memory of their own: what they say no more is over
 
     @property
     def present(self) -> list[Alarm]:
@@ -85,11 +85,12 @@ class AlarmWatch:
                 continue
             known.pulses = pulses
             if alarm.level is Level.ERROR and known.alarm.level is not Level.ERROR:
-                known.alarm = alarm
                 begun.append(alarm)
+            if alarm.level is known.alarm.level or alarm in begun:  # with the figures of now
+                known.alarm = alarm
         over = [
             topic for topic, known in self._present.items()
-            if topic not in found and (topic == _STOPPED or pulses >= known.pulses + _CALM_PULSES)
+            if topic not in found and (topic in self._remembered or pulses >= known.pulses + _CALM_PULSES)
         ]  # fmt: skip
         return begun, [self._present.pop(topic).alarm for topic in over]
 
@@ -106,6 +107,6 @@ class AlarmWatch:
             yield Alarm("rate", Level.WARNING, TRIGGER, drifted)
         if self._one_edge and (apart := spread(health, self._names)) is not None:
             yield Alarm("spread", Level.WARNING, TRIGGER, apart)
-        for name, missed in zip(self._names, self._missing.look(health, overloaded), strict=True):
-            if missed is not None:
-                yield Alarm(f"camera {name}", Level.ERROR, name, missed)
+        for topic, name, missed in self._missing.look(health, overloaded):
+            self._remembered.add(topic)
+            yield Alarm(topic, Level.ERROR, name, missed)

@@ -38,6 +38,10 @@ _SHOWN_BY_LINK: Final = re.compile(
 _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
     (r"POST /api/arm", lambda: phrase("act_armed", "armed the rig")),
     (r"POST /api/disarm", lambda: phrase("act_disarmed", "disarmed the rig")),
+    (
+        r"POST /api/alarms/([^/]+)/acknowledge",
+        lambda number: phrase("act_acknowledged", "acknowledged alarm {number}", number=number),
+    ),
     (r"POST /api/rehearsal", lambda: phrase("act_rehearsed", "asked for a rehearsal")),
     (r"DELETE /api/rehearsal", lambda: phrase("act_rehearsal_ended", "ended the rehearsal")),
     (r"POST /api/recordings", lambda: phrase("act_started", "started a recording")),

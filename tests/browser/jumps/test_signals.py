@@ -83,6 +83,12 @@ def test_started_stopped_and_fault_are_signalled_once_they_are_switched_on(
     assert tones() == alarmed(Level.WARNING) == []
     page.reload()
     expect(page.locator("#alarms-sound")).to_have_text("Alarm sound on")
+    page.locator("#alarms-list").get_by_role("button", name="Seen").click()
+    expect(page.locator("#alarms li[data-acknowledged]")).to_contain_text("seen, since")
+    expect(page.locator("#alarms-list").get_by_role("button")).to_be_hidden()
+    assert service.status().alarms[0].acknowledged
+    alarmed(Level.ERROR)
+    expect(page.locator("#alarms-list").get_by_role("button", name="Seen")).to_be_visible()
     service.alarms = ()
     service._wake()
     expect(page.locator("#alarms")).to_be_hidden()

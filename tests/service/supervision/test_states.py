@@ -9,7 +9,7 @@ import pytest
 
 from rig.api.recordings import Recording, RecordingOrder, StopOrder
 from rig.api.status import State
-from rig.errors import BadInputError, StateForbidsError, StorageError
+from rig.errors import BadInputError, StateForbidsError, StorageError, UnknownAlarmError
 from rig.phrase import phrase
 from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording
 from rig.transport.recorder_reports import CameraNews
@@ -211,6 +211,10 @@ def test_that_jumps_cannot_be_measured_is_an_alarm_until_they_can(bench: Bench) 
     bench.rig.measuring(refused)  # the process was killed, and its successor finds the same
     bench.turn()
     assert bench.supervisor.status.alarms == first
+    bench.supervisor.acknowledge(first[0].number)
+    assert bench.supervisor.status.alarms == (first[0].model_copy(update={"acknowledged": True}),)
+    with pytest.raises(UnknownAlarmError, match="there is no alarm 99 any more"):
+        bench.supervisor.acknowledge(99)
     bench.recorder_dies()
     bench.until(FAULT)
     assert alarms() == [said], "the recorder's death does not mend it"
@@ -218,6 +222,7 @@ def test_that_jumps_cannot_be_measured_is_an_alarm_until_they_can(bench: Bench) 
     assert alarms() == []
     bench.rig.measuring(refused)
     assert alarms() == [said]
+    assert not bench.supervisor.status.alarms[0].acknowledged, "it came anew"
     bench.disarm()
     bench.until(IDLE)
     assert alarms() == []

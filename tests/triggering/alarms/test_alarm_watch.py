@@ -205,6 +205,7 @@ def test_clean_pulses_give_no_alarm_in_half_an_hour(rate_hz: float) -> None:
         (lacking(lost=10), {"overloaded": (0, 1)}, "alarm_computer"),
         (({"missed": 10}, {"missed": 10}, {"missed": 10}), {}, "alarm_missed_alike"),
         (({"lost": 10}, {"lost": 10}, {}), {}, "alarm_bandwidth"),
+        (({"lost": 10}, {"lost": 10}, {"lost": 10}), {"overloaded": (0, 1, 2)}, "alarm_computer"),
     ],
 )
 def test_a_camera_that_misses_pulses_with_its_likely_cause(
@@ -215,13 +216,49 @@ def test_a_camera_that_misses_pulses_with_its_likely_cause(
         rig.second()
     for _ in range(5):
         rig.second(failed=failed, **more)
-    ill = [name for name, lacks in zip(NAMES, failed, strict=True) if lacks]
-    assert rig.told == [(code, False)] * len(ill)
+    ill = ", ".join(name for name, lacks in zip(NAMES, failed, strict=True) if lacks)
+    assert rig.told == [(code, False)]
     assert rig.levels[code][0] is Level.ERROR
-    assert [alarm.name for alarm in rig.watch.present] == ill
+    (alarm,) = rig.watch.present
+    assert alarm.said.values["camera"] == ill
+    assert alarm.name == ("computer" if code == "alarm_computer" else "trigger" if "," in ill else ill)
     for _ in range(50):  # some 1100 good pulses
         rig.second()
-    assert rig.told == [(code, False)] * len(ill) + [(code, True)] * len(ill)
+    assert rig.told == [(code, False), (code, True)]
+
+
+def test_a_computer_that_is_too_slow_is_one_alarm_and_no_cable_is_accused_any_more() -> None:
+    rig, lost = Running(), {"lost": 10}
+    for _ in range(3):
+        rig.second(failed=({}, lost, {}))
+    assert rig.told == [("alarm_link", False)]
+    for _ in range(5):
+        rig.second(failed=(lost, lost, lost), overloaded=(0, 1, 2))
+    assert rig.told == [("alarm_link", False), ("alarm_computer", False), ("alarm_link", True)]
+    for _ in range(5):
+        rig.second(failed=(lost, lost, lost))
+    (alarm,) = rig.watch.present
+    assert str(alarm.said).startswith("frames of K1, K2, K3 get lost, 300 of 900, since this computer is too slow: ")
+
+
+def test_what_two_cameras_have_in_turn_is_one_alarm() -> None:
+    rig, lost = Running(), {"lost": 10}
+    for _ in range(3):
+        rig.second(failed=(lost, {}, {}))
+    for _ in range(5):
+        rig.second(failed=(lost, lost, {}))
+    assert [alarm.said.values["camera"] for alarm in rig.watch.present] == ["K1, K2"]
+
+
+def test_the_figures_of_an_alarm_are_of_the_last_seconds() -> None:
+    rig = Running()
+    for _ in range(10):
+        rig.second(failed=lacking(missed=15))
+    for _ in range(8):
+        rig.second(failed=lacking(missed=1))
+    (alarm,) = rig.watch.present
+    assert str(alarm.said).startswith("K2 misses pulses, 38 of 300: ")
+    assert rig.told == [("alarm_missed", False)], "it is told of once"
 
 
 def test_one_frame_in_fifty_is_told_of_and_the_alarm_does_not_flap() -> None:
@@ -249,6 +286,6 @@ def test_what_is_over_is_said_without_the_advice() -> None:
     for _ in range(3):
         rig.second(failed=lacking(missed=15))
     (alarm,) = rig.watch.present
-    assert str(alarm.said) == "K2 misses pulses, 15 of 30: check its trigger cable and the plug"
-    assert str(alarm.over) == "over: K2 misses pulses, 15 of 30"
+    assert str(alarm.said) == "K2 misses pulses, 30 of 60: check its trigger cable and the plug"
+    assert str(alarm.over) == "over: K2 misses pulses, 30 of 60"
     assert msgspec.json.decode(msgspec.json.encode(alarm.over.values))["what"]["code"] == "alarm_missed"

@@ -83,7 +83,7 @@ function callForSomebody() {
   const { status, connected } = known;
   if (!status || !connected) return;
   const heard = load("alarms_heard", 0);
-  const fresh = status.alarms.filter(({ since }) => Date.parse(since) > heard);
+  const fresh = status.alarms.filter(({ since, acknowledged }) => !acknowledged && Date.parse(since) > heard);
   if (!fresh.length || soundsAlarms() && !touched) return;
   save("alarms_heard", Math.max(...fresh.map(({ since }) => Date.parse(since))));
   give(fresh.some(({ statement }) => statement.level === "error") ? "alarm" : "warning", soundsAlarms());

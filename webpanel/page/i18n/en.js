@@ -49,6 +49,8 @@ export const en = {
 
   "alarms.label": "Alarms",
   "alarms.since": "since {time}",
+  "alarms.seen_since": "seen, since {time}",
+  "alarms.acknowledge": "Seen",
   "alarms.mute": "Alarm sound off",
   "alarms.unmute": "Alarm sound on",
 
@@ -300,6 +302,7 @@ export const en = {
   "log.info": "what happens",
   "log.warning": "trouble only",
   "log.empty": "Nothing has happened yet.",
+  "log.times": "× {count}",
   "log.is_debug": "debug",
   "log.is_info": "info",
   "log.is_warning": "warning",

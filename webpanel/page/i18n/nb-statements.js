@@ -100,6 +100,7 @@ export const statements = {
   request_head_too_large: ["for mye på én gang: slett nettleserens informasjonskapsler for denne siden"],
   request_timeout: ["kallet kom ikke fram i tide: sjekk forbindelsen, og prøv igjen"],
   range_not_satisfiable: ["filen er kortere enn det: last den ned på nytt"],
+  unknown_alarm: ["denne alarmen er over, eller er blitt verre: se på alarmene"],
   unknown_camera: ["det finnes ikke noe kamera med dette navnet: last siden på nytt"],
   svev: ["det gikk ikke: se i loggen hva som skjedde, og prøv igjen"],
   internal_error: ["en feil i svev selv: prøv igjen; det som skjedde, står i tjenestens logg"],

@@ -49,6 +49,8 @@ export const nb = {
 
   "alarms.label": "Alarmer",
   "alarms.since": "siden kl. {time}",
+  "alarms.seen_since": "sett, siden {time}",
+  "alarms.acknowledge": "Sett",
   "alarms.mute": "Slå av alarmlyden",
   "alarms.unmute": "Slå på alarmlyden",
 
@@ -300,6 +302,7 @@ export const nb = {
   "log.info": "det som skjer",
   "log.warning": "bare problemer",
   "log.empty": "Ingenting har skjedd ennå.",
+  "log.times": "× {count}",
   "log.is_debug": "detalj",
   "log.is_info": "info",
   "log.is_warning": "advarsel",

@@ -196,7 +196,7 @@
  * @property {number} done
  * @property {number} pulses
  *
- * @typedef {{ number: number, topic: string, since: string, statement: Statement }} Alarm
+ * @typedef {{ number: number, topic: string, since: string, statement: Statement, acknowledged: boolean }} Alarm
  *
  * @typedef {object} Status
  * @property {State} state

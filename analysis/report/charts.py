@@ -1,5 +1,6 @@
 """Charts of a jump: bands over the distance, and the stick model from the side and from above (Fig. 8)."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from analysis.report.course import Course, Series, best_state
 from analysis.report.figures import fixed
+from analysis.report.language import Language, Said, with_comma
 from analysis.report.overlay import stick_lines
 from photogrammetry.reports.document import Drawing
 from photogrammetry.reports.drawing.svg import Colour
@@ -29,6 +31,7 @@ class Graph:
         name: of the quantity.
         symbol: at its axis.
         title: for people.
+        title_nb, symbol_nb: both in Norwegian.
         unit: of the values.
         least: the smallest range of values, so that noise does not look like motion.
     """
@@ -38,24 +41,76 @@ class Graph:
     title: str
     unit: str
     least: float
+    title_nb: str
+    symbol_nb: str
+
+    @property
+    def titles(self) -> Said:
+        """In both languages."""
+        return Said(self.title, self.title_nb)
+
+    @property
+    def symbols(self) -> Said:
+        """In both languages."""
+        return Said(self.symbol, self.symbol_nb)
 
 
 GRAPHS = (
-    Graph("alpha", "alpha", "Ski-to-body angle (skis to legs)", "°", 10.0),
-    Graph("beta", "beta", "Hip angle (180° is straight)", "°", 10.0),
-    Graph("angle_of_attack", "angle of attack", "Angle of attack of the skis (no wind assumed)", "°", 10.0),
-    Graph("phi", "phi", "Slope of the skis (tips up is positive)", "°", 10.0),
-    Graph("gamma", "gamma", "V angle between the skis", "°", 5.0),
-    Graph("dphi", "delta-phi", "Slope of the right ski minus the left", "°", 5.0),
-    Graph("height", "Z0", "Height of the bindings (survey's zero)", "m", 0.5),
-    Graph("speed", "v", "Speed of the bindings", "m/s", 1.0),
+    Graph(
+        "alpha",
+        "alpha",
+        "Ski-to-body angle (skis to legs)",
+        "°",
+        10.0,
+        "Vinkel mellom ski og kropp (ski mot legger)",
+        "alfa",
+    ),
+    Graph("beta", "beta", "Hip angle (180° is straight)", "°", 10.0, "Hoftevinkel (180° er rett)", "beta"),
+    Graph(
+        "angle_of_attack",
+        "angle of attack",
+        "Angle of attack of the skis (no wind assumed)",
+        "°",
+        10.0,
+        "Skienes angrepsvinkel (uten vind)",
+        "angrepsvinkel",
+    ),
+    Graph(
+        "phi",
+        "phi",
+        "Slope of the skis (tips up is positive)",
+        "°",
+        10.0,
+        "Skienes helning (tuppene opp er positivt)",
+        "phi",
+    ),
+    Graph("gamma", "gamma", "V angle between the skis", "°", 5.0, "V-vinkelen mellom skiene", "gamma"),
+    Graph(
+        "dphi",
+        "delta-phi",
+        "Slope of the right ski minus the left",
+        "°",
+        5.0,
+        "Høyre skis helning minus venstre skis",
+        "delta-phi",
+    ),
+    Graph(
+        "height",
+        "Z0",
+        "Height of the bindings (survey's zero)",
+        "m",
+        0.5,
+        "Bindingenes høyde (fra innmålingens null)",
+        "Z0",
+    ),
+    Graph("speed", "v", "Speed of the bindings", "m/s", 1.0, "Bindingenes fart", "v"),
 )
 
 
-def bands(course: Course) -> list[Drawing]:
+def bands(course: Course, language: Language) -> list[Drawing]:
     """A chart of each quantity over the distance; none of a quantity that was never found."""
-    found = [(graph, _band(course, graph)) for graph in GRAPHS]
-    return [Drawing(graph.title, svg) for graph, svg in found if svg]
+    found = [(graph, _band(course, graph, language)) for graph in GRAPHS]
+    return [Drawing(graph.titles.of(language), svg) for graph, svg in found if svg]
 
 
 def cursor_places(course: Course) -> list[float | None]:
@@ -67,7 +122,7 @@ def cursor_places(course: Course) -> list[float | None]:
     return [round(chart.x(d), 1) if np.isfinite(d) else None for d in course.distance]
 
 
-def fig8(course: Course) -> list[Drawing]:
+def fig8(course: Course, language: Language) -> list[Drawing]:
     """The stick model at evenly distributed pulses, projected on the vertical plane of the flight and from above."""
     shown = evenly(course, _FIG8_POSITIONS, range(len(course.pulses)))
     if not shown:
@@ -80,10 +135,15 @@ def fig8(course: Course) -> list[Drawing]:
         for i in shown
     }
     speed = course.smoothed["speed"].value
-    speeds = [f"{fixed(float(speed[i]), 1)} m/s at {_when(course, i)}" for i in shown if np.isfinite(speed[i])]
+    at = Said("at", "ved").of(language)
+    speeds = [f"{fixed(float(speed[i]), 1)} m/s {at} {_when(course, i)}" for i in shown if np.isfinite(speed[i])]
+    side = Said("From the side; right ski amber, left ski blue.", "Fra siden; høyre ski oransje, venstre ski blå.")
+    above = " ".join(
+        (Said("From above.", "Ovenfra.").of(language), *_sentence(Said("Speed", "Fart").of(language), speeds))
+    )
     return [
-        _projected(course, sticks, (0, 2), "up", "From the side; right ski amber, left ski blue."),
-        _projected(course, sticks, (0, 1), "left", " ".join(("From above.", *_sentence("Speed", speeds)))),
+        _projected(course, sticks, (0, 2), Said("up", "opp"), side.of(language), language),
+        _projected(course, sticks, (0, 1), Said("left", "venstre"), above, language),
     ]
 
 
@@ -113,7 +173,7 @@ def _limits(course: Course) -> tuple[float, float] | None:
     return float(finite.min()), float(finite.max())
 
 
-def _band(course: Course, graph: Graph) -> str:
+def _band(course: Course, graph: Graph, language: Language) -> str:
     """A chart as SVG; empty if there is nothing to draw. Without a model over time, each pulse has its own bar."""
     limits, raw = _limits(course), course.raw[graph.name]
     series = course.smoothed[graph.name]
@@ -127,7 +187,7 @@ def _band(course: Course, graph: Graph) -> str:
         bottom, top = _range(raw.value[there], raw.sigma[there], graph.least)
     if limits is None:
         return ""
-    chart = Chart(limits, (bottom, top), _x_label(course), f"{graph.symbol} ({graph.unit})")
+    chart = Chart(limits, (bottom, top), _x_label(course).of(language), f"{graph.symbols.of(language)} ({graph.unit})")
     if limits[0] < 0 < limits[1]:
         chart.upright(0.0, Colour.SOFT)
     if smooth:
@@ -139,7 +199,12 @@ def _band(course: Course, graph: Graph) -> str:
     with np.errstate(invalid="ignore"):
         inside = np.isfinite(course.distance) & (raw.value >= bottom) & (raw.value <= top)
     chart.dots(course.distance[inside], raw.value[inside], Colour.INK, 1.1)
-    return chart.svg.rendered(f"{graph.title}, {graph.unit}, over the distance")
+    over = Said("over the distance", "over avstanden").of(language)
+    return _in_language(chart.svg.rendered(f"{graph.titles.of(language)}, {graph.unit}, {over}"), language)
+
+
+def _in_language(svg: str, language: Language) -> str:
+    return with_comma(svg) if language == "nb" else svg
 
 
 def _draw_band(chart: Chart, course: Course, series: Series, there: Flags, limits: tuple[float, float]) -> None:
@@ -164,8 +229,10 @@ def _runs(there: Flags, unsure: Flags) -> Iterator[tuple[slice, bool]]:
             first = i
 
 
-def _x_label(course: Course) -> str:
-    return "distance from the " + ("first pulse" if course.takeoff_sigma_s is None else "take-off") + " (m)"
+def _x_label(course: Course) -> Said:
+    if course.takeoff_sigma_s is None:
+        return Said("distance from the first pulse (m)", "avstand fra den første pulsen (m)")
+    return Said("distance from the take-off (m)", "avstand fra satsen (m)")
 
 
 def _range(value: Floats, sigma: Floats, least: float) -> tuple[float, float]:
@@ -177,7 +244,12 @@ def _range(value: Floats, sigma: Floats, least: float) -> tuple[float, float]:
 
 
 def _projected(
-    course: Course, sticks: dict[int, dict[str, Floats]], columns: tuple[int, int], up: str, caption: str
+    course: Course,
+    sticks: dict[int, dict[str, Floats]],
+    columns: tuple[int, int],
+    up: Said,
+    caption: str,
+    language: Language,
 ) -> Drawing:
     """One projection; O's path behind it, and the time under each stick model."""
     pick = list(columns)
@@ -200,5 +272,7 @@ def _projected(
             canvas.svg.dot(x, y, Colour.INK, 2.4)
             canvas.svg.text(x, y - 6.0, _when(course, i), "middle")
     canvas.scale_bar("m")
-    canvas.axes("along the flight", up)
-    return Drawing(caption, canvas.svg.rendered(caption))
+    canvas.axes(Said("along the flight", "langs svevet").of(language), up.of(language))
+    if language == "nb":
+        caption = re.sub(r"(?<=\d)\.(?=\d)", ",", caption)
+    return Drawing(caption, _in_language(canvas.svg.rendered(caption), language))

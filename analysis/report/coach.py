@@ -14,6 +14,7 @@ from analysis.report.course import course_of
 from analysis.report.crops import crops_of, windows_of
 from analysis.report.figures import five_figures
 from analysis.report.jump_section import JumpShown, jump_section
+from analysis.report.language import LANGUAGES, Said, attribute, said, same, shown
 from analysis.report.scrubbing import overlays_of, shown_pulses
 from analysis.result.model import MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
@@ -26,22 +27,49 @@ PICTURE_BUDGET: Final = 6_000_000
 _MOST_FRAMES: Final = 120
 _FEWEST_FRAMES: Final = 12
 _NOTES: Final = (
-    (
+    Said(
         "± is one standard deviation: two of three such numbers are closer than that to the truth, 95 of 100 closer "
         "than twice that. It carries the errors of the measurement in the images, of the orientation of the cameras "
-        "and of the survey."
+        "and of the survey.",
+        "± er ett standardavvik: to av tre slike tall ligger nærmere sannheten enn det, 95 av 100 nærmere enn det "
+        "dobbelte. Det har med seg feilene i målingen i bildene, i orienteringen av kameraene og i innmålingen.",
     ),
-    (
+    Said(
         "Angle of attack: slope of the skis minus the slope of the path. No wind is assumed: head wind and up-draught "
-        "make the true angle to the air larger."
+        "make the true angle to the air larger.",
+        "Angrepsvinkel: skienes helning minus banens helning. Det regnes uten vind: motvind og oppvind gjør den sanne "
+        "vinkelen mot luften større.",
     ),
-    (
+    Said(
         "The posture in early flight correlates with the length of the jump most at 1.1 s after take-off (Virmavirta "
-        "and others, 2005), some 28 m from the edge: that is beyond the 20 m filmed here."
+        "and others, 2005), some 28 m from the edge: that is beyond the 20 m filmed here.",
+        "Stillingen tidlig i svevet henger mest sammen med hopplengden 1,1 s etter satsen (Virmavirta m.fl., 2005), "
+        "rundt 28 m fra hoppkanten: det er lenger ute enn de 20 m som filmes her.",
     ),
-    "Speed, height and distance are those of O, the middle between the two bindings, not of the centre of mass.",
+    Said(
+        "Speed, height and distance are those of O, the middle between the two bindings, not of the centre of mass.",
+        "Fart, høyde og avstand gjelder O, midt mellom de to bindingene, ikke tyngdepunktet.",
+    ),
 )
-_MORE: Final = "How the cameras were oriented, and the test of every ray: protocol.html."
+_MORE: Final = Said(
+    "How the cameras were oriented, and the test of every ray: protocol.html.",
+    "Hvordan kameraene ble orientert, og testen av hver stråle: protocol.html (på engelsk).",
+)
+#: Fields of a session as a coach calls them.
+_FIELDS: Final = {
+    "bib": Said("bib", "startnummer"),
+    "gate": Said("gate", "bom"),
+    "wind": Said("wind", "vind"),
+    "notes": Said("notes", "merknad"),
+    "operator": Said("operator", "operatør"),
+    "club": Said("club", "klubb"),
+    "round": Said("round", "omgang"),
+    "session": Said("session", "økt"),
+}
+_MONTHS: Final = (
+    "januar", "februar", "mars", "april", "mai", "juni", "juli", "august", "september", "oktober", "november",
+    "desember",
+)  # fmt: skip
 
 
 def write_report(
@@ -91,14 +119,15 @@ def report_page(
         overlays = overlays_of(course, pulses, measured.get(jump.number), system)
         crops = crops_of(log, windows_of(overlays, system), PICTURE_BUDGET // share)
         figures = five_figures(course, perpendicular.get(jump.number))
-        shown = JumpShown(jump, course, pulses, overlays, crops, system.names, figures)
-        parts.append(jump_section(shown, several=len(result.jumps) > 1))
-    main = "\n".join(parts) or "<p>There is no jump in this recording.</p>"
+        of_jump = JumpShown(jump, course, pulses, overlays, crops, system.names, figures)
+        parts.append(jump_section(of_jump, several=len(result.jumps) > 1))
+    nothing = Said("There is no jump in this recording.", "Det er ikke noe hopp i dette opptaket.")
+    main = "\n".join(parts) or shown(nothing, "p")
     body = f"{_head(result)}\n<main>{_alarms(result)}{main}</main>\n{_notes(result)}"
     return lone_page(_title(result), body, "report.css", "report.js")
 
 
-def lone_page(title: str, body: str, style_name: str, script_name: str | None = None) -> str:
+def lone_page(title: Said, body: str, style_name: str, script_name: str | None = None) -> str:
     """A page that needs nothing from elsewhere, and may load nothing.
 
     Args:
@@ -116,7 +145,8 @@ def lone_page(title: str, body: str, style_name: str, script_name: str | None = 
     head = (
         f'<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{style}</style>"
+        f'<title data-en="{escape(title.english)}" data-nb="{escape(title.norwegian)}">{escape(title.english)}</title>'
+        f"<style>{style}</style>"
     )
     whole = f"{body}\n<script>{script}</script>" if script else body
     return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n{whole}</body></html>\n'
@@ -130,29 +160,58 @@ def _hash(text: str) -> str:
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
 
 
-def _title(result: MeasuredRecording) -> str:
-    return result.session.get("athlete", "").strip() or f"Recording {result.recording}"
+def _title(result: MeasuredRecording) -> Said:
+    athlete = result.session.get("athlete", "").strip()
+    return same(athlete) if athlete else _recording(result)
+
+
+def _recording(result: MeasuredRecording) -> Said:
+    return Said(f"Recording {result.recording}", f"Opptak {result.recording}")
 
 
 def _head(result: MeasuredRecording) -> str:
     elsewhere = {"athlete", "recording"}
-    facts = [f"{key} {value}" for key, value in result.session.items() if key not in elsewhere and value.strip()]
+    facts = [
+        Said(f"{name.english} {value}", f"{name.norwegian} {value}")
+        for key, value in result.session.items()
+        if key not in elsewhere and value.strip() and (name := _FIELDS.get(key, same(key)))
+    ]
     times = [pulse.time for jump in result.jumps for pulse in jump.pulses[:1]]
     if times:
-        facts.append(datetime.fromtimestamp(min(times) // NS_PER_S, UTC).strftime("%-d %B %Y, %H:%M:%S UTC"))
-    facts.append(f"recording {result.recording}")
-    items = "".join(f"<li>{escape(fact)}</li>" for fact in facts)
-    return f'<header><h1>{escape(_title(result))}</h1><ul class="facts">{items}</ul></header>'
+        then = datetime.fromtimestamp(min(times) // NS_PER_S, UTC)
+        clock = then.strftime("%Y, %H:%M:%S UTC")
+        facts.append(Said(f"{then:%-d %B} {clock}", f"{then.day}. {_MONTHS[then.month - 1]} {clock}"))
+    recording = _recording(result)
+    facts.append(Said(recording.english.replace("R", "r", 1), recording.norwegian.replace("O", "o", 1)))
+    items = "".join(f"<li>{shown(fact)}</li>" for fact in facts)
+    choice = "".join(
+        f'<button type="button" data-language="{language}">{name}</button>'
+        for language, name in zip(LANGUAGES, ("English", "Norsk"), strict=True)
+    )
+    languages = (
+        f'<div class="languages" role="group" {attribute("aria-label", Said("Language", "Språk"))}>{choice}</div>'
+    )
+    return f'<header>{languages}<h1>{shown(_title(result))}</h1><ul class="facts">{items}</ul></header>'
 
 
 def _alarms(result: MeasuredRecording) -> str:
     """What is wrong with the whole recording."""
-    lines = [move.message for move in result.orientation.moved]
-    lines += [offset.message for offset in result.synchrony.values() if offset.message]
-    return "".join(f'<p class="alarm"><strong>Attention:</strong> {escape(line)}</p>' for line in lines)
+    lines = [move.said for move in result.orientation.moved]
+    lines += [offset.said for offset in result.synchrony.values() if offset.said is not None]
+    attention = Said("Attention:", "Obs:")
+    return "".join(
+        f'<p class="alarm" lang="{language}"><strong>{attention.of(language)}</strong> '
+        f"{escape(said(line).of(language))}</p>"
+        for line in lines
+        for language in LANGUAGES
+    )
 
 
 def _notes(result: MeasuredRecording) -> str:
-    pulses = f"Measured at {result.rate_hz:g} pulses per second."
-    items = "".join(f"<li>{escape(line)}</li>" for line in (*_NOTES, f"{pulses} {_MORE}"))
-    return f"<footer><h2>What the numbers mean</h2><ul>{items}</ul></footer>"
+    rate = f"{result.rate_hz:g}"
+    pulses = Said(
+        f"Measured at {rate} pulses per second. {_MORE.english}",
+        f"Målt med {rate.replace('.', ',')} pulser i sekundet. {_MORE.norwegian}",
+    )
+    items = "".join(f"<li>{shown(line)}</li>" for line in (*_NOTES, pulses))
+    return f"<footer><h2>{shown(Said('What the numbers mean', 'Hva tallene betyr'))}</h2><ul>{items}</ul></footer>"

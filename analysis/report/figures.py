@@ -59,16 +59,19 @@ class Figure:
     """One number.
 
     Attributes:
-        title: what it is.
+        title: what it is, in English.
         quantity: the number; None where it is not known.
         unit: of it.
-        note: where the definition matters.
+        note: where the definition matters, in English.
+        title_nb, note_nb: both in Norwegian.
     """
 
     title: str
     quantity: Quantity | None
     unit: str
     note: str
+    title_nb: str
+    note_nb: str
 
 
 def five_figures(course: Course, perpendicular: Quantity | None) -> tuple[Figure, ...]:
@@ -79,25 +82,46 @@ def five_figures(course: Course, perpendicular: Quantity | None) -> tuple[Figure
         perpendicular: velocity perpendicular to the table, m/s.
     """
     early = f"{EARLY_S:g} s after take-off"
+    early_nb = f"{EARLY_S:g} s etter satsen".replace(".", ",")
     return (
-        Figure("Take-off speed", course.at_time("speed", 0.0), "m/s", "when the bindings pass the edge"),
+        Figure(
+            "Take-off speed",
+            course.at_time("speed", 0.0),
+            "m/s",
+            "when the bindings pass the edge",
+            "Fart på kanten",
+            "når bindingene passerer hoppkanten",
+        ),
         Figure(
             "Velocity perpendicular to the table",
             perpendicular,
             "m/s",
             "what the take-off adds, across the path before it; up is positive",
+            "Fart vinkelrett på bordet",
+            "det satsen gir, på tvers av banen før det; opp er positivt",
         ),
         Figure(
             f"Speed at {FAR_M:g}\N{NO-BREAK SPACE}m",
             course.at_distance("speed", FAR_M),
             "m/s",
             "horizontal distance from take-off",
+            f"Fart ved {FAR_M:g}\N{NO-BREAK SPACE}m",
+            "vannrett avstand fra satsen",
         ),
         Figure(
             "Angle of attack",
             course.at_time("angle_of_attack", EARLY_S),
             "°",
             f"{early}; skis against the path, no wind assumed",
+            "Angrepsvinkel",
+            f"{early_nb}; skiene mot banen, uten vind",
         ),
-        Figure("Ski-to-body angle", course.at_time("alpha", EARLY_S), "°", f"{early}; alpha, skis to legs"),
+        Figure(
+            "Ski-to-body angle",
+            course.at_time("alpha", EARLY_S),
+            "°",
+            f"{early}; alpha, skis to legs",
+            "Ski mot kropp",
+            f"{early_nb}; alfa, ski mot legger",
+        ),
     )

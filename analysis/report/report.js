@@ -8,6 +8,13 @@
   const SLOW_MOTION_MS = 110;
   const DEGREE = Math.PI / 180;
 
+  /** @type {Record<string, { play: string, pause: string, pulse: string }>} */
+  const WORDS = { en: { play: "Play", pause: "Pause", pulse: "pulse" }, nb: { play: "Spill av", pause: "Pause", pulse: "puls" } };
+  let language = "en";
+
+  /** @param {string} text numbers and units, as they are written in English */
+  const local = (text) => (language === "nb" ? text.replace(/(\d)\.(?=\d)/g, "$1,").replace("pulse", WORDS.nb.pulse) : text);
+
   /** @param {string} name @param {Record<string, string | number>} attributes */
   function shape(name, attributes) {
     const made = document.createElementNS(SVG, name);
@@ -123,7 +130,7 @@
 
     start() {
       if (this.at === this.frames.length - 1) this.range.value = "0";
-      this.play.textContent = "Pause";
+      this.play.textContent = WORDS[language].pause;
       this.timer = window.setInterval(() => {
         this.range.value = String(this.at + 1);
         this.show();
@@ -134,13 +141,13 @@
     stop() {
       window.clearInterval(this.timer);
       this.timer = 0;
-      this.play.textContent = "Play";
+      this.play.textContent = WORDS[language].play;
     }
 
     show() {
       const frame = this.frames[this.at];
-      this.words.textContent = frame.words;
-      this.range.setAttribute("aria-valuetext", frame.words);
+      this.words.textContent = local(frame.words);
+      this.range.setAttribute("aria-valuetext", local(frame.words));
       this.views.forEach((figure, i) => {
         const view = frame.views[i];
         const image = one(figure, "img");
@@ -150,7 +157,7 @@
         one(figure, "svg").innerHTML = view ? view.over : "";
       });
       this.table.classList.toggle("unsure", frame.unsure);
-      this.numbers.forEach((cell, i) => (cell.textContent = frame.numbers[i]));
+      this.numbers.forEach((cell, i) => (cell.textContent = local(frame.numbers[i])));
       for (const mark of this.marks) {
         mark.toggleAttribute("hidden", frame.cursor === null);
         mark.setAttribute("x1", frame.cursor ?? 0);
@@ -165,6 +172,28 @@
   const jumps = all(document, ".jump").filter((jump) => one(jump, ".scrubber"));
   const scrubbers = jumps.map((jump) => new Scrubber(jump));
   let current = scrubbers[0];
+
+  /** @param {string} chosen */
+  function speak(chosen) {
+    language = chosen;
+    document.documentElement.lang = chosen;
+    for (const element of all(document, "[data-nb]")) {
+      const words = element.dataset[chosen];
+      if (element.localName === "title") element.textContent = words;
+      else element.setAttribute(element.localName === "img" ? "alt" : "aria-label", words);
+    }
+    for (const number of all(document, ".five .value:not(.none), .five .sigma")) {
+      number.dataset.written ??= number.textContent;
+      number.textContent = local(number.dataset.written);
+    }
+    for (const button of all(document, "[data-language]")) button.setAttribute("aria-pressed", String(button.dataset.language === chosen));
+    for (const scrubber of scrubbers) {
+      scrubber.play.textContent = WORDS[chosen][scrubber.timer ? "pause" : "play"];
+      scrubber.show();
+    }
+  }
+  for (const button of all(document, "[data-language]")) button.addEventListener("click", () => speak(button.dataset.language));
+  speak(/^(nb|nn|no)\b/i.test(navigator.language) ? "nb" : "en");
   jumps.forEach((jump, i) => jump.addEventListener("pointerdown", () => (current = scrubbers[i])));
   document.addEventListener("keydown", (event) => {
     const own = event.target instanceof Element && event.target.closest("input, button");

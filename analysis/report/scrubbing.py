@@ -10,6 +10,7 @@ from analysis.report.charts import cursor_places
 from analysis.report.course import Course, best_state
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Crop
 from analysis.report.figures import fixed, plus_minus
+from analysis.report.language import Said, attribute
 from analysis.report.overlay import Overlay, half_axes, overlay_of, stick_lines
 from analysis.result.model import PulseState, Quantity
 from analysis.scene.camera_system import CameraSystem
@@ -17,14 +18,14 @@ from rig.arrays import Floats
 
 #: Numbers beside the views: quantity, words, unit.
 READOUT = (
-    ("speed", "Speed v", "m/s"),
-    ("height", "Height Z0", "m"),
-    ("alpha", "Skis to legs, alpha", "°"),
-    ("beta", "Hip, beta", "°"),
-    ("gamma", "V angle, gamma", "°"),
-    ("dphi", "Delta-phi", "°"),
-    ("phi", "Slope of skis, phi", "°"),
-    ("angle_of_attack", "Angle of attack", "°"),
+    ("speed", Said("Speed v", "Fart v"), "m/s"),
+    ("height", Said("Height Z0", "Høyde Z0"), "m"),
+    ("alpha", Said("Skis to legs, alpha", "Ski mot legger, alfa"), "°"),
+    ("beta", Said("Hip, beta", "Hofte, beta"), "°"),
+    ("gamma", Said("V angle, gamma", "V-vinkel, gamma"), "°"),
+    ("dphi", Said("Delta-phi", "Delta-phi"), "°"),
+    ("phi", Said("Slope of skis, phi", "Skienes helning, phi"), "°"),
+    ("angle_of_attack", Said("Angle of attack", "Angrepsvinkel"), "°"),
 )
 _CROSS = 4.0  # half the size of a measured point's mark, page units
 
@@ -103,10 +104,10 @@ def overlay_svg(overlay: Overlay) -> str:
     return "".join(parts)
 
 
-def still_svg(overlay: Overlay, crop: Crop, words: str) -> str:
-    """A crop with its overlay as one picture for print; `words` must be escaped."""
+def still_svg(overlay: Overlay, crop: Crop, words: Said) -> str:
+    """A crop with its overlay as one picture for print."""
     return (
-        f'<svg class="view" viewBox="0 0 {CROP_WIDTH} {CROP_HEIGHT}" role="img" aria-label="{words}">'
+        f'<svg class="view" viewBox="0 0 {CROP_WIDTH} {CROP_HEIGHT}" role="img" {attribute("aria-label", words)}>'
         f'<image href="{crop.data}" width="{CROP_WIDTH}" height="{CROP_HEIGHT}"/>'
         f"<g>{overlay_svg(crop.window.on_page(overlay))}</g></svg>"
     )

@@ -26,7 +26,6 @@ from analysis.report.kinogram.words import (
     RIGHT,
     SIGMA,
     TITLES,
-    Said,
     facts_words,
     mark_words,
     name_words,
@@ -35,6 +34,7 @@ from analysis.report.kinogram.words import (
     reference_words,
     where_words,
 )
+from analysis.report.language import Said, same
 from analysis.report.overlay import Overlay
 from analysis.result.model import MeasuredRecording, Quantity
 
@@ -58,7 +58,7 @@ def page_text(kinograms: Sequence[Kinogram], result: MeasuredRecording, hill: st
     parts = [_jump(kinogram, pictures, result, hill) for kinogram in kinograms]
     foot = f"<footer><p>{_both(SIGMA)}</p><p>{_both(RECORDING)} {escape(result.recording)}</p></footer>"
     title = f"{name_words(result).english}: kinogram"
-    return lone_page(title, f"<main>{''.join(parts)}</main>{foot}", "kinogram/kinogram.css")
+    return lone_page(same(title), f"<main>{''.join(parts)}</main>{foot}", "kinogram/kinogram.css")
 
 
 def _jump(kinogram: Kinogram, pictures: Iterator[str], result: MeasuredRecording, hill: str) -> str:

@@ -21,7 +21,6 @@ from analysis.report.kinogram.words import (
     RIGHT,
     SIGMA,
     TITLES,
-    Said,
     facts_words,
     mark_words,
     name_words,
@@ -30,6 +29,7 @@ from analysis.report.kinogram.words import (
     reference_words,
     where_words,
 )
+from analysis.report.language import Said
 from analysis.result.model import MeasuredRecording
 
 _GAP: Final = 16

@@ -1,26 +1,18 @@
 """What a kinogram says, in English and Norwegian beside each other: who gets it has no setting for its language."""
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 from analysis.report.figures import EARLY_S, FAR_M, fixed
 from analysis.report.kinogram.figures import UNITS, Mark, Reference, Word
 from analysis.report.kinogram.model import Kinogram
 from analysis.report.kinogram.shots import Missing, Shot
+from analysis.report.language import Said
 from analysis.result.model import MeasuredRecording, Quantity
 
 KMH: Final = 3.6  #: km/h in one m/s
 _MOST_DECIMALS: Final = {"°": 1}  # more says no coach; of all others as many as sigma allows
 _MOST: Final = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Said:
-    """Words in both languages."""
-
-    english: str
-    norwegian: str
 
 
 _EARLY_NB: Final = f"{EARLY_S:g}".replace(".", ",")

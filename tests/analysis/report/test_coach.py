@@ -16,11 +16,12 @@ from analysis.report.coach import report_page, write_report
 from analysis.report.course import course_of
 from analysis.report.crops import crops_of, windows_of
 from analysis.report.figures import five_figures, value_and_sigma
+from analysis.report.norwegian import SENTENCES
 from analysis.report.scrubbing import overlays_of
 from analysis.result.model import CameraMove, JumperState, MeasuredRecording, Quantity
 from photogrammetry.jumper.stick_model import ANGLES
 from rig.errors import BadInputError
-from rig.phrase import plain
+from rig.phrase import phrase, plain
 from tests.analysis.report.jumps import EVERY, measured_recording, measurements
 from tests.analysis.result.recordings import without_takeoff
 from tests.analysis.simulated import RATE_HZ, true_cameras
@@ -44,8 +45,12 @@ def _frames(page: str) -> list[dict[str, Any]]:
     return [frame for text in found for frame in json.loads(text)]
 
 
-def _text(page: str) -> str:
-    """What a person reads."""
+def _text(page: str, language: str = "en") -> str:
+    """What a person reads in one language."""
+    other = {"en": "nb", "nb": "en"}[language]
+    page = re.sub(rf'<(span|p|li) (class="alarm" )?lang="{other}">.*?</\1>', "", page, flags=re.DOTALL)
+    page = re.sub(rf'<div lang="{other}"><strong>.*?</div>', "", page, flags=re.DOTALL)
+    page = re.sub(rf'<div lang="{other}"><h3>.*?</figure></div></div>', "", page, flags=re.DOTALL)
     body = re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL)
     return " ".join(unescape(re.sub(r"<[^>]*>", " ", body)).split())
 
@@ -65,6 +70,36 @@ def test_verdict_and_definitions_are_said(page: str) -> None:
     assert "no wind assumed" in text
     assert "1.1 s after take-off" in text
     assert '<html lang="en">' in page
+
+
+def test_all_of_it_is_said_in_norwegian_too(page: str) -> None:
+    text, english = _text(page, "nb"), _text(page)
+    assert "Du kan stole på disse tallene" in text
+    for word in ("the ", "take-off", "pulse ", "Speed", "camera", "flight"):
+        assert word in english or word in page
+        assert word not in text.replace("protocol.html", ""), text[max(0, text.find(word) - 60) : text.find(word) + 40]
+    assert "startnummer 1" in text
+    # Nothing is in one language only.
+    for tag in ("span", "p", "div"):
+        assert page.count(f'<{tag} lang="en"') == page.count(f'<{tag} lang="nb"')
+
+
+def test_a_verdict_with_codes_is_said_in_norwegian(jump_log: Path) -> None:
+    result = measured_recording()
+    where = phrase("jump_in_flight", " in flight")
+    said = phrase(
+        "jump_coarse", "in {coarse} of {pulses} pulses{where} a point is uncertain by more than {limit} m",
+        coarse=3, pulses=9, where=where, limit=0.02,
+    )  # fmt: skip
+    verdict = replace(result.jumps[0].verdict, ok=False, message=said.text, said=(said, plain("as it is")))
+    page = _page(jump_log, replace(result, jumps=(replace(result.jumps[0], pulses=(), verdict=verdict),)))
+    assert "i 3 av 9 pulser i svevet er et punkt mer usikkert enn 0,02 m; as it is" in _text(page, "nb")
+    assert "in 3 of 9 pulses in flight a point is uncertain by more than 0.02 m; as it is" in _text(page)
+
+
+def test_the_sentences_are_those_of_the_panel() -> None:
+    panel = (Path(__file__).parents[3] / "webpanel" / "page" / "i18n" / "nb-analysis.js").read_text(encoding="utf-8")
+    assert dict(re.findall(r'^  (\w+): \["(.*)"\],$', panel, re.MULTILINE)) == SENTENCES
 
 
 def test_the_session_is_text_and_nothing_else(page: str) -> None:

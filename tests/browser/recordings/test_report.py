@@ -1,5 +1,7 @@
 """The coach's page in a real browser: scrubbing, keys, sizes, accessibility."""
 
+import re
+
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -70,9 +72,9 @@ def test_the_stick_figure_turns(report: str, open_page: Open) -> None:
     assert skis.get_attribute("points") == side
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_phone_shows_all_without_scrolling_sideways(report: str, open_page: Open, scheme: str) -> None:
-    page = open_page(report, width=360, color_scheme=scheme, bypass_csp=True)
+@pytest.mark.parametrize(("scheme", "locale"), [("light", "en-GB"), ("dark", "nb-NO")])
+def test_a_phone_shows_all_without_scrolling_sideways(report: str, open_page: Open, scheme: str, locale: str) -> None:
+    page = open_page(report, width=360, color_scheme=scheme, locale=locale, bypass_csp=True)
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     small = "[...document.querySelectorAll('button')].map(b => b.getBoundingClientRect()).filter(r => r.height < 44)"
     assert page.evaluate(f"{small}.length") == 0
@@ -83,9 +85,29 @@ def test_a_phone_shows_all_without_scrolling_sideways(report: str, open_page: Op
     assert found == []
 
 
-def test_no_word_of_a_title_is_broken_on_a_phone(report: str, open_page: Open) -> None:
-    page = open_page(report, width=360)
-    broken = page.locator(".five dt").evaluate_all(
+def test_it_speaks_the_language_of_the_browser_and_the_one_chosen(report: str, open_page: Open) -> None:
+    page = open_page(report, locale="nb-NO")
+    expect(page.locator("html")).to_have_attribute("lang", "nb")
+    expect(page.get_by_role("button", name="Spill av")).to_be_visible()
+    expect(page.locator(".verdict strong:visible")).to_have_text("Du kan stole på disse tallene")
+    value = page.locator(".five .value").nth(1)
+    expect(value).to_have_text("2,052")
+    page.get_by_role("slider").fill("12")
+    expect(page.locator("output")).to_have_text(re.compile(r"^.?\d,\d{3}.s · .*\d,\d m · puls \d+$"))
+    expect(page.locator(".charts svg text:visible", has_text="avstand fra satsen (m)").first).to_be_visible()
+    page.get_by_role("button", name="English").click()
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    expect(page.get_by_role("button", name="English")).to_have_attribute("aria-pressed", "true")
+    expect(page.locator(".verdict strong:visible")).to_have_text("You can rely on these numbers")
+    expect(value).to_have_text("2.052")
+    expect(page.locator("output")).to_have_text(re.compile(r" · pulse \d+$"))
+    assert page.locator(".scrubber").get_attribute("aria-label") == "Frame by frame"
+
+
+@pytest.mark.parametrize("locale", ["en-GB", "nb-NO"])
+def test_no_word_of_a_title_is_broken_on_a_phone(report: str, open_page: Open, locale: str) -> None:
+    page = open_page(report, width=360, locale=locale)
+    broken = page.locator(".five dt > span:visible").evaluate_all(
         """titles => titles.flatMap(title => [...title.textContent.matchAll(/[^\\s-]+/g)].filter(word => {
           const range = document.createRange();
           range.setStart(title.firstChild, word.index);

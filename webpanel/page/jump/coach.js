@@ -38,7 +38,7 @@ let shown = null;
 let running = false;
 
 export function startCoach() {
-  replay = makeReplay($("coach-replay"), { may: () => known.view === "coach" && known.connected && !known.status?.recording, button: false });
+  replay = makeReplay($("coach-replay"), { may: () => known.view === "coach" && known.connected && !known.status?.recording, button: false, width: 1440 });
   hear({ picture: (image) => { if (running) delay.put(image); } });
   $("coach-live-image").addEventListener("load", () => URL.revokeObjectURL($("coach-live-image").src));
   setInterval(() => { if (known.view === "coach") look(); }, LOOK_MS);

@@ -22,21 +22,24 @@ const SLOWER = 4;
 const REST_MS = 800;
 /** More pictures than these say no more at this speed. */
 const PICTURES_MAX = 45;
-const WIDTH = 960;
 /** So soon it is tried again after a failure, ms. */
 const AGAIN_MS = 3000;
 /** While nobody sees it, it looks so often whether somebody does, ms. */
 const IDLE_MS = 500;
 
 /** @typedef {{ pulse: number, time_s: number, image: Blob|null }} Frame */
+/** @typedef {{ frames: Frame[], kind: string, moment: number }} Scene `moment`: index of the frame that matters */
 /** @typedef {""|"loading"|"waits"|"none"|"ready"} Stage */
+
+/** @type {Scene} */
+const NOTHING = { frames: [], kind: "none", moment: 0 };
 
 /**
  * @param {HTMLElement} root
- * @param {{ may: () => boolean, button: boolean }} options `may`: whether pictures may be fetched now; `button`: it can be stopped
+ * @param {{ may: () => boolean, button: boolean, width: number }} options `may`: whether pictures may be fetched now; `button`: it can be stopped; `width`: of the pictures, px
  * @returns {Replay}
  */
-export function makeReplay(root, { may, button }) {
+export function makeReplay(root, { may, button, width }) {
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches && button;
   const canvas = make("canvas", { role: "img" });
   const words = make("p", { class: "replay-words" });
@@ -44,38 +47,39 @@ export function makeReplay(root, { may, button }) {
   root.append(canvas, make("div", { class: "replay-foot" }, words, button ? play : null));
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 
-  let shown = "";
-  /** Number of the loading that began last: those before it are given up. */
-  let loads = 0;
-  /** @type {Frame[]} */
-  let frames = [];
-  let kind = "none";
-  /** Index of the frame of the moment. */
-  let moment = 0;
+  /** Recording and version that are shown. */
+  let [id, known] = ["", ""];
+  /** Numbers of the loading and of the showing that began last: those before them are given up. */
+  let [loads, runs] = [0, 0];
+  /** What is shown. @type {Scene} */
+  let scene = NOTHING;
   /** @type {Stage} */
   let stage = "";
   let playing = !still;
   let wake = () => {};
 
-  /** @param {number} own */
+  /**
+   * Load the pictures; those that are shown stay until the others are there.
+   *
+   * @param {number} own
+   */
   async function load(own) {
-    const id = JSON.parse(shown)[0];
-    frames = [];
+    let coming = NOTHING;
     while (own === loads) {
       try {
         if (!may()) await waitFor(own);
         if (own !== loads) return;
         become("loading");
-        if (!frames.length) await choose(id, own);
-        for (const frame of frames.filter(({ image }) => !image)) {
-          if (own !== loads) return;
-          if (!may()) break;
-          frame.image = await fetchPicture(id, frame.pulse);
+        if (!coming.frames.length) coming = await choose(id);
+        for (const frame of coming.frames.filter(({ image }) => !image)) {
+          if (own !== loads || !may()) break;
+          frame.image = await fetchPicture(id, frame.pulse, width);
         }
-        if (frames.some(({ image }) => !image)) continue;
         if (own !== loads) return;
-        become(frames.length ? "ready" : "none");
-        if (frames.length) void run(own);
+        if (coming.frames.some(({ image }) => !image)) continue;
+        scene = coming;
+        become(scene.frames.length ? "ready" : "none");
+        if (scene.frames.length) void run(++runs);
         return;
       } catch (error) {
         if (!(error instanceof Problem)) throw error;
@@ -94,34 +98,14 @@ export function makeReplay(root, { may, button }) {
   }
 
   /**
-   * Choose the pictures.
-   *
-   * @param {string} id
-   * @param {number} own
-   */
-  async function choose(id, own) {
-    /** @type {{ pulses: import("./types.js").PulseSummary[] }} */
-    const { pulses } = await call("GET", recordingPath(id, "/pulses"));
-    const found = await call("GET", recordingPath(id, "/moment"));
-    if (own !== loads || !pulses.length) return;
-    kind = found.kind;
-    const at = Math.max(0, found.pulse === null ? Math.floor(pulses.length / 2) : pulses.findIndex(({ pulse }) => pulse === found.pulse));
-    const middle = pulses[at].time_s;
-    const near = pulses.filter(({ time_s }) => time_s >= middle - BEFORE_S && time_s <= middle + AFTER_S);
-    const every = Math.ceil(near.length / PICTURES_MAX);
-    const first = near.findIndex(({ pulse }) => pulse === pulses[at].pulse) % every; // the moment itself is one of them
-    frames = near.filter((_, index) => index % every === first).map(({ pulse, time_s }) => ({ pulse, time_s, image: null }));
-    moment = frames.findIndex(({ pulse }) => pulse === pulses[at].pulse);
-  }
-
-  /**
-   * Show the pictures, until others are loaded.
+   * Show the pictures, until others are shown.
    *
    * @param {number} own
    */
   async function run(own) {
+    const { frames, moment } = scene;
     await paint(frames[moment]);
-    for (let index = 0; own === loads;) {
+    for (let index = 0; own === runs;) {
       const seen = playing && !document.hidden && root.checkVisibility();
       if (seen) await paint(frames[index]);
       const [now, next] = [frames[index], frames[index + 1]];
@@ -142,7 +126,7 @@ export function makeReplay(root, { may, button }) {
 
   /** @param {Stage} now */
   function become(now) {
-    stage = now;
+    stage = scene.frames.length ? "ready" : now;
     draw();
   }
 
@@ -161,7 +145,7 @@ export function makeReplay(root, { may, button }) {
     if (stage === "loading") return t("replay.loading");
     if (stage === "none") return t("replay.none");
     if (stage === "") return "";
-    return t({ takeoff: "replay.takeoff", activity: "replay.activity" }[kind] ?? "replay.middle", { times: SLOWER });
+    return t({ takeoff: "replay.takeoff", activity: "replay.activity" }[scene.kind] ?? "replay.middle", { times: SLOWER });
   }
 
   watch(() => { if (may()) wake(); });
@@ -169,10 +153,13 @@ export function makeReplay(root, { may, button }) {
 
   return {
     draw,
-    show(id, version = "") {
-      const now = id ? JSON.stringify([id, version]) : "";
-      if (now === shown) return;
-      shown = now;
+    show(recording, version = "") {
+      if (recording === id && (version === known || !id)) return;
+      if (recording !== id) {
+        scene = NOTHING; // nothing of another jump is shown, not even for a moment
+        runs += 1;
+      }
+      [id, known] = [recording, version];
       loads += 1;
       wake();
       become("");
@@ -182,15 +169,37 @@ export function makeReplay(root, { may, button }) {
 }
 
 /**
+ * Choose the pictures of a recording.
+ *
+ * @param {string} id
+ * @returns {Promise<Scene>}
+ * @throws {Problem}
+ */
+async function choose(id) {
+  /** @type {{ pulses: import("./types.js").PulseSummary[] }} */
+  const { pulses } = await call("GET", recordingPath(id, "/pulses"));
+  const found = await call("GET", recordingPath(id, "/moment"));
+  if (!pulses.length) return NOTHING;
+  const at = Math.max(0, found.pulse === null ? Math.floor(pulses.length / 2) : pulses.findIndex(({ pulse }) => pulse === found.pulse));
+  const middle = pulses[at];
+  const near = pulses.filter(({ time_s }) => time_s >= middle.time_s - BEFORE_S && time_s <= middle.time_s + AFTER_S);
+  const every = Math.ceil(near.length / PICTURES_MAX);
+  const first = near.indexOf(middle) % every; // the moment itself is one of them
+  const frames = near.filter((_, index) => index % every === first).map(({ pulse, time_s }) => ({ pulse, time_s, image: null }));
+  return { frames, kind: found.kind, moment: frames.findIndex(({ pulse }) => pulse === middle.pulse) };
+}
+
+/**
  * @param {string} id
  * @param {number} pulse
+ * @param {number} width
  * @returns {Promise<Blob>}
  * @throws {Problem}
  */
-async function fetchPicture(id, pulse) {
+async function fetchPicture(id, pulse, width) {
   let answer;
   try {
-    answer = await fetch(partOf(id, `pulses/${pulse}.jpg?width=${WIDTH}`));
+    answer = await fetch(partOf(id, `pulses/${pulse}.jpg?width=${width}`));
     if (answer.ok) return await answer.blob();
   } catch {
     throw new Problem(0, "page_no_connection", "no connection to the service: check network and service, then try again");

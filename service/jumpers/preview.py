@@ -6,7 +6,7 @@ from typing import Final
 from rig.api.start_list import NewLine, Preview, ReadingChoice, StartList
 from service.jumpers.table import Reading, Table
 
-_SHOWN: Final = 8
+_SHOWN: Final = 5
 #: So many texts that differ show which letters are right.
 _WORDS: Final = 6
 _FIELDS: Final = ("bib", "athlete", "gate", "club", "notes")

@@ -100,6 +100,7 @@ def test_forty_jumpers_forty_names_and_one_tap_for_each(tmp_path: Path, loopback
     with _training(tmp_path, loopback) as service:
         pages = [_phone(open_page, service.url), _phone(open_page, service.url), open_page(service.url)]
         pages[2].locator("#list-file").set_input_files(table)
+        pages[2].locator("#list-replace").click()
         for number, (bib, name) in enumerate(JUMPERS, 1):
             page, other = monkey.sample(pages, 2)
             if monkey.random() < 0.2:

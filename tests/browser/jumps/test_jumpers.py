@@ -8,6 +8,7 @@ from playwright.sync_api import Route, expect
 from rig.api.recordings import RecordingOrder
 from tests.browser.conftest import Open
 from tests.browser.views import SMALLEST_TOUCH_PX, TOO_SMALL, enter
+from tests.service.jumpers.test_workbook import book
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
@@ -99,6 +100,11 @@ def test_a_start_list_on_two_phones(panel: Panel, service: MemoryService, open_p
     first.locator("#list-file").set_input_files(tmp_path / "wrong.csv")
     expect(first.get_by_role("alert")).to_contain_text('The list was not loaded. column "recording" has a name')
     first.locator("#list-file").set_input_files(table)
+    dialog = first.get_by_role("dialog", name="Load this list?")
+    expect(dialog.get_by_role("status")).to_have_text("Jumpers in the file: 3; in the list now: 0.")
+    expect(dialog.get_by_role("row")).to_have_text(["BibAthleteClub", "17Åse BjørkLyn", "18Berit", "19Cecilie"])
+    assert service.jumpers.view().lines == ()
+    dialog.get_by_role("button", name="Replace").tap()
     following = second.locator("#list-rows [aria-current]")
     expect(following).to_contain_text("17Åse Bjørk")
     second.get_by_role("button", name="Hopp over").tap()
@@ -119,3 +125,34 @@ def test_a_start_list_on_two_phones(panel: Panel, service: MemoryService, open_p
     for page in (first, second):
         assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
         assert page.evaluate("document.documentElement.scrollWidth") == 360
+
+
+def test_a_file_that_can_be_read_in_several_ways_is_chosen_from(
+    panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path
+) -> None:
+    service.jumpers.import_table(b"bib;athlete;gate\n1;Anna;12\n2;Berit;12\n")
+    page = open_page(panel.url, width=360, height=780, locale="nb-NO", has_touch=True, is_mobile=True)
+    page.get_by_role("button", name="Rediger").tap()
+    dialog = page.get_by_role("dialog", name="Lese inn denne listen?")
+    (tmp_path / "letters.csv").write_bytes("Startliste\nbib;athlete;klasse\n7;Anže Lanišek;J18\n".encode("cp1252"))
+    page.locator("#list-file").set_input_files(tmp_path / "letters.csv")
+    expect(dialog.locator("#list-choices button")).to_have_text(["Anže Lanišek", "Anûe Laniöek"])
+    expect(dialog.get_by_role("button", name="Erstatt")).to_be_disabled()
+    dialog.get_by_text("Anže Lanišek", exact=True).tap()
+    expect(dialog.get_by_role("status")).to_have_text("Hoppere i filen: 1; i listen nå: 2.")
+    expect(dialog).to_contain_text("Nye kolonner: klasse")
+    expect(dialog).to_contain_text("Ikke lenger med: Bom")
+    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+    dialog.get_by_role("button", name="Erstatt").tap()
+    expect(page.locator("#list-rows li").first).to_contain_text("Anže Lanišek")
+
+    (tmp_path / "list.xlsx").write_bytes(book(("Gutter", [["bib", "athlete"], [3, "Åse"]]), ("Jenter", [["bib"]])))
+    page.locator("#list-file").set_input_files(tmp_path / "list.xlsx")
+    dialog.get_by_text("Jenter").tap()
+    expect(dialog.get_by_role("button", name="Tøm listen")).to_be_visible()  # a heading alone asks before it empties
+    dialog.get_by_role("button", name="Avbryt").tap()
+    expect(page.locator("#list-rows li").first).to_contain_text("Anže Lanišek")
+    page.locator("#list-file").set_input_files(tmp_path / "list.xlsx")
+    dialog.get_by_text("Gutter").tap()
+    dialog.get_by_role("button", name="Erstatt").tap()
+    expect(page.locator("#list-rows li").first).to_contain_text("3Åse")

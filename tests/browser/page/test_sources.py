@@ -21,8 +21,6 @@ NPM = ROOT / "tests" / "browser" / "npm"
 MODULES = sorted(PAGE.rglob("*.js"))
 EVERYTHING = sorted(path for path in PAGE.rglob("*") if path.is_file())
 WORDS = re.compile(r'^  "([\w.]+)": "(.*)",$', re.MULTILINE)
-#: Words that stand in files of their own, by the ends of their names.
-PARTS = sorted(path.stem.removeprefix("en") for path in (PAGE / "i18n").glob("en-*.js"))
 #: Keys that are put together in the code, by their beginnings.
 COMPOSED = (
     "state.",
@@ -44,6 +42,8 @@ COMPOSED = (
     "measured.",
     "spans.q_",
 )
+#: Ends of the names of the modules that hold words: "", "-check" and so on.
+PARTS = sorted(path.stem.removeprefix("en") for path in (PAGE / "i18n").glob("en*.js"))
 #: The rooms whose sentences reach the page.
 SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
 #: Which argument of these calls is the code; the templates follow it.
@@ -52,9 +52,7 @@ SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 
 def _words(language: str) -> dict[str, str]:
     return {
-        key: text
-        for name in (language, *(f"{language}{part}" for part in PARTS))
-        for key, text in WORDS.findall((PAGE / "i18n" / f"{name}.js").read_text())
+        key: text for part in PARTS for key, text in WORDS.findall((PAGE / "i18n" / f"{language}{part}.js").read_text())
     }
 
 
@@ -63,7 +61,7 @@ def _placeholders(text: str) -> set[str]:
 
 
 def _sources() -> str:
-    own_words = {PAGE / "i18n" / f"{language}{part}.js" for language in ("en", "nb") for part in ("", *PARTS)}
+    own_words = {PAGE / "i18n" / f"{language}{part}.js" for language in ("en", "nb") for part in PARTS}
     return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
 
 

@@ -5,6 +5,7 @@ import { check } from "./en-check.js";
 import { jump } from "./en-jump.js";
 import { kinogram } from "./en-kinogram.js";
 import { measuring } from "./en-measuring.js";
+import { startList } from "./en-startlist.js";
 import { viewing } from "./en-viewing.js";
 
 export const en = {
@@ -13,6 +14,7 @@ export const en = {
   ...jump,
   ...kinogram,
   ...measuring,
+  ...startList,
   ...viewing,
 
   "skip": "Skip to the content",
@@ -109,10 +111,6 @@ export const en = {
   "list.none": "No start list",
   "list.title": "Round {round}: {jumped} of {of} have jumped",
   "list.edit": "Edit",
-  "list.load": "Load a list (CSV)",
-  "list.loaded": "The start list has {jumpers} jumpers.",
-  "list.refused": "The list was not loaded. {why}",
-  "list.columns": "The first line names the columns: bib, athlete, gate, club, and any others.",
   "list.round": "New round",
   "list.add": "Add",
   "list.auto": "After each jump the next one is up by himself",

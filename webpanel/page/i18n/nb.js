@@ -5,6 +5,7 @@ import { check } from "./nb-check.js";
 import { jump } from "./nb-jump.js";
 import { kinogram } from "./nb-kinogram.js";
 import { measuring } from "./nb-measuring.js";
+import { startList } from "./nb-startlist.js";
 import { viewing } from "./nb-viewing.js";
 
 export const nb = {
@@ -13,6 +14,7 @@ export const nb = {
   ...jump,
   ...kinogram,
   ...measuring,
+  ...startList,
   ...viewing,
 
   "skip": "Hopp til innholdet",
@@ -109,10 +111,6 @@ export const nb = {
   "list.none": "Ingen startliste",
   "list.title": "Runde {round}: {jumped} av {of} har hoppet",
   "list.edit": "Rediger",
-  "list.load": "Les inn en liste (CSV)",
-  "list.loaded": "Startlisten har {jumpers} hoppere.",
-  "list.refused": "Listen ble ikke lest inn. {why}",
-  "list.columns": "Første linje navngir kolonnene: bib (startnr), navn, bom, klubb, og eventuelt andre.",
   "list.round": "Ny runde",
   "list.add": "Legg til",
   "list.auto": "Etter hvert hopp står den neste klar av seg selv",

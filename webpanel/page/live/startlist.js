@@ -3,8 +3,9 @@
 import { say, t } from "../i18n/i18n.js";
 import { call, Problem } from "../shared/api.js";
 import { $, icon, make, setText } from "../shared/dom.js";
-import { attempt, tell, tellProblem } from "../shared/snacks.js";
+import { attempt } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
+import { startListLoading } from "./listload.js";
 import { adopt, flush } from "./session.js";
 
 /** @typedef {import("../shared/types.js").StartLine} StartLine */
@@ -21,8 +22,7 @@ let editing = false;
 export function startStartList() {
   $("list-undo").addEventListener("click", () => void change("POST", "start-list/undo", { version: list?.version }));
   $("list-edit").addEventListener("click", () => { editing = !editing; draw(); });
-  $("list-load").addEventListener("click", () => $("list-file").click());
-  $("list-file").addEventListener("change", load);
+  startListLoading(() => list?.lines.length ?? 0, (found) => { take(found); adopt(found.next); });
   $("list-round").addEventListener("click", () => void change("POST", "start-list/round"));
   $("list-add").addEventListener("submit", add);
   $("list-auto").addEventListener("change", () => void change("PATCH", "start-list", { auto_advance: $("list-auto").checked }));
@@ -68,20 +68,6 @@ async function change(method, path, body) {
   if (!found) return;
   take(found);
   adopt(found.next);
-}
-
-async function load() {
-  const [file] = $("list-file").files;
-  $("list-file").value = "";
-  if (!file) return;
-  try {
-    take(await call("PUT", "start-list", await file.arrayBuffer()));
-    tell("good", t("list.loaded", { jumpers: list?.lines.length ?? 0 }));
-  } catch (error) {
-    // Which column or line is wrong stands in the service's words only.
-    if (error instanceof Problem && error.code === "bad_input") tell("error", t("list.refused", { why: error.message }));
-    else tellProblem(error);
-  }
 }
 
 /** @param {SubmitEvent} event */

@@ -40,7 +40,7 @@ export function needToken() {
  *
  * @param {string} method
  * @param {string} path below /api/
- * @param {object} [body] sent as JSON; an ArrayBuffer as a table (CSV), a Blob as what it is
+ * @param {object} [body] sent as JSON; a Blob as what it is
  * @param {number} [deadlineMs] time after which the call counts as unanswered
  * @returns {Promise<any>} the answer's JSON; null if it has none
  * @throws {Problem}
@@ -94,7 +94,6 @@ async function ask(method, path, body, deadlineMs) {
  */
 function contentOf(body) {
   if (body instanceof Blob) return { headers: { "Content-Type": body.type }, body };
-  if (body instanceof ArrayBuffer) return { headers: { "Content-Type": "text/csv" }, body };
   return { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
 }
 

@@ -118,10 +118,8 @@ def _key(kinogram: Kinogram) -> str:
     metre = ""
     if scale is not None:  # as wide beside the pictures as a metre is in them
         bar = f'<path d="M2 2v16M2 10h{scale:.0f}m0-8v16" stroke="currentColor" stroke-width="3"/>'
-        words = f'<text x="{scale + 14:.0f}" y="17" fill="currentColor">1 m</text>'
-        metre = (
-            f'<svg class="metre" viewBox="-16 0 {WIDTH} 20" aria-hidden="true">{bar}{words}</svg><p>{_both(METRE)}</p>'
-        )
+        metre = f'<svg class="metre" viewBox="-16 0 {WIDTH} 20" aria-hidden="true">{bar}</svg>'
+        metre += f"<p><b>1 m</b> {_both(METRE)}</p>"
     why = f'<p lang="en">{escape(kinogram.jump.verdict.message.removeprefix(_SAID))}</p>'
     kind, said = ("good", GOOD) if ok else ("bad", DOUBTFUL)
     verdict = f'<div class="verdict {kind}"><strong>{_both(said)}</strong>{why}</div>'

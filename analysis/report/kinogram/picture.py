@@ -36,6 +36,7 @@ _GAP: Final = 16
 _ACROSS: Final = 2 * WIDTH + 3 * _GAP
 _HEAD, _FIGURE, _FOOT = 116, 164, 62
 _QUALITY: Final = 88
+_WIDEST_METRE: Final = 220  # px; a longer one leaves no room for the words beside it
 _SURE, _BOLD = 450, 750  # weights of letters
 _GROUND: Final[Colour] = (238, 242, 247)
 _CARD: Final[Colour] = (255, 255, 255)
@@ -161,12 +162,12 @@ def _key(sheet: _Sheet, kinogram: Kinogram, at: tuple[int, int]) -> None:
     y = _key_words(sheet, PREDICTED, (x, y))
     scale = next((shot.px_per_m for shot in kinogram.shots if shot.px_per_m is not None), None)
     if scale is not None:
-        metre = round(scale)
+        length = 1.0 if scale < _WIDEST_METRE else 0.5
+        metre = round(length * scale)
         cv2.line(sheet.pixels, (x + 20, y), (x + 20 + metre, y), _INK, 3)
         for end in (x + 20, x + 20 + metre):
             cv2.line(sheet.pixels, (end, y - 8), (end, y + 8), _INK, 3)
-        sheet.write("1 m", (x + 30 + metre, y + 2), 20, _BOLD, most=60)
-        beside = x + 76 + metre
+        beside = sheet.write(f"{length:g} m", (x + 30 + metre, y + 2), 20, _BOLD, most=60) + 14
         sheet.write(METRE.english, (beside, y - 2), 18, most=x + WIDTH - 12 - beside)
         sheet.write(METRE.norwegian, (beside, y + 20), 16, colour=_SOFT, most=x + WIDTH - 12 - beside)
 

@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from analysis.report.figures import EARLY_S, FAR_M, fixed
-from analysis.report.kinogram.figures import UNITS, Mark, Reference, Word
+from analysis.report.kinogram.figures import FEWEST, UNITS, Mark, Reference, Word
 from analysis.report.kinogram.model import Kinogram
 from analysis.report.kinogram.shots import Missing, Shot
 from analysis.report.language import Said
@@ -93,6 +93,8 @@ def reference_words(reference: Reference, *, ok: bool) -> Said:
         return Said("Not compared: the jump is doubtful.", "Ikke sammenlignet: hoppet er usikkert.")
     if not n:
         return Said("No earlier jumps to compare with.", "Ingen tidligere hopp å sammenligne med.")
+    if n < FEWEST:
+        return Said(f"Earlier jumps: {n}, too few to compare with.", f"Tidligere hopp: {n}, for få å sammenligne med.")
     if reference.by_speed:
         return Said(
             f"Marks: against the mean of the athlete's {n} fastest earlier jumps.",

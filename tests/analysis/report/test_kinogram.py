@@ -307,9 +307,13 @@ def test_marks_stand_on_the_page_and_a_doubtful_jump_has_none(log: Path, tmp_pat
         )
         for day in range(1, 4)
     ]
-    (tmp_path / "next").mkdir()
+    for name in ("next", "few"):
+        (tmp_path / name).mkdir()
     content = _written(result, log, tmp_path / "next", slower)
     assert content["jumps"][0]["marks"]["takeoff_speed"]["word"] == "better"
+    few = _written(result, log, tmp_path / "few", slower[:2])
+    assert few["jumps"][0]["marks"] == {}
+    assert "Earlier jumps: 2, too few" in _text((tmp_path / "few" / "kinogram.html").read_text(encoding="utf-8"))
     assert content["jumps"][0]["marks"]["v_angle"]["word"] == "within noise"
     text = _text((tmp_path / "next" / "kinogram.html").read_text(encoding="utf-8"))
     assert re.search(r"better \+\d\.\d+ bedre", text)

@@ -160,7 +160,7 @@ def _greatest(comparison: Comparison, name: str, language: Language) -> str:
 
 def _table(head: list[str], rows: list[list[str]]) -> str:
     """A table of elements; the first of each row is its heading."""
-    lines = ["".join(f"<th>{cell}</th>" for cell in head)]
+    lines = ["".join(f"<th>{cell}</th>" if cell else "<td></td>" for cell in head)]
     lines += [f"<th>{row[0]}</th>" + "".join(f"<td>{cell}</td>" for cell in row[1:]) for row in rows]
     return f'<div class="table" tabindex="0"><table>{"".join(f"<tr>{line}</tr>" for line in lines)}</table></div>'
 

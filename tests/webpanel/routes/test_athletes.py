@@ -28,6 +28,8 @@ from tests.recorder.logs import ALL_OK
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 
+#: A comparison has the processor time that nobody else wants.
+PATIENCE_S = 90.0
 NOON = datetime(2026, 2, 14, 12, tzinfo=UTC)
 
 
@@ -138,7 +140,7 @@ def test_a_page_compares_two_jumps_under_their_present_names(client: httpx.Clien
     client.patch("/api/recordings/two", json={"athlete": "Åse <b>Moe</b>"}).raise_for_status()
     assert client.get("/api/recordings/two/moment").json()["from_log"] is True
     query = {"first": "one", "second": "two", "language": "nb"}
-    answer = client.get("/api/comparison.html", params=query).raise_for_status()
+    answer = client.get("/api/comparison.html", params=query, timeout=PATIENCE_S).raise_for_status()
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
     assert answer.headers["content-security-policy"].startswith("sandbox ")
     assert "allow-same-origin" not in answer.headers["content-security-policy"]
@@ -167,7 +169,11 @@ def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Clien
         "first_since": "2026-02-14T00:00:00Z", "first_until": "2026-02-15T00:00:00Z",
         "second_since": "2026-02-15T00:00:00Z", "second_until": "2026-02-16T00:00:00Z",
     }  # fmt: skip
-    found = client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}).raise_for_status().json()
+    found = (
+        client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}, timeout=PATIENCE_S)
+        .raise_for_status()
+        .json()
+    )
     assert (found["first"], found["second"], found["left_out"], found["scatter_jumps"]) == (3, 3, 1, 6)
     assert found["different"] == ["alpha"]
     by_name = {each["quantity"]: each for each in found["quantities"]}

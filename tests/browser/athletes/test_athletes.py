@@ -81,6 +81,7 @@ def test_a_table_of_the_day_is_sorted_filtered_and_taken_away(panel: Panel, open
     assert lines[1].startswith(
         '2026-02-14;13:01:00;1;"Kari / Ødegård;";12;jump-01;1;26,1000;0,0500;2,1000;0,1000;;;21,'
     )
+    assert lines[1].endswith(";Godt målt;all points")
     assert len(lines) == 5
     page.locator("#day-date").fill("2026-02-13")
     expect(page).to_have_url(re.compile("#/jumps/2026-02-13$"))
@@ -136,7 +137,7 @@ def test_two_days_are_compared_by_the_service(panel: Panel, service: MemoryServi
     with panel.client() as client:
         assert client.post("/api/recordings", json={}).is_success
     page.get_by_role("button", name="Compare").click()
-    expect(page.get_by_role("alert")).to_contain_text("jumps are not compared while a recording runs")
+    expect(page.get_by_role("alert")).to_contain_text("Nothing is compared while a recording runs")
 
 
 @pytest.mark.usefixtures("season")

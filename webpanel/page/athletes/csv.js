@@ -5,6 +5,7 @@
 
 import { t } from "../i18n/i18n.js";
 import { make } from "../shared/dom.js";
+import { levelOf, MARKS, verdictOf } from "../shared/figures.js";
 import { dayOf, FIGURES, figureOf } from "./figures.js";
 
 /** @typedef {import("./types.js").AthleteJump} AthleteJump */
@@ -22,7 +23,7 @@ export function csvOf(jumps) {
   const rows = jumps.map((each) => [
     dayOf(each.jump.time), new Date(each.jump.time).toTimeString().slice(0, 8), each.bib, each.athlete, each.gate, each.jump.recording, String(each.jump.jump),
     ...FIGURES.flatMap(({ name }) => { const found = figureOf(each, name); return [figure(found?.value), figure(found?.sigma)]; }),
-    each.level, each.jump.verdict,
+    t(MARKS[levelOf(each.jump, each.level === "info")]), verdictOf(each.jump),
   ]);
   return `\ufeff${[heading, ...rows].map((row) => row.map(cell).join(";")).join("\r\n")}\r\n`;
 }

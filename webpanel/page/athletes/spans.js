@@ -1,11 +1,11 @@
 /** "Better than chance?": two days or spans of an athlete's jumps, compared by the service with the test of `svev compare`. */
 
 import { t } from "../i18n/i18n.js";
-import { call } from "../shared/api.js";
+import { call, Problem } from "../shared/api.js";
 import { $, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { place } from "../shared/router.js";
-import { attempt } from "../shared/snacks.js";
+import { tell, tellProblem } from "../shared/snacks.js";
 import { spanOf } from "./figures.js";
 
 /** @typedef {import("./types.js").Comparison} Comparison */
@@ -50,14 +50,22 @@ export function offerSpans(days) {
 async function compare() {
   if (asking) return;
   const [first, second] = [spanOf($("spans-first-from").value, $("spans-first-to").value), spanOf($("spans-second-from").value, $("spans-second-to").value)];
+  if (first.since < second.until && second.since < first.until) return tell("warning", t("spans.overlap"));
   const whose = athlete;
   const query = new URLSearchParams({ athlete, first_since: first.since, first_until: first.until, second_since: second.since, second_until: second.until });
   [asking, found] = [true, null];
   drawSpans();
-  const answer = await attempt(() => call("GET", `jumps/comparison?${query}`, undefined, DEADLINE_MS));
-  asking = false;
-  if (whose === athlete) found = answer;
-  drawSpans();
+  try {
+    const answer = await call("GET", `jumps/comparison?${query}`, undefined, DEADLINE_MS);
+    if (whose === athlete) found = answer;
+  } catch (error) {
+    if (error instanceof Problem && error.status === 409) tell("error", t("spans.busy"));
+    else if (error instanceof Problem && error.status === 422) tell("error", t("spans.refused", { why: error.message }));
+    else tellProblem(error);
+  } finally {
+    asking = false;
+    drawSpans();
+  }
 }
 
 /** Draw the answer. */

@@ -190,8 +190,7 @@ def _put(stage: Path, targets: list[Target], places: Places, made: Written) -> N
                     continue
                 made.backups.append(path.with_name(f"{path.name}.{stamp}"))
                 shutil.copy2(path, made.backups[-1])
-            new.chmod(target.mode)
-            _give(new, places, service=target.service)
+            _set_rights(new, target, places)
             sync(new)
             ready.append((new, path))
     except OSError:
@@ -203,6 +202,18 @@ def _put(stage: Path, targets: list[Target], places: Places, made: Written) -> N
         made.written.append(path)
     for folder in {path.parent for _, path in ready}:
         sync(folder)
+
+
+def _set_rights(new: Path, target: Target, places: Places) -> None:
+    """Give a file the rights of the one that it renews: an administrator may have taken that from the service."""
+    if not target.path.exists():
+        new.chmod(target.mode)
+        _give(new, places, service=target.service)
+        return
+    before = target.path.stat()
+    new.chmod(before.st_mode & 0o777)
+    if os.geteuid() == 0:
+        os.chown(new, before.st_uid, before.st_gid)
 
 
 def _give(path: Path, places: Places, *, service: bool) -> None:

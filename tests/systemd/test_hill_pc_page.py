@@ -29,7 +29,7 @@ def _with(word: str) -> str:
 def test_what_is_added_to_the_rig_file_is_a_rig(tmp_path: Path) -> None:
     rig = (CONFIG / "rigs" / "hill-gige.toml").read_text().replace('directory = "recordings"\n', "")
     parts = _blocks("toml")
-    assert len(parts) == 2
+    assert len(parts) == 3
     for part in parts:
         # Tables that the file has already are continued there, as a person would do it.
         table, keys = part.split("\n", 1)
@@ -37,7 +37,8 @@ def test_what_is_added_to_the_rig_file_is_a_rig(tmp_path: Path) -> None:
         path = tmp_path / "rig.toml"
         path.write_text(whole)
         settings = load_rig(path)
-        assert settings.service.arm_at_start or settings.recorder.fallback_directory is not None, keys
+        added = settings.service.arm_at_start, settings.recorder.fallback_directory, settings.analysis
+        assert any(added), keys
 
 
 def test_the_unit_understands_what_is_added_to_it(tmp_path: Path) -> None:
@@ -58,9 +59,11 @@ def test_the_network_settings_are_those_of_this_systemd() -> None:
     if not _NETWORKD.exists():
         pytest.skip("systemd-networkd is not installed")
     known = _NETWORKD.read_bytes()
-    file = configparser.ConfigParser()
-    file.optionxform = str  # type: ignore[assignment,method-assign]
-    file.read_string(_with("ConfigureWithoutCarrier"))
-    keys = [f"{section}.{key}" for section in file.sections() for key in file[section]]
-    assert len(keys) == 6
+    keys = []
+    for word in ("LinkLocalAddressing", "DHCPServer"):
+        file = configparser.ConfigParser()
+        file.optionxform = str  # type: ignore[assignment,method-assign]
+        file.read_string(_with(word))
+        keys += [f"{section}.{key}" for section in file.sections() for key in file[section]]
+    assert len(keys) == 13
     assert [key for key in keys if key.encode() + b"\0" not in known] == []

@@ -76,6 +76,13 @@ def test_the_service_is_told_of_a_folder_on_another_disk(tmp_path: Path) -> None
     assert not (tmp_path / "units2").exists()
 
 
+def test_a_file_that_is_renewed_keeps_its_rights(tmp_path: Path) -> None:
+    write(answers(tmp_path, phones=False), Today.of(tmp_path), Places(tmp_path))
+    (tmp_path / "rig.toml").chmod(0o604)
+    write(answers(tmp_path, phones=False, name="new"), Today.of(tmp_path), Places(tmp_path))
+    assert (tmp_path / "rig.toml").stat().st_mode & 0o777 == 0o604
+
+
 def test_phones_need_nothing_new_while_the_names_are_the_same(tmp_path: Path) -> None:
     places, files = Places(tmp_path), CertificateFiles.within(tmp_path / "tls")
     first = write(answers(tmp_path), Today.of(tmp_path), places)

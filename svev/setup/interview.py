@@ -9,6 +9,7 @@ from typing import Final
 from analysis.scene.survey import read_survey
 from rig.errors import BadInputError
 from rig.host.disk import free_bytes
+from rig.settings.camera import Backend
 from rig.settings.trigger import GpioTrigger, TriggerBoxTrigger
 from svev.doctor.disk import existing_part
 from svev.gige.interfaces import interface_to, own_interfaces
@@ -22,6 +23,8 @@ from svev.setup.words import said
 
 _NONE: Final = frozenset({"none", "ingen", ""})
 _LANGUAGES: Final[dict[str, Language]] = {"en": "en", "nb": "nb", "english": "en", "norsk": "nb", "engelsk": "en"}
+#: Sources whose commands only cameras of one back end take.
+_COMMANDS: Final[dict[Source, Backend]] = {"action": "aravis", "iidc-broadcast": "iidc"}
 _RATE_HZ: Final = 30.0
 _RATES_HZ: Final = (0.1, 1000.0)
 _NAME_MAX: Final = 80
@@ -76,7 +79,7 @@ class Interview:
         dialog.say("files_in", folder=self._places.folder)
         name = dialog.ask("name", "--name", given.name, rig.name if rig else "hill", _name)
         cameras, seen = WhichCameras(given.cameras, self._today.cameras, dialog, self._look).ask()
-        source, rate_hz, port, line = self._trigger()
+        source, rate_hz, port, line = self._trigger(cameras)
         by_cable = source in {"external", "triggerbox", "gpio"} and any(each.backend == "aravis" for each in cameras)
         trigger_input = self._input(seen) if by_cable else None
         survey = self._survey(cameras)
@@ -91,14 +94,21 @@ class Interview:
             packet_size=min(sizes) if sizes and min(sizes) < wanted else None,
         )  # fmt: skip
 
-    def _trigger(self) -> tuple[Source, float, str | None, str | None]:
+    def _trigger(self, cameras: tuple[CameraAnswer, ...]) -> tuple[Source, float, str | None, str | None]:
         """Who makes the pulses, how many a second, and by which port or line."""
+
+        def check(text: str) -> Source:
+            source = _source(text)
+            if source in _COMMANDS and any(each.backend != _COMMANDS[source] for each in cameras):
+                raise BadInputError(f"{source}: not all of these cameras take such commands; give another one")
+            return source
+
         given, dialog, rig = self._given, self._dialog, self._today.rig
         if given.trigger is None and dialog.asks:
             for text in said(dialog.language, "trigger_list").split("\n"):
                 dialog.plain(text)
         usual = rig.trigger.source if rig else "external"
-        source = dialog.ask("trigger", "--trigger", given.trigger, usual, _source)
+        source = dialog.ask("trigger", "--trigger", given.trigger, usual, check)
         rate = f"{rig.trigger.rate_hz if rig else _RATE_HZ:g}"
         rate_hz = dialog.ask("rate", "--rate", given.rate, rate, _rate)
         port = line = None

@@ -38,14 +38,14 @@ class WhichCameras:
         """
         if self._given:
             return self._named(self._given)
+        known = tuple(CameraAnswer(each.name, each.backend, _bare(each.address)) for each in self._today)
         while True:
             found = self._show(None)
             if found.cameras:
-                return self._choose(found)
+                return self._choose(found, known)
             self._dialog.say("none_found")
             if found.firewire:
                 self._dialog.say("firewire", why=found.firewire)
-            known = tuple(CameraAnswer(each.name, each.backend, _bare(each.address)) for each in self._today)
             if not self._dialog.asks:
                 if known:
                     return known, ()
@@ -67,14 +67,21 @@ class WhichCameras:
                 self._dialog.say("silent", camera=camera.option)
         return self._with_regions(cameras, found), found.cameras
 
-    def _choose(self, found: Found) -> tuple[tuple[CameraAnswer, ...], tuple[Seen, ...]]:
+    def _choose(
+        self, found: Found, known: tuple[CameraAnswer, ...]
+    ) -> tuple[tuple[CameraAnswer, ...], tuple[Seen, ...]]:
+        """The cameras of those that were found; or those of today, also if one of them does not answer now."""
         addresses = [each.address for each in found.cameras]
-        today = [_bare(each.address) for each in self._today]
-        usual = [addresses.index(each) for each in today] if set(today) <= set(addresses) else []
-        usual = usual or list(range(min(len(addresses), _MOST)))
-        shown = " ".join(str(index + 1) for index in usual)
+        silent = [each for each in known if each.address not in addresses]
+        some_answer = len(silent) < len(known)
+        for camera in silent if some_answer else ():
+            self._dialog.say("of_today_silent", camera=camera.option)
+        usual = [each.address for each in known] if some_answer else addresses[:_MOST]
+        shown = _KEEP if some_answer and silent else " ".join(str(addresses.index(each) + 1) for each in usual)
 
-        def numbers(text: str) -> tuple[Seen, ...]:
+        def numbers(text: str) -> tuple[Seen, ...] | None:
+            if text.lower() == _KEEP and known:
+                return None
             words = text.replace(",", " ").split()
             chosen = [int(word) for word in words if word.isdecimal() and 1 <= int(word) <= len(addresses)]
             if not words or len(chosen) < len(words) or len(set(chosen)) < len(chosen) or len(chosen) > _MOST:
@@ -82,6 +89,8 @@ class WhichCameras:
             return tuple(found.cameras[number - 1] for number in chosen)
 
         chosen = self._dialog.ask("cameras", "--camera", None, shown, numbers)
+        if chosen is None:
+            return known, tuple(each for each in found.cameras if each.address in {one.address for one in known})
         return self._with_regions(self._answers(tuple(each.address for each in chosen)), found), chosen
 
     def _show(self, addresses: tuple[str, ...] | None, *, firewire: bool = True) -> Found:

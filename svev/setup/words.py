@@ -54,6 +54,10 @@ _WORDS: Final[dict[str, tuple[str, str]]] = {
         "  {camera} does not answer now; it is written down all the same",
         "  {camera} svarer ikke nå; det blir skrevet opp likevel",
     ),
+    "of_today_silent": (
+        '{camera} of the rig file does not answer; "keep" leaves the cameras as they are',
+        "{camera} i riggfilen svarer ikke; «keep» lar kameraene være som de er",
+    ),
     "trigger_list": (
         (
             "The pulses that expose all cameras at once come from\n"

@@ -8,7 +8,8 @@ import pwd
 import secrets
 import shutil
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -73,11 +74,10 @@ def write(answers: Answers, today: Today, places: Places) -> Written:
     made = Written()
     folder = places.folder
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".setup-", dir=folder) as name:
+        with _folder(folder), tempfile.TemporaryDirectory(prefix=".setup-", dir=folder) as name:
             stage = Path(name)
             targets = _make(answers, today, places, stage, made)
-            load_rig(stage / RIG)
+            _check(stage / RIG, folder / RIG)
             with counted_endings():  # whoever wants to end it now waits for some milliseconds
                 _make_recordings(answers.recordings, places)
                 _put(stage, targets, places, made)
@@ -87,6 +87,31 @@ def write(answers: Answers, today: Today, places: Places) -> Written:
             "--folder"
         ) from None
     return made
+
+
+@contextmanager
+def _folder(folder: Path) -> Iterator[None]:
+    """A folder, made if missing; if it comes to nothing, it is as it was."""
+    missing = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except BaseException:
+        if missing:
+            folder.rmdir()
+        raise
+
+
+def _check(made: Path, shown: Path) -> None:
+    """Check that the answers make a rig.
+
+    Raises:
+        BadInputError: they do not; the message names the file that was to be written.
+    """
+    try:
+        load_rig(made)
+    except BadInputError as error:
+        raise BadInputError(str(error).replace(str(made), str(shown))) from None
 
 
 def _make(answers: Answers, today: Today, places: Places, stage: Path, made: Written) -> list[Target]:

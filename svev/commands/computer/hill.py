@@ -1,7 +1,10 @@
 """`svev setup`: asks what a new hill needs, writes its files, and rehearses."""
 
 import shlex
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from ipaddress import IPv4Network
 from pathlib import Path
@@ -11,7 +14,7 @@ import typer
 
 from recorder.publishing.keys import check_publication
 from rig.errors import BadInputError, SvevError
-from rig.host.endings import counted_endings
+from rig.host.endings import ENDINGS, counted_endings
 from rig.settings.file import load_rig
 from svev import console
 from svev.commands.rig.record import aside
@@ -95,9 +98,10 @@ def setup(
     dialog = Dialog(asks=not yes, aside=as_json)
     today = Today.of(places.folder)
     try:
-        with pictures() as place:
-            answers = Interview(given, today, places, dialog, partial(search, place, network or "")).ask()
-        written = write(answers, today, places)
+        with _interrupted_by_all_endings():
+            with pictures() as place:
+                answers = Interview(given, today, places, dialog, partial(search, place, network or "")).ask()
+            written = write(answers, today, places)
     except KeyboardInterrupt:
         console.say("", aside=True)
         dialog.aside = True
@@ -110,6 +114,17 @@ def setup(
         console.print_json(_as_json(answers, today, places, written, commands) | _rehearsed_json(done, failed))
     if failed or (done is not None and not done.ready):
         raise typer.Exit(_NOT_READY)
+
+
+@contextmanager
+def _interrupted_by_all_endings() -> Iterator[None]:
+    """Within, a closed terminal and `kill` do what Ctrl-C does: nothing is left behind."""
+    before = {number: signal.signal(number, signal.default_int_handler) for number in ENDINGS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _check_network(text: str) -> None:
@@ -177,6 +192,8 @@ def _tell_how_to_start(answers: Answers, today: Today, places: Places, written: 
         by_hand = [svev, "serve", "--rig", str(places.folder / RIG), *options]
         dialog.say("start_by_hand", command=shlex.join(by_hand))
         again = ["sudo", svev, "setup", "--folder", str(SERVICE), "--yes", *answers.command_line()]
+        if answers.recordings != places.recordings:
+            again += ["--recordings", str(answers.recordings)]
         commands = [*installed, shlex.join(again), *start]
         dialog.say("needs_root", folder=SERVICE)
     for command in commands:

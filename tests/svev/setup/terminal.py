@@ -65,6 +65,10 @@ class Terminal:
         """Type."""
         os.write(self._ours, text.encode())
 
+    def send_signal(self, number: int) -> None:
+        """Send the command a signal."""
+        self._process.send_signal(number)
+
     def end(self) -> int:
         """Wait for the end of the command.
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -137,6 +138,14 @@ def test_with_answers_as_options_nothing_is_asked_and_what_is_not_asked_about_st
     assert (json.loads(again.stdout)["written"], json.loads(again.stdout)["backups"]) == ([], []), again.stdout
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
+    # A camera that is off does not fall out of the rig because nobody was asked.
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "rig.toml").write_text(text.replace(cameras[1], loopback.cameras(4)[3]))
+    off = run_svev("setup", "--folder", str(tmp_path), *network(loopback), "--yes", "--no-rehearse", "--json")
+    assert [each["name"] for each in json.loads(off.stdout)["cameras"]] == ["A", "B", "C"]
+    assert f"B={loopback.cameras(4)[3]} of the rig file does not answer" in off.stderr
+    (tmp_path / "rig.toml").write_text(text)
+
     fewer = run_svev(
         "setup", "--folder", str(tmp_path), "--camera", cameras[1], "--trigger", "software", "--no-phones", "--yes",
         "--no-rehearse",
@@ -196,7 +205,10 @@ def test_who_leaves_finds_everything_as_it_was(tmp_path: Path, loopback: Loopbac
         if question != "English or Norwegian":
             terminal.answer("[en]", "")
         terminal.await_text(question)
-        terminal.type("\x03")
+        if question == "English or Norwegian":
+            terminal.send_signal(signal.SIGHUP)  # the window is closed
+        else:
+            terminal.type("\x03")
         assert (terminal.end(), "ended; nothing has been changed" in terminal.shown) == (130, True), terminal.shown
     assert {path.name for path in tmp_path.iterdir()} == {"rig.toml"}
     assert (tmp_path / "rig.toml").read_bytes() == before
@@ -210,8 +222,10 @@ def test_who_cannot_be_asked_is_told_how_to_answer(tmp_path: Path) -> None:
         ("--network", "everywhere"): "give one like 192.168.11.0/24",
         ("--camera", "127.0.0.1", "--trigger", "me"): "--trigger me: give one of external",
         ("--camera", "127.0.0.1", "--camera", "127.0.0.1"): "is there twice",
+        ("--camera", "127.0.0.1", "--trigger", "iidc-broadcast"): "not all of these cameras take such commands",
+        ("--camera", "recorder=127.0.0.1", "--no-phones"): f"{tmp_path}/hill/rig.toml: recorder is the name of a part",
     }
     for options, words in refused.items():
-        done = run_svev("setup", "--folder", str(tmp_path), *options, "--yes")
+        done = run_svev("setup", "--folder", str(tmp_path / "hill"), *options, "--yes")
         assert (done.returncode, words in done.stderr) == (2, True), done.stderr
     assert list(tmp_path.iterdir()) == []

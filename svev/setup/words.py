@@ -92,7 +92,7 @@ _WORDS: Final[dict[str, tuple[str, str]]] = {
     ),
     "survey": (
         'File of the surveyed balls; "none" if there is none yet:',
-        "Fil med de innmålte ballene; «none» hvis den ikke finnes ennå:",
+        "Fil med de innmålte ballene; «ingen» hvis den ikke finnes ennå:",
     ),
     "surveyed": ("  {points} points, cameras {cameras}", "  {points} punkter, kameraer {cameras}"),
     "recordings": ("Folder for the recordings:", "Mappe for opptakene:"),
@@ -113,7 +113,7 @@ _WORDS: Final[dict[str, tuple[str, str]]] = {
     "kept": ("{path} is as it was", "{path} er som før"),
     "backup": ("the former one is {path}", "den forrige er {path}"),
     "address": ("the page: {url}", "siden: {url}"),
-    "token": ("its token, asked for once by each phone: {token}", "kode, som hver telefon spør om én gang: {token}"),
+    "token": ("its token, asked for once by each phone: {token}", "nøkkelen, som hver telefon spør om én gang: {token}"),
     "authority": (
         "phones trust it when {path} is installed on them: docs/hill-pc.md says how",
         "telefonene stoler på den når {path} er installert på dem: docs/hill-pc.md sier hvordan",

@@ -18,6 +18,8 @@ const CARRIED = ["bib", "athlete", "gate", "wind", "operator", "notes"];
 let list = null;
 let fetching = false;
 let editing = false;
+/** Version of the list and language of the words that the rows have. */
+let drawn = "";
 
 export function startStartList() {
   $("list-undo").addEventListener("click", () => void change("POST", "start-list/undo", { version: list?.version }));
@@ -110,6 +112,9 @@ function draw() {
     box.checked = list.carry.includes(box.name);
     setText(box.nextElementSibling, t(`field.${box.name}`));
   }
+  const words = `${list.version} ${document.documentElement.lang}`;
+  if (words === drawn) return; // a list may have two thousand rows, and a status comes every second
+  drawn = words;
   for (const row of $("list-rows").children) drawRow(row);
 }
 
@@ -120,6 +125,7 @@ function drawRows(found) {
   const focused = /** @type {HTMLElement|null} */ (document.activeElement)?.closest("#list-rows li")?.getAttribute("data-line");
   const does = document.activeElement?.getAttribute("data-does");
   rows.replaceChildren(...found.lines.map(makeRow));
+  drawn = "";
   if (focused) rows.querySelector(`[data-line="${focused}"] [data-does="${does}"]`)?.focus({ preventScroll: true });
   const next = rows.querySelector("[aria-current]");
   if (next && before?.getAttribute("data-line") !== next.dataset.line) {

@@ -18,12 +18,15 @@ const CARRIED = ["bib", "athlete", "gate", "wind", "operator", "notes"];
 let list = null;
 let fetching = false;
 let editing = false;
+/** Rows that are shown, by the id of their line, with what they show: those that stay the same stay where they are. */
+/** @type {Map<number, { key: string, row: HTMLElement }>} */
+let shown = new Map();
 /** Version of the list and language of the words that the rows have. */
 let drawn = "";
 
 export function startStartList() {
   $("list-undo").addEventListener("click", () => void change("POST", "start-list/undo", { version: list?.version }));
-  $("list-edit").addEventListener("click", () => { editing = !editing; draw(); });
+  $("list-edit").addEventListener("click", edit);
   startListLoading(() => list?.lines.length ?? 0, (found) => { take(found); adopt(found.next); });
   $("list-round").addEventListener("click", () => void change("POST", "start-list/round"));
   $("list-add").addEventListener("submit", add);
@@ -31,6 +34,12 @@ export function startStartList() {
   $("list-carry").append(...CARRIED.map(makeCarried));
   $("list-rows").addEventListener("click", pressed);
   watch(follow);
+}
+
+function edit() {
+  editing = !editing;
+  if (list) drawRows(list); // only then its rows have the buttons to edit it
+  draw();
 }
 
 /** Fetch the list if the service has a newer one. */
@@ -124,7 +133,22 @@ function drawRows(found) {
   const before = rows.querySelector("[aria-current]");
   const focused = /** @type {HTMLElement|null} */ (document.activeElement)?.closest("#list-rows li")?.getAttribute("data-line");
   const does = document.activeElement?.getAttribute("data-does");
-  rows.replaceChildren(...found.lines.map(makeRow));
+  const made = new Map(found.lines.map((line) => {
+    const key = JSON.stringify([line, line.id === found.next.line, editing]);
+    const kept = shown.get(line.id);
+    return [line.id, kept?.key === key ? kept : { key, row: makeRow(line) }];
+  }));
+  for (const [id, { row }] of shown) {
+    const now = made.get(id);
+    if (!now) row.remove();
+    else if (now.row !== row) row.replaceWith(now.row);
+  }
+  let place = rows.firstElementChild;
+  for (const { row } of made.values()) {
+    if (row === place) place = place.nextElementSibling;
+    else rows.insertBefore(row, place);
+  }
+  shown = made;
   drawn = "";
   if (focused) rows.querySelector(`[data-line="${focused}"] [data-does="${does}"]`)?.focus({ preventScroll: true });
   const next = rows.querySelector("[aria-current]");
@@ -139,7 +163,7 @@ function makeRow(line) {
     make("small", {}, [line.club, ...Object.values(line.more)].filter(Boolean).join("  ·  ")), make("em"));
   const row = make("li", { "data-line": String(line.id), "data-mark": line.mark },
     make("button", { type: "button", class: "list-jumper", "data-does": "choose" }, name),
-    ...[["up", "frame-back"], ["down", "frame-on"], ["remove", "close"]].map(([does, picture]) =>
+    ...(editing ? [["up", "frame-back"], ["down", "frame-on"], ["remove", "close"]] : []).map(([does, picture]) =>
       make("button", { type: "button", class: `square list-${does}`, "data-does": does }, icon(picture))));
   if (line.id === list?.next.line) row.setAttribute("aria-current", "true");
   return row;

@@ -11,6 +11,7 @@ from playwright.sync_api import Page, Request, expect
 from rig.api.recordings import RecordingOrder
 from tests.browser.conftest import MEASURED, Open
 from tests.browser.views import AXE, BROKEN, assert_fits_a_phone
+from tests.support.waiting import wait_until
 from tests.webpanel.door.test_links import Clock
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel, serving
@@ -131,6 +132,14 @@ def test_a_link_shows_its_jump_and_nothing_else(hill: Hill, service: MemoryServi
     expect(page.locator("#visit-who")).to_have_text("4 · Ola <b>Nordmann</b>")
     expect(page.locator("#visit-figures > div").first).to_contain_text("94.0\u202fkm/h")
     expect(page.locator("#visit-replay")).to_have_attribute("data-stage", "ready")
+    size = (
+        "[document.querySelector('#visit-replay canvas').width, document.querySelector('#visit-replay canvas').height]"
+    )
+    other = page.locator("#visit-replay .replay-camera")
+    for camera, expected in (("K1", [160, 120]), ("K2", [160, 120]), ("K3", [160, 120]), ("All cameras", [480, 120])):
+        expect(other).to_have_text(camera)
+        wait_until(lambda expected=expected: page.evaluate(size) == expected, f"{camera} is shown", 20)
+        other.click()
     expect(page.locator("#visit-until")).to_have_text(re.compile(r"^This page opens until .*, \d\d:\d\d\.$"))
     page.locator("#visit-more summary").click()
     assert_fits_a_phone(page)

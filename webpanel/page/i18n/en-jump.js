@@ -16,6 +16,8 @@ export const jump = {
   "replay.waits": "The pictures come when no recording runs.",
   "replay.loading": "Fetching the pictures …",
   "replay.none": "There are no pictures of it.",
+  "replay.all": "All cameras",
+  "replay.camera": "Camera {camera}",
   "replay.play": "Play",
   "replay.pause": "Stop",
 

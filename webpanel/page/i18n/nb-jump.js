@@ -16,6 +16,8 @@ export const jump = {
   "replay.waits": "Bildene kommer når det ikke tas opp.",
   "replay.loading": "Henter bildene …",
   "replay.none": "Det finnes ingen bilder av det.",
+  "replay.all": "Alle kameraer",
+  "replay.camera": "Kamera {camera}",
   "replay.play": "Spill av",
   "replay.pause": "Stopp",
 

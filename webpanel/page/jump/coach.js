@@ -38,7 +38,7 @@ let shown = null;
 let running = false;
 
 export function startCoach() {
-  replay = makeReplay($("coach-replay"), { may: () => known.view === "coach" && known.connected && !known.status?.recording, button: false, width: 1440 });
+  replay = makeReplay($("coach-replay"), { may: () => known.view === "coach" && known.connected && !known.status?.recording, button: false });
   hear({ picture: (image) => { if (running) delay.put(image); } });
   $("coach-live-image").addEventListener("load", () => URL.revokeObjectURL($("coach-live-image").src));
   setInterval(() => { if (known.view === "coach") look(); }, LOOK_MS);
@@ -98,7 +98,7 @@ function drawState(status) {
   $("coach-state").dataset.state = lost ? "unknown" : status?.state;
   setText($("coach-state"), lost
     ? known.heard ? t("coach.lost", { time: timeOfDay(known.heard) }) : t("coach.connecting")
-    : level === "warning" || level === "error" ? `${state}: ${status ? say(status.statement).text : ""}` : state);
+    : status && (level === "warning" || level === "error") ? say(status.statement).text : state);
 }
 
 function drawJump() {

@@ -38,7 +38,7 @@ let measured = null;
 let wrong = null;
 
 export function startVisit() {
-  replay = makeReplay($("visit-replay"), { may: () => known.view === "jump", button: true, width: 720 });
+  replay = makeReplay($("visit-replay"), { may: () => known.view === "jump", button: true });
 }
 
 /**

@@ -14,7 +14,7 @@ let replay;
 let near = false;
 
 export function startMeasured() {
-  replay = makeReplay($("measured-replay"), { may: () => near && known.view === "live" && known.connected && !known.status?.recording, button: true, width: 720 });
+  replay = makeReplay($("measured-replay"), { may: () => near && known.view === "live" && known.connected && !known.status?.recording, button: true });
   new IntersectionObserver((seen) => { near = Boolean(seen.at(-1)?.isIntersecting); draw(); }).observe($("measured"));
   watch(draw);
 }

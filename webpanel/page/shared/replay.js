@@ -22,29 +22,37 @@ const SLOWER = 4;
 const REST_MS = 800;
 /** More pictures than these say no more at this speed. */
 const PICTURES_MAX = 45;
+/** Width of the pictures, px. */
+const WIDTH = 1440;
 /** So soon it is tried again after a failure, ms. */
 const AGAIN_MS = 3000;
 /** While nobody sees it, it looks so often whether somebody does, ms. */
 const IDLE_MS = 500;
 
 /** @typedef {{ pulse: number, time_s: number, image: Blob|null }} Frame */
-/** @typedef {{ frames: Frame[], kind: string, moment: number }} Scene `moment`: index of the frame that matters */
+/**
+ * @typedef {{ frames: Frame[], kind: string, moment: number, cameras: string[], columns: [number, number][] }} Scene
+ *   `moment`: index of the frame that matters; `columns`: of each camera in the triplet
+ */
 /** @typedef {""|"loading"|"waits"|"none"|"ready"} Stage */
 
 /** @type {Scene} */
-const NOTHING = { frames: [], kind: "none", moment: 0 };
+const NOTHING = { frames: [], kind: "none", moment: 0, cameras: [], columns: [] };
+/** The window is too narrow for all cameras side by side. */
+const NARROW = matchMedia("(max-width: 599px)");
 
 /**
  * @param {HTMLElement} root
- * @param {{ may: () => boolean, button: boolean, width: number }} options `may`: whether pictures may be fetched now; `button`: it can be stopped; `width`: of the pictures, px
+ * @param {{ may: () => boolean, button: boolean }} options `may`: whether pictures may be fetched now; `button`: it has buttons, to stop it and to see one camera large
  * @returns {Replay}
  */
-export function makeReplay(root, { may, button, width }) {
+export function makeReplay(root, { may, button }) {
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches && button;
   const canvas = make("canvas", { role: "img" });
   const words = make("p", { class: "replay-words" });
   const play = make("button", { type: "button", class: "square replay-play", onclick: () => { playing = !playing; draw(); } }, icon("pause"));
-  root.append(canvas, make("div", { class: "replay-foot" }, words, button ? play : null));
+  const other = make("button", { type: "button", class: "replay-camera", onclick: () => { camera += 1; draw(); void paint(painted); } });
+  root.append(canvas, make("div", { class: "replay-foot" }, words, ...button ? [other, play] : []));
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 
   /** Recording and version that are shown. */
@@ -56,6 +64,10 @@ export function makeReplay(root, { may, button, width }) {
   /** @type {Stage} */
   let stage = "";
   let playing = !still;
+  /** Which camera is shown, counted on and on; 0: all. */
+  let camera = button && NARROW.matches ? 1 : 0;
+  /** What is in sight. @type {Frame|null} */
+  let painted = null;
   let wake = () => {};
 
   /**
@@ -73,7 +85,7 @@ export function makeReplay(root, { may, button, width }) {
         if (!coming.frames.length) coming = await choose(id);
         for (const frame of coming.frames.filter(({ image }) => !image)) {
           if (own !== loads || !may()) break;
-          frame.image = await fetchPicture(id, frame.pulse, width);
+          frame.image = await fetchPicture(id, frame.pulse);
         }
         if (own !== loads) return;
         if (coming.frames.some(({ image }) => !image)) continue;
@@ -114,14 +126,24 @@ export function makeReplay(root, { may, button, width }) {
     }
   }
 
-  /** @param {Frame} frame */
-  async function paint({ pulse, image }) {
-    if (!image) return;
-    const picture = await createImageBitmap(image);
-    if (canvas.width !== picture.width || canvas.height !== picture.height) [canvas.width, canvas.height] = [picture.width, picture.height];
-    pen.drawImage(picture, 0, 0);
+  /** Index of the one camera that is shown; -1: all. */
+  function one() {
+    return camera % (scene.cameras.length + 1) - 1;
+  }
+
+  /** @param {Frame|null} frame */
+  async function paint(frame) {
+    if (!frame?.image) return;
+    painted = frame;
+    const { columns } = scene;
+    const picture = await createImageBitmap(frame.image);
+    const all = columns[columns.length - 1][1];
+    const [left, right] = one() < 0 ? [0, all] : columns[one()];
+    const [from, wide] = [Math.round(left * picture.width / all), Math.round((right - left) * picture.width / all)];
+    if (canvas.width !== wide || canvas.height !== picture.height) [canvas.width, canvas.height] = [wide, picture.height];
+    pen.drawImage(picture, -from, 0);
     picture.close();
-    root.dataset.pulse = String(pulse);
+    root.dataset.pulse = String(frame.pulse);
   }
 
   /** @param {Stage} now */
@@ -133,7 +155,9 @@ export function makeReplay(root, { may, button, width }) {
   function draw() {
     root.dataset.stage = stage;
     canvas.hidden = stage !== "ready";
-    play.hidden = stage !== "ready";
+    play.hidden = other.hidden = stage !== "ready";
+    setText(other, one() < 0 ? t("replay.all") : scene.cameras[one()]);
+    other.setAttribute("aria-label", one() < 0 ? t("replay.all") : t("replay.camera", { camera: scene.cameras[one()] }));
     canvas.setAttribute("aria-label", t("replay.alt"));
     setIcon(play.querySelector("svg"), playing ? "pause" : "play");
     play.setAttribute("aria-label", t(playing ? "replay.pause" : "replay.play"));
@@ -176,8 +200,8 @@ export function makeReplay(root, { may, button, width }) {
  * @throws {Problem}
  */
 async function choose(id) {
-  /** @type {{ pulses: import("./types.js").PulseSummary[] }} */
-  const { pulses } = await call("GET", recordingPath(id, "/pulses"));
+  /** @type {import("./types.js").Pulses} */
+  const { pulses, cameras, columns } = await call("GET", recordingPath(id, "/pulses"));
   const found = await call("GET", recordingPath(id, "/moment"));
   if (!pulses.length) return NOTHING;
   const at = Math.max(0, found.pulse === null ? Math.floor(pulses.length / 2) : pulses.findIndex(({ pulse }) => pulse === found.pulse));
@@ -186,20 +210,19 @@ async function choose(id) {
   const every = Math.ceil(near.length / PICTURES_MAX);
   const first = near.indexOf(middle) % every; // the moment itself is one of them
   const frames = near.filter((_, index) => index % every === first).map(({ pulse, time_s }) => ({ pulse, time_s, image: null }));
-  return { frames, kind: found.kind, moment: frames.findIndex(({ pulse }) => pulse === middle.pulse) };
+  return { frames, kind: found.kind, moment: frames.findIndex(({ pulse }) => pulse === middle.pulse), cameras, columns };
 }
 
 /**
  * @param {string} id
  * @param {number} pulse
- * @param {number} width
  * @returns {Promise<Blob>}
  * @throws {Problem}
  */
-async function fetchPicture(id, pulse, width) {
+async function fetchPicture(id, pulse) {
   let answer;
   try {
-    answer = await fetch(partOf(id, `pulses/${pulse}.jpg?width=${width}`));
+    answer = await fetch(partOf(id, `pulses/${pulse}.jpg?width=${WIDTH}`));
     if (answer.ok) return await answer.blob();
   } catch {
     throw new Problem(0, "page_no_connection", "no connection to the service: check network and service, then try again");

@@ -125,12 +125,11 @@ def address_for_phones(request: Request, access: Access) -> str | None:
         return None
     if not is_loopback(name):
         return f"{scheme}://{host}"
-    # At a proxy's name the port is the proxy's, which nobody has told.
-    named = (
-        [] if behind_proxy else sorted(filter(_is_for_others, access.names), key=lambda name: (_is_number(name), name))
-    )
+    named = sorted(filter(_is_for_others, access.names), key=lambda each: (_is_number(each), each))
+    if behind_proxy or not named:  # the port at a proxy's name is the proxy's, which nobody has told
+        return None
     port = (request.scope.get("server") or ("", None))[1]
-    return f"{scheme}://{_in_address(named[0])}:{port}" if named else None
+    return f"{scheme}://{_in_address(named[0])}:{port}"
 
 
 def _is_for_others(name: str) -> bool:

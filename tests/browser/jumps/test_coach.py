@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, Request, expect
@@ -63,9 +62,7 @@ def _watched(page: Page) -> list[str]:
     return asked
 
 
-def test_the_screen_shows_the_last_jump_without_a_hand(
-    hill: Hill, service: MemoryService, open_page: Open, tmp_path: Path
-) -> None:
+def test_the_screen_shows_the_last_jump_without_a_hand(hill: Hill, service: MemoryService, open_page: Open) -> None:
     service.arm()
     page = open_page("about:blank", width=1280, height=720)
     page.context.add_init_script(f"({COUNT_LOCKS})()")
@@ -93,6 +90,7 @@ def test_the_screen_shows_the_last_jump_without_a_hand(
     assert not [path for path in asked[before:] if "/pulses/" in path]
     service.stop_recording(started.id)
     expect(page.locator("#coach-who")).to_have_text("5 · name unknown")
+    wait_until(lambda: f"api/recordings/{started.id}/link" in asked, "the code of this jump is asked for", 20)
     expect(page.locator("#coach-far")).to_have_text("Not measured")
     expect(page.locator("#coach-figures")).to_be_hidden()
     expect(replay).to_have_attribute("data-stage", "ready")
@@ -100,7 +98,14 @@ def test_the_screen_shows_the_last_jump_without_a_hand(
     service.last_jump = MEASURED.model_copy(update={"recording": started.id})
     service._wake()
     expect(page.locator("#coach-figures b").first).to_be_visible()
-    page.screenshot(path=tmp_path / "coach.png")
+    expect(page.locator("#coach-code")).to_be_visible()
+    page.route("**/link", lambda route: route.abort())
+    started = service.start_recording(RecordingOrder(bib="6", preroll_s=0))
+    service.stop_recording(started.id)
+    expect(page.locator("#coach-who")).to_have_text("6 · name unknown")
+    expect(page.locator("#coach-code")).to_be_hidden()  # no code of the jump before
+    page.unroute("**/link")
+    expect(page.locator("#coach-code")).to_be_visible()
 
 
 def test_the_screen_says_that_the_connection_is_lost_and_comes_back(

@@ -112,11 +112,19 @@ function drawJump() {
   setText($("coach-far"), recording ? howFar(measured, Boolean(figures)) : "");
   drawFigures(figures);
   replay.show(recording?.id ?? "", measured?.measured ?? "");
-  if (recording && (recording.id !== code.id || Date.now() - code.at > CODE_MS) && known.connected) {
-    const id = recording.id;
-    code = { id, at: Date.now() };
-    void showCode(id, $("coach-code"), $("coach-code-words"), () => known.view === "coach" && code.id === id);
+  void drawCode(recording?.id ?? "");
+}
+
+/** @param {string} id of the last jump; "": there is none */
+async function drawCode(id) {
+  const [image, words] = [$("coach-code"), $("coach-code-words")];
+  if (id !== code.id) {
+    clearCode(image, words); // at once: nobody gets the jump of the one before
+    code = { id, at: 0 };
   }
+  if (!id || !known.connected || Date.now() - code.at < CODE_MS) return;
+  code.at = Date.now();
+  if (!await showCode(id, image, words, () => known.view === "coach" && code.id === id) && code.id === id) code.at = 0;
 }
 
 /** @param {import("../shared/types.js").LastJump|null} figures */

@@ -12,20 +12,23 @@ import { day, timeOfMinute } from "../shared/format.js";
  * @param {HTMLImageElement} image hidden if there is no code
  * @param {HTMLElement} words
  * @param {() => boolean} wanted whether it is still to be shown when it comes
+ * @returns {Promise<boolean>} whether the service has answered
  */
 export async function showCode(id, image, words, wanted) {
   try {
     const { code, ends } = await call("GET", recordingPath(id, "/link"));
-    if (!wanted()) return;
+    if (!wanted()) return true;
     putImage(image, code);
     image.alt = t("share.alt");
     setText(words, t("share.until", { day: day(ends), time: timeOfMinute(ends) }));
   } catch (error) {
     if (!(error instanceof Problem)) throw error;
-    if (!wanted() || error.status === 0) return; // the code that is there is still good
+    if (!wanted()) return true;
+    if (error.status === 0) return false; // a code of this jump that is there is still good
     clearCode(image, words);
     setText(words, say({ code: error.code, text: error.message }).text);
   }
+  return true;
 }
 
 /**

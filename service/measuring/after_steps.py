@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +17,7 @@ from rig.host.files import make_folder
 from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import AnalysisSettings
 from service.background.child import run_child
-from service.measuring.results import keep_problem, keep_result, keep_step
+from service.measuring.results import VIDEO, keep_file, keep_problem, keep_result, keep_step
 
 #: Where results are made, before they are whole.
 _WORKSHOP: Final = ".measuring"
@@ -60,35 +61,44 @@ class AfterSteps:
             log: it.
             analysis: how.
         """
-        made = self._folder / _WORKSHOP / recording
+        made, video = (self._folder / _WORKSHOP / f"{recording}{ending}" for ending in ("", ".mp4"))
+        wants_video = AfterStep.VIDEO in analysis.after_recording
         try:
             make_folder(made.parent)
             shutil.rmtree(made, ignore_errors=True)
             asked = {
                 "log": str(log),
                 "out": str(made),
+                "video": str(video) if wants_video else None,
                 "survey": analysis.survey and str(analysis.survey),
                 "calibration": analysis.calibration and str(analysis.calibration),
-                "video": AfterStep.VIDEO in analysis.after_recording,
             }
-            end = self._child(recording, "service.measuring.program", asked)
-            if end is not None and log.exists():
-                self._end(recording, log, made, end)
+
+            def hear(news: dict[str, Any]) -> None:
+                if "jumps" in news:  # people wait for the figures, not for the video
+                    self._keep(recording, log, made, news["jumps"])
+                else:
+                    self._hear(news)
+
+            end = self._child(recording, "service.measuring.program", asked, hear)
+            if end is None or not log.exists():
+                return
+            if "problem" in end:
+                self._fail(recording, log, _phrase(end["problem"]))
+            elif wants_video:
+                if end["no_video"] is None:
+                    keep_file(video, log, VIDEO)
+                self._note(recording, log, AfterStep.VIDEO, end["no_video"])
         except (OSError, ValueError) as error:
             self._fail(recording, log, plain(f"{log.name}: {error}"))
         finally:
             shutil.rmtree(made, ignore_errors=True)
 
-    def _end(self, recording: str, log: Path, made: Path, end: dict[str, Any]) -> None:
-        if "problem" in end:
-            self._fail(recording, log, _phrase(end["problem"]))
+    def _keep(self, recording: str, log: Path, made: Path, found: list[dict[str, Any]]) -> None:
+        if not log.exists():
             return
-        jumps = tuple(
-            LastJump.model_validate(jump).model_copy(update={"recording": recording}) for jump in end["jumps"]
-        )
+        jumps = tuple(LastJump.model_validate(jump).model_copy(update={"recording": recording}) for jump in found)
         keep_result(made, log, jumps)
-        if "video" in end:
-            self._note(recording, log, AfterStep.VIDEO, end["video"])
         self._found(jumps)
 
     def copy(self, recording: str, log: Path, to: Path) -> None:
@@ -96,21 +106,17 @@ class AfterSteps:
         self._hear({"step": MeasuringStep.COPYING, "share": 0.0})
         asked = {"paths": [str(path) for path in (log, *beside(log))], "to": str(to)}
         try:
-            end = self._child(recording, "service.measuring.copying", asked)
+            end = self._child(recording, "service.measuring.copying", asked, self._hear)
             if end is not None and log.exists():
                 self._note(recording, log, AfterStep.COPY, end.get("problem"))
         except (OSError, ValueError) as error:
             self._warn(_not_copied(recording, plain(str(error))))
 
-    def _child(self, recording: str, module: str, asked: dict[str, Any]) -> dict[str, Any] | None:
-        return run_child(
-            module,
-            asked,
-            busy=self._busy,
-            wanted=lambda: self._wanted(recording),
-            tell=self._hear,
-            hold=self._hold,
-        )
+    def _child(
+        self, recording: str, module: str, asked: dict[str, Any], tell: Callable[[dict[str, Any]], None]
+    ) -> dict[str, Any] | None:
+        wanted = partial(self._wanted, recording)
+        return run_child(module, asked, busy=self._busy, wanted=wanted, tell=tell, hold=self._hold)
 
     def _note(self, recording: str, log: Path, step: AfterStep, problem: dict[str, Any] | None) -> None:
         """Note what came of a further step, and tell if it failed."""

@@ -15,14 +15,12 @@ _STEPS: Final = {
     "computing": MeasuringStep.COMPUTING,
     "writing": MeasuringStep.WRITING,
 }
-#: MP4, which every phone plays.
-_VIDEO: Final = "overlay.mp4"
 
 
 def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
-    """Measure `log` by `survey` or `calibration` into the folder `out`, with or without a `video`.
+    """Measure `log` by `survey` or `calibration` into the folder `out`, then draw the `video`, unless it is null.
 
-    Says the main figures of the jumps, and of a video why there is none; null: there is one.
+    Tells the main figures of the jumps when the folder is whole, and says at the end why there is no video.
     """
     from analysis.cameras.source import read_source  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.procedure.analyze import analyze  # noqa: PLC0415
@@ -43,17 +41,17 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     jumps = [
         summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
     ]
-    end: dict[str, Any] = {"jumps": [jump.model_dump(mode="json") for jump in jumps]}
-    if asked["video"]:
-        try:
-            write_video(
-                result, found.measurements, found.system, log, out / _VIDEO,
-                progress=lambda done, of: tell(step=MeasuringStep.VIDEO, share=done / max(1, of)),
-            )  # fmt: skip
-            end["video"] = None
-        except SvevError as error:  # what was measured is worth more
-            end["video"] = as_plain(error.said)
-    return end
+    tell(last=True, jumps=[jump.model_dump(mode="json") for jump in jumps])
+    if asked["video"] is None:
+        return {}
+    try:
+        write_video(
+            result, found.measurements, found.system, log, Path(asked["video"]),
+            progress=lambda done, of: tell(step=MeasuringStep.VIDEO, share=done / max(1, of)),
+        )  # fmt: skip
+    except SvevError as error:
+        return {"no_video": as_plain(error.said)}
+    return {"no_video": None}
 
 
 if __name__ == "__main__":

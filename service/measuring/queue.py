@@ -1,7 +1,7 @@
-"""The logs that wait to be measured: one after the other, none while a recording runs, none forgotten.
+"""The logs that wait to be measured: one after the other, the last jump first, none while a recording runs.
 
 A log is queued when it is opened, and measured when it is closed; then come the further steps that the rig file asks
-for. A service that was killed, or a computer without power, goes on with the queue.
+for. None is forgotten: A service that was killed, or a computer without power, goes on with the queue.
 """
 
 import threading
@@ -67,12 +67,15 @@ class Measurings:
         self._thread.join(_END_S)
 
     def opened(self, log: Path) -> None:
-        """Note that a recording writes this log; when it is closed that is done with it which the rig file asks for."""
+        """Note that a recording writes this log; when it is closed that is done with it which the rig file asks for.
+
+        It comes before those that wait: people at the hill look at the last jump.
+        """
         analysis = self._in_use().analysis
         if log.parent != self._folder or analysis is None or not analysis.after_recording:
             return
         with suppress(StateForbidsError):  # two thousand wait: this one is measured when somebody asks
-            self._waiting.add(log.stem)
+            self._waiting.add(log.stem, first=True)
         self._bell.set()
 
     def want(self, recording: str, log: Path) -> Measurement:
@@ -108,11 +111,15 @@ class Measurings:
         known = measurement_of(recording, log)  # what left the queue before is there
         if recording not in ids:
             return known
-        update: dict[str, Any] = {"state": MeasuringState.WAITING, "before": ids.index(recording)}
         if running is None or running.recording != recording:
+            others = [other for other in ids if running is None or other != running.recording]
+            before = others.index(recording) + (running is not None)
+            update: dict[str, Any] = {"state": MeasuringState.WAITING, "before": before}
             running = None
         else:
-            update |= {name: getattr(running, name) for name in ("state", "paused", "step", "share")}
+            update = {name: getattr(running, name) for name in ("state", "paused", "step", "share")}
+            if running.step in _AT_WORK:  # what was measured is there
+                update["state"] = known.state
         return known.model_copy(update=update | {"steps": self._steps(known, running)})
 
     def _steps(self, known: Measurement, running: MeasuringQueue | None) -> tuple[StepState, ...]:

@@ -23,6 +23,8 @@ from service.seam.archive import Download
 
 _NAME: Final = "measurement.json"
 _JUMPER: Final = "jumper.json"
+#: MP4, which every phone plays.
+VIDEO: Final = "overlay.mp4"
 _VERSION: Final = version("svev")
 
 
@@ -144,6 +146,17 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...]) -> None:
     made.rename(target)
     sync(target.parent)
     _remove(old)
+
+
+def keep_file(made: Path, log: Path, name: str) -> None:
+    """Put a file into the result of a log, in place of one of this name.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    sync(made)
+    made.replace(measured_path(log) / name)
+    sync(measured_path(log))
 
 
 def keep_problem(log: Path, problem: Statement) -> None:

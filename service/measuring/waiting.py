@@ -41,8 +41,8 @@ class WaitingLogs:
         with self._lock:
             return list(self._ids)
 
-    def add(self, recording: str) -> None:
-        """Let a log wait behind the others, unless it waits already.
+    def add(self, recording: str, *, first: bool = False) -> None:
+        """Let a log wait behind the others, or before them, unless it waits already.
 
         Raises:
             StateForbidsError: too many wait.
@@ -52,7 +52,7 @@ class WaitingLogs:
                 return
             if len(self._ids) >= _MOST:
                 raise StateForbidsError(f"{_MOST} logs are waiting already: wait until some are measured")
-            self._ids.append(recording)
+            self._ids.insert(0 if first else len(self._ids), recording)
 
     def remove(self, recording: str) -> None:
         """Let a log wait no more."""
@@ -61,7 +61,7 @@ class WaitingLogs:
                 self._ids.remove(recording)
 
     def load(self) -> None:
-        """Go on with those of an earlier service, before those that have come since."""
+        """Go on with those of an earlier service, behind those that have come since."""
         try:
             before = _IDS.validate_json(read_whole(self._file, TEXT_MAX, links=False))
         except FileNotFoundError:
@@ -72,7 +72,8 @@ class WaitingLogs:
             self._warn(phrase("event_no_queue", text, file=NAME, why=why))
             return
         with self._lock:
-            self._ids = [*before[:_MOST], *(recording for recording in self._ids if recording not in before)]
+            self._ids += [recording for recording in before if recording not in self._ids]
+            del self._ids[_MOST:]
 
     def keep(self) -> None:
         """Write the file, if anything has changed."""

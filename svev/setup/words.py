@@ -113,7 +113,10 @@ _WORDS: Final[dict[str, tuple[str, str]]] = {
     "kept": ("{path} is as it was", "{path} er som før"),
     "backup": ("the former one is {path}", "den forrige er {path}"),
     "address": ("the page: {url}", "siden: {url}"),
-    "token": ("its token, asked for once by each phone: {token}", "nøkkelen, som hver telefon spør om én gang: {token}"),
+    "token": (
+        "its token, asked for once by each phone: {token}",
+        "nøkkelen, som hver telefon spør om én gang: {token}",
+    ),
     "authority": (
         "phones trust it when {path} is installed on them: docs/hill-pc.md says how",
         "telefonene stoler på den når {path} er installert på dem: docs/hill-pc.md sier hvordan",

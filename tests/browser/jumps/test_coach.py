@@ -1,5 +1,6 @@
 """The coach's screen, and the athlete's page behind its code, in a network that phones reach."""
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -143,7 +144,7 @@ def test_a_link_shows_its_jump_and_nothing_else(hill: Hill, service: MemoryServi
     other = page.locator("#visit-replay .replay-camera")
     for camera, expected in (("K1", [160, 120]), ("K2", [160, 120]), ("K3", [160, 120]), ("All cameras", [480, 120])):
         expect(other).to_have_text(camera)
-        wait_until(lambda expected=expected: page.evaluate(size) == expected, f"{camera} is shown", 20)
+        page.wait_for_function(f"JSON.stringify({size}) === '{json.dumps(expected, separators=(',', ':'))}'")
         other.click()
     expect(page.locator("#visit-until")).to_have_text(re.compile(r"^This page opens until .*, \d\d:\d\d\.$"))
     page.locator("#visit-more summary").click()

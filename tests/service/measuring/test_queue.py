@@ -146,8 +146,8 @@ def _a_failure_leaves_the_result(bench: Bench) -> None:
 def test_a_service_that_ends_in_the_middle_goes_on_when_it_is_started_again(bench: Bench) -> None:
     write_log(bench.log("other"))
     with bench.running() as queue:
-        queue.opened(bench.log("jump"))
         queue.opened(bench.log("other"))
+        queue.opened(bench.log("jump"))  # the last one comes first: people at the hill look at it
         wait_until(lambda: queue.view.state is MeasuringState.MEASURING, "it is being measured", PATIENCE_S, 0.01)
     assert bench.waiting() == ["jump", "other"]
     assert not measured_path(bench.log("jump")).exists()
@@ -220,15 +220,21 @@ def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Benc
     bench.further = {"after_recording": ("measure", "video", "copy"), "copy_to": other}
     with bench.running() as queue:
         queue.opened(bench.log("jump"))
-        seen = set()
-        while (now := bench.of(queue, "jump")).state not in OVER:
-            seen.add(tuple((each.step.value, each.state.value) for each in now.steps))
-            wait_until(lambda: bench.of(queue, "jump") != now, "it goes on", PATIENCE_S, 0.01)
-        without_a_disk = now
+        seen, figures = set(), 0
+        wait_until(lambda: bench.waiting() == ["jump"], "it stands in the queue")
+        while bench.waiting():
+            now = bench.of(queue, "jump")
+            seen.add(tuple(_states(now)))
+            if ("video", "measuring") in _states(now):
+                figures = max(figures, len(now.figures))
+            wait_until(lambda now=now: bench.of(queue, "jump") != now or not bench.waiting(), "it goes on", PATIENCE_S)  # type: ignore[misc]
+        without_a_disk = bench.of(queue, "jump")
+        assert figures == 1, "they do not wait for the video"
         assert not list(tmp_path.glob("other disk*"))  # nothing is made where a disk is not connected
         other.mkdir()
         queue.want("jump", bench.log("jump"))
-        copied = bench.until_over(queue, "jump")
+        wait_until(lambda: (other / "jump.measured").exists() and not bench.waiting(), "it is copied", PATIENCE_S)
+        copied = bench.of(queue, "jump")
     assert without_a_disk.state is MeasuringState.DONE
     assert (("measure", "measuring"), ("video", "waiting"), ("copy", "waiting")) in seen
     assert (("measure", "done"), ("video", "measuring"), ("copy", "waiting")) in seen
@@ -257,7 +263,9 @@ def test_another_log_of_the_same_name_is_not_written_over(bench: Bench, tmp_path
     bench.further, bench.survey = {"after_recording": ("measure", "copy"), "copy_to": other}, tmp_path / "none.json"
     with bench.running() as queue:
         queue.opened(bench.log("jump"))
-        failed = bench.until_over(queue, "jump")
+        bench.until_over(queue, "jump")
+        wait_until(lambda: not bench.waiting(), "the copy is over too", PATIENCE_S)
+        failed = bench.of(queue, "jump")
     assert _states(failed) == [("measure", "failed"), ("copy", "failed")]
     assert failed.steps[-1].problem is not None
     assert "another log of this name" in failed.steps[-1].problem.text

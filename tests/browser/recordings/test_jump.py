@@ -152,6 +152,11 @@ def test_one_tap_loops_the_take_off_in_slow_motion(panel: Panel, overlay: Path, 
     seen = page.evaluate("seen")
     assert min(seen) == FIRST  # the log begins less than 0.5 s before the take-off
     assert max(seen) <= TAKEOFF + RATE_HZ
+    page.locator("#frame-loop").click()
+    page.locator("#frame-play").click()  # stopped, but still in a loop
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    page.locator("#frame-loop").click()
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
 
 
 def test_a_result_of_an_older_version_says_why_there_is_no_stick_figure(

@@ -90,7 +90,7 @@ export function makePlayer(scene) {
       requestAnimationFrame(playOn);
     },
     toggleLoop() {
-      looping = !looping;
+      looping = !(looping && playing); // one that somebody has stopped begins again by one tap
       $("frame-loop").setAttribute("aria-pressed", String(looping));
       if (!looping || !scene.pulses().length) return pause();
       if (Number($("frame-speed").value) === 1) $("frame-speed").value = String(LOOP_SLOWER);

@@ -17,7 +17,7 @@ from service.measuring.results import keep_result
 from tests.analysis.report.jumps import measured_recording, write_jump_log
 from tests.analysis.simulated import RATE_HZ, SIZE, true_cameras
 from tests.browser.conftest import Open
-from tests.browser.views import assert_fits_a_phone
+from tests.browser.views import AXE, assert_fits_a_phone
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
@@ -204,6 +204,8 @@ def test_a_phone_shows_one_camera_in_full_width_with_two_rows_of_controls(
     page.locator("#frame-more").click()
     expect(page.locator("#frame-cameras")).to_be_visible()
     assert_fits_a_phone(page)
+    page.evaluate(AXE.read_text())
+    assert page.evaluate("axe.run().then(found => found.violations.map(each => each.id))") == []
     page.locator("#frame-full").click()
     expect(page.locator("#frame-full")).to_have_attribute("aria-pressed", "true")
     assert page.evaluate("document.fullscreenElement.id") == "player"

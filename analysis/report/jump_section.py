@@ -12,7 +12,7 @@ from analysis.report.charts import BAND_SIGMAS, bands, evenly, fig8
 from analysis.report.course import LARGEST_SIGMA_M, Course
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Crop
 from analysis.report.figures import EARLY_S, Figure, fixed, value_and_sigma
-from analysis.report.language import LANGUAGES, Language, Said, attribute, same, sentences, shown
+from analysis.report.language import LANGUAGES, Language, Said, attribute, reasons, shown
 from analysis.report.overlay import ELLIPSE_SIGMAS, SKI_LENGTH_M, Overlay
 from analysis.report.scrubbing import READOUT, frames_json, still_svg
 from analysis.result.model import Jump
@@ -80,7 +80,7 @@ def _verdict(jump: Jump) -> str:
         if jump.verdict.ok
         else ("bad", "!", Said("Do not rely on these numbers", "Ikke stol på disse tallene"))
     )
-    told = sentences(jump.verdict.said) if jump.verdict.said else same(jump.verdict.message)
+    told = reasons(jump.verdict)
     both = "".join(
         f'<div lang="{language}"><strong>{words.of(language)}</strong><p>{escape(told.of(language))}</p></div>'
         for language in LANGUAGES

@@ -5,6 +5,7 @@ from html import escape
 from typing import Final, Literal, NamedTuple
 
 from analysis.report.norwegian import SENTENCES
+from analysis.result.model import Verdict
 from rig.phrase import Phrase, Value
 
 Language = Literal["en", "nb"]
@@ -48,6 +49,11 @@ def sentences(all_of_them: tuple[Phrase, ...]) -> Said:
     """Sentences one after the other."""
     words = [said(each) for each in all_of_them]
     return Said("; ".join(each.english for each in words), "; ".join(each.norwegian for each in words))
+
+
+def reasons(verdict: Verdict) -> Said:
+    """What a verdict rests on."""
+    return sentences(verdict.said) if verdict.said else same(verdict.message.removeprefix("measured well: "))
 
 
 def with_comma(svg: str) -> str:

@@ -34,15 +34,13 @@ from analysis.report.kinogram.words import (
     reference_words,
     where_words,
 )
-from analysis.report.language import Said, same
+from analysis.report.language import Said, reasons, same
 from analysis.report.overlay import Overlay
 from analysis.result.model import MeasuredRecording, Quantity
 
 #: Bytes that all pictures of a page may need; the whole page stays below 600 kB.
 PICTURE_BUDGET: Final = 500_000
 _QUALITIES: Final = (85, 75, 60, 45, 30, 15)
-#: What the verdict's words begin with where the mark says it in both languages.
-_SAID: Final = "measured well: "
 _KEY: Final = (("right", RIGHT), ("left", LEFT), ("body", BODY))
 
 
@@ -120,9 +118,9 @@ def _key(kinogram: Kinogram) -> str:
         bar = f'<path d="M2 2v16M2 10h{scale:.0f}m0-8v16" stroke="currentColor" stroke-width="3"/>'
         metre = f'<svg class="metre" viewBox="-16 0 {WIDTH} 20" aria-hidden="true">{bar}</svg>'
         metre += f"<p><b>1 m</b> {_both(METRE)}</p>"
-    why = f'<p lang="en">{escape(kinogram.jump.verdict.message.removeprefix(_SAID))}</p>'
     kind, said = ("good", GOOD) if ok else ("bad", DOUBTFUL)
-    verdict = f'<div class="verdict {kind}"><strong>{_both(said)}</strong>{why}</div>'
+    why = _both(reasons(kinogram.jump.verdict))
+    verdict = f'<div class="verdict {kind}"><strong>{_both(said)}</strong><p>{why}</p></div>'
     return f'<div class="key">{verdict}<ul>{lines}{ring}</ul>{metre}</div>'
 
 

@@ -21,10 +21,11 @@ from analysis.report.kinogram.figures import Mark, Word, marks_of, reference_of
 from analysis.report.kinogram.folder import write_kinograms
 from analysis.report.kinogram.shots import PLACES_M, WIDTH, Missing, Shot, moments_of, shots_of
 from analysis.report.overlay import Overlay
-from analysis.result.model import Jump, MeasuredRecording, Quantity
+from analysis.result.model import Jump, MeasuredRecording, Quantity, Verdict
 from analysis.scene.camera_system import PlacedCamera
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import phrase
 from tests.analysis.report.jumps import JUMP_SEED, measured_recording, measurements, write_jump_log
 from tests.analysis.result.recordings import model, without_takeoff
 from tests.analysis.simulated import RATE_HZ, true_cameras
@@ -318,12 +319,18 @@ def test_marks_stand_on_the_page_and_a_doubtful_jump_has_none(log: Path, tmp_pat
     text = _text((tmp_path / "next" / "kinogram.html").read_text(encoding="utf-8"))
     assert re.search(r"better \+\d\.\d+ bedre", text)
     assert "the athlete's 3 fastest earlier jumps" in text
-    doubtful = replace(result.jumps[0], verdict=replace(result.jumps[0].verdict, ok=False, message="K2 has moved"))
+    doubtful = replace(result.jumps[0], verdict=_verdict())
     content = _written(replace(result, jumps=(doubtful,)), log, tmp_path / "next", slower)
     assert content["jumps"][0]["marks"] == {}
     text = _text((tmp_path / "next" / "kinogram.html").read_text(encoding="utf-8"))
-    assert "Doubtful: do not rely on it Usikkert: ikke stol på det K2 has moved" in text
+    assert "Doubtful: do not rely on it Usikkert: ikke stol på det the take-off was not found" in text
+    assert "satsen ble ikke funnet" in text
     assert "Not compared" in text
+
+
+def _verdict() -> Verdict:
+    no = phrase("jump_no_takeoff", "the take-off was not found, so that time counts from the first pulse")
+    return Verdict(False, str(no), {}, (no,))
 
 
 def test_several_jumps_have_a_picture_each_and_share_the_page(log: Path, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from analysis.report.course import course_of
 from analysis.report.crops import crops_of, windows_of
 from analysis.report.figures import five_figures
 from analysis.report.jump_section import JumpShown, jump_section
-from analysis.report.language import LANGUAGES, Said, attribute, said, same, shown
+from analysis.report.language import LANGUAGES, Said, attribute, day_of, said, same, shown
 from analysis.report.scrubbing import overlays_of, shown_pulses
 from analysis.result.model import MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
@@ -66,10 +66,6 @@ _FIELDS: Final = {
     "round": Said("round", "omgang"),
     "session": Said("session", "økt"),
 }
-_MONTHS: Final = (
-    "januar", "februar", "mars", "april", "mai", "juni", "juli", "august", "september", "oktober", "november",
-    "desember",
-)  # fmt: skip
 
 
 def write_report(
@@ -179,8 +175,7 @@ def _head(result: MeasuredRecording) -> str:
     times = [pulse.time for jump in result.jumps for pulse in jump.pulses[:1]]
     if times:
         then = datetime.fromtimestamp(min(times) // NS_PER_S, UTC)
-        clock = then.strftime("%Y, %H:%M:%S UTC")
-        facts.append(Said(f"{then:%-d %B} {clock}", f"{then.day}. {_MONTHS[then.month - 1]} {clock}"))
+        facts.append(Said(*(f"{day}, {then:%H:%M:%S} UTC" for day in day_of(then))))
     recording = _recording(result)
     facts.append(Said(recording.english.replace("R", "r", 1), recording.norwegian.replace("O", "o", 1)))
     items = "".join(f"<li>{shown(fact)}</li>" for fact in facts)

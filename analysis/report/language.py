@@ -1,6 +1,7 @@
 """The coach's page in English and Norwegian: both stand in it, and `html[lang]` says which is shown."""
 
 import re
+from datetime import datetime
 from html import escape
 from typing import Final, Literal, NamedTuple
 
@@ -10,6 +11,12 @@ from rig.phrase import Phrase, Value
 
 Language = Literal["en", "nb"]
 LANGUAGES: Final[tuple[Language, ...]] = ("en", "nb")
+
+
+_MONTHS: Final = (
+    "januar", "februar", "mars", "april", "mai", "juni", "juli", "august", "september", "oktober", "november",
+    "desember",
+)  # fmt: skip
 
 
 class Said(NamedTuple):
@@ -26,6 +33,11 @@ class Said(NamedTuple):
 def same(text: str) -> Said:
     """What is the same in both languages, e.g. a name."""
     return Said(text, text)
+
+
+def day_of(then: datetime) -> Said:
+    """A date."""
+    return Said(f"{then:%-d %B %Y}", f"{then.day}. {_MONTHS[then.month - 1]} {then.year}")
 
 
 def shown(words: Said, tag: str = "span") -> str:

@@ -15,8 +15,9 @@ from analysis.comparison.report import WORDS, Comparison, deviation, in_words, i
 from analysis.comparison.shared_calibration import Common
 from analysis.report.compared.charts import difference_chart, value_chart
 from analysis.report.compared.places import Images, at_places
-from analysis.report.compared.words import Language, both, date, first_letter_large, quantity, said, text
+from analysis.report.compared.words import figure, first_letter_large, quantity, said, text
 from analysis.report.course import course_of
+from analysis.report.language import LANGUAGES, Language, Said, day_of, same, shown
 from analysis.result.model import QUANTITIES
 from rig.clocks import NS_PER_S
 
@@ -25,11 +26,11 @@ _SHOWN: Final = 2
 #: As much is said to be more than 99 %.
 _NEARLY: Final = 0.995
 _COMMON: Final = {Common.CALIBRATION: "calibration", Common.SURVEY: "survey", Common.NOTHING: "nothing"}
-_NAMES: Final = {Language.EN: "English", Language.NB: "Norsk"}
+_NAMES: Final[dict[Language, str]] = {"en": "English", "nb": "Norsk"}
 
 
 def comparison_page(
-    comparison: Comparison, images: tuple[Images | None, Images | None], language: Language = Language.EN
+    comparison: Comparison, images: tuple[Images | None, Images | None], language: Language = "en"
 ) -> str:
     """The page as HTML.
 
@@ -61,7 +62,7 @@ def comparison_page(
         _folded("method", _method(comparison)),
         "</main>",
     ]
-    title = f"{_who(jumps[0], language)} / {_who(jumps[1], language)}"
+    title = " / ".join(_who(jump).of(language) for jump in jumps)
     return _whole(title, "\n".join(filter(None, body)), language)
 
 
@@ -83,9 +84,9 @@ def _whole(title: str, body: str, language: Language) -> str:
 
 def _head(jumps: tuple[MeasuredJump, MeasuredJump], language: Language) -> str:
     choices = "".join(
-        f'<label><input type="radio" name="language" id="in-{each}"{" checked" if each is language else ""}>'
+        f'<label><input type="radio" name="language" id="in-{each}"{" checked" if each == language else ""}>'
         f"{_NAMES[each]}</label>"
-        for each in Language
+        for each in LANGUAGES
     )
     rows = "".join(_heading(letter, jump) for letter, jump in zip("AB", jumps, strict=True))
     switch = f'<fieldset><legend class="unseen">{text("language")}</legend>{choices}</fieldset>'
@@ -93,26 +94,25 @@ def _head(jumps: tuple[MeasuredJump, MeasuredJump], language: Language) -> str:
 
 
 def _heading(letter: str, jump: MeasuredJump) -> str:
-    who, when = both(lambda language: _who(jump, language)), both(lambda language: _when(jump, language), "small")
-    return f'<li class="{letter.lower()}"><b>{letter}</b> {who} {when}</li>'
+    return f'<li class="{letter.lower()}"><b>{letter}</b> {shown(_who(jump))} {shown(_when(jump), "small")}</li>'
 
 
-def _who(jump: MeasuredJump, language: Language) -> str:
+def _who(jump: MeasuredJump) -> Said:
     """Name and bib."""
     bib = jump.recording.session.get("bib", "").strip()
-    name = jump.athlete.strip() or said(language, "nobody")
-    return f"{name} ({bib})" if bib else name
+    name = jump.athlete.strip()
+    return same(f"{name} ({bib})" if bib else name) if name else said("unnamed", bib=f" ({bib})" if bib else "")
 
 
-def _when(jump: MeasuredJump, language: Language) -> str:
+def _when(jump: MeasuredJump) -> Said:
     """Date and time of the take-off here, and which jump of its recording it is, if there are several."""
     takeoff = jump.jump.takeoff
     if takeoff is None:
-        return ""
+        return same("")
     then = datetime.fromtimestamp(takeoff.time / NS_PER_S, UTC).astimezone()
-    day = date(language, then)
+    when = day_of(then)
     several = len(jump.recording.jumps) > 1
-    return f"{day}, {said(language, 'jump', number=jump.jump.number)}" if several else day
+    return said("when", day=when, time=f"{then:%H:%M}", jump=said("jump", number=jump.jump.number) if several else "")
 
 
 def _section(key: str, content: str) -> str:
@@ -132,29 +132,24 @@ def _verdict(comparison: Comparison, found: list[str]) -> str:
     own = text("no_scatter", "p") if scatter is None else text("scatter", "p", jumps=scatter.jumps)
     if not found:
         return _section("same", text("same_how", "p") + own)
-    lines = "".join(f"<li>{_greatest_of(comparison, name)}</li>" for name in found)
+    lines = "".join(f"<li>{shown(_greatest(comparison, name))}</li>" for name in found)
     return _section("different", f'<ul class="found">{lines}</ul>{text("found_how", "p")}{own}')
 
 
-def _greatest_of(comparison: Comparison, name: str) -> str:
-    return both(lambda language: _greatest(comparison, name, language))
-
-
-def _greatest(comparison: Comparison, name: str, language: Language) -> str:
+def _greatest(comparison: Comparison, name: str) -> Said:
     d, row = comparison.difference, QUANTITIES.index(name)
     at = d.greatest(row)
     if at is None:
-        return ""
+        return same("")
     value, since = float(d.value[row, at]), float(d.times[at])
     _, _, unit, decimals = WORDS[name]
-    when = said(language, "before" if since < 0 else "after", at=f"{abs(since):.2f}")
-    size = f"{abs(value):.{decimals}f} ± {deviation(name, d.sigma[row, at])}"
-    words = said(
-        language, "less" if value < 0 else "more", quantity=quantity(language, name), size=size, unit=unit, when=when
-    )
+    when = said("before" if since < 0 else "after", at=figure(f"{abs(since):.2f}"))
+    size = figure(f"{abs(value):.{decimals}f} ± {deviation(name, d.sigma[row, at])}")
+    words = said("less" if value < 0 else "more", quantity=quantity(name), size=size, unit=unit, when=when)
     scatter = comparison.scatter
     if scatter is not None and np.isfinite(scatter.deviation[row, at]):
-        words += said(language, "own", p=in_words(float(scatter.p(d.value)[row, at])))
+        own = said("own", p=figure(in_words(float(scatter.p(d.value)[row, at]))))
+        words = Said(*(one + other for one, other in zip(words, own, strict=True)))
     return first_letter_large(words)
 
 
@@ -168,13 +163,13 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
 def _numbers(comparison: Comparison) -> str:
     d, own = comparison.difference, comparison.scatter
     times = instants(d.times)
-    head = ["", *(_figure(f"{signed(d.times[at], 2)} s") for at in times)]
+    head = ["", *(_number(f"{signed(d.times[at], 2)} s") for at in times)]
     names = [f"{_named(name)} ({WORDS[name][2]})" for name in QUANTITIES]
-    rows = [[names[row], *(_figure(_cell(d, name, row, at)) for at in times)] for row, name in enumerate(QUANTITIES)]
+    rows = [[names[row], *(_number(_cell(d, name, row, at)) for at in times)] for row, name in enumerate(QUANTITIES)]
     parts = [text("instants", "p"), _table(head, rows)]
     if own is not None:
         deviations = [
-            [names[row], *(_figure(plain(own.deviation[row, at], WORDS[name][3] + 1)) for at in times)]
+            [names[row], *(_number(plain(own.deviation[row, at], WORDS[name][3] + 1)) for at in times)]
             for row, name in enumerate(QUANTITIES)
         ]
         parts += [text("own_scatter", "p"), _table(head, deviations)]
@@ -185,22 +180,22 @@ def _numbers(comparison: Comparison) -> str:
 
 
 def _named(name: str) -> str:
-    return both(lambda language: quantity(language, name))
+    return shown(quantity(name))
 
 
-def _figure(number: str) -> str:
-    return both(lambda _: number)
+def _number(number: str) -> str:
+    return shown(figure(number))
 
 
 def _power_row(name: str, power: Power) -> list[str]:
     _, _, unit, decimals = WORDS[name]
-
-    def chance(language: Language) -> str:
-        percent = said(language, "nearly") if power.probability >= _NEARLY else f"{100 * power.probability:.0f} %"
-        return said(language, "chance", change=f"{power.change:g}", unit=unit, percent=percent)
-
-    found = text("chance", change=f"{power.change_80:.{decimals + 1}f}", unit=unit, percent="80 %")
-    return [_named(name), both(chance), found]
+    percent = said("nearly") if power.probability >= _NEARLY else f"{100 * power.probability:.0f} %"
+    found = figure(f"{power.change_80:.{decimals + 1}f}")
+    return [
+        _named(name),
+        text("chance", change=figure(f"{power.change:g}"), unit=unit, percent=percent),
+        text("chance", change=found, unit=unit, percent="80 %"),
+    ]
 
 
 def _cell(d: Difference, name: str, row: int, at: int) -> str:
@@ -213,7 +208,7 @@ def _method(comparison: Comparison) -> str:
     d = comparison.difference
     count = int(np.isfinite(d.value).sum())
     lines = [
-        text("greatest_of", "p", count=count, independent=f"{d.independent:.0f}", limit=f"{d.limit:.1f}"),
+        text("greatest_of", "p", count=count, independent=f"{d.independent:.0f}", limit=figure(f"{d.limit:.1f}")),
         text(_COMMON[d.common], "p"),
         "" if comparison.alignment.at_one_place else text("two_places", "p"),
     ]

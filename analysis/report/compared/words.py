@@ -2,21 +2,10 @@
 """What the page of a comparison says, in English and Norwegian; a reader switches between them on the page."""
 
 import re
-from collections.abc import Callable
-from datetime import datetime
-from enum import StrEnum
-from html import escape
 from typing import Final
 
 from analysis.comparison.report import WORDS
-
-
-class Language(StrEnum):
-    """Languages of the page, as in the attribute `lang`."""
-
-    EN = "en"
-    NB = "nb"
-
+from analysis.report.language import LANGUAGES, Language, Said, shown
 
 _NORWEGIAN: Final = {
     "alpha": "leggvinkel",
@@ -31,15 +20,13 @@ _NORWEGIAN: Final = {
     "velocity_y": "fart langs Y",
     "velocity_z": "fart langs Z",
 }
-_MONTHS: Final = (
-    "januar", "februar", "mars", "april", "mai", "juni", "juli", "august", "september", "oktober", "november", "desember",
-)  # fmt: skip
 #: English and Norwegian, with `{name}` filled in.
 TEXTS: Final = {
     "title": ("Two jumps compared", "To hopp sammenlignet"),
     "language": ("Language", "Språk"),
     "jump": ("jump {number}", "hopp {number}"),
-    "nobody": ("No name", "Uten navn"),
+    "unnamed": ("No name{bib}", "Uten navn{bib}"),
+    "when": ("{day}, {time} {jump}", "{day}, {time} {jump}"),
     "different": ("What differs", "Hva som er ulikt"),
     "same": ("No difference found", "Ingen forskjell funnet"),
     "more": ("{quantity}: {size} {unit} more in B, {when}", "{quantity}: {size} {unit} mer i B, {when}"),
@@ -109,38 +96,30 @@ TEXTS: Final = {
 }  # fmt: skip
 
 
-def said(language: Language, key: str, **values: object) -> str:
-    """A text in a language, with its values."""
-    return TEXTS[key][list(Language).index(language)].format(**values)
+def said(key: str, **values: object) -> Said:
+    """A text with its values, of which a `Said` stands in each language's text as it is said there."""
+    return Said(*(TEXTS[key][place].format(**_in(language, values)) for place, language in enumerate(LANGUAGES)))
 
 
-def quantity(language: Language, name: str) -> str:
+def figure(written: str) -> Said:
+    """A number, or several: a Norwegian one has a comma before its decimals."""
+    return Said(written, re.sub(r"(?<=\d)\.(?=\d)", ",", written))
+
+
+def quantity(name: str) -> Said:
     """The name of a quantity."""
-    return WORDS[name][0] if language is Language.EN else _NORWEGIAN[name]
-
-
-def date(language: Language, then: datetime) -> str:
-    """Day and time."""
-    if language is Language.EN:
-        return f"{then.day} {then:%b %Y, %H:%M}"
-    return f"{then.day}. {_MONTHS[then.month - 1]} {then:%Y, %H:%M}"
-
-
-def both(words: Callable[[Language], str], tag: str = "span") -> str:
-    """An element with text in each language, of which the page shows one."""
-    return "".join(f'<{tag} lang="{each}">{escape(localised(each, words(each)))}</{tag}>' for each in Language)
+    return Said(WORDS[name][0], _NORWEGIAN[name])
 
 
 def text(key: str, tag: str = "span", **values: object) -> str:
     """A text as an element in each language."""
-    return both(lambda language: said(language, key, **values), tag)
+    return shown(said(key, **values), tag)
 
 
-def localised(language: Language, written: str) -> str:
-    """Numbers as the language writes them: a Norwegian one has a comma before its decimals."""
-    return written if language is Language.EN else re.sub(r"(?<=\d)\.(?=\d)", ",", written)
-
-
-def first_letter_large(written: str) -> str:
+def first_letter_large(words: Said) -> Said:
     """The text with its first letter as a capital."""
-    return written[0].upper() + written[1:]
+    return Said(*(each[0].upper() + each[1:] for each in words))
+
+
+def _in(language: Language, values: dict[str, object]) -> dict[str, object]:
+    return {name: value.of(language) if isinstance(value, Said) else value for name, value in values.items()}

@@ -13,9 +13,9 @@ from analysis.comparison.report import Comparison, summary, to_json
 from analysis.comparison.scatter import scatter
 from analysis.report.compared.page import comparison_page
 from analysis.report.compared.places import Images, images_beside
-from analysis.report.compared.words import Language
 from analysis.result.file import read
 from analysis.result.model import MeasuredRecording
+from rig.api.comparison import PageLanguage
 from rig.errors import BadInputError
 from svev import console
 
@@ -32,8 +32,8 @@ def compare(
         list[Path] | None, typer.Option("--also", help="further jumps, for the athlete's own scatter; may be repeated")
     ] = None,
     language: Annotated[
-        Language, typer.Option("--language", help="that the page shows first; a reader can choose the other one")
-    ] = Language.EN,
+        PageLanguage, typer.Option("--language", help="that the page shows first; a reader can choose the other one")
+    ] = PageLanguage.EN,
     as_json: Annotated[
         bool, typer.Option("--json", help="end with one JSON object: the result without series")
     ] = False,
@@ -55,7 +55,9 @@ def compare(
     found = difference(alignment)
     comparison = Comparison(alignment, found, scatter(alignment.jumps[2:], found.times))
     result = to_json(comparison)
-    page = comparison_page(comparison, (_images(dir_a, a), _images(dir_b, b)), language)
+    page = comparison_page(
+        comparison, (_images(dir_a, a), _images(dir_b, b)), "nb" if language is PageLanguage.NB else "en"
+    )
     out.mkdir(parents=True, exist_ok=True)
     written = json.dumps(result, allow_nan=False, ensure_ascii=False) + "\n"
     (out / "comparison.json").write_text(written, encoding="utf-8")

@@ -33,6 +33,9 @@ _NEEDED: Final = re.compile(
 _ENCODING: Final = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([^"']*)["']""")
 _UTF8: Final = frozenset({b"utf-8", b"us-ascii", b"ascii"})
 _FORMULA: Final = re.compile(rb"<(?:\w+:)?f[ >/]")
+#: Column and rows of cells that are merged, and as many rows as all of these may have together.
+_MERGED: Final = re.compile(rb'<(?:\w+:)?mergeCell\s[^>]*?ref="([A-Z]{1,3})(\d{1,7}):[A-Z]{1,3}(\d{1,7})"')
+_MERGED_ROWS_MAX: Final = 100_000
 _SAVE: Final = "save the list anew as an Excel workbook (.xlsx), or as CSV UTF-8, and load that"
 _ERRORS: Final = frozenset({"#NULL!", "#DIV/0!", "#VALUE!", "#REF!", "#NAME?", "#NUM!", "#N/A"})
 
@@ -59,10 +62,9 @@ def sheets_of(content: bytes) -> tuple[Sheet, ...]:
         BadInputError: it is no workbook, damaged, encrypted, too large, or holds what a list of names never does.
     """
     parts = _parts(content)
-    archive = _archive_of(parts)
-    found = _load(archive, results=True)
+    found = _load(parts, results=True)
     if any(_FORMULA.search(part) for name, part in parts.items() if _SHEET.fullmatch(name)):
-        _check_results(found, _load(archive, results=False))
+        _check_results(found, _load(parts, results=False))
     return tuple(sheet for sheet in found if sheet.rows)
 
 
@@ -123,16 +125,19 @@ def _archive_of(parts: dict[str, bytes]) -> bytes:
     return made.getvalue()
 
 
-def _load(archive: bytes, *, results: bool) -> tuple[Sheet, ...]:
+def _load(parts: dict[str, bytes], *, results: bool) -> tuple[Sheet, ...]:
     """The visible sheets, with the results of formulas or with the formulas themselves."""
     from openpyxl import load_workbook  # noqa: PLC0415 - takes 0.2 s, which the start of the service need not wait for
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about styles and extensions, of which no list has need
-            book = load_workbook(io.BytesIO(archive), read_only=True, data_only=results, keep_links=False)
+            book = load_workbook(io.BytesIO(_archive_of(parts)), read_only=True, data_only=results, keep_links=False)
             visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
-            return tuple(Sheet(sheet.title, tuple(_rows(sheet))) for sheet in visible)
+            rows = [(sheet, _rows(sheet)) for sheet in visible]
+            for sheet, there in rows:  # openpyxl gives who reads rows no merged cells
+                _fill_merged(there, parts[sheet._worksheet_path])
+            return tuple(Sheet(sheet.title, tuple(there)) for sheet, there in rows)
     except BadInputError:
         raise
     except Exception as error:  # noqa: BLE001 - whatever a damaged part makes of openpyxl
@@ -158,6 +163,31 @@ def _rows(sheet: Any) -> list[Row]:
         if texts:
             rows.append((number, texts))
     return rows
+
+
+def _fill_merged(rows: list[Row], part: bytes) -> None:
+    """Give each row what stands in a cell that it shares with the rows above, of which Excel keeps the first alone."""
+    by_number = dict(rows)
+    left = _MERGED_ROWS_MAX
+    for column, first, last in _MERGED.findall(part):
+        left -= max(0, int(last) - int(first))
+        if left < 0:
+            raise BadInputError("the workbook merges more cells than a list does: undo that, and load it again")
+        place = _place(column)
+        above = by_number.get(int(first), [])
+        text = above[place] if place < len(above) else ""
+        for number in range(int(first) + 1, int(last) + 1) if text else ():
+            if (row := by_number.get(number)) is not None:
+                row.extend([""] * (place + 1 - len(row)))
+                row[place] = text
+
+
+def _place(column: bytes) -> int:
+    """Index of a column by its letters: A is 0, AA 26."""
+    place = 0
+    for letter in column:
+        place = 26 * place + letter - ord("A") + 1
+    return place - 1
 
 
 def _text(cell: object) -> str:

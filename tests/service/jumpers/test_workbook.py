@@ -75,6 +75,21 @@ def test_a_list_as_excel_has_it() -> None:
     ]  # fmt: skip
 
 
+def test_a_club_that_stands_once_for_several_jumpers_is_that_of_all() -> None:
+    made = openpyxl.Workbook()
+    sheet = made.active
+    for row in ([None, "bib", "athlete", "club"], [None, 1, "Åse", "Lyn"], [None, 2, "Eva"], [None, 3, "Ida", "Koll"]):
+        sheet.append(row)
+    sheet.merge_cells("D2:D3")
+    sheet.merge_cells("D4:D9")
+    content = saved(made)
+    assert [line.club for line in read_table(content).lines] == ["Lyn", "Lyn", "Koll"]
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        many = archive.read(SHEET).replace(b"D4:D9", b"D4:D1048576")
+    with pytest.raises(BadInputError, match="merges more cells than a list does"):
+        read_table(with_part(content, SHEET, many))
+
+
 def test_the_sheet_with_the_heading_is_taken_and_of_several_one_is_chosen() -> None:
     other: list[list[object]] = [["Program"], ["10:00", "Prøveomgang"]]
     found = readings_of(book(("Program", other), ("Liste", ROWS), ("Tom", [])))

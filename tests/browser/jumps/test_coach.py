@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, Request, expect
 
@@ -17,6 +18,7 @@ from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel, serving
 from webpanel.door.access import Access
 from webpanel.door.links import Links
+from webpanel.routes.preview import to_jpeg
 
 TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
 #: A name that leads here (RFC 6761, 6.3) and that the service takes for a name in the network.
@@ -130,6 +132,8 @@ def test_the_screen_says_that_the_connection_is_lost_and_comes_back(
 
 def test_a_link_shows_its_jump_and_nothing_else(hill: Hill, service: MemoryService, open_page: Open) -> None:
     service.arm()
+    picture = service.catalogue.file("jump-2").with_name("jump-2.measured") / "kinogram.jpg"
+    picture.write_bytes(to_jpeg(np.zeros((40, 100), np.uint8)))
     with hill.panel.client(headers={"Authorization": f"Bearer {TOKEN}", "Host": f"{NAME}:{hill.panel.port}"}) as coach:
         link = coach.get("/api/recordings/jump-2/link").json()["link"]
     page = open_page("about:blank", width=360, height=780, has_touch=True, is_mobile=True)
@@ -147,6 +151,7 @@ def test_a_link_shows_its_jump_and_nothing_else(hill: Hill, service: MemoryServi
         page.wait_for_function(f"JSON.stringify({size}) === '{json.dumps(expected, separators=(',', ':'))}'")
         other.click()
     expect(page.locator("#visit-until")).to_have_text(re.compile(r"^This page opens until .*, \d\d:\d\d\.$"))
+    expect(page.locator("#visit-pictures img")).to_have_js_property("naturalWidth", 100)
     page.locator("#visit-more summary").click()
     assert_fits_a_phone(page)
     page.evaluate(AXE.read_text())

@@ -41,5 +41,4 @@ export const jump = {
   "visit.until": "This page opens until {day}, {time}.",
   "visit.lost": "No connection: are you still in the network of the hill? It is tried again by itself.",
   "visit.kinogram": "Kinogram",
-  "visit.kinogram_picture": "Kinogram as a picture",
 };

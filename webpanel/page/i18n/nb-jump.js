@@ -41,5 +41,4 @@ export const jump = {
   "visit.until": "Siden kan åpnes til {day}, {time}.",
   "visit.lost": "Ingen forbindelse: er du fortsatt i nettverket i bakken? Det prøves igjen av seg selv.",
   "visit.kinogram": "Kinogram",
-  "visit.kinogram_picture": "Kinogram som bilde",
 };

@@ -3,10 +3,10 @@
  * the service, not even its state, so that this page asks for what it shows.
  */
 
-import { say, t } from "../i18n/i18n.js";
+import { languageInUse, say, t } from "../i18n/i18n.js";
 import { call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { $, icon, make, setText } from "../shared/dom.js";
-import { fillFigures, levelOf, MARKS } from "../shared/figures.js";
+import { fillFigures, levelOf, MARKS, verdictOf } from "../shared/figures.js";
 import { day, timeOfDay, timeOfMinute } from "../shared/format.js";
 import { howFar, measurementOf, named } from "../shared/latest.js";
 import { makeReplay } from "../shared/replay.js";
@@ -17,11 +17,12 @@ const AGAIN_MS = 5000;
 const UNFINISHED = ["none", "waiting", "measuring"];
 /** Files that athletes open, in this order; others come after them, folded away. @type {[RegExp, string][]} */
 const FILES = [
-  [/^kinogram\.html$/, "visit.kinogram"], [/^kinogram\.(png|jpg)$/, "visit.kinogram_picture"],
-  [/^report\.html$/, "measurement.report"], [/^overlay\.(webm|mp4)$/, "measurement.video"],
+  [/^kinogram\.html$/, "visit.kinogram"], [/^report\.html$/, "measurement.report"], [/^overlay\.(webm|mp4)$/, "measurement.video"],
 ];
+/** Pictures that stand on the page itself. */
+const PICTURE = /^kinogram(?:-\d+)?\.jpg$/;
 /** What the browser shows itself instead of keeping it. */
-const SHOWN = /\.(html|txt|webm)$/;
+const SHOWN = /\.(html|txt|webm|jpg)$/;
 
 /** @type {import("../shared/replay.js").Replay} */
 let replay;
@@ -34,6 +35,8 @@ let ends = "";
 let recording = null;
 /** @type {import("../shared/latest.js").Measured|null} */
 let measured = null;
+/** Recording, files and language of what `drawFiles` has drawn. */
+let drawn = "";
 /** Why nothing more can be shown; null: all is well. @type {Problem|null} */
 let wrong = null;
 
@@ -103,6 +106,8 @@ export function drawVisit() {
   setText($("visit-mark"), level ? t(MARKS[level]) : "");
   $("visit-mark").dataset.level = level ?? "";
   setText($("visit-far"), howFar(measured, Boolean(figures)));
+  $("visit-why").hidden = !figures || figures.ok;
+  setText($("visit-why"), figures && !figures.ok ? verdictOf(figures) : "");
   $("visit-figures").hidden = !figures;
   if (figures) fillFigures($("visit-figures"), figures);
   drawFiles(measured?.files ?? []);
@@ -112,11 +117,28 @@ export function drawVisit() {
 
 /** @param {string[]} files */
 function drawFiles(files) {
+  const now = JSON.stringify([languageInUse(), id, measured?.measured, files]);
+  if (now === drawn) return;
+  drawn = now;
+  $("visit-pictures").replaceChildren(...files.filter((name) => PICTURE.test(name)).map(makePicture));
   const first = FILES.flatMap(([kind, words]) => files.filter((name) => kind.test(name)).map((name) => makeFile(name, t(words))));
-  const rest = files.filter((name) => !FILES.some(([kind]) => kind.test(name))).map((name) => makeFile(name, name));
+  const rest = files.filter((name) => !PICTURE.test(name) && !FILES.some(([kind]) => kind.test(name))).map((name) => makeFile(name, name));
   $("visit-files").replaceChildren(...first);
   $("visit-others").replaceChildren(...rest);
   $("visit-more").hidden = !rest.length;
+}
+
+/** @param {string} name */
+function makePicture(name) {
+  const address = fileAddress(name);
+  const again = () => setTimeout(() => { if (image.isConnected) image.src = address; }, AGAIN_MS);
+  const image = make("img", { src: address, alt: t("visit.kinogram"), onerror: again }); // refused while a recording runs
+  return make("a", { href: address, target: "_blank", rel: "noopener" }, image);
+}
+
+/** @param {string} name of a file */
+function fileAddress(name) {
+  return partOf(id, `measurement/files/${encodeURIComponent(name)}`);
 }
 
 /**
@@ -125,6 +147,6 @@ function drawFiles(files) {
  */
 function makeFile(name, words) {
   const how = SHOWN.test(name) ? { target: "_blank", rel: "noopener" } : { download: "" };
-  return make("a", { class: "button", href: partOf(id, `measurement/files/${encodeURIComponent(name)}`), ...how },
+  return make("a", { class: "button", href: fileAddress(name), ...how },
     icon(SHOWN.test(name) ? "log" : "download"), make("span", {}, words));
 }

@@ -135,10 +135,10 @@ function drawFigures(figures) {
   if (list.children.length !== rows.length) {
     list.replaceChildren(...rows.map(() => make("div", {}, make("dt"), make("dd", {}, make("b"), make("span"), make("small")))));
   }
-  rows.forEach(({ term, value, deviation, unit }, index) => {
+  rows.forEach(({ term, value, unit, beside }, index) => {
     const [name, content] = list.children[index].children;
     setText(name, term);
-    [value, value === "–" ? "" : unit, deviation && `± ${deviation}`].forEach((text, part) => setText(content.children[part], text));
+    [value, unit, beside].forEach((text, part) => setText(content.children[part], text));
   });
 }
 

@@ -8,7 +8,7 @@ import { number } from "./format.js";
 
 const KMH = 3.6; // km/h in one m/s
 /** Most digits of a value after the decimal point. */
-const MOST_DIGITS = { "m/s": 4, "km/h": 2, m: 4, "°": 1 };
+const MOST_DIGITS = { "m/s": 4, m: 4, "°": 1 };
 
 /** What is said of a jump of each level. */
 export const MARKS = { good: "measured.ok", warning: "measured.doubtful", info: "measurement.live_jump" };
@@ -57,21 +57,24 @@ export function inKmh(speed) {
 }
 
 /**
- * The figures of a jump as one reads them from afar: speeds in km/h, value and standard deviation apart.
+ * The figures of a jump as one reads them from afar: one number in large, and what stands beside it in small.
  *
  * @param {import("./types.js").LastJump} jump
- * @returns {{ term: string, value: string, deviation: string, unit: string }[]}
+ * @returns {{ term: string, value: string, unit: string, beside: string }[]}
  */
 export function inLarge(jump) {
-  /** @type {(speed: MeasuredValue|null) => MeasuredValue|null} */
-  const faster = (speed) => speed && { value: KMH * speed.value, sigma: KMH * speed.sigma };
-  /** @type {[string, MeasuredValue|null, keyof typeof MOST_DIGITS][]} */
-  const rows = [
-    ["measured.takeoff_speed", faster(jump.takeoff_speed), "km/h"], ["measured.perpendicular", jump.perpendicular, "m/s"],
-    ["measured.speed_20_m", faster(jump.speed_20_m), "km/h"], ["measured.angle_of_attack", jump.angle_of_attack, "°"],
-    ["measured.ski_to_body", jump.ski_to_body, "°"],
-  ];
-  return rows.map(([key, measured, unit]) => ({ term: t(key), unit, ...inParts(measured, unit) ?? { value: "–", deviation: "" } }));
+  /** @type {(key: string, speed: MeasuredValue|null) => [string, string, string, string]} */
+  const speed = (key, of) => of ? [key, number(KMH * of.value, 1), "km/h", withSigma(of, "m/s")] : [key, "–", "", ""];
+  /** @type {(key: string, of: MeasuredValue|null, unit: "m/s"|"°") => [string, string, string, string]} */
+  const other = (key, of, unit) => {
+    const parts = inParts(of, unit);
+    return parts ? [key, parts.value, unit, `± ${parts.deviation}`] : [key, "–", "", ""];
+  };
+  return [
+    speed("measured.takeoff_speed", jump.takeoff_speed), other("measured.perpendicular", jump.perpendicular, "m/s"),
+    speed("measured.speed_20_m", jump.speed_20_m), other("measured.angle_of_attack", jump.angle_of_attack, "°"),
+    other("measured.ski_to_body", jump.ski_to_body, "°"),
+  ].map(([key, value, unit, beside]) => ({ term: t(key), value, unit, beside }));
 }
 
 /**

@@ -127,6 +127,10 @@ class RehearsingError(StateForbidsError):
     """A rehearsal has the cameras; arming ends it."""
 
 
+class NoAnalysisError(StateForbidsError):
+    """Nothing can be measured: the rig file does not say where the balls are."""
+
+
 class StillRecordingError(StateForbidsError):
     """The caller asked for the log of a recording in progress."""
 

@@ -59,6 +59,9 @@ class Measurement(Model):
     share: float = Field(0.0, description="of this step that is done, 0 to 1")
     before: int = Field(0, description="logs that are measured before this one")
     problem: Statement | None = Field(None, description="why it could not be measured, and what to do")
+    refused: Statement | None = Field(
+        None, description="why it cannot be measured at all: the rig file has no `[analysis]`; null: it can be"
+    )
     steps: tuple[StepState, ...] = Field((), description="what is done with the log, in order, and how far each is")
     measured: datetime | None = Field(None, description="when the log was measured, UTC")
     version: str = Field("", description="of svev, that measured it")

@@ -19,6 +19,8 @@ from triggering.alarms.watch import AlarmWatch
 _LEVELS: Final = {EventLevel.WARNING: Level.WARNING, EventLevel.ERROR: Level.ERROR}
 #: The alarm that jumps cannot be measured, which the analysis tells.
 _MEASURING: Final = "measuring"
+#: The alarm that a jump may not be recorded.
+_UNRECORDED: Final = "unrecorded"
 
 
 class AlarmKeeper:
@@ -99,6 +101,16 @@ class AlarmKeeper:
             said = phrase("event_analysis_again", "what was wrong is put right: jumps are measured from now on")
             self._tell(Event.now(EventLevel.INFO, "analysis", said))
 
+    def unrecorded(self, statement: Statement | None) -> None:
+        """Enter which jump may not be recorded; None: none, or a recording has begun since."""
+        known = self._known.get(_UNRECORDED)
+        if statement == (known and known.statement):
+            return
+        self._known.pop(_UNRECORDED, None)
+        if statement is not None:
+            self._enter(_UNRECORDED, statement)
+            self._tell(Event.now(EventLevel.WARNING, "service", statement.said))
+
     def use(self, rig: RigSettings) -> None:
         """Judge by other exposures or another rate from now on."""
         self._rig = rig
@@ -107,7 +119,7 @@ class AlarmKeeper:
     def forget(self) -> None:
         """Start anew: there is no recorder any more. That nobody watches any more does not end what was wrong."""
         self._watch = None
-        self._known = {topic: alarm for topic, alarm in self._known.items() if topic == _MEASURING}
+        self._known = {topic: alarm for topic, alarm in self._known.items() if topic in {_MEASURING, _UNRECORDED}}
 
     def end(self) -> None:
         """Forget everything: no process of the rig is left."""

@@ -115,7 +115,10 @@ class Marks:
     def _moved(self, time: HostNs) -> None:
         """Begin a recording, because something moves in an image; the thread that watches goes on whatever happens."""
         try:
-            self.mark(_mark("motion", time))
+            if self._motion is not None and self._motion.on:
+                self.mark(_mark("motion", time))
+                return
+            self._supervisor.commands.ask(at_once(self._supervisor.moved), _NOTED_S)
         except SvevError as error:
             text = "something moved, but no recording could begin: {why}"
             self._tell(Level.WARNING, "motion", phrase("event_motion_unrecorded", text, why=str(error)))

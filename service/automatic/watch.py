@@ -27,7 +27,8 @@ class MotionWatch:
         motion: which part of which camera's images.
         slot: shared memory with the newest triplet.
         state: the state of the service.
-        seen: called with the host time of the image in which something moves, in the watching thread.
+        seen: called with the host time of the image in which something moves, in the watching thread, also if `on` is
+            false: then nothing begins, and somebody may have to be told.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class MotionWatch:
     def _run(self) -> None:
         while not self._closing.wait(_POLL_S):
             state = self._state()
-            if not self.on or state not in {State.ARMED, State.RECORDING}:
+            if state not in {State.ARMED, State.RECORDING}:
                 continue
             self._slot.want(_LEASE_S)
             if self._slot.newest() not in {0, self._pulse} and (image := self._slot.read()) is not None:

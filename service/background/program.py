@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from rig.errors import SvevError
-from rig.phrase import Phrase, plain
+from rig.phrase import as_plain, plain
 
 _NICE: Final = 19
 #: Between two lines that say how far it is.
@@ -64,12 +64,6 @@ def serve(work: Callable[[dict[str, Any], Teller], dict[str, Any]]) -> None:
     except OSError as error:
         end = {"problem": as_plain(plain(str(error)))}
     _say({"end": end})
-
-
-def as_plain(said: Phrase) -> dict[str, Any]:
-    """A phrase as JSON holds it."""
-    values = {name: as_plain(value) if isinstance(value, Phrase) else value for name, value in said.values.items()}
-    return {"code": said.code, "text": said.text, "values": values}
 
 
 def _say(what: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from rig.api.statement import Level, Statement
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.host.files import make_folder
-from rig.phrase import Phrase, phrase, plain
+from rig.phrase import Phrase, from_plain, phrase, plain
 from rig.settings.model import AnalysisSettings
 from service.background.child import run_child
 from service.measuring.results import VIDEO, keep_file, keep_problem, keep_result, keep_step
@@ -84,7 +84,7 @@ class AfterSteps:
             if end is None or not log.exists():
                 return
             if "problem" in end:
-                self._fail(recording, log, _phrase(end["problem"]))
+                self._fail(recording, log, from_plain(end["problem"]))
             elif wants_video:
                 if end["no_video"] is None:
                     keep_file(video, log, VIDEO)
@@ -120,7 +120,7 @@ class AfterSteps:
 
     def _note(self, recording: str, log: Path, step: AfterStep, problem: dict[str, Any] | None) -> None:
         """Note what came of a further step, and tell if it failed."""
-        why = None if problem is None else _phrase(problem)
+        why = None if problem is None else from_plain(problem)
         keep_step(log, step, None if why is None else _warning(why))
         if why is not None and step is AfterStep.COPY:
             self._warn(_not_copied(recording, why))
@@ -149,8 +149,3 @@ def _not_copied(recording: str, why: Phrase) -> Phrase:
 
 def _warning(why: Phrase) -> Statement:
     return Statement(level=Level.WARNING, code=why.code, text=why.text, values=why.values)
-
-
-def _phrase(plainly: dict[str, Any]) -> Phrase:
-    values = {name: _phrase(value) if isinstance(value, dict) else value for name, value in plainly["values"].items()}
-    return Phrase(plainly["code"], plainly["text"], values)

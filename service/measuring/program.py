@@ -5,7 +5,8 @@ from typing import Any, Final
 
 from rig.api.measuring import MeasuringStep
 from rig.errors import SvevError
-from service.background.program import Teller, as_plain, serve
+from rig.phrase import as_plain
+from service.background.program import Teller, serve
 
 #: What the steps of the analysis are called by those who translate them.
 _STEPS: Final = {

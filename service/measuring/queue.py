@@ -13,7 +13,8 @@ from typing import Any, Final
 from recorder.log.write_lock import is_being_written
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, Measurement, MeasuringQueue, MeasuringState, MeasuringStep, StepState
-from rig.errors import StateForbidsError
+from rig.api.statement import Level, Statement
+from rig.errors import NoAnalysisError, StateForbidsError
 from rig.events import Event
 from rig.settings.model import RigSettings
 from service.measuring.after_steps import AfterSteps
@@ -26,6 +27,11 @@ _SEEN: Final = 0.05
 _END_S: Final = 10.0
 #: What is at work in these steps; in all others the log is measured.
 _AT_WORK: Final = {MeasuringStep.VIDEO: AfterStep.VIDEO, MeasuringStep.COPYING: AfterStep.COPY}
+#: Why nothing can be measured, and what to do.
+_UNKNOWN: Final = (
+    "nothing says where the balls are: give the rig file an [analysis] with survey or calibration, and restart the "
+    "service"
+)
 
 
 class Measurings:
@@ -86,13 +92,11 @@ class Measurings:
             log: the log, in the folder.
 
         Raises:
-            StateForbidsError: the rig file does not say by what, or too many are waiting.
+            NoAnalysisError: the rig file does not say by what.
+            StateForbidsError: too many are waiting.
         """
         if self._in_use().analysis is None:
-            raise StateForbidsError(
-                "nothing says where the balls are: give the rig file an [analysis] with survey or calibration, and "
-                "restart the service"
-            )
+            raise NoAnalysisError(_UNKNOWN)
         self._waiting.add(recording)
         self._bell.set()
         self._changed()
@@ -109,6 +113,10 @@ class Measurings:
         """What is known of the jumps of a log that lies in the folder, and how far its measuring is."""
         ids, running = self._waiting.ids, self._running
         known = measurement_of(recording, log)  # what left the queue before is there
+        if self._in_use().analysis is None:
+            what, _, advice = _UNKNOWN.partition(": ")
+            refused = Statement(level=Level.INFO, code="no_analysis", text=what, advice=advice)
+            known = known.model_copy(update={"refused": refused})
         if recording not in ids:
             return known
         if running is None or running.recording != recording:

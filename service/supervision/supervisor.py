@@ -23,6 +23,7 @@ from rig.settings.region import RegionLimits
 from rig.transport.analysis_messages import JumpMeasured, Measuring
 from rig.transport.recorder_commands import RecorderOptions
 from rig.transport.recorder_reports import CameraLimits, RecorderFailed, RecorderHealth, RecorderReport
+from service.alarms.unrecorded import Unrecorded
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RECORDER
 from service.recordings import live_results
@@ -109,6 +110,7 @@ class Supervisor:
         self.train = TrainControl(self._machine, self._session, self.recordings, self._refresh)
         self.settings = SettingsControl(self._machine, self._session, self.recordings, self._use, self._begin_again)
         self.limits: dict[str, RegionLimits] = {}
+        self._unrecorded = Unrecorded()
         self._ending_by: float | None = None
         self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
@@ -199,6 +201,10 @@ class Supervisor:
         """
         self._watch.alarms.acknowledge(alarm)
         return self._refresh()
+
+    def moved(self) -> None:
+        """Command: note that somebody has come into sight, and that no recording begins for it."""
+        self._unrecorded.moved(time.monotonic())
 
     def look(self) -> WarmUp:
         """Command: say how far the rig has come since it was armed."""
@@ -387,6 +393,8 @@ class Supervisor:
 
     def _refresh(self) -> Status:
         self._dirty, self._pictured = False, time.monotonic()
+        waits = self._machine.state is State.ARMED and self.recordings.current is None
+        self._watch.alarms.unrecorded(self._unrecorded.look(self._jumpers.view(), waits=waits, now=self._pictured))
         self._status = self._picture()
         if not self.recordings.opening:
             self._jumpers.announce()

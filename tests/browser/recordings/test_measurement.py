@@ -117,14 +117,16 @@ def _measuring(service: MemoryService, now: MeasuringQueue) -> None:
     service._wake()
 
 
-def test_a_rig_file_without_analysis_is_said_in_the_words_of_the_service(
+def test_where_nothing_can_be_measured_it_is_not_offered_and_the_page_says_why(
     panel: Panel, jumps: None, open_page: Open
 ) -> None:
     page = open_page(f"{panel.url}/#/recordings/jump-1", locale="nb-NO")
-    _state(page, "Ikke målt ennå.")
-    page.get_by_role("button", name="Mål", exact=True).click()
-    expect(page.get_by_role("alert")).to_contain_text("Det måles ikke: nothing says where the balls are")
-    expect(page.locator("#measurement-measure")).to_be_enabled()
+    _state(
+        page,
+        "Ikke målt ennå. Det kan ikke måles: ingenting sier hvor ballene er: gi riggfilen en [analysis] med innmåling "
+        "eller kalibrering, og start tjenesten på nytt.",
+    )
+    expect(page.locator("#measurement-measure")).to_be_hidden()
 
 
 def test_a_live_figure_is_never_measured_well(panel: Panel, log: Path, open_page: Open) -> None:
@@ -185,7 +187,7 @@ def test_a_recording_in_progress_and_one_in_the_trash_have_one_quiet_line(
     _state(page, "It is measured when it has ended.")
     expect(page.locator("#measurement-known")).to_be_hidden()
     service.stop_recording(started.id)
-    _state(page, "Not measured yet.")
+    expect(page.locator("#measurement-state")).to_contain_text("Not measured yet.")
 
 
 def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(

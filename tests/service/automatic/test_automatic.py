@@ -29,6 +29,12 @@ def _ended(service: Serving) -> list[dict[str, Any]]:
     return [recording for recording in reversed(recordings) if recording["state"] == "finished"]
 
 
+def _alarms(service: Serving) -> list[str]:
+    """What may be unrecorded, of all alarms."""
+    alarms = [alarm for alarm in service.get("/api/status")["alarms"] if alarm["topic"] == "unrecorded"]
+    return [alarm["statement"]["code"] for alarm in alarms]
+
+
 def test_jumpers_are_recorded_without_a_touch_and_marks_from_outside_too(tmp_path: Path, loopback: Loopback) -> None:
     rig = write_rig(tmp_path, "sim", loopback)
     rig.write_text(rig.read_text().replace("[[cameras]]", AUTOMATIC + "[[cameras]]", 1))
@@ -44,10 +50,13 @@ def test_jumpers_are_recorded_without_a_touch_and_marks_from_outside_too(tmp_pat
             assert recording["counts"]["pulses"] >= 1.2 * 30
             assert recording["duration_s"] < 2.6  # and not the hour for which the service runs
 
+        wait_until(lambda: _alarms(service) == ["alarm_unrecorded_seen"], "somebody jumps unrecorded", 60, 0.1)
+
         service.call("PATCH", "/api/next-jumper", {"bib": "99"})
         mark = {"source": "light barrier", "time": (datetime.now(UTC) - timedelta(seconds=0.5)).isoformat()}
         first, again = service.post("/api/mark", mark), service.post("/api/mark", mark)
         assert (first["started"], again["started"]) == (True, False)
+        assert _alarms(service) == [], "a recording has begun"
         assert first["recording"]["id"] == again["recording"]["id"]
         assert first["recording"]["session"]["bib"] == "99"
         wait_until(lambda: len(_ended(service)) == len(before) + 1, "the marked jump is recorded", 20, 0.1)

@@ -89,7 +89,9 @@ def test_nothing_but_the_files_of_the_result_is_given(client: httpx.Client, log:
 
 
 def test_who_asks_waits_his_turn_and_may_give_up(client: httpx.Client, service: MemoryService) -> None:
-    assert "give the rig file an [analysis]" in refused(client.post(PATH), 409).detail
+    problem = refused(client.post(PATH), 409)
+    assert (problem.code, "give the rig file an [analysis]" in problem.detail) == ("no_analysis", True)
+    assert client.get(PATH).json()["refused"]["code"] == "no_analysis"
     service.settings = service.settings.model_copy(update={"analysis": AnalysisSettings(survey=Path("balls.json"))})
     write_recording(service.catalogue.directory, "other")
     first, second = client.post(PATH), client.post(PATH.replace("jump", "other"))

@@ -53,5 +53,5 @@ export const measuring = {
   "measurement.measure": "Measure",
   "measurement.again": "Measure again",
   "measurement.cancel": "Cancel",
-  "measurement.refused": "It is not measured: {why}",
+  "measurement.refused": "It cannot be measured: {why}",
 };

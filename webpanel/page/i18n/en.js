@@ -4,6 +4,7 @@ import { athletes } from "./en-athletes.js";
 import { check } from "./en-check.js";
 import { jump } from "./en-jump.js";
 import { kinogram } from "./en-kinogram.js";
+import { log } from "./en-log.js";
 import { measuring } from "./en-measuring.js";
 import { startList } from "./en-startlist.js";
 import { viewing } from "./en-viewing.js";
@@ -13,6 +14,7 @@ export const en = {
   ...check,
   ...jump,
   ...kinogram,
+  ...log,
   ...measuring,
   ...startList,
   ...viewing,
@@ -294,26 +296,6 @@ export const en = {
   "status.lost.means": "The camera took the frame, but it did not arrive.",
   "status.damaged.means": "The frame did not arrive whole.",
   "status.absent.means": "The camera was not there.",
-
-  "log.show": "Show",
-  "log.all": "everything",
-  "log.info": "what happens",
-  "log.warning": "trouble only",
-  "log.empty": "Nothing has happened yet.",
-  "log.times": "× {count}",
-  "log.is_debug": "debug",
-  "log.is_info": "info",
-  "log.is_warning": "warning",
-  "log.is_error": "error",
-  "log.is_fatal": "fatal",
-  "log.of_access": "access",
-  "log.of_analysis": "analysis",
-  "log.of_disk": "disk",
-  "log.of_publisher": "publisher",
-  "log.of_recorder": "recorder",
-  "log.of_service": "service",
-  "log.of_start_list": "start list",
-  "log.of_truth": "truth",
 
   "doctor.title": "Check the rig",
   "doctor.lead": "Looks at everything that a recording stands on: cameras, network, disk, computer. Takes some seconds.",

@@ -53,5 +53,5 @@ export const measuring = {
   "measurement.measure": "Mål",
   "measurement.again": "Mål på nytt",
   "measurement.cancel": "Avbryt",
-  "measurement.refused": "Det måles ikke: {why}",
+  "measurement.refused": "Det kan ikke måles: {why}",
 };

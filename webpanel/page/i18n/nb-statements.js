@@ -42,6 +42,8 @@ export const statements = {
   recording_resumed: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: pulsene {first} til {last} mangler, {seconds} s", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
   recording_resumed_whole: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: ingen puls mangler", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
   process_restarted: ["{process} ble startet på nytt {restarts} ganger", "skjer det igjen, sjekk riggen"],
+  alarm_unrecorded: ["{who} ble ropt opp, og ingenting ble tatt opp: det siste hoppet er kanskje ikke tatt opp", "har hopperen hoppet nå nettopp, trykk Lagre siste hopp; ellers er det ingenting å gjøre"],
+  alarm_unrecorded_seen: ["noen ble sett mens ingenting ble tatt opp: det siste hoppet er kanskje ikke tatt opp", "har noen hoppet nå nettopp, trykk Lagre siste hopp; ellers er det ingenting å gjøre"],
   alarm_not_measured: ["hoppene tas opp, men måles ikke: {why}", "rett den filen, den leses på nytt av seg selv; nevner [analysis] i riggfilen feil fil, rett det og start tjenesten på nytt"],
 
   camera_off: ["riggen er ikke gjort klar"],
@@ -80,6 +82,7 @@ export const statements = {
   verdict_session: ["Rettelsene ved siden av opptaket kan ikke leses", "Rett eller fjern filen som ender på .session.json"],
   verdict_trouble: ["Opptaket kan ikke leses", "Kjør svev verify på det"],
 
+  no_analysis: ["ingenting sier hvor ballene er", "gi riggfilen en [analysis] med innmåling eller kalibrering, og start tjenesten på nytt"],
   state_forbids: ["det går ikke slik riggen står nå: se øverst hva den gjør, og hva som er neste steg"],
   changed_meanwhile: ["noe er blitt annerledes i mellomtiden, så ingenting ble gjort: se etter, og trykk igjen"],
   too_soon: ["dette teller som et dobbelt trykk, så ingenting ble gjort: vent litt, og trykk igjen"],

@@ -4,6 +4,7 @@ import { athletes } from "./nb-athletes.js";
 import { check } from "./nb-check.js";
 import { jump } from "./nb-jump.js";
 import { kinogram } from "./nb-kinogram.js";
+import { log } from "./nb-log.js";
 import { measuring } from "./nb-measuring.js";
 import { startList } from "./nb-startlist.js";
 import { viewing } from "./nb-viewing.js";
@@ -13,6 +14,7 @@ export const nb = {
   ...check,
   ...jump,
   ...kinogram,
+  ...log,
   ...measuring,
   ...startList,
   ...viewing,
@@ -294,26 +296,6 @@ export const nb = {
   "status.lost.means": "Kameraet tok bildet, men det kom ikke fram.",
   "status.damaged.means": "Bildet kom ikke helt fram.",
   "status.absent.means": "Kameraet var ikke der.",
-
-  "log.show": "Vis",
-  "log.all": "alt",
-  "log.info": "det som skjer",
-  "log.warning": "bare problemer",
-  "log.empty": "Ingenting har skjedd ennå.",
-  "log.times": "× {count}",
-  "log.is_debug": "detalj",
-  "log.is_info": "info",
-  "log.is_warning": "advarsel",
-  "log.is_error": "feil",
-  "log.is_fatal": "kritisk",
-  "log.of_access": "tilgang",
-  "log.of_analysis": "analyse",
-  "log.of_disk": "disk",
-  "log.of_publisher": "publisering",
-  "log.of_recorder": "opptak",
-  "log.of_service": "tjeneste",
-  "log.of_start_list": "startliste",
-  "log.of_truth": "fasit",
 
   "doctor.title": "Sjekk riggen",
   "doctor.lead": "Ser på alt et opptak er avhengig av: kameraer, nettverk, disk, datamaskin. Tar noen sekunder.",

@@ -115,6 +115,7 @@ function draw() {
   const queued = QUEUED.includes(shown.state);
   const idle = known.connected && !ordering;
   setText($("measurement-measure").querySelector("span"), t(shown.measured ? "measurement.again" : "measurement.measure"));
+  $("measurement-measure").hidden = Boolean(shown.refused) && !queued; // the state says why
   $("measurement-measure").disabled = queued || !idle;
   $("measurement-cancel").hidden = !queued;
   $("measurement-cancel").disabled = !idle;
@@ -139,7 +140,9 @@ function drawProgress(shown) {
  * @param {boolean} paused
  * @param {Measurement["step"]} step
  */
-function inWords({ state, before, measured: then, version, figures, live }, paused, step) {
+function inWords({ state, before, measured: then, version, figures, live, refused }, paused, step) {
+  const why = refused && state !== "done" ? say(refused) : null;
+  const unable = why ? t("measurement.refused", { why: `${why.text}: ${why.advice}.` }) : "";
   const when = { day: then ? day(then) : "", time: then ? timeOfDay(then) : "" };
   const old = figures.length && !live ? t("measurement.earlier", when) : "";
   const sentences = {
@@ -151,7 +154,7 @@ function inWords({ state, before, measured: then, version, figures, live }, paus
     done: [t("measurement.done", { ...when, version }), figures.length ? "" : t("measurement.no_jump")],
     failed: [t("measurement.failed"), old],
   };
-  return sentences[state].filter(Boolean).join(" ");
+  return [...sentences[state], unable].filter(Boolean).join(" ");
 }
 
 /**

@@ -11,7 +11,10 @@ const KEPT = 500;
 /** Lines that say the same are one if no longer time than this lies between one and the next. */
 const TOGETHER_MS = 60_000;
 /** What events are about, beside cameras, which have names of their own. */
-const NAMES = ["access", "analysis", "disk", "publisher", "recorder", "service", "start list", "truth"];
+const NAMES = [
+  "access", "analysis", "computer", "disk", "light barrier", "mark", "pairing", "publisher", "pulses", "recorder", "rehearsal", "service", "start list",
+  "trigger", "truth", "webhook",
+];
 
 /** @typedef {import("../shared/types.js").Event} Event */
 

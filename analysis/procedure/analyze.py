@@ -23,6 +23,7 @@ from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import StaticImage, static_images
 from photogrammetry.procedures.orientation import Orientation
 from rig.errors import NoJumpError
+from rig.phrase import phrase
 
 _NAMED = 6  # pulses that a message names, at most
 #: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
@@ -132,10 +133,11 @@ def analyze(
     if by_hand is not None:
         measurements = merged(measurements, by_hand)
     if not measurements.jumps:
-        raise NoJumpError(
-            f"{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording, "
+        text = (
+            "{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording, "
             "or look whether the survey is in metres with Z up and the markers stand out"
         )
+        raise NoJumpError(phrase("why_no_jump", text, log=str(log)))
     standings, flights = _flights(measurements, steadiness)
     if helmet:
         scene, orientation = with_helmet(scene, flights, facts.cameras, facts.rate_hz)

@@ -195,7 +195,7 @@ class Archive(ABC):
             StateForbidsError: a recording runs.
             BadInputError: the spans overlap, one has no jump that was measured well, or they cannot be compared.
         """
-        return self._comparisons.spans(self.measured_jumps(JumpQuery(athlete=athlete)), first, second)
+        return self._comparisons.spans(self.measured_jumps(JumpQuery.model_construct(athlete=athlete)), first, second)
 
     def comparison_page(self, first: tuple[str, int], second: tuple[str, int], language: str) -> str:
         """The page that compares two measured jumps, each given by recording and number.

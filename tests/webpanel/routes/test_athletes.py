@@ -180,7 +180,8 @@ def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Clien
     assert by_name["alpha"]["difference"] == pytest.approx(10.0, abs=1.5)
     assert by_name["alpha"]["p"] < 0.05 < by_name["gamma"]["p"]
     assert by_name["alpha"]["needed"] < by_name["alpha"]["difference"]
-    refused(client.get("/api/jumps/comparison", params={"athlete": "Kari", **spans}), 422)
+    for nobody in ("Kari", "two\nlines", "\x00"):
+        refused(client.get("/api/jumps/comparison", params={"athlete": nobody, **spans}), 422)
     overlapping = spans | {"second_since": "2026-02-14T23:00:00Z"}
     refused(client.get("/api/jumps/comparison", params={"athlete": "ola", **overlapping}), 422)
     service.arm()

@@ -5,6 +5,7 @@ from pathlib import Path
 from analysis.report.kinogram.earlier import NAME, EarlierJump, read_earlier
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_changes
+from rig.api.athletes import folded
 from rig.errors import BadInputError
 
 
@@ -18,7 +19,7 @@ def earlier_jumps(log: Path, athlete: str) -> list[EarlierJump]:
         log: the log that is being measured.
         athlete: who jumped in it.
     """
-    wanted = _key(athlete)
+    wanted = folded(athlete)
     found: list[EarlierJump] = []
     if not wanted:
         return found
@@ -31,9 +32,5 @@ def earlier_jumps(log: Path, athlete: str) -> list[EarlierJump]:
             jumps = read_earlier(path)
         except BadInputError:
             continue  # what is broken beside another log must not hinder the measuring of this one
-        found += [jump for jump in jumps if _key(jump.athlete if changed is None else changed) == wanted]
+        found += [jump for jump in jumps if folded(jump.athlete if changed is None else changed) == wanted]
     return found
-
-
-def _key(athlete: str) -> str:
-    return " ".join(athlete.casefold().split())

@@ -153,7 +153,15 @@ def keep_measured(log: Path, jumps: tuple[LastJump, ...]) -> None:
     made.mkdir()
     (made / "report.html").write_text("<!doctype html><title>Report</title><h1>For the coach</h1>")
     write_kinogram(made, "4", "Ola <b>Nordmann</b>")
-    for name in ("jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html", "protocol.txt"):
+    for name in (
+        "overlay.mp4",
+        "jumper.c3d",
+        "jumper.trc",
+        "jumper.csv",
+        "jumper.json",
+        "protocol.html",
+        "protocol.txt",
+    ):
         (made / name).write_text(name)
     keep_result(made, log, jumps)
 

@@ -29,7 +29,7 @@ _SHOWN: Final = {
     ".html": "text/html; charset=utf-8",
     ".jpg": "image/jpeg",
     ".txt": "text/plain; charset=utf-8",
-    ".webm": "video/webm",
+    ".mp4": "video/mp4",
 }
 
 

@@ -63,14 +63,14 @@ def test_figures_verdict_and_files_of_a_measured_jump(panel: Panel, jumps: None,
         ]
     )
     files = page.locator("#measurement-files a")
-    expect(files).to_have_text(["The coach's page", "C3D", "TRC", "CSV", "Protocol"])
+    expect(files).to_have_text(["The coach's page", "Video", "C3D", "TRC", "CSV", "Protocol"])
     assert files.first.bounding_box()["height"] >= 60  # type: ignore[index]
     expect(page.locator("#measurement-others a")).to_have_text(["jumper.json", "protocol.txt"])
     with page.expect_popup() as opened:
         files.first.click()
     expect(opened.value.locator("h1")).to_have_text("For the coach")
     with page.expect_download() as got:
-        files.nth(1).click()
+        files.nth(2).click()
     assert got.value.suggested_filename == "jump-2-jumper.c3d"
 
 

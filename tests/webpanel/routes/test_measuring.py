@@ -36,7 +36,13 @@ def _jump(verdict: str) -> LastJump:
 def _measured(log: Path) -> None:
     made = log.parent / "made"
     made.mkdir()
-    for name, text in {"report.html": PAGE, "jumper.csv": "a,b\n", "jumper.c3d": "C3D", "jumper.json": JUMPER}.items():
+    for name, text in {
+        "report.html": PAGE,
+        "jumper.csv": "a,b\n",
+        "jumper.c3d": "C3D",
+        "overlay.mp4": "film",
+        "jumper.json": JUMPER,
+    }.items():
         (made / name).write_text(text)
     keep_result(made, log, (_jump("measured well"),))
 
@@ -50,7 +56,7 @@ def test_live_figures_are_given_until_the_log_is_measured(client: httpx.Client, 
     _measured(log)
     done = client.get(PATH).json()
     assert (done["state"], done["live"], done["figures"][0]["verdict"]) == ("done", False, "measured well")
-    assert done["files"] == ["jumper.c3d", "jumper.csv", "jumper.json", "report.html"]
+    assert done["files"] == ["jumper.c3d", "jumper.csv", "jumper.json", "overlay.mp4", "report.html"]
 
 
 def test_jumps_stand_in_the_answer_as_in_the_file_of_the_result(client: httpx.Client, log: Path) -> None:
@@ -66,6 +72,7 @@ def test_jumps_stand_in_the_answer_as_in_the_file_of_the_result(client: httpx.Cl
 
 def test_a_page_among_the_files_reaches_nothing_of_the_panel(client: httpx.Client, log: Path) -> None:
     _measured(log)
+    assert client.get(f"{PATH}/files/overlay.mp4").headers["content-type"] == "video/mp4"
     page = client.get(f"{PATH}/files/report.html")
     assert page.text == PAGE
     assert page.headers["content-type"].startswith("text/html")

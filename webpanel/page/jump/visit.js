@@ -17,12 +17,12 @@ const AGAIN_MS = 5000;
 const UNFINISHED = ["none", "waiting", "measuring"];
 /** Files that athletes open, in this order; others come after them, folded away. @type {[RegExp, string][]} */
 const FILES = [
-  [/^kinogram\.html$/, "visit.kinogram"], [/^report\.html$/, "measurement.report"], [/^overlay\.(webm|mp4)$/, "measurement.video"],
+  [/^kinogram\.html$/, "visit.kinogram"], [/^report\.html$/, "measurement.report"], [/^overlay\.mp4$/, "measurement.video"],
 ];
 /** Pictures that stand on the page itself. */
 const PICTURE = /^kinogram(?:-\d+)?\.jpg$/;
 /** What the browser shows itself instead of keeping it. */
-const SHOWN = /\.(html|txt|webm|jpg)$/;
+const SHOWN = /\.(html|txt|mp4|jpg)$/;
 
 /** @type {import("../shared/replay.js").Replay} */
 let replay;

@@ -17,9 +17,9 @@ import { showJump } from "./jump.js";
 
 const QUEUED = ["waiting", "measuring"];
 /** Files of the result that people open, in this order; any others come after them, folded away. */
-const FILES = [/^report\.html$/, /^overlay\.webm$/, /\.c3d$/, /\.trc$/, /\.csv$/, /^protocol\.html$/];
+const FILES = [/^report\.html$/, /^overlay\.mp4$/, /\.c3d$/, /\.trc$/, /\.csv$/, /^protocol\.html$/];
 /** What the browser shows itself instead of keeping it. */
-const SHOWN = /\.(html|txt|webm)$/;
+const SHOWN = /\.(html|txt|mp4)$/;
 
 /** @type {import("../shared/types.js").Recording|null} */
 let recording = null;
@@ -204,8 +204,13 @@ function makeJump(jump, live, several) {
  * @returns {[string[], string[]]}
  */
 function sorted(files) {
-  const first = FILES.flatMap((kind) => files.filter((name) => kind.test(name)));
+  const first = FILES.flatMap((kind) => files.filter((name) => kind.test(name)).sort((a, b) => jumpOf(a) - jumpOf(b)));
   return [first, files.filter((name) => !first.includes(name))];
+}
+
+/** @param {string} name of a file: that of the first jump has no number */
+function jumpOf(name) {
+  return Number(name.match(/-(\d+)\.\w+$/)?.[1] ?? 1);
 }
 
 /**
@@ -221,7 +226,7 @@ function makeFile(id, name) {
 /** @param {string} name of a file */
 function named(name) {
   if (name === "protocol.html") return t("measurement.protocol");
-  if (name === "overlay.webm") return t("measurement.video");
+  if (name === "overlay.mp4") return t("measurement.video");
   const [, order, kind] = name.match(/^jumper(?:-(\d+))?\.(c3d|trc|csv)$/) ?? [];
   if (!kind) return name;
   return order ? t("measurement.file_of", { kind: kind.toUpperCase(), jump: order }) : kind.toUpperCase();

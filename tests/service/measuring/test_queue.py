@@ -215,6 +215,7 @@ def test_a_queue_that_cannot_be_read_is_said(bench: Bench) -> None:
     assert bench.said[0].startswith(f"{NAME}: cannot be read, so logs that waited to be measured are forgotten")
 
 
+@pytest.mark.long
 def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Bench, tmp_path: Path) -> None:
     other = tmp_path / "other disk"
     bench.further = {"after_recording": ("measure", "video", "copy"), "copy_to": other}
@@ -277,8 +278,7 @@ def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:
     with bench.running() as queue:
         queue.opened(bench.log("jump"))
         assert queue.view.waiting == 0
-        queue.want("jump", bench.log("jump"))
-        assert bench.until_over(queue, "jump").state is MeasuringState.DONE
+        assert queue.want("jump", bench.log("jump")).state in {MeasuringState.WAITING, MeasuringState.MEASURING}
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.measurements.model import ImageMeasurements
 from analysis.report.course import origin_of
@@ -16,6 +17,8 @@ from rig.arrays import Floats
 SKI_LENGTH_M = 2.63
 #: Drawn sizes of standard deviations: the true ones are smaller than a pixel.
 ELLIPSE_SIGMAS = 10.0
+#: Bits of sub-pixels when OpenCV draws.
+SHIFT = 4
 _ALONG = np.linspace(0.0, 1.0, 9)[:, None]  # a straight line may be bent by the lens
 
 
@@ -120,3 +123,8 @@ def _ellipses(state: JumperState, camera: PlacedCamera) -> dict[str, tuple[Float
     covariances = np.stack([point.covariance for point in known.values()])
     spread = by_point @ covariances @ by_point.transpose(0, 2, 1)
     return {name: (xy[i], spread[i]) for i, name in enumerate(known)}
+
+
+def fine(places: Floats) -> NDArray[np.int32]:
+    """Places in px as OpenCV takes them with `SHIFT` bits of sub-pixels."""
+    return np.asarray(np.rint(np.clip(places, -1e5, 1e5) * (1 << SHIFT)), np.int32)

@@ -24,7 +24,7 @@ from analysis.report.course import Course, course_of
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Windows, windows_of
 from analysis.report.figures import fixed
 from analysis.report.frames import Grey, frames_of
-from analysis.report.overlay import Overlay, half_axes
+from analysis.report.overlay import SHIFT, Overlay, fine, half_axes
 from analysis.report.scrubbing import overlays_of
 from analysis.result.model import MeasuredRecording
 from analysis.scene.camera_system import CameraSystem
@@ -43,7 +43,6 @@ _AROUND_S: Final = 0.5
 _WIDEST_PX: Final = 1920
 #: Phones play H.264 in MP4.
 _CODECS: Final = {".mp4": h264(23), ".webm": VP9, ".mkv": VP9}
-_SHIFT: Final = 4  # bits of sub-pixels when lines are drawn
 _LETTERS: Final = 0.6  # size of words, in units of the font
 #: Blue, green, red.
 _COLOURS: Final[Mapping[str, _Colour]] = {
@@ -199,22 +198,17 @@ def _seen(overlay: Overlay, corner: Floats, scale: float) -> Overlay:
 def _draw(block: _Picture, overlay: Overlay, width: int) -> None:
     """Draw an overlay into a picture, in place, with lines of so many px."""
     for part, line in overlay.lines.items():
-        cv2.polylines(block, [_fine(line)], False, _COLOURS[part], width, cv2.LINE_AA, _SHIFT)
+        cv2.polylines(block, [fine(line)], False, _COLOURS[part], width, cv2.LINE_AA, SHIFT)
     for place, covariance in overlay.ellipses.values():
         long, short, turn = half_axes(covariance)
         if np.isfinite(place).all() and long < block.shape[1]:
-            size = (_fine(np.array(long)).item(), _fine(np.array(short)).item())
-            centre = tuple(_fine(place).tolist())
-            cv2.ellipse(block, centre, size, turn, 0, 360, _INK, 1, cv2.LINE_AA, _SHIFT)
+            size = (fine(np.array(long)).item(), fine(np.array(short)).item())
+            centre = tuple(fine(place).tolist())
+            cv2.ellipse(block, centre, size, turn, 0, 360, _INK, 1, cv2.LINE_AA, SHIFT)
     for x, y in overlay.points.values():
         for dx, dy in ((3.0 * width, 0.0), (0.0, 3.0 * width)):
-            ends = _fine(np.array([(x - dx, y - dy), (x + dx, y + dy)]))
-            cv2.polylines(block, [ends], False, _POINT, width, cv2.LINE_AA, _SHIFT)
+            ends = fine(np.array([(x - dx, y - dy), (x + dx, y + dy)]))
+            cv2.polylines(block, [ends], False, _POINT, width, cv2.LINE_AA, SHIFT)
     for side, points in overlay.skis.items():
-        for x, y in _fine(points):
-            cv2.circle(block, (int(x), int(y)), width << _SHIFT, _COLOURS[side], -1, cv2.LINE_AA, _SHIFT)
-
-
-def _fine(places: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Image coordinates as OpenCV takes sub-pixels."""
-    return np.asarray(np.rint(np.clip(places, -1e5, 1e5) * (1 << _SHIFT)), np.int32)
+        for x, y in fine(points):
+            cv2.circle(block, (int(x), int(y)), width << SHIFT, _COLOURS[side], -1, cv2.LINE_AA, SHIFT)

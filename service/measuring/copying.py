@@ -47,7 +47,7 @@ def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
 
 
 def _is_copied(source: Path, target: Path) -> bool:
-    """Whether a file is there with the same size and time; results and notes are always copied anew.
+    """Whether a log is there with the same size; results and notes are always copied anew.
 
     Raises:
         StorageError: another log of this name is there.

@@ -1,7 +1,7 @@
 """The logs that wait to be measured: one after the other, the last jump first, none while a recording runs.
 
 A log is queued when it is opened, and measured when it is closed; then come the further steps that the rig file asks
-for. None is forgotten: A service that was killed, or a computer without power, goes on with the queue.
+for. None is forgotten: a service that was killed, or a computer without power, goes on with the queue.
 """
 
 import threading

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.report.overlay import Overlay
+from analysis.report.overlay import SHIFT, Overlay, fine
 from rig.arrays import Floats
 
 Picture = NDArray[np.uint8]
@@ -26,7 +26,6 @@ WIDTHS: Final = (11, 8, 4)
 #: Radii of points likewise; the helmet is larger.
 RADII: Final = (9.0, 7.5, 5.5)
 HELMET: Final = 1.4
-_SHIFT: Final = 4  # bits of sub-pixels
 
 
 class Line(NamedTuple):
@@ -68,23 +67,18 @@ def draw(picture: Picture, overlay: Overlay) -> None:
     for step, edge in enumerate((LIGHT, DARK, None)):
         for line in lines:
             colour = edge or COLOURS[line.part]
-            cv2.polylines(picture, [_fine(line.places)], False, colour, WIDTHS[step], cv2.LINE_AA, _SHIFT)
+            cv2.polylines(picture, [fine(line.places)], False, colour, WIDTHS[step], cv2.LINE_AA, SHIFT)
         for dot in dots:
             inner = COLOURS[dot.part] if dot.seen else DARK
             _disc(picture, dot, RADII[step] * dot.size, edge or inner)
     for dot in dots:
         if not dot.seen:
-            radius = round(RADII[2] * dot.size * (1 << _SHIFT))
-            centre = _fine(np.array((dot.x, dot.y)))
-            cv2.circle(picture, (int(centre[0]), int(centre[1])), radius, COLOURS[dot.part], 2, cv2.LINE_AA, _SHIFT)
+            radius = round(RADII[2] * dot.size * (1 << SHIFT))
+            centre = fine(np.array((dot.x, dot.y)))
+            cv2.circle(picture, (int(centre[0]), int(centre[1])), radius, COLOURS[dot.part], 2, cv2.LINE_AA, SHIFT)
 
 
 def _disc(picture: Picture, dot: Dot, radius: float, colour: Colour) -> None:
-    centre = _fine(np.array((dot.x, dot.y)))
-    fine = round(radius * (1 << _SHIFT))
-    cv2.circle(picture, (int(centre[0]), int(centre[1])), fine, colour, -1, cv2.LINE_AA, _SHIFT)
-
-
-def _fine(places: Floats) -> NDArray[np.int32]:
-    """Places as OpenCV takes sub-pixels."""
-    return np.asarray(np.rint(np.clip(places, -1e5, 1e5) * (1 << _SHIFT)), np.int32)
+    centre = fine(np.array((dot.x, dot.y)))
+    size = round(radius * (1 << SHIFT))
+    cv2.circle(picture, (int(centre[0]), int(centre[1])), size, colour, -1, cv2.LINE_AA, SHIFT)

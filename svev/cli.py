@@ -53,6 +53,7 @@ _COMMANDS: Final = {
     "calibrate": ("networks.calibrate", "calibrate", "Calibrate cameras with images of a 3D frame."),
     "orient": ("networks.orient", "orient", "Estimate the poses of the cameras on the hill."),
     "analyze": ("jumps.analyze", "analyze_command", "Measure the jumps of a recording."),
+    "digitize": ("jumps.digitize", "digitize_command", "Measure a recording by hand, in the browser."),
     "compare": ("jumps.compare", "compare", "Compare two measured jumps."),
     "network": ("networks.network", "app", "Make a network out of files of other programs."),
     "plan": ("networks.plan", "plan", "Predict the accuracy of planned cameras."),

@@ -11,6 +11,9 @@ from typing import Final
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
+from analysis.digitizing.desks import Desks
+from analysis.digitizing.files import DeskFiles
+from rig.errors import UnknownRecordingError
 from service.seam.rig import RigService
 from webpanel.documentation import DESCRIPTION, serve_documentation
 from webpanel.door.access import Access
@@ -24,6 +27,7 @@ from webpanel.routes.alarms import alarms_router
 from webpanel.routes.athletes import athletes_router
 from webpanel.routes.common import COMMON
 from webpanel.routes.contents import contents_router
+from webpanel.routes.digitizing import digitizing_router
 from webpanel.routes.events import Changes, events_router
 from webpanel.routes.exports import exports_router
 from webpanel.routes.files import files_router
@@ -45,7 +49,11 @@ _TYPES: Final = {
 
 
 def create_app(
-    service: RigService, access: Access, links: Links | None = None, sessions: Sessions | None = None
+    service: RigService,
+    access: Access,
+    links: Links | None = None,
+    sessions: Sessions | None = None,
+    desks: Desks | None = None,
 ) -> FastAPI:
     """The panel of one running service.
 
@@ -54,6 +62,7 @@ def create_app(
         access: who may reach the panel.
         links: makes links that open single recordings; None: there are none.
         sessions: of who has logged in; None: they end with the panel.
+        desks: where recordings are measured by hand; None: none can be.
 
     Returns:
         The application; `app.state.streams` are its `OpenStreams`. Serve it with `webpanel.server.make_server`.
@@ -84,6 +93,7 @@ def create_app(
         exports_router(service, streams.downloads),
         measuring_router(service, streams.downloads),
         athletes_router(service),
+        digitizing_router(desks or Desks(_nothing_to_measure, lambda: None)),
         preview_router(service, streams),
         cameras_router(service, streams),
         events_router(service, changes, streams.events),
@@ -101,11 +111,16 @@ def create_app(
     app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
     app.add_middleware(CountRequests, metrics=metrics)
     serve_documentation(app, access)
-    _serve_page(app)
+    serve_page(app)
     return app
 
 
-def _serve_page(app: FastAPI) -> None:
+def _nothing_to_measure(recording: str) -> DeskFiles:
+    raise UnknownRecordingError(f"recording {recording!r} cannot be measured by hand here")
+
+
+def serve_page(app: FastAPI) -> None:
+    """Serve the files of the page."""
     for suffix, media_type in _TYPES.items():
         mimetypes.add_type(media_type, suffix)
     app.frontend("/", directory=str(files("webpanel") / "page"), fallback=None)

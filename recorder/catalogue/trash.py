@@ -11,6 +11,7 @@ from typing import Final
 
 from recorder.catalogue.entry import SUFFIX
 from recorder.catalogue.voice_notes import voice_folder
+from recorder.log.digitized_path import digitized_path
 from recorder.log.jumper_path import jumper_path
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_path
@@ -106,7 +107,8 @@ def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[Tr
 
 def beside(log: Path) -> tuple[Path, ...]:
     """The files and folders that belong to a log, whether they are there or not."""
-    return session_path(log), truth_path(log), jumper_path(log), measured_path(log), voice_folder(log)
+    parts = (session_path, truth_path, jumper_path, measured_path, digitized_path, voice_folder)
+    return tuple(part(log) for part in parts)
 
 
 def _trashed(path: Path) -> TrashedLog | None:

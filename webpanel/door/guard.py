@@ -93,8 +93,8 @@ class Guard:
                 # The browser asks for the page's files each time, but gets only those that have changed.
                 headers.setdefault("cache-control", "no-store" if protected else "no-cache")
                 changed = scope["method"] not in READING and message["status"] < HTTPStatus.BAD_REQUEST
-                if changed and caller is not None:
-                    done = act(scope["method"], scope["path"])
+                done = act(scope["method"], scope["path"]) if changed and caller is not None else None
+                if done is not None:
                     said = phrase("event_act", "{act} ({caller})", act=done, caller=str(caller))
                     await run_in_threadpool(self._note, said)
             await send(message)

@@ -104,11 +104,21 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         r"DELETE /api/recordings/([^/]+)/measurement",
         lambda recording: phrase("act_not_measured", "gave up measuring recording {recording}", recording=recording),
     ),
+    (
+        r"POST /api/recordings/([^/]+)/digitizing/(?:orientation|sessions/[^/]+/compute)",
+        lambda recording: phrase(
+            "act_digitized", "asked for recording {recording}, measured by hand, to be computed", recording=recording
+        ),
+    ),
     (r"DELETE /api/exports/[^/]+", lambda: phrase("act_export_ended", "ended or removed an export")),
     (r"[A-Z]+ /api/next-jumper(?:/.*)?", lambda: phrase("act_next_jumper", "edited the next jumper")),
     (r"POST /api/start-list/preview", lambda: phrase("act_list_looked", "looked at a start list before loading it")),
     (r"[A-Z]+ /api/start-list(?:/.*)?", lambda: phrase("act_start_list", "edited the start list")),
 )
+
+
+#: Calls that are not told: each click of who measures by hand is kept with his marks, and would bury the log.
+_UNTOLD: Final = re.compile(r"[A-Z]+ /api/recordings/[^/]+/digitizing/(?:tape|refine|sessions/[^/]+/(?!compute).*)")
 
 
 def needed_role(method: str, path: str) -> Role:
@@ -136,9 +146,14 @@ def shown_by_link(method: str, path: str, recording: str) -> bool:
     return method in {"GET", "HEAD"} and found is not None and found[1] == recording
 
 
-def act(method: str, path: str) -> Phrase:
-    """What a call that changes something did, in words; e.g. `stopped recording 2026-02-14T10-15-30Z`."""
+def act(method: str, path: str) -> Phrase | None:
+    """What a call that changes something did, in words; e.g. `stopped recording 2026-02-14T10-15-30Z`.
+
+    None: it is not told in the live log.
+    """
     call = f"{method} {path}"
+    if _UNTOLD.fullmatch(call):
+        return None
     for pattern, words in _ACTS:
         if found := re.fullmatch(pattern, call):
             return words(*found.groups())

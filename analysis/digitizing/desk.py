@@ -1,0 +1,333 @@
+"""The desk at which a log is measured by hand: its frames, its operators' sessions, and the geometry between images."""
+
+import threading
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from analysis.cameras.source import Source
+from analysis.digitizing.computing import Computing
+from analysis.digitizing.effective import covariance_of, effective
+from analysis.digitizing.epipolar import epipolar_curves
+from analysis.digitizing.files import DeskFiles
+from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key, operators
+from analysis.digitizing.opened_log import OpenedLog
+from analysis.digitizing.orienting import Orienting
+from analysis.digitizing.pulse_view import PulseMarks, as_mark, pulse_view
+from analysis.digitizing.session import Session
+from analysis.digitizing.space import Ray, intersected, predicted_points, space_points
+from analysis.digitizing.things import BALL, things
+from analysis.measurements.file import read_measurements
+from analysis.measurements.model import Measurements, PulseMeasurements
+from analysis.scene.camera_system import CameraSystem
+from rig.api.digitizing import (
+    Action,
+    Changed,
+    Changes,
+    Curve,
+    Estimate,
+    Geometry,
+    HandResult,
+    JumpSpan,
+    Mark,
+    Opening,
+    OrientationState,
+    PulseView,
+    SessionView,
+    TapeOrder,
+    Touched,
+    ViewedCamera,
+    Worst,
+)
+from rig.arrays import Floats
+from rig.errors import BadInputError, StateForbidsError
+
+#: So many of the rays that fit worst are told.
+_WORST: Final = 20
+_NOTABLE_W: Final = 2.0
+
+
+class Desk:
+    """One log. Any thread may call any method.
+
+    Args:
+        files: the log and what lies beside it.
+        source: reads survey or poses; gives None if nobody named any.
+
+    Raises:
+        BadInputError: no such log, or it holds no pulse.
+    """
+
+    def __init__(self, files: DeskFiles, source: Callable[[], Source | None]) -> None:
+        self.files = files
+        self.log = OpenedLog(files.log)
+        self.orienting = Orienting(self.log, source)
+        self.computing = Computing(files.log, files.folder)
+        self._sessions: dict[str, Session] = {}
+        self._tests: dict[str, dict[int, list[Worst]]] = {}
+        self._lock = threading.Lock()
+        self._automatic: tuple[tuple[int, int] | None, Measurements | None] = (None, None)
+        self._by_pulse: dict[int, PulseMeasurements] = {}
+        self.orienting.begin()
+
+    def close(self) -> None:
+        """Let other programs measure in this log."""
+        with self._lock:
+            for session in self._sessions.values():
+                session.close()
+            self._sessions.clear()
+
+    def opening(self) -> Opening:
+        """What a page needs to begin."""
+        system = self.orienting.system
+        facts, known = self.log.facts, self.orienting.balls
+        return Opening(
+            recording=facts.recording,
+            rate_hz=facts.rate_hz,
+            cameras=[
+                ViewedCamera(name=name, size=camera.size, oriented=system is not None and name in system.names)
+                for name, camera in facts.cameras.items()
+            ],
+            pulses=self.log.pulses,
+            status=self.log.status,
+            things=things(() if known is None else known.names),
+            orientation=self.orienting.state,
+            operators=operators(self.files.folder),
+            jump=self._span(),
+        )
+
+    def orient(self, operator: str | None) -> OrientationState:
+        """Orient the cameras again: by the balls that an operator clicked, or by those that the images show."""
+        if operator is None:
+            return self.orienting.begin()
+        marks = {key: entered for key, entered in self.session(operator).everything() if key.thing.startswith(BALL)}
+        return self.orienting.begin(marks)
+
+    def session(self, operator: str) -> Session:
+        """The session of an operator, opened at the first call.
+
+        Raises:
+            BadInputError, StorageError: of its journal.
+        """
+        with self._lock:
+            if operator not in self._sessions:
+                path = self.files.folder / f"{operator}{SUFFIX}"
+                self._sessions[operator] = Session(Journal(path, self.log.facts.recording, operator))
+            return self._sessions[operator]
+
+    def session_view(self, operator: str) -> SessionView:
+        """The state of an operator's session."""
+        session = self.session(operator)
+        balls: dict[str, dict[str, Mark]] = {}
+        coverage = session.coverage()
+        for thing, cameras in coverage.items():
+            if thing.startswith(BALL):
+                for camera, pulses in cameras.items():
+                    for pulse in pulses:
+                        key = Key(pulse, camera, thing)
+                        balls.setdefault(camera, {})[thing] = as_mark(key, session.at(pulse)[key])
+        return SessionView(
+            revision=session.revision,
+            undo=session.undo_depth,
+            redo=session.redo_depth,
+            coverage=coverage,
+            worst=self._worst(operator, session),
+            balls=balls,
+        )
+
+    def view(self, operator: str, pulse: int) -> PulseView:
+        """Everything about one pulse.
+
+        Raises:
+            BadInputError: the log has no such pulse.
+        """
+        session = self.session(operator)
+        at = self._index(pulse)
+        before = tuple(self._marks(session, self.log.pulses[k]) for k in (at - 1, at - 2) if k >= 0)
+        view = pulse_view(
+            session.revision, self._marks(session, pulse), before, self.orienting.system, self.orienting.proposals()
+        )
+        self._tests.setdefault(operator, {})[pulse] = _tests(view)
+        return view
+
+    def act(self, operator: str, action: Action) -> Changed:
+        """Do what an operator asked for; it is on the disk when this returns.
+
+        Raises:
+            BadInputError: the action does not fit this log.
+            StorageError: the disk refuses; nothing was changed.
+        """
+        session = self.session(operator)
+        if action.do in {"place", "state", "remove"}:
+            self._index(action.pulse)
+            self._camera(action.camera)
+        touched = session.act(action)
+        return self._changed(operator, session, touched)
+
+    def changes(self, operator: str, since: int, wait_s: float) -> Changes:
+        """What changed after a revision; waits for a change if there is none yet."""
+        revision, touched = self.session(operator).changes(since, wait_s)
+        return Changes(revision=revision, touched=touched)
+
+    def geometry(self, operator: str, pulse: int, camera: str, thing: str, xy: tuple[float, float]) -> Geometry:
+        """What one place in one image means for the others.
+
+        Raises:
+            BadInputError: the log has no such pulse or camera.
+            StateForbidsError: the camera is not oriented.
+        """
+        self._index(pulse)
+        self._camera(camera)
+        system = self.oriented()
+        if camera not in system.names:
+            return Geometry(curves={}, space=None, predicted={})
+        place, covariance = np.array(xy, float), covariance_of(Entered(xy=xy))
+        curves = epipolar_curves(system, camera, place, covariance)
+        others = self._marks(self.session(operator), pulse).rays().get(thing, {})
+        found = intersected(system, {thing: {**others, camera: Ray(place, covariance)}})
+        return Geometry(
+            curves={
+                name: Curve(line=_list(curve.line), low=_list(curve.low), high=_list(curve.high))
+                for name, curve in curves.items()
+                if len(curve.line)
+            },
+            space=space_points(system, found)[thing],
+            predicted={name: points[thing] for name, points in predicted_points(system, found).items()},
+        )
+
+    def tape(self, order: TapeOrder) -> Estimate:
+        """The distance between two things that were clicked in two images or more each.
+
+        Raises:
+            BadInputError: their rays do not give both places.
+            StateForbidsError: no camera is oriented.
+        """
+        system = self.oriented()
+        clicks = {
+            end: {camera: Ray(np.array(xy), covariance_of(Entered(xy=xy))) for camera, xy in places.items()}
+            for end, places in (("start", order.start), ("end", order.end))
+        }
+        found = intersected(system, clicks).adjusted
+        if not found.ok.all():
+            raise BadInputError("the clicks do not give both ends: click each in two images or more")
+        way = found.state[1] - found.state[0]
+        length = float(np.linalg.norm(way))
+        if not length:
+            return Estimate(value=0.0, sigma=float(np.sqrt(np.trace(found.image_covariance.sum(axis=0)))))
+        along = way / length
+        influence = along @ (found.by_calibration[1] - found.by_calibration[0])
+        variance = along @ found.image_covariance.sum(axis=0) @ along + influence @ system.covariance @ influence
+        return Estimate(value=length, sigma=float(np.sqrt(variance)))
+
+    def measurements(self, operator: str) -> Measurements:
+        """What counts of the automatic measurement and of an operator's marks."""
+        automatic = self.automatic() or Measurements(
+            self.log.facts.recording, self.log.facts.rate_hz, self.log.facts.cameras, ()
+        )
+        return effective(automatic, self.session(operator).everything(), self.log.times)
+
+    def compute(self, operator: str) -> HandResult:
+        """Begin to compute from an operator's marks.
+
+        Raises:
+            StateForbidsError: nobody told where the balls are.
+        """
+
+        def order() -> tuple[Measurements, Source]:
+            source = self.orienting.for_analysis
+            if source is None:
+                raise StateForbidsError(f"nothing can be computed in space: {self.orienting.state.message}")
+            return self.measurements(operator), source
+
+        return self.computing.begin(operator, order)
+
+    def automatic(self) -> Measurements | None:
+        """What was measured automatically in this log; None: nothing yet."""
+        path = self.files.measured / "measurements.json"
+        try:
+            state = path.stat()
+        except OSError:
+            return None
+        stamp = state.st_mtime_ns, state.st_ino
+        with self._lock:
+            if self._automatic[0] != stamp:
+                found = read_measurements(path)
+                self._automatic = stamp, found
+                self._by_pulse = {int(pulse.pulse): pulse for jump in found.jumps for pulse in jump.pulses}
+            return self._automatic[1]
+
+    def oriented(self) -> CameraSystem:
+        """The oriented cameras.
+
+        Raises:
+            StateForbidsError: there are none yet.
+        """
+        if (system := self.orienting.system) is None:
+            raise StateForbidsError(f"the cameras are not oriented: {self.orienting.state.message or 'wait for it'}")
+        return system
+
+    def _changed(self, operator: str, session: Session, touched: Touched | None) -> Changed:
+        view = None
+        if touched is not None:
+            view = self.view(operator, touched.pulse)
+        return Changed(
+            revision=session.revision, undo=session.undo_depth, redo=session.redo_depth, touched=touched, view=view
+        )
+
+    def _marks(self, session: Session, pulse: int) -> PulseMarks:
+        self.automatic()
+        return PulseMarks(pulse, self.log.times[pulse], session.at(pulse), self._by_pulse.get(pulse))
+
+    def _worst(self, operator: str, session: Session) -> list[Worst]:
+        """The rays that fit worst, of all pulses that were looked at or marked."""
+        known = self._tests.setdefault(operator, {})
+        system = self.orienting.system
+        if system is None:
+            return []
+        missing = [pulse for pulse in session.pulses() if pulse not in known and pulse in self.log.times]
+        if missing:
+            rays = {
+                (pulse, thing): by_camera
+                for pulse in missing
+                for thing, by_camera in self._marks(session, pulse).rays().items()
+            }
+            found = intersected(system, {f"{pulse} {thing}": rays[pulse, thing] for pulse, thing in rays})
+            known.update({pulse: [] for pulse in missing})
+            for row, (pulse, thing) in enumerate(rays):
+                for camera, w in zip(system.names, found.adjusted.w[row], strict=True):
+                    if found.adjusted.ok[row] and w > _NOTABLE_W:
+                        known[pulse].append(Worst(pulse=pulse, camera=camera, thing=thing, w=float(w)))
+        return sorted((each for tests in known.values() for each in tests), key=lambda each: -each.w)[:_WORST]
+
+    def _span(self) -> JumpSpan | None:
+        found = self.automatic()
+        if found is None or not found.jumps:
+            return None
+        pulses = found.jumps[0].pulses
+        return JumpSpan(first=int(pulses[0].pulse), last=int(pulses[-1].pulse), takeoff=None)
+
+    def _index(self, pulse: int) -> int:
+        at = int(np.searchsorted(self.log.pulses, pulse))
+        if at == len(self.log.pulses) or self.log.pulses[at] != pulse:
+            first, last = self.log.pulses[0], self.log.pulses[-1]
+            raise BadInputError(f"the log has no pulse {pulse}: it goes from {first} to {last}")
+        return at
+
+    def _camera(self, name: str) -> None:
+        if name not in self.log.facts.cameras:
+            raise BadInputError(f"the log has no camera {name}: choose among {', '.join(self.log.facts.cameras)}")
+
+
+def _tests(view: PulseView) -> list[Worst]:
+    return [
+        Worst(pulse=view.pulse, camera=camera, thing=thing, w=w)
+        for found in (view.space, view.lines)
+        for thing, point in found.items()
+        for camera, w in point.w.items()
+        if w > _NOTABLE_W
+    ]
+
+
+def _list(line: Floats) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y in np.round(line, 3)]

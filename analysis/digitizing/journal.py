@@ -1,0 +1,156 @@
+"""Keeps an operator's actions in a file to which lines are only added; none is lost once it was answered.
+
+The file begins with a line that names format, recording and operator. Each further line is an entry: the marks that an
+action set and the places that it cleared, or "undo", or "redo". What stands when the file is read is what the entries
+make in their order. An entry is on the disk before its action is answered; one that a crash cut is no entry.
+"""
+
+import fcntl
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+import msgspec
+
+from rig.api.digitizing import MarkSource, MarkState
+from rig.errors import BadInputError, StorageError
+
+FORMAT: Final = "svev-digitizing/1"
+SUFFIX: Final = ".jsonl"
+
+
+class Key(msgspec.Struct, frozen=True, array_like=True, order=True):
+    """Which thing in which image; `vertex` counts the points of a line and is -1 of everything else."""
+
+    pulse: int
+    camera: str
+    thing: str
+    vertex: int = -1
+
+
+class Entered(msgspec.Struct, frozen=True, array_like=True):
+    """What was said of it: `xy` and `sigma` are px; `xy` is None where it cannot be measured."""
+
+    state: MarkState = MarkState.MEASURED
+    xy: tuple[float, float] | None = None
+    sigma: tuple[float, float] | None = None
+    source: MarkSource = MarkSource.HAND
+
+
+class Entry(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One action: marks that it set, keys that it cleared; or that one was taken back, or done again."""
+
+    do: Literal["change", "undo", "redo"] = "change"
+    at: str = ""
+    set: tuple[tuple[Key, Entered], ...] = ()
+    clear: tuple[Key, ...] = ()
+
+
+class _Head(msgspec.Struct, frozen=True):
+    format: str
+    recording: str
+    operator: str
+
+
+_HEAD: Final = msgspec.json.Decoder(_Head)
+_ENTRY: Final = msgspec.json.Decoder(Entry)
+_ENCODE: Final = msgspec.json.Encoder().encode
+
+
+class Journal:
+    """The file of one operator's actions. One program holds it at a time.
+
+    Args:
+        path: the file; made if it is missing, with its folder.
+        recording: id of the recording.
+        operator: name.
+
+    Raises:
+        BadInputError: the file is another recording's, or no journal, or another program holds it.
+        StorageError: it cannot be made or read.
+    """
+
+    def __init__(self, path: Path, recording: str, operator: str) -> None:
+        self.path = path
+        self._whole = 0
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
+        except OSError as error:
+            raise StorageError(f"{path}: {error.strerror}; the marks cannot be kept: free the folder") from None
+        try:
+            self.entries: Sequence[Entry] = self._begin(recording, operator)
+        except BaseException:
+            os.close(self._fd)
+            raise
+
+    def append(self, entry: Entry) -> None:
+        """Put an entry on the disk.
+
+        Raises:
+            StorageError: the disk refuses; the entry is not kept.
+        """
+        line = _ENCODE(entry) + b"\n"
+        try:
+            written = os.pwrite(self._fd, line, self._whole)
+            os.fdatasync(self._fd)
+            trouble = None if written == len(line) else "the disk is full"
+        except OSError as error:
+            trouble = error.strerror
+        if trouble is not None:
+            self._cut()
+            raise StorageError(f"{self.path}: {trouble}; the last action was not kept: make room")
+        self._whole += len(line)
+
+    def close(self) -> None:
+        """Let other programs have the file."""
+        os.close(self._fd)
+
+    def _begin(self, recording: str, operator: str) -> Sequence[Entry]:
+        try:
+            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BadInputError(
+                f"{self.path}: another program measures under this name now; close it, or take another name"
+            ) from None
+        with os.fdopen(os.dup(self._fd), "rb") as file:
+            text = file.read()
+        if not text.strip(b"\n"):
+            head = _ENCODE(_Head(FORMAT, recording, operator)) + b"\n"
+            os.pwrite(self._fd, head, 0)
+            os.fsync(self._fd)
+            self._whole = len(head)
+            return ()
+        return self._read(text, recording)
+
+    def _read(self, text: bytes, recording: str) -> Sequence[Entry]:
+        """Whole entries; a last line that a crash cut is removed."""
+        end = text.rfind(b"\n") + 1
+        lines = text[:end].split(b"\n")[:-1]
+        try:
+            head = _HEAD.decode(lines[0] if lines else text)
+            entries = [_ENTRY.decode(line) for line in lines[1:]]
+        except msgspec.MsgspecError as error:
+            raise BadInputError(f"{self.path}: is no journal of marks ({error}); move it away") from None
+        if head.format != FORMAT or head.recording != recording:
+            raise BadInputError(
+                f"{self.path}: belongs to recording {head.recording} ({head.format}), not to {recording}; move it away"
+            )
+        self._whole = end
+        self._cut()
+        return entries
+
+    def _cut(self) -> None:
+        """Remove what stands after the last whole entry; if that fails, the next entry is written over it."""
+        try:
+            os.ftruncate(self._fd, self._whole)
+        except OSError as error:
+            raise StorageError(f"{self.path}: {error.strerror}; the marks cannot be kept") from None
+
+
+def operators(folder: Path) -> list[str]:
+    """Who has measured: the names of the journals in a folder, in order."""
+    if not folder.is_dir():
+        return []
+    return sorted(path.name.removesuffix(SUFFIX) for path in folder.iterdir() if path.name.endswith(SUFFIX))

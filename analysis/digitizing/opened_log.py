@@ -1,0 +1,141 @@
+"""A log that is being measured by hand: its pulses, what became of each frame, and frames one by one."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.cameras.frames import camera_images
+from analysis.procedure.log_facts import log_facts
+from analysis.scene.static_image import StaticImage, static_images
+from recorder.reading.log_reader import LogReader
+from recorder.reading.triplets import stored_triplets, tags
+from rig.clocks import UtcNs
+from rig.errors import BadInputError
+from rig.frame import FrameStatus
+from rig.images.picture import Grey, measurable, shown
+
+LETTERS: Final = {
+    FrameStatus.OK: "o",
+    FrameStatus.LOST: "l",
+    FrameStatus.MISSED: "m",
+    FrameStatus.DAMAGED: "d",
+    FrameStatus.ABSENT: "a",
+}
+#: So many pulses stay in memory: those around the one that is looked at.
+_KEPT: Final = 12
+#: A difference of so many standard deviations of a pixel's noise is shown black or white.
+_SHOWN_SIGMAS: Final = 12.0
+_GREY: Final = 128
+
+
+class NoFrameError(BadInputError):
+    """The log has no such frame; the message says what became of it."""
+
+
+class OpenedLog:
+    """Any thread may call any method.
+
+    Args:
+        log: the log.
+
+    Raises:
+        BadInputError: no such log, or it holds no pulse.
+    """
+
+    def __init__(self, log: Path) -> None:
+        self.path = log
+        self.facts = log_facts(log)
+        found = {int(tag.pulse): tag for tag in tags(log)}
+        self.pulses = sorted(found)
+        self.times: Mapping[int, UtcNs] = {pulse: found[pulse].time for pulse in self.pulses}
+        self.status = {
+            camera: "".join(_letter(found[pulse].cameras, camera) for pulse in self.pulses)
+            for camera in self.facts.cameras
+        }
+        with LogReader(log) as reader:
+            self._stored = {int(triplet.tag.pulse): triplet for triplet in stored_triplets(reader)}
+        self._lock = threading.Lock()
+        self._frames: OrderedDict[int, tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]]] = OrderedDict()
+        self._static: dict[str, StaticImage] | None = None
+
+    def frames(self, pulse: int) -> Mapping[str, Grey]:
+        """The frames of a pulse by camera, grey values to measure in; those that are not there are left out."""
+        return self._read(pulse)[0]
+
+    def png(self, pulse: int, camera: str, *, difference: bool = False) -> bytes:
+        """A frame as a PNG file without loss, or its difference from the background.
+
+        Raises:
+            NoFrameError: there is none.
+        """
+        grey, pictures = self._read(pulse)
+        if camera not in pictures:
+            raise NoFrameError(self._why_none(pulse, camera))
+        picture = pictures[camera]
+        if difference:
+            picture = _difference(grey[camera], self.static()[camera])
+        _, png = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        return png.tobytes()
+
+    def static(self) -> dict[str, StaticImage]:
+        """What each camera sees when nothing moves; takes a second or two at the first call.
+
+        Raises:
+            LogDamagedError: no frame can be read.
+        """
+        with self._lock:
+            if self._static is None:
+                self._static = static_images(self.path)
+            return self._static
+
+    def _read(self, pulse: int) -> tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]]:
+        with self._lock:
+            if pulse in self._frames:
+                self._frames.move_to_end(pulse)
+                return self._frames[pulse]
+            found: tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]] = ({}, {})
+            if (triplet := self._stored.get(pulse)) is not None:
+                with LogReader(self.path) as reader:
+                    try:
+                        image = triplet.image(reader)
+                        grey, picture = measurable(image, triplet.tag.pixels), shown(image, triplet.tag.pixels)
+                        found = (
+                            {name: part.copy() for name, part in camera_images(triplet.tag, grey).items()},
+                            {name: part.copy() for name, part in camera_images(triplet.tag, picture).items()},
+                        )
+                    except ValueError:
+                        found = ({}, {})  # a damaged chunk: `svev verify` names it, and the page shows that it is none
+            self._frames[pulse] = found
+            while len(self._frames) > _KEPT:
+                self._frames.popitem(last=False)
+            return found
+
+    def _why_none(self, pulse: int, camera: str) -> str:
+        if camera not in self.status:
+            return f"the log has no camera {camera}: choose among {', '.join(self.status)}"
+        if pulse not in self.times:
+            return f"the log has no pulse {pulse}: it goes from {self.pulses[0]} to {self.pulses[-1]}"
+        letter = self.status[camera][self.pulses.index(pulse)]
+        what = next(status.value for status, known in LETTERS.items() if known == letter)
+        if what == FrameStatus.OK.value:
+            what = "damaged in the file"
+        return f"the frame of {camera} at pulse {pulse} is {what}: measure in another pulse"
+
+
+def _letter(cameras: tuple[object, ...], name: str) -> str:
+    return next(
+        (LETTERS[tag.status] for tag in cameras if tag.name == name),  # type: ignore[attr-defined]
+        LETTERS[FrameStatus.ABSENT],
+    )
+
+
+def _difference(grey: Grey, static: StaticImage) -> NDArray[np.uint8]:
+    """Grey value minus background over noise, middle grey where nothing differs."""
+    sigmas = (grey.astype(np.float32) - static.grey) / np.maximum(static.noise, 1e-3)
+    return np.clip(_GREY + sigmas * (_GREY / _SHOWN_SIGMAS), 0, 255).astype(np.uint8)

@@ -1,0 +1,190 @@
+"""Puts together what a page shows of one pulse: marks, the automatic measurement, and what follows in space."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from analysis.digitizing.effective import covariance_of, effective_pulse
+from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.space import (
+    PointsInSpace,
+    Ray,
+    Stick,
+    intersected,
+    predicted,
+    predicted_points,
+    space_points,
+    stick,
+)
+from analysis.digitizing.things import LANDMARK, LINES
+from analysis.measurements.model import POINTS, PulseMeasurements
+from analysis.scene.camera_system import CameraSystem
+from rig.api.digitizing import (
+    AutomaticLine,
+    AutomaticPoint,
+    LineMarks,
+    Mark,
+    MarkState,
+    PredictedPoint,
+    PulseView,
+)
+from rig.clocks import NS_PER_S, UtcNs
+
+#: Standard deviation of a point's acceleration beside that of free fall, m/s^2: a jumper who rises or lands has 20.
+_ACCELERATION: Final = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PulseMarks:
+    """What is known of one pulse.
+
+    Attributes:
+        pulse: its number.
+        time: when it fired.
+        marks: of the operator.
+        automatic: the automatic measurement; None: there is none.
+    """
+
+    pulse: int
+    time: UtcNs
+    marks: Mapping[Key, Entered]
+    automatic: PulseMeasurements | None
+
+    def effective(self) -> PulseMeasurements:
+        """What counts of both."""
+        return effective_pulse(self.pulse, self.time, self.marks, self.automatic)
+
+    def rays(self) -> dict[str, dict[str, Ray]]:
+        """The rays of all points: P1 to P4 as they count, and landmarks."""
+        found: dict[str, dict[str, Ray]] = {}
+        for camera, image in self.effective().images.items():
+            for name, point in image.points.items():
+                found.setdefault(name, {})[camera] = Ray(point.xy, point.covariance)
+        for key, entered in self.marks.items():
+            if key.thing.startswith(LANDMARK) and entered.state is MarkState.MEASURED and entered.xy is not None:
+                found.setdefault(key.thing, {})[key.camera] = Ray(np.array(entered.xy), covariance_of(entered))
+        return found
+
+
+def pulse_view(
+    revision: int, now: PulseMarks, before: tuple[PulseMarks, ...], system: CameraSystem | None,
+    balls: Mapping[str, Mapping[str, PredictedPoint]],
+) -> PulseView:  # fmt: skip
+    """The view of a pulse.
+
+    Args:
+        revision: of the session.
+        now: the pulse.
+        before: the pulse before it and the one before that, as far as there are any.
+        system: the oriented cameras; None: none are.
+        balls: where the surveyed balls should be, by camera and thing.
+    """
+    marks = _marks(now)
+    found, sticks = None, Stick({}, {})
+    guessed: dict[str, dict[str, PredictedPoint]] = {}
+    if system is not None:
+        found = intersected(system, now.rays())
+        sticks = stick(system, now.effective())
+        guessed = predicted_points(system, found)
+        for source in (_by_time(system, now, before, found), balls):
+            for camera, points in source.items():
+                own = marks.get(camera, {})
+                there = guessed.setdefault(camera, {})
+                there.update({name: place for name, place in points.items() if name not in there and name not in own})
+    return PulseView(
+        revision=revision,
+        pulse=now.pulse,
+        marks=marks,
+        automatic=_automatic(now.automatic),
+        space={} if found is None or system is None else space_points(system, found),
+        lines=sticks.lines,
+        predicted={camera: points for camera, points in guessed.items() if points},
+        previous=_places(before[0].marks) if before else {},
+        figures=sticks.figures,
+    )
+
+
+def _by_time(
+    system: CameraSystem, now: PulseMarks, before: tuple[PulseMarks, ...], found: PointsInSpace
+) -> dict[str, dict[str, PredictedPoint]]:
+    """Where points should be that two rays do not give now but gave in the two pulses before: constant velocity."""
+    if len(before) < 2:
+        return {}
+    given = {name for i, name in enumerate(found.names) if found.adjusted.ok[i]}
+    last, older = (intersected(system, marks.rays()) for marks in before[:2])
+    places = {name: i for i, name in enumerate(older.names) if older.adjusted.ok[i]}
+    step = (now.time - before[0].time) / NS_PER_S
+    ratio = step * NS_PER_S / max(before[0].time - before[1].time, 1)
+    result: dict[str, dict[str, PredictedPoint]] = {}
+    for i, name in enumerate(last.names):
+        if name in given or name not in places or not last.adjusted.ok[i]:
+            continue
+        j = places[name]
+        xyz = last.adjusted.state[i] + ratio * (last.adjusted.state[i] - older.adjusted.state[j])
+        covariance = (
+            (1 + ratio) ** 2 * last.adjusted.image_covariance[i]
+            + ratio**2 * older.adjusted.image_covariance[j]
+            + (_ACCELERATION * step**2) ** 2 * np.eye(3)
+        )
+        for camera in system.cameras.values():
+            px = camera.project(xyz)
+            if np.isfinite(px).all() and (px > 0).all() and (px < camera.size - 1).all():
+                _, by_point, _ = camera.linearised(xyz[None], px[None])
+                ellipse = predicted(px, by_point[0] @ covariance @ by_point[0].T, "time")
+                result.setdefault(camera.name, {})[name] = ellipse
+    return result
+
+
+def _marks(now: PulseMarks) -> dict[str, dict[str, Mark | LineMarks]]:
+    result: dict[str, dict[str, Mark | LineMarks]] = {}
+    lines: dict[tuple[str, str], list[Mark]] = {}
+    for key, entered in sorted(now.marks.items()):
+        mark = as_mark(key, entered)
+        if key.thing in LINES:
+            lines.setdefault((key.camera, key.thing), []).append(mark)
+        else:
+            result.setdefault(key.camera, {})[key.thing] = mark
+    for (camera, thing), vertices in lines.items():
+        placed = [mark for mark in vertices if mark.xy is not None]
+        result.setdefault(camera, {})[thing] = LineMarks(state=vertices[0].state, vertices=placed)
+    return result
+
+
+def as_mark(key: Key, entered: Entered) -> Mark:
+    """A mark for a page."""
+    return Mark(
+        pulse=key.pulse,
+        camera=key.camera,
+        thing=key.thing,
+        vertex=None if key.vertex < 0 else key.vertex,
+        state=entered.state,
+        xy=entered.xy,
+        sigma=entered.sigma,
+        source=entered.source,
+    )
+
+
+def _automatic(pulse: PulseMeasurements | None) -> dict[str, dict[str, AutomaticPoint | AutomaticLine]]:
+    result: dict[str, dict[str, AutomaticPoint | AutomaticLine]] = {}
+    for camera, image in ({} if pulse is None else pulse.images).items():
+        there: dict[str, AutomaticPoint | AutomaticLine] = {}
+        for name in POINTS:
+            if (point := image.points.get(name)) is not None:
+                sx, sy = np.sqrt(np.diagonal(point.covariance)).tolist()
+                there[name] = AutomaticPoint(xy=(float(point.xy[0]), float(point.xy[1])), sigma=(sx, sy))
+        for name, side in LINES.items():
+            if (ski := image.skis.get(side)) is not None:
+                there[name] = AutomaticLine(xy=[(float(x), float(y)) for x, y in ski.xy])
+        if there:
+            result[camera] = there
+    return result
+
+
+def _places(marks: Mapping[Key, Entered]) -> dict[str, dict[str, list[tuple[float, float]]]]:
+    result: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for key, entered in sorted(marks.items()):
+        if entered.xy is not None:
+            result.setdefault(key.camera, {}).setdefault(key.thing, []).append(entered.xy)
+    return result

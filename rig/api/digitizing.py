@@ -1,0 +1,369 @@
+"""Measuring by hand: what a person marks in the images of a recording, and what follows from it in space."""
+
+from enum import StrEnum
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from rig.api.fields import WHOLE, Model
+
+#: So many changes one action may hold: all points of a long track.
+MARKS_MAX: Final = 200_000
+_LARGEST_PX: Final = 100_000.0
+
+Pixel = Annotated[float, Field(ge=-_LARGEST_PX, le=_LARGEST_PX, allow_inf_nan=False)]
+SigmaPx = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Place = tuple[Pixel, Pixel]
+Sigmas = tuple[SigmaPx, SigmaPx]
+PulseNumber = Annotated[int, Field(ge=0, le=2**53), WHOLE]
+Vertex = Annotated[int, Field(ge=0, le=999), WHOLE]
+Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")]
+OperatorName = Annotated[
+    str, Field(min_length=1, max_length=40, pattern=r"^[\w][\w .\-]*$", description="who measures", examples=["Anna"])
+]
+
+
+class MarkState(StrEnum):
+    """What a person says of a thing in an image."""
+
+    MEASURED = "measured"
+    GUESS = "guess"  #: has a place, which nothing is computed from
+    HIDDEN = "hidden"  #: behind something
+    NOT_VISIBLE = "not visible"
+
+
+class MarkSource(StrEnum):
+    """How a place came about. Places that were only predicted are no marks."""
+
+    HAND = "hand"
+    REFINED = "refined"  #: by hand, then by the image
+    TRACKED = "tracked"  #: followed in the images from marks by hand
+    AUTOMATIC = "automatic"  #: as the automatic measurement gave it, and accepted
+
+
+class Mark(Model):
+    """What an operator says of one thing in one image. The vertices of a line are marks of their own."""
+
+    pulse: PulseNumber
+    camera: Name
+    thing: Name
+    vertex: Vertex | None = None
+    state: MarkState = MarkState.MEASURED
+    xy: Place | None = Field(None, description="px; (0, 0) is the centre of the top-left pixel")
+    sigma: Sigmas | None = Field(None, description="px, of x and y; null: that of a click by hand")
+    source: MarkSource = MarkSource.HAND
+
+
+class PlaceAction(Model):
+    """Put a thing at a place; `vertex` null appends one to a line."""
+
+    do: Literal["place"]
+    pulse: PulseNumber
+    camera: Name
+    thing: Name
+    xy: Place
+    vertex: Vertex | None = None
+    state: Literal[MarkState.MEASURED, MarkState.GUESS] = MarkState.MEASURED
+    sigma: Sigmas | None = None
+    source: Literal[MarkSource.HAND, MarkSource.REFINED, MarkSource.AUTOMATIC] = MarkSource.HAND
+
+
+class StateAction(Model):
+    """Say that a thing cannot be measured in an image."""
+
+    do: Literal["state"]
+    pulse: PulseNumber
+    camera: Name
+    thing: Name
+    state: Literal[MarkState.HIDDEN, MarkState.NOT_VISIBLE]
+
+
+class RemoveAction(Model):
+    """Take back all that was said of a thing in an image, or one vertex of a line."""
+
+    do: Literal["remove"]
+    pulse: PulseNumber
+    camera: Name
+    thing: Name
+    vertex: Vertex | None = None
+
+
+class UndoAction(Model):
+    """Take back the last action, or do again what was taken back."""
+
+    do: Literal["undo", "redo"]
+
+
+Action = Annotated[PlaceAction | StateAction | RemoveAction | UndoAction, Field(discriminator="do")]
+
+
+class Estimate(Model):
+    """A value with its standard deviation."""
+
+    value: float
+    sigma: float
+
+
+class Touched(Model):
+    """What an action changed: one thing in one image."""
+
+    pulse: int
+    camera: str
+    thing: str
+
+
+class LineMarks(Model):
+    """The marks of a line in an image."""
+
+    state: MarkState
+    vertices: list[Mark]
+
+
+class AutomaticPoint(Model):
+    """Where the automatic measurement has a point, px."""
+
+    xy: Place
+    sigma: Sigmas
+
+
+class AutomaticLine(Model):
+    """Points on a line as the automatic measurement has them, px."""
+
+    xy: list[Place]
+
+
+class SpacePoint(Model):
+    """A point in space from its rays."""
+
+    X: tuple[float, float, float] | None = Field(description="m; null: not determined")
+    sigma: tuple[float, float, float] | None
+    status: str = Field(description="controlled, two rays, one ray, or why it is not determined")
+    rays: list[str] = Field(description="cameras whose rays are used")
+    residuals: dict[str, Place] = Field(description="measured - computed by camera, px")
+    w: dict[str, float] = Field(description="test values by camera; standard normal where nothing is wrong")
+    finding: str | None = Field(None, description="a ray that does not fit, in words")
+
+
+class SideCheck(Model):
+    """Whether left and right fit together in three images (trifocal check)."""
+
+    ok: bool
+    message: str
+
+
+class SpaceLine(Model):
+    """A ski in space from its image lines."""
+
+    slope: Estimate | None
+    heading: Estimate | None
+    status: str
+    w: dict[str, float]
+    finding: str | None = None
+    sides: SideCheck | None = None
+
+
+class PredictedPoint(Model):
+    """Where a point should be in an image."""
+
+    xy: Place
+    ellipse: tuple[float, float, float] = Field(description="semi-axes of one sigma, px, and angle of the first, rad")
+    source: Literal["rays", "time"]
+
+
+class PulseView(Model):
+    """Everything about one pulse: marks, what the automatic measurement found, and what follows in space."""
+
+    revision: int
+    pulse: int
+    marks: dict[str, dict[str, Mark | LineMarks]]
+    automatic: dict[str, dict[str, AutomaticPoint | AutomaticLine]]
+    space: dict[str, SpacePoint]
+    lines: dict[str, SpaceLine]
+    predicted: dict[str, dict[str, PredictedPoint]]
+    previous: dict[str, dict[str, list[Place]]] = Field(description="the marks of the pulse before")
+    figures: dict[str, Estimate] = Field(description="angles in degrees, height in the survey's unit")
+
+
+class Changed(Model):
+    """The answer to an action."""
+
+    revision: int
+    undo: int = Field(description="so many actions can be taken back")
+    redo: int
+    touched: Touched | None
+    view: PulseView | None = Field(description="of the pulse that was touched")
+
+
+class Changes(Model):
+    """What has changed since a revision."""
+
+    revision: int
+    touched: list[Touched]
+
+
+class Worst(Model):
+    """A ray that fits badly."""
+
+    pulse: int
+    camera: str
+    thing: str
+    w: float
+
+
+class SessionView(Model):
+    """The state of an operator's session."""
+
+    revision: int
+    undo: int
+    redo: int
+    coverage: dict[str, dict[str, dict[int, str]]] = Field(
+        description="by thing, camera and pulse: m measured, r refined, t tracked, a automatic, g guess, h hidden, "
+        "n not visible"
+    )
+    worst: list[Worst]
+    balls: dict[str, dict[str, Mark]] = Field(description="by camera, the balls that were marked")
+
+
+class Thing(Model):
+    """Something that can be measured."""
+
+    name: str
+    kind: Literal["point", "line", "ball"]
+    title: str
+    group: str
+
+
+class OrientationState(Model):
+    """How far the cameras are oriented."""
+
+    state: Literal["none", "working", "done", "failed"]
+    message: str | None = None
+    findings: tuple[str, ...] = ()
+
+
+class ViewedCamera(Model):
+    """A camera of the log."""
+
+    name: str
+    size: tuple[int, int]
+    oriented: bool
+
+
+class JumpSpan(Model):
+    """The pulses of the first jump that was measured automatically."""
+
+    first: int
+    last: int
+    takeoff: int | None
+
+
+class Opening(Model):
+    """What a page needs to begin."""
+
+    recording: str
+    rate_hz: float
+    cameras: list[ViewedCamera]
+    pulses: list[int]
+    status: dict[str, str] = Field(
+        description="a letter for each pulse: o ok, l lost, m missed, d damaged, a absent", examples=[{"K1": "oom"}]
+    )
+    things: list[Thing]
+    orientation: OrientationState
+    operators: list[str]
+    jump: JumpSpan | None
+
+
+class Curve(Model):
+    """An epipolar curve in an image, with its band of two sigmas, px."""
+
+    line: list[Place]
+    low: list[Place]
+    high: list[Place]
+
+
+class Geometry(Model):
+    """What one place in one image means for the others."""
+
+    curves: dict[str, Curve]
+    space: SpacePoint | None
+    predicted: dict[str, PredictedPoint]
+
+
+class RefineOrder(Model):
+    """Where to look for a thing more exactly."""
+
+    pulse: PulseNumber
+    camera: Name
+    x: Pixel
+    y: Pixel
+    kind: Literal["disc", "dark disc", "edge"]
+
+
+class Refined(Model):
+    """A place found in the image, px."""
+
+    xy: Place
+    sigma: Sigmas
+    kind: str
+
+
+class TrackOrder(Model):
+    """What to follow through the images, from where."""
+
+    things: Annotated[list[Name], Field(min_length=1, max_length=100)]
+    pulse: PulseNumber
+    direction: Literal[1, -1]
+    most: Annotated[int, Field(ge=1, le=10_000), WHOLE] = 30
+
+
+class Tracked(Model):
+    """What was followed."""
+
+    revision: int
+    tracked: dict[str, list[int]] = Field(description="by thing, the pulses")
+    stopped: dict[str, str] = Field(description="by thing, why it ended")
+
+
+class Suggestion(Model):
+    """Where one more click lowers the sigmas most."""
+
+    pulse: int
+    camera: str
+    thing: str
+    why: str
+
+
+class TapeOrder(Model):
+    """Two things of which each is clicked in two images or more."""
+
+    pulse: PulseNumber
+    start: dict[Name, Place] = Field(alias="from")
+    end: dict[Name, Place] = Field(alias="to")
+
+
+class CurvePoint(Model):
+    """A value of a pulse."""
+
+    pulse: int
+    value: float
+    sigma: float
+
+
+class HandResult(Model):
+    """How far the computing of a session is, and what it gave."""
+
+    state: Literal["none", "computing", "done", "failed"]
+    message: str | None = None
+    verdict: str | None = None
+    curves: dict[str, list[CurvePoint]] = Field({})
+    files: tuple[str, ...] = ()
+
+
+class Repeatability(Model):
+    """How two or more operators agree in what all of them measured."""
+
+    operators: list[str]
+    points: dict[str, Estimate] = Field(description="by thing: bias is value, scatter of one click is sigma, px")
+    count: dict[str, int]
+    angles: dict[str, Estimate] = Field(description="differences of the angles: mean and scatter, degrees")
+    message: str

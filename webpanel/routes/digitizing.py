@@ -1,0 +1,162 @@
+"""Routes of measuring by hand: frames without loss, marks of operators, geometry between images, results."""
+
+from collections.abc import Callable
+from functools import partial
+from http import HTTPStatus
+from typing import TYPE_CHECKING, Annotated, Final
+
+import anyio
+from anyio.to_thread import run_sync
+from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi.responses import FileResponse
+
+from analysis.digitizing.desks import Desks
+from rig.api.digitizing import (
+    Action,
+    Changed,
+    Changes,
+    Estimate,
+    Geometry,
+    HandResult,
+    Name,
+    Opening,
+    OperatorName,
+    OrientationState,
+    PulseView,
+    SessionView,
+    TapeOrder,
+)
+from webpanel.problems import ProblemError
+from webpanel.routes.common import ALONE, CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
+from webpanel.routes.files import attachment
+from webpanel.routes.measuring import FileName
+
+if TYPE_CHECKING:
+    from analysis.digitizing.desk import Desk
+else:
+    Desk = object  # imported when a log is opened; the framework needs a name for it
+
+#: A frame of a closed log never changes.
+_KEPT: Final = {"Cache-Control": "private, max-age=31536000, immutable"}
+#: So long an answer about changes waits for one, s.
+_WAIT_S: Final = 20.0
+#: Threads that wait for changes: those of so many pages.
+_WAITING: Final = 32
+_PNG: Final[Responses] = {
+    200: {
+        "description": "The frame, 8 bits of grey.",
+        "content": {"image/png": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+_FILE: Final[Responses] = {
+    200: {
+        "description": "The file.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+Operator = Annotated[OperatorName, Path(examples=["Anna"])]
+Pulse = Annotated[int, Path(ge=0, le=2**53, description="number of the pulse", examples=[1])]
+Coordinate = Annotated[float, Query(ge=-100_000, le=100_000, allow_inf_nan=False, description="px", examples=[320.5])]
+
+
+def digitizing_router(desks: Desks) -> APIRouter:
+    """The routes of measuring by hand."""
+    router = strict_router("Measuring by hand")
+
+    def opened(recording_id: RecordingId) -> Desk:
+        return desks.desk(recording_id)
+
+    AtDesk = Annotated[Desk, Depends(opened)]  # noqa: N806 - a type
+    base = "/recordings/{recording_id}/digitizing"
+
+    @router.get(base, responses=refusals(404))
+    def open_digitizing(desk: AtDesk) -> Opening:
+        """What a page needs to begin: cameras, pulses, what became of each frame, what can be measured."""
+        return desk.opening()
+
+    @router.post(base + "/orientation", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404))
+    def orient_cameras(
+        desk: AtDesk,
+        operator: Annotated[OperatorName | None, Query(description="by the balls that this operator clicked")] = None,
+        _: NoFields = None,
+    ) -> OrientationState:
+        """Orient the cameras again, by the balls that the images show by themselves or that an operator clicked."""
+        return desk.orient(operator)
+
+    @router.get(base + "/frames/{pulse}/{camera}.png", response_class=Response, responses=_PNG | refusals(404))
+    def get_frame(
+        desk: AtDesk,
+        pulse: Pulse,
+        camera: Annotated[Name, Path(examples=["K1"])],
+        difference: Annotated[bool, Query(description="its difference from the background")] = False,
+    ) -> Response:
+        """A camera's frame without loss."""
+        return Response(desk.log.png(pulse, camera, difference=difference), media_type="image/png", headers=_KEPT)
+
+    @router.get(base + "/geometry", responses=refusals(404, 409))
+    def get_geometry(
+        desk: AtDesk, operator: OperatorName, pulse: Annotated[int, Query(ge=0)], camera: Name, thing: Name,
+        x: Coordinate, y: Coordinate,
+    ) -> Geometry:  # fmt: skip
+        """What a place in one image means for the others: epipolar curves, the point in space, predicted places."""
+        return desk.geometry(operator, pulse, camera, thing, (x, y))
+
+    @router.post(base + "/tape", responses=CHANGING | refusals(404))
+    def measure_length(desk: AtDesk, order: TapeOrder) -> Estimate:
+        """The distance between two things, each clicked in two images or more; keeps nothing."""
+        return desk.tape(order)
+
+    _add_sessions(router, opened, base + "/sessions/{operator}")
+    return router
+
+
+def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -> None:
+    waiters = anyio.CapacityLimiter(_WAITING)
+    AtDesk = Annotated[Desk, Depends(opened)]  # noqa: N806 - a type
+
+    @router.get(base, responses=refusals(404))
+    def get_session(desk: AtDesk, operator: Operator) -> SessionView:
+        """How much an operator has measured, and which rays fit worst."""
+        return desk.session_view(operator)
+
+    @router.get(base + "/pulses/{pulse}", responses=refusals(404))
+    def get_pulse_view(desk: AtDesk, operator: Operator, pulse: Pulse) -> PulseView:
+        """Everything about one pulse: marks, the automatic measurement, points and skis in space, angles."""
+        return desk.view(operator, pulse)
+
+    @router.post(base + "/actions", responses=CHANGING | refusals(404))
+    def do_action(desk: AtDesk, operator: Operator, action: Action) -> Changed:
+        """Set or remove a mark, undo or redo. It is on the disk when this is answered."""
+        return desk.act(operator, action)
+
+    @router.get(base + "/changes", responses=refusals(404))
+    async def await_changes(
+        desk: AtDesk,
+        operator: Operator,
+        since: Annotated[int, Query(ge=0, description="revision that is known")],
+    ) -> Changes:
+        """What was changed after a revision, also on another page; waits up to 20 s for a change."""
+        return await run_sync(partial(desk.changes, operator, since, _WAIT_S), limiter=waiters, abandon_on_cancel=True)
+
+    @router.post(base + "/compute", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404))
+    def compute(desk: AtDesk, operator: Operator, _: NoFields = None) -> HandResult:
+        """Compute the jump from what was measured by hand, with the rest of the automatic measurement."""
+        return desk.compute(operator)
+
+    @router.get(base + "/result", responses=refusals(404))
+    def get_result(desk: AtDesk, operator: Operator) -> HandResult:
+        """How far the computing is, and what it gave."""
+        return desk.computing.result(operator)
+
+    @router.get(base + "/result/files/{name}", response_class=FileResponse, responses=_FILE | refusals(404))
+    def get_result_file(desk: AtDesk, operator: Operator, name: FileName) -> FileResponse:
+        """A file of the result, such as `report.html`."""
+        file = desk.computing.file(operator, name)
+        if file is None:
+            text = f"there is no file {name} of {operator}: compute first"
+            raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_file", text)
+        shown = file.suffix == ".html"
+        offered = {} if shown else {"Content-Disposition": attachment(f"{operator}-{name}")}
+        return FileResponse(
+            file, headers=ALONE | offered, media_type="text/html" if shown else "application/octet-stream"
+        )

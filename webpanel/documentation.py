@@ -36,6 +36,7 @@ _TAGS: Final = {
     "Exports": "Videos, pictures and tables of recordings, made by the service beside its work.",
     "Athletes": "The measured jumps of all recordings, by athlete and day.",
     "Measurements": "What was measured in a recording, by itself after its end: figures, files, progress.",
+    "Measuring by hand": "Marks of people in the images of a recording, and what follows from them in space.",
     "Watching": "What happens now: events and live pictures.",
     "Login": "Tokens, cookies, links to single recordings, and what one may do.",
     "Observing": "For monitoring programs.",

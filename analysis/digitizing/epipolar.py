@@ -63,20 +63,19 @@ def epipolar_curves(system: CameraSystem, camera: str, xy: Floats, covariance: F
 def _curve(
     system: CameraSystem, own: PlacedCamera, ray: Floats, xy: Floats, covariance: Floats, other: PlacedCamera
 ) -> EpipolarCurve:
-    inverse = np.linspace(1 / _FARTHEST_M, 1 / _NEAREST_M, _SEARCH)
-    sight = _in_sight(other, other.project(own.position + ray / inverse[:, None]))
+    distance = np.geomspace(_NEAREST_M, _FARTHEST_M, _SEARCH)
+    sight = _in_sight(other, other.project(own.position + ray * distance[:, None]))
     if not sight.any():
         return EpipolarCurve(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2)))
     first, last = np.flatnonzero(sight)[[0, -1]]
-    low, high = inverse[max(first - 1, 0)], inverse[min(last + 1, _SEARCH - 1)]
-    # Once more between the last samples out of sight: near the camera one step of the search is much of the image.
-    fine = np.linspace(low, high, _SEARCH)
-    line = other.project(own.position + ray / fine[:, None])
+    # Once more between the last samples out of sight: one step of the search may be much of the image.
+    fine = np.geomspace(distance[max(first - 1, 0)], distance[min(last + 1, _SEARCH - 1)], _SEARCH)
+    line = other.project(own.position + ray * fine[:, None])
     inside = np.flatnonzero(_in_sight(other, line))
     fine, line = fine[inside[0] : inside[-1] + 1], line[inside[0] : inside[-1] + 1]
     way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
     fine = np.interp(np.linspace(0.0, way[-1], _SAMPLES), way, fine)
-    xyz = own.position + ray / fine[:, None]
+    xyz = own.position + ray * fine[:, None]
     line = other.project(xyz)
     across = _across(line)
     sigma = np.sqrt(np.einsum("ni,nij,nj->n", across, _scatter(system, own, xy, covariance, other, xyz), across))

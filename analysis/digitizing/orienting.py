@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -13,7 +13,7 @@ from analysis.cameras.source import Source
 from analysis.digitizing.effective import sigma_of
 from analysis.digitizing.journal import Entered, Key
 from analysis.digitizing.opened_log import OpenedLog
-from analysis.digitizing.space import predicted
+from analysis.digitizing.space import inside, predicted
 from analysis.digitizing.things import BALL, ball_of
 from analysis.procedure.orienting import oriented
 from analysis.scene.camera_system import CameraSystem, camera_system
@@ -36,6 +36,7 @@ class _Known:
     state: OrientationState
     system: CameraSystem | None = None
     by_clicks: bool = False
+    proposals: dict[str, dict[str, PredictedPoint]] = field(default_factory=dict)
 
 
 class Orienting:
@@ -104,23 +105,10 @@ class Orienting:
 
     def proposals(self) -> dict[str, dict[str, PredictedPoint]]:
         """Where each camera should show the surveyed balls, by camera and thing."""
-        system, known = self.system, self.balls
-        if system is None or known is None:
-            return {}
-        result: dict[str, dict[str, PredictedPoint]] = {}
-        for name, camera in system.cameras.items():
-            px = camera.project(known.xyz)
-            _, by_point, by_camera = camera.linearised(known.xyz, np.nan_to_num(px))
-            own = system.covariance[np.ix_(camera.columns, camera.columns)]
-            for i, ball in enumerate(known.names):
-                if not (np.isfinite(px[i]).all() and (px[i] > 0).all() and (px[i] < camera.size - 1).all()):
-                    continue
-                covariance = by_point[i] @ known.covariance[i] @ by_point[i].T + by_camera[i] @ own @ by_camera[i].T
-                result.setdefault(name, {})[BALL + ball] = predicted(px[i], covariance, "rays")
-        return result
+        return self._known.proposals
 
     def _work(self, source: Source, marks: Mapping[Key, Entered] | None) -> None:
-        before, by_clicks = self._known.system, self._known.by_clicks
+        before = self._known
         try:
             if marks is None:
                 found = oriented(self._log.static(), source, LogFrames(self._log.path))
@@ -131,10 +119,10 @@ class Orienting:
             lacking = [name for name in self._log.facts.cameras if name not in system.names]
             message = f"not oriented: {', '.join(lacking)}" if lacking else None
             state = OrientationState(state="done", message=message, findings=tuple(findings))
-            self._known = _Known(state, system, marks is not None)
+            self._known = _Known(state, system, marks is not None, _proposals(system, self.balls))
         except _FAILURES as error:
             advice = "" if marks is not None else "; or click four or more balls in each image, and orient by them"
-            self._known = _Known(OrientationState(state="failed", message=f"{error}{advice}"), before, by_clicks)
+            self._known = replace(before, state=OrientationState(state="failed", message=f"{error}{advice}"))
 
     def _by_clicks(self, source: Source, marks: Mapping[Key, Entered]) -> tuple[CameraSystem, list[str]]:
         """Orient by the clicked balls alone (paper, step 2, alternative 1)."""
@@ -179,5 +167,20 @@ class Orienting:
             distances=(),
             differences=(),
         )
-        orientation = orient(chosen, alternative=1, uncertain_interior=True)
+        orientation = orient(chosen, uncertain_interior=True)
         return camera_system(orientation, tuple(sizes)), list(orientation.notes)
+
+
+def _proposals(system: CameraSystem, known: KnownPoints | None) -> dict[str, dict[str, PredictedPoint]]:
+    result: dict[str, dict[str, PredictedPoint]] = {}
+    if known is None:
+        return result
+    for name, camera in system.cameras.items():
+        px = camera.project(known.xyz)
+        _, by_point, by_camera = camera.linearised(known.xyz, np.nan_to_num(px))
+        own = system.covariance[np.ix_(camera.columns, camera.columns)]
+        for i, ball in enumerate(known.names):
+            if inside(px[i], camera.size):
+                covariance = by_point[i] @ known.covariance[i] @ by_point[i].T + by_camera[i] @ own @ by_camera[i].T
+                result.setdefault(name, {})[BALL + ball] = predicted(px[i], covariance, "rays")
+    return result

@@ -12,6 +12,7 @@ from analysis.digitizing.space import (
     PointsInSpace,
     Ray,
     Stick,
+    inside,
     intersected,
     predicted,
     predicted_points,
@@ -130,7 +131,7 @@ def _by_time(
         )
         for camera in system.cameras.values():
             px = camera.project(xyz)
-            if np.isfinite(px).all() and (px > 0).all() and (px < camera.size - 1).all():
+            if inside(px, camera.size):
                 _, by_point, _ = camera.linearised(xyz[None], px[None])
                 ellipse = predicted(px, by_point[0] @ covariance @ by_point[0].T, "time")
                 result.setdefault(camera.name, {})[name] = ellipse

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from rig.arrays import Floats
 
 #: Test values beyond which a ray is named: one sound ray in a thousand.
 _NAMED_W: Final = 3.29
+#: Probability from which the side check is believed.
+_SURE: Final = 0.99
 _WORDS: Final = {
     Condition.FEW_IMAGES: "one ray",
     Condition.UNDETERMINED: "the rays are parallel within their accuracy",
@@ -117,7 +119,7 @@ def predicted_points(system: CameraSystem, found: PointsInSpace) -> dict[str, di
         px = camera.project(xyz)
         _, by_point, by_camera = camera.linearised(xyz, np.nan_to_num(px))
         for k, i in enumerate(rows):
-            if points.seen[i, j] or not _inside(px[k], camera.size):
+            if points.seen[i, j] or not inside(px[k], camera.size):
                 continue
             influence = by_point[k] @ adjusted.by_calibration[i]
             influence[:, camera.columns] += by_camera[k]
@@ -128,7 +130,7 @@ def predicted_points(system: CameraSystem, found: PointsInSpace) -> dict[str, di
     return result
 
 
-def predicted(xy: Floats, covariance: Floats, source: str) -> PredictedPoint:
+def predicted(xy: Floats, covariance: Floats, source: Literal["rays", "time"]) -> PredictedPoint:
     """A predicted point with its ellipse of one sigma."""
     values, vectors = np.linalg.eigh(covariance)
     major, minor = np.sqrt(np.maximum(values[::-1], 0.0))
@@ -210,7 +212,10 @@ def _sides(system: CameraSystem, pulse: PulseMeasurements) -> SideCheck | None:
     sigma = float(np.sqrt(np.mean([np.mean(ski.sigma**2) + ski.common**2 for line in skis for ski in line])))
     right, left = (fit_image_lines(xy[i][None], sigma, seen=seen[i][None]) for i in range(len(SIDES)))
     check = check_sides([system[name].ideal() for name in three], left, right)
-    return SideCheck(ok=bool(check.fits[0] and check.proposal[0] < 0), message=check.words(0, three))
+    if not check.fits[0] or check.confidence[0] < _SURE:
+        # The check takes the orientations for exact: beside their errors lines of sound measurements may fit badly.
+        return SideCheck(ok=None, message="left and right cannot be told by these lines: compare by eye")
+    return SideCheck(ok=bool(check.proposal[0] < 0), message=check.words(0, three))
 
 
 def _figures(state: JumperState) -> dict[str, Estimate]:
@@ -232,7 +237,8 @@ def _by_camera(system: CameraSystem, values: Floats) -> dict[str, float]:
     return {name: float(value) for name, value in zip(system.names, values, strict=True) if np.isfinite(value)}
 
 
-def _inside(px: Floats, size: Floats) -> bool:
+def inside(px: Floats, size: Floats) -> bool:
+    """Whether a place (2,) is in an image of width and height `size` (2,), px."""
     return bool(np.isfinite(px).all() and (px > -0.5).all() and (px < size - 0.5).all())
 
 

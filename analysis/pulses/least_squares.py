@@ -227,7 +227,7 @@ def _result(
     n, m = seen.shape
     gain, weight, v = solution.gain, solution.weight, solution.v
     own = np.where(seen[..., None, None], equations.covariance, 0.0)
-    of_image = gain.reshape(n, -1, m, 2)
+    of_image = gain.reshape(n, gain.shape[1], m, 2)
     image_covariance = np.einsum("numa,nmab,nrmb->nur", of_image, own, of_image)
     influence = -gain @ _rows(equations.by_calibration, seen)
     # weighted residuals and their covariance: W v and W - W A N^-1 A^T W

@@ -147,7 +147,7 @@ class SpacePoint(Model):
 class SideCheck(Model):
     """Whether left and right fit together in three images (trifocal check)."""
 
-    ok: bool
+    ok: bool | None = Field(description="null: it cannot be told")
     message: str
 
 

@@ -9,14 +9,19 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from analysis.digitizing.desks import Desks
+from analysis.digitizing.files import DeskFiles
 from recorder.catalogue.entry import unlisted_logs
 from recorder.catalogue.folder import Catalogue
+from recorder.log.digitized_path import digitized_path
+from recorder.log.measured_path import measured_path
+from recorder.log.write_lock import is_being_written
 from recorder.publishing.keys import check_publication
 from rig.api.jump import LastJump
 from rig.api.status import ArmOrder
-from rig.errors import ProcessDiedError
+from rig.errors import ProcessDiedError, StateForbidsError
 from rig.events import Event, Level
 from rig.host.disk import free_bytes
 from rig.host.endings import ENDINGS
@@ -56,6 +61,9 @@ from webpanel.door.logins import Sessions
 from webpanel.door.session_file import SessionFile
 from webpanel.door.tls import Tls
 from webpanel.server import PanelServer, make_server
+
+if TYPE_CHECKING:
+    from analysis.cameras.source import Source
 
 _STOP_S: Final = 15.0
 _SOON_S: Final = 10.0
@@ -126,7 +134,13 @@ def serve(settings: ServiceSettings) -> None:
             rehearser, lights, trains, balls, PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
         server = make_server(
-            create_app(service, settings.access, *_door(settings, rig, data, hub, stack)), settings.tls
+            create_app(
+                service,
+                settings.access,
+                *_door(settings, rig, data, hub, stack),
+                desks=stack.enter_context(closing(_desks(catalogue, supervisor))),
+            ),
+            settings.tls,
         )
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
         supervisor.on_turn = reporter.report
@@ -193,6 +207,27 @@ def _measurings(data: Path, supervisor: Supervisor) -> Measurings:
     made = Measurings(data, lambda: supervisor.rig, busy, supervisor.hub.tell, found, supervisor.hub.wake)
     supervisor.recordings.on_log = made.opened
     return made
+
+
+def _desks(catalogue: Catalogue, supervisor: Supervisor) -> Desks:
+    """Where recordings are measured by hand, from the survey or the poses that the rig file names."""
+
+    def find(recording: str) -> DeskFiles:
+        log = catalogue.file(recording)
+        if is_being_written(log):
+            raise StateForbidsError(f"recording {recording} is being made: stop it, then measure it")
+        return DeskFiles(log, digitized_path(log), measured_path(log))
+
+    def source() -> "Source | None":
+        # Imported here because the analysis and its libraries take memory and half a second to load.
+        from analysis.cameras.source import read_source  # noqa: PLC0415
+
+        given = supervisor.rig.analysis
+        if given is None or (given.survey is None and given.calibration is None):
+            return None
+        return read_source(given.survey, given.calibration)
+
+    return Desks(find, source)
 
 
 def _telling(

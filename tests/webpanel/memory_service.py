@@ -104,6 +104,7 @@ class MemoryService(Archive):
         self.measurings = Measurings(folder, lambda: self.settings, self._busy, lambda _: None, self._found, self._wake)
         super().__init__(self.catalogue, Exports(folder, self._busy, lambda: 1e12), self.measurings)
         self.state = State.IDLE
+        self.survey: Path | None = None
         self.well = True
         self.broken: Exception | None = None
         self.last_jump: LastJump | None = None

@@ -8,6 +8,11 @@ from dataclasses import dataclass
 
 import httpx
 
+from analysis.cameras.source import read_source
+from analysis.digitizing.desks import Desks
+from analysis.digitizing.files import DeskFiles
+from recorder.log.digitized_path import digitized_path
+from recorder.log.measured_path import measured_path
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from webpanel.app import create_app
@@ -42,12 +47,23 @@ class Panel:
         return socket.create_connection((self.host, self.port), timeout=20)
 
 
+def desks_of(service: MemoryService) -> Desks:
+    """Where the recordings of the service are measured by hand, by its `survey`."""
+
+    def find(recording: str) -> DeskFiles:
+        log = service.catalogue.file(recording)
+        return DeskFiles(log, digitized_path(log), measured_path(log))
+
+    return Desks(find, lambda: None if service.survey is None else read_source(service.survey, None))
+
+
 @contextmanager
 def serving(
     service: MemoryService, access: Access, tls: Tls | None = None, links: Links | None = None
 ) -> Iterator[Panel]:
     """Serve meanwhile."""
-    server = make_server(create_app(service, access, links), tls)
+    desks = desks_of(service)
+    server = make_server(create_app(service, access, links, desks=desks), tls)
     listener = socket.create_server((access.host, 0))
     port = listener.getsockname()[1]
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="panel")
@@ -58,6 +74,7 @@ def serving(
     finally:
         server.should_exit = True
         thread.join(20)
+        desks.close()
         listener.close()
         service.exports.close()
     assert not thread.is_alive()

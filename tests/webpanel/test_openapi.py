@@ -50,6 +50,16 @@ CALLS = {
     "GET /api/recordings/{recording_id}/link", "POST /api/login/link",
     "GET /api/athletes", "GET /api/jumps", "GET /api/jumps/comparison",
     "GET /api/comparison.html",
+    "GET /api/recordings/{recording_id}/digitizing", "POST /api/recordings/{recording_id}/digitizing/orientation",
+    "GET /api/recordings/{recording_id}/digitizing/frames/{pulse}/{camera}.png",
+    "GET /api/recordings/{recording_id}/digitizing/geometry", "POST /api/recordings/{recording_id}/digitizing/tape",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/pulses/{pulse}",
+    "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/actions",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/changes",
+    "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result/files/{name}",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip
 

@@ -87,7 +87,7 @@ def digitizing_router(desks: Desks) -> APIRouter:
     def get_frame(
         desk: AtDesk,
         pulse: Pulse,
-        camera: Annotated[Name, Path(examples=["K1"])],
+        camera: Annotated[Name, Path(description="name of the camera", examples=["K1"])],
         difference: Annotated[bool, Query(description="its difference from the background")] = False,
     ) -> Response:
         """A camera's frame without loss."""
@@ -95,7 +95,10 @@ def digitizing_router(desks: Desks) -> APIRouter:
 
     @router.get(base + "/geometry", responses=refusals(404, 409))
     def get_geometry(
-        desk: AtDesk, operator: OperatorName, pulse: Annotated[int, Query(ge=0)], camera: Name, thing: Name,
+        desk: AtDesk, operator: OperatorName,
+        pulse: Annotated[int, Query(ge=0, le=2**53, description="number of the pulse", examples=[1])],
+        camera: Annotated[Name, Query(description="in whose image the place is", examples=["K1"])],
+        thing: Annotated[Name, Query(description="what is there", examples=["P1"])],
         x: Coordinate, y: Coordinate,
     ) -> Geometry:  # fmt: skip
         """What a place in one image means for the others: epipolar curves, the point in space, predicted places."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.analysis.digitizing import run_digitizing
 from bench.analysis.faults import run_faults
 from bench.analysis.honesty import run_honesty
 from bench.analysis.jumps import run_jumps
@@ -183,6 +184,7 @@ SUITES: dict[str, Suite] = {
     "jump-faults": _faults,
     "live": lambda seconds, directory: _timed("live", lambda _: run_live(), seconds, directory),
     "jump-honesty": _honesty,
+    "digitizing": lambda seconds, directory: _timed("digitizing", lambda _: run_digitizing(), seconds, directory),
 }
 #: Suites that draw jumps or networks and the errors of their measurements.
 DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "jump-repeats": _repeats, "gross-errors": _gross_errors}

@@ -162,7 +162,7 @@ def test_head_answers_wherever_get_does(panel: Panel, service: MemoryService) ->
     service.arm()
     write_recording(service.catalogue.directory, "jump")
     values = {"recording_id": "jump", "pulse": "1", "export_id": "1", "line": "1", "number": "1", "camera": "K1"}
-    values["name"] = "report.html"
+    values |= {"operator": "Anna", "name": "report.html"}
     with panel.client() as client:
         for name, _ in operations(client.get("/openapi.json").json()):
             path = name.partition(" ")[2].format(**values)

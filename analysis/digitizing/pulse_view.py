@@ -1,7 +1,7 @@
 """Puts together what a page shows of one pulse: marks, the automatic measurement, and what follows in space."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -86,10 +86,12 @@ def pulse_view(
     found, sticks = None, Stick({}, {})
     guessed: dict[str, dict[str, PredictedPoint]] = {}
     if system is not None:
-        found = intersected(system, now.rays())
-        sticks = stick(system, now.effective())
+        found, earlier = _intersected(system, now, before)
+        effective = now.effective()
+        sticks = stick(system, effective, found.some(range(len(POINTS))))
+        found = found.some([i for i in range(len(found.names)) if found.points.seen[i].any()])
         guessed = predicted_points(system, found)
-        for source in (_by_time(system, now, before, found), balls):
+        for source in (_by_time(system, now, before, found, earlier), balls):
             for camera, points in source.items():
                 own = marks.get(camera, {})
                 there = guessed.setdefault(camera, {})
@@ -107,14 +109,34 @@ def pulse_view(
     )
 
 
+def _intersected(
+    system: CameraSystem, now: PulseMarks, before: tuple[PulseMarks, ...]
+) -> tuple[PointsInSpace, list[PointsInSpace]]:
+    """The points of a pulse, P1 to P4 first whether they are marked or not, and those of the pulses before it.
+
+    All are intersected at once, which takes little longer than one.
+    """
+    nothing: dict[str, dict[str, Ray]] = {name: {} for name in POINTS}
+    rays = [nothing | now.rays(), *(marks.rays() for marks in before)]
+    names = [(k, name) for k, of_pulse in enumerate(rays) for name in of_pulse]
+    found = intersected(system, {f"{k} {name}": rays[k][name] for k, name in names})
+    rows = [[i for i, (of_pulse, _) in enumerate(names) if of_pulse == k] for k in range(len(rays))]
+    parts = [replace(found.some(of_pulse), names=[names[i][1] for i in of_pulse]) for of_pulse in rows]
+    return parts[0], parts[1:]
+
+
 def _by_time(
-    system: CameraSystem, now: PulseMarks, before: tuple[PulseMarks, ...], found: PointsInSpace
+    system: CameraSystem,
+    now: PulseMarks,
+    before: tuple[PulseMarks, ...],
+    found: PointsInSpace,
+    earlier: list[PointsInSpace],
 ) -> dict[str, dict[str, PredictedPoint]]:
     """Where points should be that two rays do not give now but gave in the two pulses before: constant velocity."""
     if len(before) < 2:
         return {}
     given = {name for i, name in enumerate(found.names) if found.adjusted.ok[i]}
-    last, older = (intersected(system, marks.rays()) for marks in before[:2])
+    last, older = earlier
     places = {name: i for i, name in enumerate(older.names) if older.adjusted.ok[i]}
     step = (now.time - before[0].time) / NS_PER_S
     ratio = step * NS_PER_S / max(before[0].time - before[1].time, 1)

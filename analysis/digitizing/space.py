@@ -1,13 +1,13 @@
 """Points, skis and the stick model of one pulse from the marks in its images, while a person measures."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final, Literal
 
 import numpy as np
 
 from analysis.digitizing.things import LINES
-from analysis.measurements.model import POINTS, SIDES, PulseMeasurements
+from analysis.measurements.model import SIDES, PulseMeasurements
 from analysis.pulses.gross_errors import check_points, check_skis
 from analysis.pulses.least_squares import Adjusted, Condition, adjust
 from analysis.pulses.points import Points
@@ -52,6 +52,12 @@ class PointsInSpace:
     names: Sequence[str]
     points: Points
     adjusted: Adjusted
+
+    def some(self, rows: Sequence[int]) -> "PointsInSpace":
+        """Some of the points, by their rows, in this order."""
+        index = np.array(rows, np.intp)
+        picked = {field.name: getattr(self.adjusted, field.name)[index] for field in fields(Adjusted)}
+        return PointsInSpace([self.names[i] for i in rows], self.points.subset(index), Adjusted(**picked))
 
 
 def intersected(system: CameraSystem, measured: Mapping[str, Mapping[str, Ray]]) -> PointsInSpace:
@@ -148,17 +154,14 @@ class Stick:
     figures: dict[str, Estimate]
 
 
-def stick(system: CameraSystem, pulse: PulseMeasurements) -> Stick:
-    """Skis in space, and angles and height from them and from the points, of one pulse."""
-    measured = {
-        name: {
-            camera: Ray(image.points[name].xy, image.points[name].covariance)
-            for camera, image in pulse.images.items()
-            if name in image.points
-        }
-        for name in POINTS
-    }
-    found = intersected(system, measured)
+def stick(system: CameraSystem, pulse: PulseMeasurements, found: PointsInSpace) -> Stick:
+    """Skis in space, and angles and height from them and from the points, of one pulse.
+
+    Args:
+        system: the oriented cameras.
+        pulse: what counts of its images.
+        found: P1 to P4 of this pulse, in this order.
+    """
     skis = skis_of(system, [pulse], np.zeros((1, len(system.names), 3)))
     adjusted = adjust(skis, system.covariance)
     checked = check_skis(skis, adjusted, system.covariance)

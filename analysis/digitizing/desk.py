@@ -1,7 +1,7 @@
 """The desk at which a log is measured by hand: its frames, its operators' sessions, and the geometry between images."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,7 @@ from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key, operators
 from analysis.digitizing.opened_log import OpenedLog
 from analysis.digitizing.orienting import Orienting
 from analysis.digitizing.pulse_view import PulseMarks, as_mark, pulse_view
+from analysis.digitizing.repeatability import repeatability
 from analysis.digitizing.session import Session
 from analysis.digitizing.space import Ray, intersected, predicted_points, space_points
 from analysis.digitizing.things import BALL, things
@@ -34,6 +35,7 @@ from rig.api.digitizing import (
     Opening,
     OrientationState,
     PulseView,
+    Repeatability,
     SessionView,
     TapeOrder,
     Touched,
@@ -227,6 +229,19 @@ class Desk:
         )
         return effective(automatic, self.session(operator).everything(), self.log.times)
 
+    def repeatability(self, names: Sequence[str]) -> Repeatability:
+        """How operators agree in what all of them measured.
+
+        Raises:
+            BadInputError: too few operators, one who has measured nothing, or too little in common.
+        """
+        known = operators(self.files.folder)
+        if strange := [name for name in names if name not in known]:
+            raise BadInputError(f"{', '.join(strange)} measured nothing here; there are: {', '.join(known) or 'none'}")
+        sessions = {name: self.session(name) for name in names}
+        marks = {name: session.everything() for name, session in sessions.items()}
+        return repeatability(marks, {name: self._figures(session) for name, session in sessions.items()})
+
     def compute(self, operator: str) -> HandResult:
         """Begin to compute from an operator's marks.
 
@@ -299,6 +314,20 @@ class Desk:
                     if found.adjusted.ok[row] and w > _NOTABLE_W:
                         known[pulse].append(Worst(pulse=pulse, camera=camera, thing=thing, w=float(w)))
         return sorted((each for tests in known.values() for each in tests), key=lambda each: -each.w)[:_WORST]
+
+    def _figures(self, session: Session) -> dict[int, dict[str, float]]:
+        """Angles and height that follow from an operator's marks alone, by pulse."""
+        system = self.orienting.system
+        if system is None:
+            return {}
+        return {
+            pulse: {name: estimate.value for name, estimate in view.figures.items()}
+            for pulse in session.pulses()
+            if pulse in self.log.times
+            and (
+                view := pulse_view(0, PulseMarks(pulse, self.log.times[pulse], session.at(pulse), None), (), system, {})
+            )
+        }
 
     def _span(self) -> JumpSpan | None:
         found = self.automatic()

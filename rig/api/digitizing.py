@@ -359,11 +359,26 @@ class HandResult(Model):
     files: tuple[str, ...] = ()
 
 
+class PointAgreement(Model):
+    """How operators agree in the image points of a thing."""
+
+    count: int = Field(description="image points that all of them measured")
+    sigma_px: float = Field(description="standard deviation of one click of one operator, in x and y alike")
+    bias_px: dict[str, Place] = Field(description="mean of each operator's points minus that of all, px")
+
+
+class FigureAgreement(Model):
+    """How operators agree in a figure, such as an angle."""
+
+    count: int = Field(description="pulses in which all of them have it")
+    sigma: float = Field(description="standard deviation of the figure from one operator to another")
+    bias: dict[str, float] = Field(description="mean of each operator's figure minus that of all")
+
+
 class Repeatability(Model):
     """How two or more operators agree in what all of them measured."""
 
     operators: list[str]
-    points: dict[str, Estimate] = Field(description="by thing: bias is value, scatter of one click is sigma, px")
-    count: dict[str, int]
-    angles: dict[str, Estimate] = Field(description="differences of the angles: mean and scatter, degrees")
+    things: dict[str, PointAgreement]
+    figures: dict[str, FigureAgreement] = Field(description="angles in degrees, height in the survey's unit")
     message: str

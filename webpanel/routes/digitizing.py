@@ -23,6 +23,7 @@ from rig.api.digitizing import (
     OperatorName,
     OrientationState,
     PulseView,
+    Repeatability,
     SessionView,
     TapeOrder,
 )
@@ -108,6 +109,19 @@ def digitizing_router(desks: Desks) -> APIRouter:
     def measure_length(desk: AtDesk, order: TapeOrder) -> Estimate:
         """The distance between two things, each clicked in two images or more; keeps nothing."""
         return desk.tape(order)
+
+    @router.get(base + "/repeatability", responses=refusals(404))
+    def compare_operators(
+        desk: AtDesk,
+        operators: Annotated[
+            str,
+            Query(
+                max_length=400, pattern=r"^[\w .,\-]+$", description="names, with commas between", examples=["Anna,Bo"]
+            ),
+        ],
+    ) -> Repeatability:
+        """How operators agree in what all of them measured: scatter of a click, bias of each, effect on angles."""
+        return desk.repeatability(list(dict.fromkeys(name.strip() for name in operators.split(",") if name.strip())))
 
     _add_sessions(router, opened, base + "/sessions/{operator}")
     return router

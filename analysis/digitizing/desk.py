@@ -43,7 +43,7 @@ from rig.api.digitizing import (
     Worst,
 )
 from rig.arrays import Floats
-from rig.errors import BadInputError, StateForbidsError
+from rig.errors import BadInputError, StateForbidsError, UnknownCameraError, UnknownRecordingError
 
 #: So many of the rays that fit worst are told.
 _WORST: Final = 20
@@ -142,7 +142,7 @@ class Desk:
         """Everything about one pulse.
 
         Raises:
-            BadInputError: the log has no such pulse.
+            UnknownRecordingError: the log has no such pulse.
         """
         session = self.session(operator)
         at = self._index(pulse)
@@ -157,7 +157,8 @@ class Desk:
         """Do what an operator asked for; it is on the disk when this returns.
 
         Raises:
-            BadInputError: the action does not fit this log.
+            UnknownRecordingError, UnknownCameraError: the log has no such pulse or camera.
+        BadInputError: the action does not fit, such as a vertex of a point.
             StorageError: the disk refuses; nothing was changed.
         """
         session = self.session(operator)
@@ -176,7 +177,7 @@ class Desk:
         """What one place in one image means for the others.
 
         Raises:
-            BadInputError: the log has no such pulse or camera.
+            UnknownRecordingError, UnknownCameraError: the log has no such pulse or camera.
             StateForbidsError: the camera is not oriented.
         """
         self._index(pulse)
@@ -340,12 +341,12 @@ class Desk:
         at = int(np.searchsorted(self.log.pulses, pulse))
         if at == len(self.log.pulses) or self.log.pulses[at] != pulse:
             first, last = self.log.pulses[0], self.log.pulses[-1]
-            raise BadInputError(f"the log has no pulse {pulse}: it goes from {first} to {last}")
+            raise UnknownRecordingError(f"the log has no pulse {pulse}: it goes from {first} to {last}")
         return at
 
     def _camera(self, name: str) -> None:
         if name not in self.log.facts.cameras:
-            raise BadInputError(f"the log has no camera {name}: choose among {', '.join(self.log.facts.cameras)}")
+            raise UnknownCameraError(f"the log has no camera {name}: choose among {', '.join(self.log.facts.cameras)}")
 
 
 def _tests(view: PulseView) -> list[Worst]:

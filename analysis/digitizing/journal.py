@@ -62,35 +62,32 @@ class Journal:
     """The file of one operator's actions. One program holds it at a time.
 
     Args:
-        path: the file; made if it is missing, with its folder.
+        path: the file; made with the first entry if it is missing, with its folder.
         recording: id of the recording.
         operator: name.
 
     Raises:
         BadInputError: the file is another recording's, or no journal, or another program holds it.
-        StorageError: it cannot be made or read.
+        StorageError: it cannot be read.
     """
 
     def __init__(self, path: Path, recording: str, operator: str) -> None:
         self.path = path
+        self._recording, self._operator = recording, operator
         self._whole = 0
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
-        except OSError as error:
-            raise StorageError(f"{path}: {error.strerror}; the marks cannot be kept: free the folder") from None
-        try:
-            self.entries: Sequence[Entry] = self._begin(recording, operator)
-        except BaseException:
-            os.close(self._fd)
-            raise
+        self._fd = -1
+        self.entries: Sequence[Entry] = self._open() if path.exists() else ()
 
     def append(self, entry: Entry) -> None:
         """Put an entry on the disk.
 
         Raises:
             StorageError: the disk refuses; the entry is not kept.
+            BadInputError: another program has begun to measure under this name.
         """
+        if self._fd < 0 and self._open():
+            self.close()
+            raise BadInputError(f"{self.path}: somebody has measured under this name meanwhile; open the page again")
         line = _ENCODE(entry) + b"\n"
         try:
             written = os.pwrite(self._fd, line, self._whole)
@@ -105,9 +102,24 @@ class Journal:
 
     def close(self) -> None:
         """Let other programs have the file."""
-        os.close(self._fd)
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
 
-    def _begin(self, recording: str, operator: str) -> Sequence[Entry]:
+    def _open(self) -> Sequence[Entry]:
+        """Open the file, and read its entries."""
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._fd = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
+        except OSError as error:
+            raise StorageError(f"{self.path}: {error.strerror}; the marks cannot be kept: free the folder") from None
+        try:
+            return self._begin()
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self) -> Sequence[Entry]:
         try:
             fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -117,14 +129,14 @@ class Journal:
         with os.fdopen(os.dup(self._fd), "rb") as file:
             text = file.read()
         if not text.strip(b"\n"):
-            head = _ENCODE(_Head(FORMAT, recording, operator)) + b"\n"
+            head = _ENCODE(_Head(FORMAT, self._recording, self._operator)) + b"\n"
             os.pwrite(self._fd, head, 0)
             os.fsync(self._fd)
             self._whole = len(head)
             return ()
-        return self._read(text, recording)
+        return self._read(text)
 
-    def _read(self, text: bytes, recording: str) -> Sequence[Entry]:
+    def _read(self, text: bytes) -> Sequence[Entry]:
         """Whole entries; a last line that a crash cut is removed."""
         end = text.rfind(b"\n") + 1
         lines = text[:end].split(b"\n")[:-1]
@@ -133,9 +145,10 @@ class Journal:
             entries = [_ENTRY.decode(line) for line in lines[1:]]
         except msgspec.MsgspecError as error:
             raise BadInputError(f"{self.path}: is no journal of marks ({error}); move it away") from None
-        if head.format != FORMAT or head.recording != recording:
+        if head.format != FORMAT or head.recording != self._recording:
             raise BadInputError(
-                f"{self.path}: belongs to recording {head.recording} ({head.format}), not to {recording}; move it away"
+                f"{self.path}: belongs to recording {head.recording} ({head.format}), not to {self._recording}; "
+                "move it away"
             )
         self._whole = end
         self._cut()

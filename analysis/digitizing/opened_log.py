@@ -16,7 +16,7 @@ from analysis.scene.static_image import StaticImage, static_images
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets, tags
 from rig.clocks import UtcNs
-from rig.errors import BadInputError
+from rig.errors import UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable, shown
 
@@ -34,7 +34,7 @@ _SHOWN_SIGMAS: Final = 12.0
 _GREY: Final = 128
 
 
-class NoFrameError(BadInputError):
+class NoFrameError(UnknownRecordingError):
     """The log has no such frame; the message says what became of it."""
 
 

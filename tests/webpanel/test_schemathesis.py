@@ -23,8 +23,11 @@ ENDLESS = (
     "/api/preview.mjpg",
     "/api/recordings/{recording_id}/digitizing/sessions/{operator}/changes",
 )
-#: No schema says which tables are right, which bytes are sound, and which jumps can be compared.
-UNDESCRIBED = ("import_start_list", "preview_start_list", "add_voice_note", "compare_spans", "compare_jumps")
+#: No schema says which tables are right, which bytes are sound, which jumps can be compared, and which clicks meet.
+UNDESCRIBED = (
+    "import_start_list", "preview_start_list", "add_voice_note", "compare_spans", "compare_jumps", "do_action",
+    "measure_length", "compare_operators",
+)  # fmt: skip
 
 
 def schemathesis(url: str, folder: Path, *options: str) -> str:
@@ -48,7 +51,7 @@ def test_the_api_is_as_it_is_described(
         write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
     service.arm()
     said = schemathesis(panel.url, tmp_path, "--phases=coverage,fuzzing", "--max-examples=8")
-    assert "85 selected / 93 total" in said
+    assert "82 selected / 93 total" in said
     assert service.healthy()
 
 

@@ -89,13 +89,22 @@ def test_vertices_of_a_line_are_counted_in_order(tmp_path: Path) -> None:
 
 
 def test_a_second_program_is_refused_until_the_first_one_ends(tmp_path: Path) -> None:
-    session = opened(tmp_path)
+    first = PlaceAction(do="place", pulse=1, camera="K1", thing="P1", xy=(1.0, 2.0))
+    session, late, other = opened(tmp_path), opened(tmp_path), opened(tmp_path, "Bo")
+    assert operators(tmp_path) == []
+    session.act(first)
+    other.act(first)
     with pytest.raises(BadInputError, match="another program measures under this name now"):
         opened(tmp_path)
-    other = opened(tmp_path, "Bo")
-    other.close()
+    with pytest.raises(BadInputError, match="another program measures under this name now"):
+        late.act(first)
     session.close()
-    opened(tmp_path).close()
+    with pytest.raises(BadInputError, match="somebody has measured under this name meanwhile"):
+        late.act(first)
+    again = opened(tmp_path)
+    assert len(again.everything()) == 1
+    again.close()
+    other.close()
     assert operators(tmp_path) == ["Anna", "Bo"]
 
 

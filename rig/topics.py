@@ -41,6 +41,7 @@ RIG_METADATA: Final = "svev.rig"
 RECORDING_METADATA: Final = "svev.recording"
 RECOVERY_METADATA: Final = "svev.recovery"
 MERGE_METADATA: Final = "svev.merge"
+IMPORT_METADATA: Final = "svev.import"
 #: What went wrong while the log was written, by where it went wrong, e.g. "disk".
 TROUBLE_METADATA: Final = "svev.trouble"
 RIG_ATTACHMENT: Final = "rig.toml"

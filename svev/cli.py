@@ -45,6 +45,7 @@ _COMMANDS: Final = {
     "export": ("logs.export", "export_command", "Make a video, pictures or a table of a log."),
     "recover": ("logs.contents", "recover_command", "Repair a log that was not closed or is damaged."),
     "merge": ("logs.merge", "merge_command", "Make one log of two that two computers recorded."),
+    "import": ("logs.importing", "import_command", "Make a log of films that other cameras took."),
     "replay": ("logs.replay", "replay_command", "Publish a log again, as it was published live."),
     "worker": ("jumps.worker", "worker_command", "Measure the jumper from published triplets."),
     "schema": ("computer.setup", "schema", "Print the JSON schema of rig files."),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.measurements.model import MeasuredCamera
-from recorder.reading.info import LogInfo, info
+from recorder.reading.info import LogInfo, imported_in_words, info
 from recorder.reading.log_reader import LogReader
 from rig.errors import BadInputError
 from rig.phrase import Phrase
@@ -52,11 +52,17 @@ def log_facts(path: Path) -> LogFacts:
     if about.first is None:
         raise BadInputError(f"{path}: holds no pulse, so there is nothing to analyze; choose another recording")
     settings = _cameras(path)
-    exposures = {str(camera.get("name")): _exposure_us(camera) for camera in settings}
+    # The rig file of films without one is made by the import, which knows no exposure times.
+    told = [camera for camera in settings if "exposure_us" in camera or not about.imported]
+    exposures = {str(camera.get("name")): _exposure_us(camera) for camera in told}
     tags = about.first.cameras
     unknown = [tag.name for tag in tags if tag.name not in exposures]
     messages = [f"exposure time of {', '.join(unknown)} is unknown: taken as {_EXPOSURE_US:g} us"] if unknown else []
     messages += [str(unfit) for camera in settings if (unfit := _unfit(camera)) is not None]
+    if about.imported:
+        messages.append(
+            f"{imported_in_words(about.imported)}. How late each camera is, is only known from the jumper's own motion"
+        )
     if about.truncated or not about.closed:
         messages.append(
             "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"

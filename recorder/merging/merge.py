@@ -5,15 +5,12 @@ by pulse, which the recorder's own writer puts into a new log. Memory grows with
 of the logs. The new log is there under its name only when it is complete.
 """
 
-import os
-import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from recorder.log.extent import CONTINUES, CONTINUES_AFTER, extent
 from recorder.merging.calibration_file import Attached, joined_calibration
@@ -22,15 +19,13 @@ from recorder.merging.rig_file import joined_rig_toml
 from recorder.merging.source import LogStream, Note, Part, look_at
 from recorder.reading.info import merged_in_words
 from recorder.reading.items import Message
-from recorder.reading.records import FileWindow, is_closed
 from recorder.reading.triplets import event_of
 from recorder.recovering.rebuilt_log import RebuiltLog
+from recorder.recovering.unfinished_log import unfinished_log
 from recorder.writing.log_writer import LogDescription
 from rig.clocks import UtcNs
-from rig.errors import BadInputError, LogDamagedError, StorageError
+from rig.errors import BadInputError, LogDamagedError
 from rig.events import Event, Level
-from rig.host.disk import sync
-from rig.host.file_names import give_name, unfinished_path
 from rig.phrase import plain
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -43,10 +38,6 @@ from rig.topics import (
 )
 from triggering.alignment import Alignment, align
 from triggering.ledger.account import Ledger, span
-
-#: Ending of a log in the making, with the number of its process in it.
-_UNFINISHED: Final = ".{pid}.part"
-_PROCESS: Final = re.compile(r"\.([0-9]+)\.part$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +101,7 @@ def merge(first: Path, second: Path, target: Path, progress: Callable[[int], Non
         alignment = align(parts[0].train, parts[1].train)
     except BadInputError as error:
         raise BadInputError(f"{first} and {second}: {error}") from None
-    with _unfinished(target) as unfinished, LogStream(first) as one, LogStream(second) as two:
+    with unfinished_log(target) as unfinished, LogStream(first) as one, LogStream(second) as two:
         merging = _Merging(parts, (one, two), alignment, target.stem)
         size = merging.write(unfinished, progress or (lambda _: None))
     alone = [int(sum(alignment.pairs[:, 1 - side] < 0)) for side in (0, 1)]
@@ -250,55 +241,3 @@ class _Merging:
 
     def _event(self) -> Event:
         return Event.now(Level.INFO, "merge", plain(merged_in_words(self._provenance())))
-
-
-@contextmanager
-def _unfinished(target: Path) -> Iterator[Path]:
-    """A name beside the target for the log in the making, which gets its own name at the end, all at once.
-
-    Once the log is whole, nothing deletes it: if it cannot get its name, it stays under the one that it has.
-    """
-    path = unfinished_path(target, _UNFINISHED.format(pid=os.getpid()))
-    try:
-        _clear_away(target)
-        yield path
-    except OSError as error:
-        path.unlink(missing_ok=True)
-        raise StorageError(f"{target}: {error.strerror}; look at `dmesg`, write to another disk") from error
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
-    kept = f"the merged log is whole, and stays in {path}: give it another name by mv"
-    try:
-        give_name(path, target)
-    except FileExistsError:
-        raise BadInputError(f"{target}: exists already and is never overwritten; {kept}") from None
-    except OSError as error:
-        raise StorageError(f"{target}: cannot be made ({error.strerror}); {kept}") from error
-    try:
-        sync(target.parent)
-    except OSError as error:
-        text = f"{target}: may not survive a loss of power ({error.strerror}); look at `dmesg`, copy it to another disk"
-        raise StorageError(text) from error
-
-
-def _clear_away(target: Path) -> None:
-    """Remove what a merging left whose process was killed; a log that is whole stays."""
-    for left in target.parent.iterdir():
-        pid = _PROCESS.search(left.name)
-        if pid is None or left != unfinished_path(target, _UNFINISHED.format(pid=pid[1])):
-            continue
-        if not Path("/proc", pid[1]).exists() and not _is_whole(left):
-            left.unlink(missing_ok=True)
-
-
-def _is_whole(log: Path) -> bool:
-    """Whether a log was closed. What cannot be read may be."""
-    try:
-        window = FileWindow(log, direct=False)
-    except BadInputError:
-        return True
-    try:
-        return is_closed(window)
-    finally:
-        window.close()

@@ -17,6 +17,7 @@ from rig.phrase import Phrase
 from rig.tag import TripletTag
 from rig.topics import (
     HEALTH,
+    IMPORT_METADATA,
     MERGE_METADATA,
     RECOVERY_METADATA,
     RIG_METADATA,
@@ -46,6 +47,8 @@ class LogInfo:
         rig: fields of the last rig record.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         merged: of a log that was made of two: fields that say which, and how their clocks differed; empty otherwise.
+        imported: of a log that was made of films: fields that say which, and that no trigger stands behind them; empty
+            otherwise.
         disk: what went wrong with the disk while the log was written; empty text if nothing.
         forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
         ended_early_said: why the log ends before its recording was to end, or that this is not known; empty text: as
@@ -70,6 +73,7 @@ class LogInfo:
     rig: dict[str, str]
     known_lost: tuple[tuple[int, int], ...]
     merged: dict[str, str]
+    imported: dict[str, str]
     disk: Phrase
     forgotten_s: float
     ended_early_said: Phrase
@@ -139,6 +143,7 @@ class LogInfo:
             "rig": self.rig,
             "utc": None if self.utc is None else asdict(self.utc),
             "merged": self.merged,
+            "imported": self.imported,
             "trouble": self.trouble,
             "ended_early": self.ended_early,
             "part_before": self.part_before,
@@ -189,7 +194,7 @@ def info(path: Path, *, original: bool = False, source: bool = False, links: boo
         return LogInfo(
             path, reader.size, reader.closed, being_written, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
-            disk_trouble(reader.metadata), forgotten_s(reader.metadata),
+            reader.metadata.get(IMPORT_METADATA, {}), disk_trouble(reader.metadata), forgotten_s(reader.metadata),
             ended_early_said(reader.metadata), part_before(reader.metadata, path), messages, reader.library,
             None if told is None else told.finish(),
         )  # fmt: skip
@@ -217,4 +222,13 @@ def merged_in_words(merged: Mapping[str, str]) -> str:
     return (
         f"merged from {one} and {two}: {common} pulses are in both; the clock of the second was "
         f"{offset.lstrip('-')} ms (+- {sigma} us) {where} that of the first"
+    )
+
+
+def imported_in_words(imported: Mapping[str, str]) -> str:
+    """What a log says of the films that it was made of, in one line."""
+    synchrony, start, date = (imported.get(key, "?") for key in ("synchrony", "start", "date"))
+    return (
+        f"imported from films, without a trigger: pulses are told by frame number from a common start by {start}; how "
+        f"synchronous the cameras were is {synchrony}; the date is {date}"
     )

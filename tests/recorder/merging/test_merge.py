@@ -229,8 +229,8 @@ def test_a_whole_log_that_cannot_get_its_name_is_kept(
     parts: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, kept = tmp_path / "out.mcap", tmp_path / f".out.mcap.{os.getpid()}.part"
-    monkeypatch.setattr("recorder.merging.merge.give_name", refusing(errno.EIO))
-    with pytest.raises(StorageError, match=f"the merged log is whole, and stays in {kept}"):
+    monkeypatch.setattr("recorder.recovering.unfinished_log.give_name", refusing(errno.EIO))
+    with pytest.raises(StorageError, match=f"the new log is whole, and stays in {kept}"):
         merge(*parts, out)
     assert not out.exists()
     assert verify(kept).findings == ()
@@ -244,7 +244,7 @@ def test_a_log_of_the_same_name_made_meanwhile_stays_and_so_does_the_merged_one(
     def intrude(_: int) -> None:
         out.write_text("precious")
 
-    with pytest.raises(BadInputError, match=f"never overwritten; the merged log is whole, and stays in {kept}"):
+    with pytest.raises(BadInputError, match=f"never overwritten; the new log is whole, and stays in {kept}"):
         merge(*parts, out, progress=intrude)
     assert out.read_text() == "precious"
     assert verify(kept).findings == ()

@@ -1,0 +1,1 @@
+"""Makes logs of films: image sequences and videos of other cameras."""

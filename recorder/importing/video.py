@@ -1,0 +1,220 @@
+"""A video of a camera, decoded frame by frame."""
+
+import re
+from array import array
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
+from typing import Final
+
+import av
+import numpy as np
+from av import VideoFrame
+from av.container import InputContainer
+from av.error import FFmpegError
+from av.video.stream import VideoStream
+
+from recorder.importing.grey import bits_of, grey_of
+from recorder.importing.source import Taken
+from rig.clocks import NS_PER_S, UtcNs
+from rig.errors import BadInputError
+from rig.frame import FrameStatus
+from rig.host.files import open_to_read
+
+#: A video whose own rate is so much another than the one that is given, as a share, was slowed down or sped up.
+_OTHER_RATE: Final = 0.01
+#: Playlists, which FFmpeg takes for videos, lead to other files and to the network: nothing but this file is read.
+_OWN_FILE_ONLY: Final = {"protocol_whitelist": "pipe"}
+
+
+class Video:
+    """The first video stream of a file. Its frames count from 1.
+
+    Args:
+        path: the file.
+        rate_hz: frames per second when it was taken.
+
+    Raises:
+        BadInputError: it is no video, or its first frame cannot be decoded.
+    """
+
+    def __init__(self, path: Path, rate_hz: float) -> None:
+        self.path, self._rate_hz = path, rate_hz
+        self.first = 1
+        self._ticks = array("q")  # the times of the frames that were read, in units of `_tick_s`
+        self._untimed = self._frames = 0
+        self._broken = ""
+        with _opened(path) as (container, stream):
+            frame = next(_decoded(container, stream), None)
+            if frame is None:
+                raise BadInputError(f"{path}: no frame of it can be decoded; copy it again, or export it anew")
+            self.size = (frame.width, frame.height)
+            self.bits = bits_of(frame)
+            self._tick_s = float(stream.time_base or 0)
+            self.kind = f"video, {stream.codec_context.name}, {frame.format.name}"
+            self._declared = stream.frames or None
+            self._duration_s = _duration_s(container, stream)
+            rate = stream.average_rate
+            self.file_rate_hz = None if rate is None else float(rate)
+            self.date = _date({**container.metadata, **stream.metadata})
+            self._first_remarks = tuple(_remarks(frame))
+
+    @property
+    def expected(self) -> int | None:
+        """Number of frames that the file says it has; None: it does not say."""
+        if self._declared is None and self._duration_s is not None and self.file_rate_hz is not None:
+            return round(self._duration_s * self.file_rate_hz)
+        return self._declared
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know of it; of times and of its end only when all frames have been read."""
+        found = [*self._first_remarks]
+        if self.file_rate_hz is not None and abs(self.file_rate_hz / self._rate_hz - 1) > _OTHER_RATE:
+            found.append(
+                f"the file plays {self.file_rate_hz:.6g} frames a second; --rate says that {self._rate_hz:.6g} were"
+                " taken"
+            )
+        if times := self._times_in_words():
+            found.append(times)
+        if self._broken:
+            found.append(self._broken)
+        return tuple(found)
+
+    def frames(self, first: int) -> Iterator[Taken]:
+        """Decode the frames, from the frame `first` on.
+
+        Where the video breaks off, the frames end, and `remarks` says so.
+
+        Raises:
+            BadInputError: there is no such frame, or frames differ in size or pixels.
+        """
+        self._ticks, self._untimed, self._frames, self._broken = array("q"), 0, 0, ""
+        if first < 1:
+            raise BadInputError(f"{self.path}: has no frame {first}: its frames count from 1; correct --start")
+        with _opened(self.path) as (container, stream):
+            frames = _decoded(container, stream)
+            for number in count(1):
+                try:
+                    frame = next(frames, None)
+                except FFmpegError as error:
+                    self._broken = f"breaks off after frame {self._frames}: {error.strerror}"
+                    break
+                if frame is None:
+                    self._broken = self._cut_short()
+                    break
+                self._frames = number
+                self._note_time(frame)
+                if number >= first:
+                    yield self._taken(number, frame)
+        if self._frames < first:
+            raise BadInputError(f"{self.path}: has no frame {first}: it has {self._frames} frames; correct --start")
+
+    def _taken(self, number: int, frame: VideoFrame) -> Taken:
+        if frame.is_corrupt:
+            return Taken(number, None, FrameStatus.DAMAGED, f"frame {number} of {self.path} is damaged")
+        if (frame.width, frame.height) != self.size or bits_of(frame) != self.bits:
+            raise BadInputError(
+                f"{self.path}: frame {number} is {frame.width} x {frame.height} px of {bits_of(frame)} bits, those "
+                f"before it are {self.size[0]} x {self.size[1]} px of {self.bits}: cut it there into two videos"
+            )
+        return Taken(number, grey_of(frame))
+
+    def _note_time(self, frame: VideoFrame) -> None:
+        if frame.pts is None:
+            self._untimed += 1
+        else:
+            self._ticks.append(frame.pts)
+
+    def _cut_short(self) -> str:
+        """What the file says of frames that are not there, in words; empty: nothing."""
+        if self._declared is not None and self._frames < self._declared:
+            return f"ends after frame {self._frames}, and the file speaks of {self._declared}"
+        expected = self.expected
+        if self._declared is None and expected is not None and self._frames < expected - 1:
+            return f"ends after frame {self._frames}, and by its duration it has {expected}"
+        return ""
+
+    def _times_in_words(self) -> str:
+        """By how much the times of the frames differ from those of frames that come evenly; empty: by nothing."""
+        if self._untimed and self._frames:
+            return (
+                f"{self._untimed} of {self._frames} frames have no time in the file: nobody knows if they came evenly"
+            )
+        if len(self._ticks) < 3:
+            return ""
+        ticks = np.frombuffer(self._ticks, np.int64) - self._ticks[0]
+        even = np.linspace(0.0, float(ticks[-1]), len(ticks))
+        if self.file_rate_hz is not None and self._tick_s and abs(self.file_rate_hz / self._rate_hz - 1) <= _OTHER_RATE:
+            even = np.arange(len(ticks)) / (self._rate_hz * self._tick_s)
+        off = ticks - even
+        worst = int(np.abs(off).argmax())
+        period = max(float(even[-1]) / (len(ticks) - 1), 1e-9)
+        if abs(off[worst]) <= 1:  # the file rounds to whole ticks
+            return ""
+        return (
+            f"its frames do not come evenly: frame {worst + 1} is {abs(off[worst]) * self._tick_s * 1e3:.1f} ms "
+            f"({abs(off[worst]) / period:.2f} frames) {'later' if off[worst] > 0 else 'sooner'} than the rate says, by "
+            "the times in the file; pulses are told by frame numbers all the same"
+        )
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
+    """A video file and its first video stream.
+
+    Raises:
+        BadInputError: it cannot be read, or is no video.
+    """
+    try:
+        file = open_to_read(path, links=True)
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read ({error.strerror}); check the name and its permissions") from error
+    with file:
+        try:
+            container = av.open(file, "r", options=_OWN_FILE_ONLY)
+        except (FFmpegError, ValueError) as error:
+            raise BadInputError(
+                f"{path}: is no video that can be read ({error}); copy it again, or convert it"
+            ) from None
+        with container:
+            if not container.streams.video:
+                raise BadInputError(f"{path}: holds no video; name another file")
+            stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
+            yield container, stream
+
+
+def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
+    yield from container.decode(stream)
+
+
+def _duration_s(container: InputContainer, stream: VideoStream) -> float | None:
+    if stream.duration is not None and stream.time_base is not None:
+        return float(stream.duration * stream.time_base)
+    return None if container.duration is None else container.duration / av.time_base
+
+
+def _date(metadata: Mapping[str, str]) -> UtcNs | None:
+    """When a video was begun, as its metadata say, UTC; None: they do not, or not in which time zone."""
+    text = metadata.get("creation_time", "")
+    if not re.search(r"(Z|[+-]\d\d:?\d\d)$", text):
+        return None
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    seconds = (moment - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds()
+    return UtcNs(round(seconds * NS_PER_S)) if seconds > 0 else None
+
+
+def _remarks(frame: VideoFrame) -> Iterator[str]:
+    if frame.interlaced_frame:
+        yield (
+            "its frames are interlaced: odd and even rows were taken half a frame apart; measure nothing that moves, "
+            "or import each half as a frame of its own"
+        )
+    if frame.rotation:
+        yield f"the file asks to be shown turned by {frame.rotation} degrees; frames are taken as the camera gave them"

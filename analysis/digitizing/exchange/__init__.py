@@ -1,0 +1,1 @@
+"""Marks in files: a table for spreadsheets, and folders of other digitizers."""

@@ -59,6 +59,9 @@ class Measurement(Model):
     share: float = Field(0.0, description="of this step that is done, 0 to 1")
     before: int = Field(0, description="logs that are measured before this one")
     problem: Statement | None = Field(None, description="why it could not be measured, and what to do")
+    again: bool = Field(
+        False, description="survey or poses kept it from being measured: it is measured again when their file changes"
+    )
     refused: Statement | None = Field(
         None, description="why it cannot be measured at all: the rig file has no `[analysis]`; null: it can be"
     )

@@ -18,6 +18,7 @@ from rig.phrase import Phrase, from_plain, phrase, plain
 from rig.settings.model import AnalysisSettings
 from service.background.child import run_child
 from service.measuring.results import VIDEO, keep_file, keep_problem, keep_result, keep_step
+from service.measuring.retries import source_mark
 
 #: Where results are made, before they are whole.
 _WORKSHOP: Final = ".measuring"
@@ -61,6 +62,7 @@ class AfterSteps:
             log: it.
             analysis: how.
         """
+        source = source_mark(analysis)
         made, video = (self._folder / _WORKSHOP / f"{recording}{ending}" for ending in ("", ".mp4"))
         wants_video = AfterStep.VIDEO in analysis.after_recording
         try:
@@ -84,7 +86,8 @@ class AfterSteps:
             if end is None or not log.exists():
                 return
             if "problem" in end:
-                self._fail(recording, log, from_plain(end["problem"]))
+                by_source = end.get("by_source", False)
+                self._fail(recording, log, from_plain(end["problem"]), source if by_source else None)
             elif wants_video:
                 if end["no_video"] is None:
                     keep_file(video, log, VIDEO)
@@ -127,11 +130,11 @@ class AfterSteps:
         elif why is not None:
             self._warn(phrase("event_no_video", "{recording} has no video: {why}", recording=recording, why=why))
 
-    def _fail(self, recording: str, log: Path, why: Phrase) -> None:
-        """Note that a log cannot be measured."""
+    def _fail(self, recording: str, log: Path, why: Phrase, source: str | None = None) -> None:
+        """Note that a log cannot be measured, and by which content of survey or poses, if they are the reason."""
         with suppress(FileNotFoundError):  # deleted meanwhile
             try:
-                keep_problem(log, _warning(why))
+                keep_problem(log, _warning(why), source)
             except FileNotFoundError:
                 raise
             except OSError as error:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rig.api.measuring import MeasuringStep
-from rig.errors import SvevError
+from rig.errors import BadInputError, LogDamagedError, SvevError
 from rig.phrase import as_plain
 from service.background.program import Teller, serve
 
@@ -21,7 +21,8 @@ _STEPS: Final = {
 def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     """Measure `log` by `survey` or `calibration` into the folder `out`, then draw the `video`, unless it is null.
 
-    Tells the main figures of the jumps when the folder is whole, and says at the end why there is no video.
+    Tells the main figures of the jumps when the folder is whole, and says at the end why there is no video; or why the
+    log cannot be measured, and whether survey or poses are the reason: they cannot be read, or do not fit its balls.
     """
     from analysis.cameras.source import read_source  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.procedure.analyze import analyze  # noqa: PLC0415
@@ -30,12 +31,25 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     from analysis.worker.findings import summary  # noqa: PLC0415
     from service.measuring.earlier import earlier_jumps  # noqa: PLC0415
 
+    orienting = False
+
     def progress(step: str, share: float) -> None:
+        nonlocal orienting
+        orienting = _STEPS[step] is MeasuringStep.BALLS and share < 1.0
         tell(last=share in {0.0, 1.0}, step=_STEPS[step], share=share)
 
     log, out = Path(asked["log"]), Path(asked["out"])
     survey, calibration = (Path(asked[key]) if asked[key] else None for key in ("survey", "calibration"))
-    found = analyze(log, read_source(survey, calibration), progress=progress)
+    try:
+        source = read_source(survey, calibration)
+    except BadInputError as error:
+        return _failed(error, by_source=True)
+    try:
+        found = analyze(log, source, progress=progress)
+    except LogDamagedError:
+        raise
+    except SvevError as error:
+        return _failed(error, by_source=orienting)
     result = found.result
     earlier = earlier_jumps(log, result.session.get("athlete", ""))
     write_folder(found, log, out, earlier=earlier, progress=progress)
@@ -53,6 +67,10 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     except SvevError as error:
         return {"no_video": as_plain(error.said)}
     return {"no_video": None}
+
+
+def _failed(error: SvevError, *, by_source: bool) -> dict[str, Any]:
+    return {"problem": as_plain(error.said), "by_source": by_source}
 
 
 if __name__ == "__main__":

@@ -16,12 +16,17 @@ from rig.api.measuring import AfterStep, Measurement, MeasuringQueue, MeasuringS
 from rig.api.statement import Level, Statement
 from rig.errors import NoAnalysisError, StateForbidsError
 from rig.events import Event
+from rig.events import Level as EventLevel
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from service.measuring.after_steps import AfterSteps
 from service.measuring.results import measurement_of
+from service.measuring.retries import Retries
 from service.measuring.waiting import WaitingLogs
 
 _LOOK_S: Final = 0.2
+#: So often survey or poses are looked at while nothing waits.
+_WATCH_S: Final = 2.0
 #: Share of a step.
 _SEEN: Final = 0.05
 _END_S: Final = 10.0
@@ -56,7 +61,9 @@ class Measurings:
         changed: Callable[[], None],
     ) -> None:
         self._folder, self._in_use, self._busy, self._changed = folder, in_use, busy, changed
+        self._tell = tell
         self._waiting = WaitingLogs(folder, tell)
+        self._retries = Retries(folder, in_use)
         self._running: MeasuringQueue | None = None
         self._after = AfterSteps(folder, busy, self._wanted, self._hear, self._hold, tell, found)
         self._lock = threading.Lock()
@@ -159,14 +166,31 @@ class Measurings:
         self._after.tidy()
         self._waiting.load()
         while not self._closed.is_set():
+            self._retry()
             self._waiting.keep()
             recording = self._next()
             if recording is None:
-                self._bell.wait(_LOOK_S if self._waiting.ids else None)
+                self._bell.wait(_LOOK_S if self._waiting.ids else _WATCH_S)
                 self._bell.clear()
                 continue
             self._work(recording)
             self._changed()
+
+    def _retry(self) -> None:
+        """Queue the logs again that survey or poses kept from being measured, when those have changed."""
+        queued = []
+        with suppress(StateForbidsError):  # two thousand wait: the others are measured when somebody asks
+            for recording in self._retries.due():
+                self._waiting.add(recording)
+                queued.append(recording)
+        if not queued:
+            return
+        self._waiting.keep()
+        self._retries.queued(queued)
+        text = "survey or poses have changed: {count} recordings that could not be measured by them are measured again"
+        said = phrase("event_measured_again", text, count=len(queued))
+        self._tell(Event.now(EventLevel.INFO, "analysis", said))
+        self._changed()
 
     def _next(self) -> str | None:
         """The first log that is closed; those that are gone do not wait any more."""
@@ -189,6 +213,7 @@ class Measurings:
         try:
             if analysis is not None:  # else another rig file, since it was queued
                 self._after.measure(recording, log, analysis)
+                self._retries.look_again()
                 if analysis.copy_to is not None and self._wanted(recording):
                     self._after.copy(recording, log, analysis.copy_to)
             if not self._closed.is_set():

@@ -36,6 +36,8 @@ class _Outcome(Model):
         version: of svev.
         jumps: main figures of the jumps of the result that lies in the folder.
         problem: why the last attempt failed; the result, if there is one, is of an attempt before.
+        source: by which content of survey or poses the last attempt failed, as `service.measuring.retries` marks it;
+            None if it failed for another reason, or did not.
         further: what was tried with the log afterwards, and why it failed.
     """
 
@@ -43,6 +45,7 @@ class _Outcome(Model):
     version: str
     jumps: tuple[LastJump, ...] = ()
     problem: Statement | None = None
+    source: str | None = None
     further: tuple[tuple[AfterStep, Statement | None], ...] = ()
 
 
@@ -56,6 +59,7 @@ def measurement_of(recording: str, log: Path) -> Measurement:
         recording=recording,
         state=_state(found.problem),
         problem=found.problem,
+        again=found.source is not None,
         steps=tuple(
             StepState(step=step, state=_state(problem), problem=problem)
             for step, problem in ((AfterStep.MEASURE, found.problem), *found.further)
@@ -159,8 +163,13 @@ def keep_file(made: Path, log: Path, name: str) -> None:
     sync(measured_path(log))
 
 
-def keep_problem(log: Path, problem: Statement) -> None:
+def keep_problem(log: Path, problem: Statement, source: str | None = None) -> None:
     """Note why a log could not be measured; a result that is there stays.
+
+    Args:
+        log: the log.
+        problem: why.
+        source: the content of survey or poses that kept it from being measured; None: something else did.
 
     Raises:
         OSError: the disk refuses.
@@ -174,9 +183,27 @@ def keep_problem(log: Path, problem: Statement) -> None:
             version=_VERSION,
             jumps=() if before is None else before.jumps,
             problem=problem,
+            source=source,
         ),
         folder,
     )
+
+
+def failed_by(log: Path) -> str | None:
+    """By which content of survey or poses a log could not be measured; None if that was not the reason."""
+    found = _outcome(measured_path(log))
+    return None if found is None else found.source
+
+
+def note_source(log: Path, source: str) -> None:
+    """Note by which content of survey or poses a log is measured next, that could not be by another one.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    folder = measured_path(log)
+    if (found := _outcome(folder)) is not None:
+        _write(found.model_copy(update={"source": source}), folder)
 
 
 def keep_step(log: Path, step: AfterStep, problem: Statement | None) -> None:

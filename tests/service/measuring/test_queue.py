@@ -194,6 +194,7 @@ def test_what_cannot_be_measured_says_why_and_the_next_one_goes_on(bench: Bench)
         failed = bench.until_over(queue, "dark")
     assert failed.problem is not None
     assert failed.problem.text
+    assert failed.again, "the survey does not fit what it shows"
     assert (failed.files, failed.figures) == ((), ())
     assert bench.waiting() == []
 

@@ -25,6 +25,7 @@ export const measuring = {
   "measurement.done": "Measured: {day}, {time} (svev {version}).",
   "measurement.no_jump": "There is no jump in it.",
   "measurement.failed": "Could not be measured.",
+  "measurement.by_itself": "It is measured again by itself when the file with survey or poses changes.",
   "measurement.earlier": "The figures are of an earlier measurement: {day}, {time}.",
   "measurement.after": "It is measured when it has ended.",
   "measurement.trash": "Restore this jump to see what was measured.",

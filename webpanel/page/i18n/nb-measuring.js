@@ -25,6 +25,7 @@ export const measuring = {
   "measurement.done": "Målt: {day}, {time} (svev {version}).",
   "measurement.no_jump": "Det er ikke noe hopp i det.",
   "measurement.failed": "Kunne ikke måles.",
+  "measurement.by_itself": "Det måles på nytt av seg selv når filen med innmåling eller kamerastillinger endres.",
   "measurement.earlier": "Tallene er fra en tidligere måling: {day}, {time}.",
   "measurement.after": "Det måles når det er ferdig.",
   "measurement.trash": "Hent hoppet tilbake for å se hva som ble målt.",

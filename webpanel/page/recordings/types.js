@@ -13,6 +13,7 @@
  * @property {number} share
  * @property {number} before
  * @property {Statement|null} problem
+ * @property {boolean} again
  * @property {Statement|null} refused
  * @property {StepState[]} steps
  * @property {string|null} measured

@@ -208,6 +208,7 @@ class Service(Archive):
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:
         """Change session fields, also of the recording in progress."""
         entry = self._catalogue.change_session(recording_id, change.texts())
+        self._measurings.renamed(recording_id, self._catalogue.file(recording_id))
         note = partial(self._supervisor.recordings.change_session, recording_id, change.fields())
         return self._supervisor.commands.ask(at_once(note), _SOON_S) or self._with_next_part(entry)
 
@@ -224,7 +225,9 @@ class Service(Archive):
 
     def restore_recording(self, recording_id: str) -> Recording:
         """Take a recording out of the trash."""
-        return self._with_next_part(self._catalogue.restore(recording_id))
+        entry = self._catalogue.restore(recording_id)
+        self._measurings.renamed(recording_id, self._catalogue.file(recording_id))
+        return self._with_next_part(entry)
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
         """Wait for a triplet of another pulse than `newer_than`; None if none came in time."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from analysis.export import motion_files
 from analysis.measurements.file import write_measurements
 from analysis.procedure.analyze import Analysis
+from analysis.procedure.renaming import write_cameras
 from analysis.report import overlay_file
 from analysis.report.coach import write_report
 from analysis.report.kinogram.earlier import EarlierJump
@@ -13,6 +14,7 @@ from analysis.report.kinogram.folder import write_kinograms
 from analysis.report.protocol import write_protocol
 from analysis.report.video import write_video
 from analysis.result import file as result_file
+from analysis.result.naming import CAMERAS
 from photogrammetry.network.file_writer import write_network
 from rig.errors import StorageError
 
@@ -54,6 +56,8 @@ def write_folder(
         result_file.write(analysis.result, written[0])
         write_measurements(analysis.measurements, written[1])
         write_network(analysis.scene.network, written[2])
+        written.append(folder / CAMERAS)
+        write_cameras(analysis.system, written[-1])
         written += motion_files.write(analysis.result, folder)
         written += write_kinograms(
             analysis.result,

@@ -31,6 +31,7 @@ class MeasuringStep(StrEnum):
     WRITING = "writing"
     VIDEO = "video"
     COPYING = "copying"
+    RENAMING = "renaming"  #: the session was corrected: the files that say whose jump it is are written anew
 
 
 class AfterStep(StrEnum):
@@ -74,6 +75,11 @@ class Measurement(Model):
     figures: tuple[LastJump, ...] = Field((), description="main figures of its jumps")
     live: bool = Field(False, description="the figures are those that were measured live, before the log was closed")
     files: tuple[str, ...] = Field((), description="names of the files of the result")
+    renaming: bool = Field(
+        False,
+        description="the session was corrected since: `report.html`, `jumper.json` and the kinogram are written anew "
+        "with it; until then they are not among the files",
+    )
 
 
 class MeasuringQueue(Model):

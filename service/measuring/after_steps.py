@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from recorder.catalogue.trash import beside
+from recorder.log.measured_path import measured_path
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, MeasuringStep
 from rig.api.statement import Level, Statement
@@ -17,7 +18,15 @@ from rig.host.files import make_folder
 from rig.phrase import Phrase, from_plain, phrase, plain
 from rig.settings.model import AnalysisSettings
 from service.background.child import run_child
-from service.measuring.results import VIDEO, keep_file, keep_problem, keep_result, keep_step
+from service.measuring.results import (
+    VIDEO,
+    keep_file,
+    keep_problem,
+    keep_renamed,
+    keep_result,
+    keep_step,
+    names_of,
+)
 from service.measuring.retries import source_mark
 
 #: Where results are made, before they are whole.
@@ -62,7 +71,7 @@ class AfterSteps:
             log: it.
             analysis: how.
         """
-        source = source_mark(analysis)
+        source, names = source_mark(analysis), names_of(log)
         made, video = (self._folder / _WORKSHOP / f"{recording}{ending}" for ending in ("", ".mp4"))
         wants_video = AfterStep.VIDEO in analysis.after_recording
         try:
@@ -78,7 +87,7 @@ class AfterSteps:
 
             def hear(news: dict[str, Any]) -> None:
                 if "jumps" in news:  # people wait for the figures, not for the video
-                    self._keep(recording, log, made, news["jumps"])
+                    self._keep(recording, log, made, news["jumps"], names)
                 else:
                     self._hear(news)
 
@@ -97,12 +106,38 @@ class AfterSteps:
         finally:
             shutil.rmtree(made, ignore_errors=True)
 
-    def _keep(self, recording: str, log: Path, made: Path, found: list[dict[str, Any]]) -> None:
+    def _keep(self, recording: str, log: Path, made: Path, found: list[dict[str, Any]], names: dict[str, str]) -> None:
         if not log.exists():
             return
         jumps = tuple(LastJump.model_validate(jump).model_copy(update={"recording": recording}) for jump in found)
-        keep_result(made, log, jumps)
+        keep_result(made, log, jumps, names)
         self._found(jumps)
+
+    def rename(self, recording: str, log: Path) -> bool:
+        """Write those files of a result anew that say whose jump it is; what failed is told.
+
+        Returns:
+            Whether that is done.
+        """
+        self._hear({"step": MeasuringStep.RENAMING, "share": 0.0})
+        names, made = names_of(log), self._folder / _WORKSHOP / f"{recording}.renamed"
+        try:
+            make_folder(made.parent)
+            shutil.rmtree(made, ignore_errors=True)
+            asked = {"log": str(log), "result": str(measured_path(log)), "out": str(made)}
+            end = self._child(recording, "service.measuring.renaming", asked, self._hear)
+            if end is None or not log.exists():
+                return False
+            if "problem" in end:
+                self._warn(_not_renamed(recording, from_plain(end["problem"])))
+                return False
+            keep_renamed(made, log, names)
+        except (OSError, ValueError) as error:
+            self._warn(_not_renamed(recording, plain(str(error))))
+            return False
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+        return True
 
     def copy(self, recording: str, log: Path, to: Path) -> None:
         """Copy a log, measured or not, with all that belongs to it."""
@@ -144,6 +179,11 @@ class AfterSteps:
 
     def _warn(self, said: Phrase) -> None:
         self._tell(Event.now(EventLevel.WARNING, "analysis", said))
+
+
+def _not_renamed(recording: str, why: Phrase) -> Phrase:
+    text = "the corrected name does not stand on the pages of {recording}, measure it again: {why}"
+    return phrase("event_not_renamed", text, recording=recording, why=why)
 
 
 def _not_copied(recording: str, why: Phrase) -> Phrase:

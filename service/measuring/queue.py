@@ -5,11 +5,13 @@ for. None is forgotten: a service that was killed, or a computer without power, 
 """
 
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
+from analysis.result.naming import CAMERAS
+from recorder.log.measured_path import measured_path
 from recorder.log.write_lock import is_being_written
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, Measurement, MeasuringQueue, MeasuringState, MeasuringStep, StepState
@@ -20,7 +22,7 @@ from rig.events import Level as EventLevel
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from service.measuring.after_steps import AfterSteps
-from service.measuring.results import measurement_of
+from service.measuring.results import is_outdated, measurement_of
 from service.measuring.retries import Retries
 from service.measuring.waiting import WaitingLogs
 
@@ -63,6 +65,8 @@ class Measurings:
         self._folder, self._in_use, self._busy, self._changed = folder, in_use, busy, changed
         self._tell = tell
         self._waiting = WaitingLogs(folder, tell)
+        self._names = WaitingLogs(folder, tell)  # results whose files say a corrected name: they tell so themselves
+        self._at = self._waiting  # what the log stands in that is at work
         self._retries = Retries(folder, in_use)
         self._running: MeasuringQueue | None = None
         self._after = AfterSteps(folder, busy, self._wanted, self._hear, self._hold, tell, found)
@@ -90,6 +94,13 @@ class Measurings:
         with suppress(StateForbidsError):  # two thousand wait: this one is measured when somebody asks
             self._waiting.add(log.stem, first=True)
         self._bell.set()
+
+    def renamed(self, recording: str, log: Path) -> None:
+        """The session of a recording was corrected: its result gets what it says of that written anew."""
+        if log.parent == self._folder and is_outdated(log):
+            with suppress(StateForbidsError):  # two thousand wait: a service that starts again finds it
+                self._names.add(recording)
+            self._bell.set()
 
     def want(self, recording: str, log: Path) -> Measurement:
         """Have a log measured, again if it was measured before.
@@ -165,15 +176,19 @@ class Measurings:
     def _run(self) -> None:
         self._after.tidy()
         self._waiting.load()
+        for log in self._folder.glob("*.mcap"):
+            self.renamed(log.stem, log)
         while not self._closed.is_set():
             self._retry()
             self._waiting.keep()
-            recording = self._next()
-            if recording is None:
-                self._bell.wait(_LOOK_S if self._waiting.ids else _WATCH_S)
+            if (recording := self._next(self._names)) is not None:
+                self._rename(recording)
+            elif (recording := self._next(self._waiting)) is not None:
+                self._work(recording)
+            else:
+                self._bell.wait(_LOOK_S if self._waiting.ids or self._names.ids else _WATCH_S)
                 self._bell.clear()
                 continue
-            self._work(recording)
             self._changed()
 
     def _retry(self) -> None:
@@ -192,14 +207,14 @@ class Measurings:
         self._tell(Event.now(EventLevel.INFO, "analysis", said))
         self._changed()
 
-    def _next(self) -> str | None:
+    def _next(self, waiting: WaitingLogs) -> str | None:
         """The first log that is closed; those that are gone do not wait any more."""
         if self._busy():
             return None
-        for recording in self._waiting.ids:
+        for recording in waiting.ids:
             log = self._log(recording)
             if not log.exists():
-                self._forget(recording)
+                waiting.remove(recording)
             elif not is_being_written(log):
                 return recording
         return None
@@ -207,23 +222,45 @@ class Measurings:
     def _work(self, recording: str) -> None:
         """Measure a log, and take the further steps; what is given up meanwhile, or was interrupted, is not noted."""
         log, analysis = self._log(recording), self._in_use().analysis
-        with self._lock:
-            self._running = MeasuringQueue(recording=recording, state=MeasuringState.MEASURING)
-        self._changed()
-        try:
+        with self._at_work(recording, self._waiting):
             if analysis is not None:  # else another rig file, since it was queued
                 self._after.measure(recording, log, analysis)
                 self._retries.look_again()
                 if analysis.copy_to is not None and self._wanted(recording):
                     self._after.copy(recording, log, analysis.copy_to)
             if not self._closed.is_set():
-                self._forget(recording)
+                self._waiting.remove(recording)
+                self._waiting.keep()
+
+    def _rename(self, recording: str) -> None:
+        """Write what a result says of the session anew; a result of an older svev is measured again for that."""
+        log, analysis = self._log(recording), self._in_use().analysis
+        if not (measured_path(log) / CAMERAS).exists():
+            self._names.remove(recording)
+            if analysis is not None:
+                self._waiting.add(recording)
+            return
+        with self._at_work(recording, self._names):
+            done = self._after.rename(recording, log)
+            if done and analysis is not None and analysis.copy_to is not None:
+                self._after.copy(recording, log, analysis.copy_to)
+            self._names.remove(recording)
+        if done:  # perhaps corrected once more meanwhile
+            self.renamed(recording, log)
+
+    @contextmanager
+    def _at_work(self, recording: str, waiting: WaitingLogs) -> Iterator[None]:
+        with self._lock:
+            self._running, self._at = MeasuringQueue(recording=recording, state=MeasuringState.MEASURING), waiting
+        self._changed()
+        try:
+            yield
         finally:
             with self._lock:
                 self._running = None
 
     def _wanted(self, recording: str) -> bool:
-        return recording in self._waiting and not self._closed.is_set()
+        return recording in self._at and not self._closed.is_set()
 
     def _hold(self, held: bool) -> None:
         self._change(paused=held)
@@ -239,10 +276,6 @@ class Measurings:
             if self._running is not None:
                 self._running = self._running.model_copy(update=what)
         self._changed()
-
-    def _forget(self, recording: str) -> None:
-        self._waiting.remove(recording)
-        self._waiting.keep()
 
     def _log(self, recording: str) -> Path:
         return self._folder / f"{recording}.mcap"

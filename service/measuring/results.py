@@ -3,26 +3,31 @@
 import json
 import os
 import shutil
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
+from analysis.result.naming import bears_names
 from recorder.log.measured_path import measured_path
+from recorder.log.session_changes import session_changes
 from rig.api.fields import Model
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, Measurement, MeasuringState, StepState
+from rig.api.recordings import SessionFields
 from rig.api.statement import Statement
-from rig.errors import StateForbidsError
+from rig.errors import BadInputError, StateForbidsError
 from rig.host.disk import replace_file, sync
 from rig.host.files import TEXT_MAX, open_to_read, opened_folder, read_whole
 from service.seam.archive import Download
 
 _NAME: Final = "measurement.json"
 _JUMPER: Final = "jumper.json"
+_NOTHING: Final[Mapping[str, str]] = {}
 #: MP4, which every phone plays.
 VIDEO: Final = "overlay.mp4"
 _VERSION: Final = version("svev")
@@ -39,6 +44,7 @@ class _Outcome(Model):
         source: by which content of survey or poses the last attempt failed, as `service.measuring.retries` marks it;
             None if it failed for another reason, or did not.
         further: what was tried with the log afterwards, and why it failed.
+        names: the corrections of the session that stand in those files of the result that say whose jump it is.
     """
 
     measured: datetime
@@ -47,6 +53,7 @@ class _Outcome(Model):
     problem: Statement | None = None
     source: str | None = None
     further: tuple[tuple[AfterStep, Statement | None], ...] = ()
+    names: dict[str, str] = Field(default_factory=dict)
 
 
 def measurement_of(recording: str, log: Path) -> Measurement:
@@ -55,6 +62,7 @@ def measurement_of(recording: str, log: Path) -> Measurement:
     found = _outcome(folder)
     if found is None:
         return Measurement(recording=recording, state=MeasuringState.NONE)
+    renaming = _is_outdated(found, log)
     return Measurement(
         recording=recording,
         state=_state(found.problem),
@@ -67,7 +75,8 @@ def measurement_of(recording: str, log: Path) -> Measurement:
         measured=found.measured,
         version=found.version,
         figures=tuple(jump.model_copy(update={"recording": recording}) for jump in found.jumps),
-        files=tuple(sorted(each.name for each in _files(folder))),
+        files=tuple(sorted(each.name for each in _files(folder) if not (renaming and bears_names(each.name)))),
+        renaming=renaming,
     )
 
 
@@ -78,6 +87,25 @@ def _state(problem: Statement | None) -> MeasuringState:
 def result_file(log: Path, name: str) -> Path | None:
     """The file of this name in the result of a log; None if there is none."""
     return next((each for each in _files(measured_path(log)) if each.name == name), None)
+
+
+def is_outdated(log: Path) -> bool:
+    """Whether the session was corrected since the files were written that say whose jump it is."""
+    found = _outcome(measured_path(log))
+    return found is not None and _is_outdated(found, log)
+
+
+def names_of(log: Path) -> dict[str, str]:
+    """The corrections of what those files say: name, bib, gate, wind, notes, operator."""
+    try:
+        changes = session_changes(log)
+    except BadInputError:
+        return {}  # the catalogue says so
+    return {field: text for field, text in changes.items() if field in SessionFields.model_fields}
+
+
+def _is_outdated(found: _Outcome, log: Path) -> bool:
+    return bool(found.jumps) and found.names != names_of(log)
 
 
 def jumps_in_full(log: Path) -> tuple[dict[str, Any], ...]:
@@ -99,13 +127,12 @@ def result_downloads(log: Path, name: str) -> list[Download]:
     """The whole result of a log as files to take away, in a folder that belongs beside the log's file.
 
     Args:
-        log: the log.
+        log: the log; files that say a name which was corrected since are left out.
         name: of the file that it is taken away as.
     """
-    folder = measured_path(log)
-    return [
-        _download(path, f"{measured_path(Path(name)).name}/{path.name}") for path in (*_files(folder), *_own(folder))
-    ]
+    folder, renaming = measured_path(log), is_outdated(log)
+    files = [each for each in _files(folder) if not (renaming and bears_names(each.name))]
+    return [_download(path, f"{measured_path(Path(name)).name}/{path.name}") for path in (*files, *_own(folder))]
 
 
 def _download(path: Path, name: str) -> Download:
@@ -129,18 +156,19 @@ def jumps_of(log: Path) -> tuple[LastJump, ...]:
     return () if found is None else found.jumps
 
 
-def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...]) -> None:
+def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...], names: Mapping[str, str] = _NOTHING) -> None:
     """Put a folder with the files of a result beside its log, in place of an earlier one.
 
     Args:
         made: the folder, on the same disk; it is gone afterwards.
         log: the log.
         jumps: main figures.
+        names: the corrections of the session, as `names_of` gave them before.
 
     Raises:
         OSError: the disk refuses.
     """
-    outcome = _Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps)
+    outcome = _Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps, names=dict(names))
     _write(outcome, made)
     for path in made.iterdir():
         sync(path)
@@ -150,6 +178,26 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...]) -> None:
     made.rename(target)
     sync(target.parent)
     _remove(old)
+
+
+def keep_renamed(made: Path, log: Path, names: Mapping[str, str]) -> None:
+    """Put files with the corrected session into the result of a log, and note that they are there, last of all.
+
+    Args:
+        made: folder with the files, on the same disk.
+        log: the log.
+        names: the corrections.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    folder = measured_path(log)
+    for path in made.iterdir():
+        sync(path)
+        path.replace(folder / path.name)
+    sync(folder)
+    if (found := _outcome(folder)) is not None:
+        _write(found.model_copy(update={"names": dict(names)}), folder)
 
 
 def keep_file(made: Path, log: Path, name: str) -> None:
@@ -184,6 +232,7 @@ def keep_problem(log: Path, problem: Statement, source: str | None = None) -> No
             jumps=() if before is None else before.jumps,
             problem=problem,
             source=source,
+            names={} if before is None else before.names,
         ),
         folder,
     )

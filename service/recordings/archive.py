@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.images.activity import busiest_pulse, liveliest_pulse
+from analysis.result.naming import bears_names
 from recorder.catalogue.entry import Entry, LogState, Trouble
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
@@ -39,7 +40,7 @@ from rig.tag import TripletTag
 from service.comparing.asking import Comparisons
 from service.exports.jobs import Exports
 from service.measuring.queue import Measurings
-from service.measuring.results import jumps_in_full, result_downloads, result_file
+from service.measuring.results import is_outdated, jumps_in_full, result_downloads, result_file
 from service.recordings import live_results
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
@@ -236,10 +237,14 @@ class Archive(ABC):
 
         Raises:
             UnknownRecordingError: there is none of this name.
+            StateForbidsError: it says a name that was corrected since.
         """
-        file = result_file(self._catalogue.file(recording_id), name)
+        log = self._catalogue.file(recording_id)
+        file = result_file(log, name)
         if file is None:
             raise UnknownRecordingError(f"recording {recording_id} has no result {name[:100]!r}: measure it")
+        if bears_names(name) and is_outdated(log):
+            raise StateForbidsError(f"{name} of {recording_id} gets the corrected name: try again in a moment")
         return file
 
     def _check_ended(self, recording_id: str) -> None:

@@ -151,7 +151,7 @@ class Archive(Protocol):
         ...
 
     def measured_file(self, recording_id: str, name: str) -> Path:
-        """A file of the result. UnknownRecordingError: there is none of this name."""
+        """A file of the result. UnknownRecordingError: none has this name. StateForbidsError: it says an old name."""
         ...
 
     def notes(self, recording_id: str) -> list[Note]:

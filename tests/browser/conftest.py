@@ -139,12 +139,12 @@ MEASURED = LastJump(
 )
 
 
-def write_kinogram(folder: Path, bib: str, athlete: str) -> None:
+def write_kinogram(folder: Path, bib: str, athlete: str, width: int = 1080) -> None:
     """The files of a kinogram, with a grey picture of its size."""
     content = {"format": "svev-kinogram/1", "recording": "jump", "athlete": athlete, "bib": bib, "jumps": []}
     (folder / "kinogram.json").write_text(json.dumps(content), encoding="utf-8")
     (folder / "kinogram.html").write_text("<!doctype html><title>Kinogram</title><h1>Five pictures</h1>")
-    (folder / "kinogram.jpg").write_bytes(cv2.imencode(".jpg", np.full((2019, 1080), 120, np.uint8))[1].tobytes())
+    (folder / "kinogram.jpg").write_bytes(cv2.imencode(".jpg", np.full((2019, width), 120, np.uint8))[1].tobytes())
 
 
 def keep_measured(log: Path, jumps: tuple[LastJump, ...]) -> None:

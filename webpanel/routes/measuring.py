@@ -63,10 +63,13 @@ def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
         "/recordings/{recording_id}/measurement/files/{name}",
         response_class=FileResponse,
         dependencies=[Depends(downloads.place)],
-        responses=_FILE | refusals(404, 503),
+        responses=_FILE | refusals(404, 409, 503),
     )
     def get_measured_file(recording_id: RecordingId, name: FileName) -> FileResponse:
-        """A file of the result: the coach's page `report.html`, tables, C3D, TRC, the protocol, the network."""
+        """A file of the result: the coach's page `report.html`, tables, C3D, TRC, the protocol, the network.
+
+        Refused (409) for a moment after the session was corrected, where the file says whose jump it is.
+        """
         file = service.measured_file(recording_id, name)
         shown = _SHOWN.get(file.suffix)
         offered = {} if shown else {"Content-Disposition": attachment(f"{recording_id}-{name}")}

@@ -1,11 +1,13 @@
 """The kinogram on the page of a recording: seen, large by a tap, sent."""
 
 import re
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
 
-from recorder.log.measured_path import measured_path
+from rig.api.measuring import MeasuringQueue, MeasuringState
+from service.measuring.results import keep_renamed, names_of
 from tests.browser.conftest import Open, write_kinogram
 from tests.browser.views import assert_fits_a_phone
 from tests.webpanel.memory_service import MemoryService
@@ -63,19 +65,25 @@ def test_a_phone_sends_it(panel: Panel, jumps: None, open_page: Open, scheme: st
     expect(page.locator("#kinogram-picture")).to_be_hidden()
 
 
-def test_a_picture_with_another_name_is_not_sent(
-    panel: Panel, service: MemoryService, jumps: None, open_page: Open
+def test_a_picture_with_the_name_before_a_correction_is_nowhere_until_it_is_drawn_anew(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open, tmp_path: Path
 ) -> None:
     page = open_page(f"{panel.url}/#/recordings/jump-2")
-    expect(page.get_by_role("link", name="Save the picture")).to_be_visible()
+    picture = page.locator("#kinogram-jumps img")
+    expect(picture).to_have_js_property("naturalWidth", 1080)
+    page.locator("#recording-athlete").fill("Kari")
+    page.locator("#recording-athlete").press("Enter")
+    expect(page.locator("#kinogram")).to_be_hidden()
+    expect(page.locator("#measurement-state")).to_contain_text("The corrected name is being written")
+    expect(page.get_by_role("link", name="The coach's page")).to_have_count(0)
     with panel.client() as client:
-        assert client.patch("/api/recordings/jump-2", json={"athlete": "Kari"}).is_success
-    expect(page.locator("#kinogram-problem")).to_have_text(
-        "The picture bears the name 4 · Ola <b>Nordmann</b>. Measure again before you send it."
-    )
-    expect(page.get_by_role("link", name="Save the picture")).to_be_hidden()
-    log = service.catalogue.file("jump-2")
-    write_kinogram(measured_path(log), "4", "Kari")
-    page.reload()
-    expect(page.get_by_role("link", name="Save the picture")).to_be_visible()
-    expect(page.locator("#kinogram-problem")).to_be_hidden()
+        for name in ("report.html", "kinogram.jpg", "kinogram.html", "jumper.json"):
+            assert client.get(f"/api/recordings/jump-2/measurement/files/{name}").status_code == 409
+    log, made = service.catalogue.file("jump-2"), tmp_path / "made"
+    made.mkdir()
+    write_kinogram(made, "4", "Kari", width=900)
+    keep_renamed(made, log, names_of(log))
+    service.measuring = MeasuringQueue(recording="jump-2", state=MeasuringState.MEASURING)
+    service._wake()
+    expect(picture).to_have_js_property("naturalWidth", 900)
+    expect(page.get_by_role("link", name="The coach's page")).to_be_visible()

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from recorder.catalogue.folder import Catalogue
 from recorder.log.measured_path import measured_path
+from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState
 from rig.errors import StateForbidsError
@@ -118,6 +119,7 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
     assert {"kinogram.html", "kinogram.jpg", "kinogram.json"} <= set(done.files)
     assert [earlier.ok for earlier in earlier_jumps(bench.log("next"), "anna  berg")] == [True]
     assert live_results.latest(bench.folder) == jump
+    _a_corrected_name_reaches_every_file(bench)
     assert live_results.takeoff_pulse(bench.log("jump")) == pytest.approx(30 - 16 + 1, abs=1)
     catalogue = Catalogue(bench.folder)
     catalogue.delete("jump")
@@ -128,6 +130,30 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
     catalogue.delete("jump")
     catalogue.purge()
     assert sorted(path.name for path in bench.folder.rglob("*") if path.is_file() and "jump" in path.name) == []
+
+
+def _a_corrected_name_reaches_every_file(bench: Bench) -> None:
+    log, folder = bench.log("jump"), measured_path(bench.log("jump"))
+    untouched = (folder / "jumper.c3d").stat().st_mtime_ns
+    bench.busy = True
+    write_session_changes(log, {"athlete": "Kari Ås", "note.3": "of a pulse"})
+    with bench.running() as queue:
+        queue.renamed("jump", log)
+        now = bench.of(queue, "jump")
+        assert (now.state, now.renaming) == (MeasuringState.DONE, True)
+        assert {"report.html", "jumper.json", "kinogram.html", "kinogram.jpg"}.isdisjoint(now.files)
+        assert "jumper.c3d" in now.files
+        bench.busy = False
+        wait_until(lambda: not bench.of(queue, "jump").renaming, "the name is written", PATIENCE_S, 0.05)
+    for name in ("report.html", "kinogram.html", "jumper.json"):
+        text = (folder / name).read_text(encoding="utf-8")
+        assert "Kari Ås" in text, name
+        assert "Anna" not in text, name
+    assert (folder / "jumper.c3d").stat().st_mtime_ns == untouched, "nothing is measured again"
+    write_session_changes(log, {"athlete": "Berit", "note.3": "of a pulse"})  # while no service runs
+    with bench.running() as queue:
+        wait_until(lambda: not bench.of(queue, "jump").renaming, "the service that starts finds it", PATIENCE_S, 0.05)
+    assert [earlier.athlete for earlier in earlier_jumps(bench.log("next"), "berit")] == ["Berit"]
 
 
 def _a_failure_leaves_the_result(bench: Bench) -> None:

@@ -6,5 +6,4 @@ export const kinogram = {
   "kinogram.send": "Send",
   "kinogram.save": "Save the picture",
   "kinogram.page": "As a page, to print",
-  "kinogram.renamed": "The picture bears the name {name}. Measure again before you send it.",
 };

@@ -85,6 +85,7 @@ export const events = {
   event_no_analysis: ["ingen hopp måles før dette er rettet: {why}"],
   event_log_not_measured: ["{recording} er ikke målt: {why}"],
   event_log_not_copied: ["{recording} er ikke kopiert: {why}"],
+  event_not_renamed: ["det rettede navnet står ikke på sidene til {recording}, mål det på nytt: {why}"],
   event_measured_again: ["innmåling eller kamerastillinger er endret: {count} opptak som ikke kunne måles med dem, måles på nytt"],
   event_no_video: ["{recording} har ingen video: {why}"],
   event_no_queue: ["{file}: kan ikke leses, så logger som ventet på å bli målt, er glemt ({why})"],

@@ -6,5 +6,4 @@ export const kinogram = {
   "kinogram.send": "Send",
   "kinogram.save": "Lagre bildet",
   "kinogram.page": "Som side, til utskrift",
-  "kinogram.renamed": "På bildet står navnet {name}. Mål på nytt før du sender det.",
 };

@@ -88,7 +88,8 @@ async function look(key, wanted) {
     wrong = error;
   }
   drawVisit();
-  return wrong ? wrong.status === 0 || wrong.status >= 500 : UNFINISHED.includes(measured?.state ?? "none");
+  if (wrong) return wrong.status === 0 || wrong.status >= 500;
+  return Boolean(measured?.renaming) || UNFINISHED.includes(measured?.state ?? "none");
 }
 
 /** Draw it, also anew in another language. */

@@ -1,8 +1,8 @@
 /** The kinogram of the recording shown: its pictures, large by a tap, and sent by another one. */
 
 import { languageInUse, t } from "../i18n/i18n.js";
-import { asProblem, call, partOf, recordingPath } from "../shared/api.js";
-import { $, icon, make, setText } from "../shared/dom.js";
+import { asProblem, partOf, Problem } from "../shared/api.js";
+import { $, icon, make } from "../shared/dom.js";
 import { who } from "../shared/format.js";
 import { attempt } from "../shared/snacks.js";
 
@@ -52,22 +52,21 @@ function orderOf(name) {
 }
 
 /**
- * Load the pictures and what they say, then draw. They are kept in memory: a page may send only what it has at hand when the button is tapped.
+ * Load the pictures, then draw. They are kept in memory: a page may send only what it has at hand when the button is tapped.
  *
  * @param {Recording} recording
  * @param {string[]} names
  */
 async function load(recording, names) {
   const own = wanted;
-  const said = call("GET", recordingPath(recording.id, "/measurement/files/kinogram.json"));
   try {
-    const [of, ...pictures] = await Promise.all([said, ...names.map((name) => fetchPicture(recording.id, name))]);
-    if (own === wanted) draw(recording, names, pictures, of);
+    const pictures = await Promise.all(names.map((name) => fetchPicture(recording.id, name)));
+    if (own === wanted) draw(recording, names, pictures);
   } catch (error) {
     if (own !== wanted) return;
     wanted = "";
     clear();
-    throw error;
+    if (!(error instanceof Problem && error.status === 409)) throw error; // they get a corrected name; then they are listed again
   }
 }
 
@@ -94,27 +93,21 @@ function fileOf(id, name) {
  * @param {Recording} recording
  * @param {string[]} names
  * @param {Blob[]} pictures
- * @param {{ athlete: string, bib: string }} of whose name stands on them
  */
-function draw(recording, names, pictures, of) {
+function draw(recording, names, pictures) {
   clear();
-  const { athlete, bib } = recording.session;
-  const renamed = athlete.trim() !== of.athlete.trim() || bib.trim() !== of.bib.trim();
-  $("kinogram-problem").hidden = !renamed;
-  setText($("kinogram-problem"), renamed ? t("kinogram.renamed", { name: who(of, t("recordings.nobody")) }) : "");
-  $("kinogram-jumps").replaceChildren(...pictures.map((picture, index) => makeJump(recording, names[index], picture, renamed)));
+  $("kinogram-jumps").replaceChildren(...pictures.map((picture, index) => makeJump(recording, names[index], picture)));
   $("kinogram").hidden = false;
 }
 
 /**
- * A picture with its buttons; one that bears another name is not sent.
+ * A picture with its buttons.
  *
  * @param {Recording} recording
  * @param {string} name
  * @param {Blob} picture
- * @param {boolean} renamed
  */
-function makeJump({ id, session }, name, picture, renamed) {
+function makeJump({ id, session }, name, picture) {
   const address = URL.createObjectURL(picture);
   addresses.push(address);
   const alt = t("kinogram.alt", { who: who(session, t("recordings.nobody")) });
@@ -122,7 +115,7 @@ function makeJump({ id, session }, name, picture, renamed) {
   return make("div", { class: "kinogram-jump" },
     make("button", { type: "button", class: "plain kinogram-open", title: t("kinogram.large"), onclick: open }, make("img", { src: address, alt })),
     make("div", { class: "buttons" },
-      ...renamed ? [] : [makeSend(address, new File([picture], `${id}-${name}`, { type: "image/jpeg" }))],
+      makeSend(address, new File([picture], `${id}-${name}`, { type: "image/jpeg" })),
       make("a", { class: "button", href: fileOf(id, "kinogram.html"), target: "_blank", rel: "noopener" }, icon("log"), make("span", {}, t("kinogram.page")))));
 }
 

@@ -140,7 +140,7 @@ function drawProgress(shown) {
  * @param {boolean} paused
  * @param {Measurement["step"]} step
  */
-function inWords({ state, before, measured: then, version, figures, live, refused, again }, paused, step) {
+function inWords({ state, before, measured: then, version, figures, live, refused, again, renaming }, paused, step) {
   const why = refused && state !== "done" ? say(refused) : null;
   const unable = why ? t("measurement.refused", { why: `${why.text}: ${why.advice}.` }) : "";
   const when = { day: then ? day(then) : "", time: then ? timeOfDay(then) : "" };
@@ -154,7 +154,7 @@ function inWords({ state, before, measured: then, version, figures, live, refuse
     done: [t("measurement.done", { ...when, version }), figures.length ? "" : t("measurement.no_jump")],
     failed: [t("measurement.failed"), again ? t("measurement.by_itself") : "", old],
   };
-  return [...sentences[state], unable].filter(Boolean).join(" ");
+  return [...sentences[state], renaming ? t("measurement.renaming") : "", unable].filter(Boolean).join(" ");
 }
 
 /**

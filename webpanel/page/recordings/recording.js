@@ -197,6 +197,7 @@ async function change(what) {
     if (recording?.id !== id) return;
     recording = changed;
     draw();
+    void attempt(() => loadMeasurement(changed)); // what says the old name is gone from its files
     tell("good", t("recording.changed"));
   });
 }

@@ -22,6 +22,7 @@
  * @property {LastJump[]} figures
  * @property {boolean} live
  * @property {string[]} files
+ * @property {boolean} renaming
  *
  * @typedef {object} StepState How far one of the things is that are done with a log after its end.
  * @property {"measure"|"video"|"copy"} step

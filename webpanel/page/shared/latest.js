@@ -12,7 +12,7 @@ import { known, update, watch } from "./store.js";
  * What is needed of the answer about a measurement.
  *
  * @typedef {{ state: import("./types.js").MeasuringQueue["state"], paused: boolean, before: number, measured: string|null,
- *   figures: LastJump[], live: boolean, files: string[] }} Measured
+ *   figures: LastJump[], live: boolean, files: string[], renaming: boolean }} Measured
  */
 
 /** @type {{ recording: Recording|null, measured: Measured|null }} */

@@ -154,7 +154,7 @@
  * @property {string|null} recording
  * @property {"none"|"waiting"|"measuring"|"done"|"failed"} state
  * @property {boolean} paused
- * @property {"balls"|"search"|"names"|"computing"|"writing"|"video"|"copying"|null} step
+ * @property {"balls"|"search"|"names"|"computing"|"writing"|"video"|"copying"|"renaming"|null} step
  * @property {number} share
  * @property {number} waiting
  *

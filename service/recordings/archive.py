@@ -290,18 +290,21 @@ class Archive(ABC):
         """The pulse to show a recording by: the middle of the stretch in which most moves."""
         return liveliest_pulse(self._catalogue.file(recording_id))
 
-    def moment(self, recording_id: str, *, by_motion: bool = False) -> Moment:
+    def moment(self, recording_id: str, *, jump: int = 1, by_motion: bool = False) -> Moment:
         """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves.
 
         Args:
             recording_id: id of the recording.
-            by_motion: where most moves, in any case: to be compared with a recording that was not measured.
+            jump: number of its jump.
+            by_motion: where most moves, in any case: to be compared with a recording that was not measured. Of several
+                measured jumps it is the middle of the pulses that show this one.
         """
         log = self._catalogue.file(recording_id)
-        if not by_motion and (exact := live_results.takeoff_pulse(log)) is not None:
+        if not by_motion and (exact := live_results.takeoff_pulse(log, jump)) is not None:
             whole = result_file(log, "jumper.json") is not None
             return Moment(pulse=round(exact), kind=MomentKind.TAKEOFF, exact=exact, from_log=whole)
-        pulse = busiest_pulse(log)
+        pulse = live_results.middle_pulse(log, jump)
+        pulse = busiest_pulse(log) if pulse is None else pulse
         return Moment(pulse=pulse, kind=MomentKind.NONE if pulse is None else MomentKind.ACTIVITY)
 
     def notes(self, recording_id: str) -> list[Note]:

@@ -23,13 +23,23 @@ def summaries(log: Path) -> list[LastJump]:
     return _read(jumper_path(log))
 
 
-def takeoff_pulse(log: Path) -> float | None:
-    """The take-off in the first jump of a log, in pulses; None if there is none, or it was not measured."""
-    for path in (measured_path(log) / "jumper.json", jumper_path(log)):
-        with suppress(OSError, ValueError, KeyError, IndexError, TypeError, OverflowError):
-            pulse = float(_content(path)["jumps"][0]["takeoff"]["pulse"])
+def takeoff_pulse(log: Path, number: int = 1) -> float | None:
+    """The take-off in a jump of a log, in pulses; None if there is no such jump, or it was not measured."""
+    for path in _results(log):
+        with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, OverflowError):
+            pulse = float(_jumps(path)[number]["takeoff"]["pulse"])
             round(pulse)
             return pulse
+    return None
+
+
+def middle_pulse(log: Path, number: int) -> int | None:
+    """The middle of the pulses in which a jumper is in sight; None if there is no such jump, or no other one."""
+    for path in _results(log):
+        with suppress(OSError, ValueError, LookupError, TypeError, AttributeError):
+            jumps = _jumps(path)
+            pulses = jumps[number]["pulses"]
+            return int(pulses[len(pulses) // 2]["pulse"]) if len(jumps) > 1 else None
     return None
 
 
@@ -51,6 +61,15 @@ def _read(path: Path) -> list[LastJump]:
         return [LastJump.model_validate(each) for each in _content(path)["summaries"]]
     except (OSError, ValueError, ValidationError, KeyError, TypeError):
         return []
+
+
+def _results(log: Path) -> tuple[Path, Path]:
+    return measured_path(log) / "jumper.json", jumper_path(log)
+
+
+def _jumps(path: Path) -> dict[int, Any]:
+    """Jumps by their numbers."""
+    return {int(jump.get("number", order)): jump for order, jump in enumerate(_content(path)["jumps"], 1)}
 
 
 def _content(path: Path) -> Any:

@@ -118,8 +118,8 @@ class Archive(Protocol):
         """The pulse to show a recording by: the middle of the stretch in which most moves."""
         ...
 
-    def moment(self, recording_id: str, *, by_motion: bool = False) -> Moment:
-        """The pulse at which to open a recording; `by_motion`: where most moves, even if its take-off was measured."""
+    def moment(self, recording_id: str, *, jump: int = 1, by_motion: bool = False) -> Moment:
+        """The pulse at which to open a jump; `by_motion`: where most moves, even if its take-off was measured."""
         ...
 
     def measurement(self, recording_id: str, *, jumps: bool) -> Measurement:

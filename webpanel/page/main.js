@@ -41,6 +41,7 @@ import * as rehearsal from "./system/rehearsal.js";
 import * as rig from "./system/rig.js";
 import { drawChoices, startComparing } from "./viewing/comparing.js";
 import { drawCurves, startCurves } from "./viewing/curves.js";
+import { drawJumps } from "./viewing/jumps.js";
 import { drawNotes, startNotes } from "./viewing/notes.js";
 import * as scrubber from "./viewing/scrubber.js";
 import { startStick } from "./viewing/stick.js";
@@ -57,6 +58,7 @@ function redraw() {
   drawExports();
   drawJump();
   drawCurves();
+  drawJumps();
   drawEarlier();
   drawKeys();
   drawPulses();

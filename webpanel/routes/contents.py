@@ -86,10 +86,11 @@ def contents_router(service: RigService, changes: Changes) -> APIRouter:
     @router.get("/recordings/{recording_id}/moment", responses=refusals(404))
     async def get_moment(
         recording_id: RecordingId,
+        jump: Annotated[int, Query(ge=1, le=100_000, description="number of the jump, of several measured ones")] = 1,
         by_motion: Annotated[bool, Query(description="where most moves, even if the take-off was measured")] = False,
     ) -> Moment:
         """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves."""
-        return await run_sync(partial(service.moment, by_motion=by_motion), recording_id, limiter=readers)
+        return await run_sync(partial(service.moment, jump=jump, by_motion=by_motion), recording_id, limiter=readers)
 
     @router.get("/recordings/{recording_id}/notes", responses=refusals(404))
     def list_notes(recording_id: RecordingId) -> list[Note]:

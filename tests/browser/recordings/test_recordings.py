@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -13,8 +14,8 @@ from playwright.sync_api import expect
 from recorder.reading.corrected_log import corrected_log
 from rig.frame import FrameStatus
 from service.measuring.results import keep_result
-from tests.browser.conftest import Open
-from tests.browser.views import enter
+from tests.browser.conftest import MEASURED, Open, write_kinogram
+from tests.browser.views import assert_fits_a_phone, enter
 from tests.recorder.logs import ALL_OK
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService, write_recording
@@ -215,12 +216,12 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     page = open_page(f"{panel.url}/#/recordings/one")
     expect(page.locator("#frame-where")).to_have_text(re.compile("^20 / 40"))
     expect(page.locator("#compare option")).to_have_count(3)
-    assert page.locator("#compare option").nth(1).get_attribute("value") == "two"  # of the same athlete
-    page.locator("#compare").select_option("two")
+    assert page.locator("#compare option").nth(1).get_attribute("value") == "two/1"  # of the same athlete
+    page.locator("#compare").select_option("two/1")
     how, where, picture = page.locator("#compare-how"), page.locator("#other-where"), page.locator("#other-frames img")
     expect(how).to_have_text("Aligned at the measured take-off of both.")
     expect(page.get_by_role("link", name="What differs")).to_have_attribute(
-        "href", "./api/comparison.html?first=one&second=two&language=en"
+        "href", "./api/comparison.html?first=one&first_jump=1&second=two&second_jump=1&language=en"
     )
     expect(where).to_have_text(re.compile("^31 .* -0.010 s"))  # 0.3 pulses before its take-off
     page.locator("#frame-on").click()
@@ -243,12 +244,12 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     expect(where).to_have_text(re.compile("^40 "))
 
     # Of one the take-off is not measured: then both are aligned by motion, which noise alone has not.
-    page.locator("#compare").select_option("three")
+    page.locator("#compare").select_option("three/1")
     expect(how).to_have_text("Both from their beginning: nothing moves in one of them.")
     expect(where).to_have_text(re.compile("^40 .* 1.300 s"))
     expect(page.get_by_role("link", name="What differs")).to_be_hidden()
     page.route(
-        "**/moment?by_motion=true",
+        "**/moment?by_motion=true&jump=1",
         lambda route: route.fulfill(
             json={"pulse": 12 if "one" in route.request.url else 7, "kind": "activity", "exact": None}
         ),
@@ -256,7 +257,7 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     page.locator("#compare").select_option("")
     expect(page.locator("#comparing")).to_be_hidden()
     page.keyboard.press("Home")
-    page.locator("#compare").select_option("three")
+    page.locator("#compare").select_option("three/1")
     expect(how).to_have_text("Aligned where most moves in each: the take-off was not measured of both.")
     for _ in range(10):
         page.locator("#frame-on").click()
@@ -264,6 +265,58 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     expect(where).to_have_text(re.compile("^6 .* -0.033 s"))  # one pulse before that moment, as 11 is before 12
     page.locator("#compare").select_option("")
     expect(page.locator("#other")).to_be_hidden()
+
+
+def test_every_jump_of_a_recording_is_looked_at_and_compared(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    takeoffs = {"one": (10.0,), "both": (12.0, 31.0)}
+    for name, pulses in takeoffs.items():
+        log = write_recording(service.catalogue.directory, name, (ALL_OK,) * 40, {"athlete": "Anna Berg"})
+        (made := log.with_name("made")).mkdir()
+        measured = [
+            {"number": number, "takeoff": {"pulse": pulse}, "pulses": [{"pulse": int(pulse) + 3}]}
+            for number, pulse in enumerate(pulses, 1)
+        ]
+        (made / "jumper.json").write_text(json.dumps({"jumps": measured}))
+        write_kinogram(made, "4", "Anna Berg")
+        for file in ("jumper.c3d", "jumper-2.c3d", "jumper.csv", "kinogram-2.jpg")[: 4 if len(pulses) > 1 else 1]:
+            shutil.copy(made / "kinogram.jpg", made / file)
+        found = [MEASURED.model_copy(update={"jump": n, "ok": n == 1}) for n in range(1, len(pulses) + 1)]
+        keep_result(made, log, tuple(found))
+    page = open_page(f"{panel.url}/#/recordings/both/2", width=360, height=780, has_touch=True, is_mobile=True)
+    choice, where = page.locator("#jump-choice"), page.locator("#frame-where")
+    expect(where).to_have_text(re.compile("^31 / 40"))
+    expect(choice.get_by_role("button", name="Jump 2")).to_have_attribute("aria-pressed", "true")
+    expect(page.locator("#kinogram-jumps img")).to_have_count(1)
+    expect(page.locator("#measurement-jumps h3")).to_have_text(re.compile("^Jump 2, "))
+    expect(page.locator("#measurement-jumps .mark")).to_have_text("Doubtful")
+    expect(page.locator("#measurement-files a")).to_have_text(["C3D, jump 2", "CSV"])
+    assert_fits_a_phone(page)
+    page.locator("#frame-more").tap()
+    page.locator("#compare").select_option("both/1")  # another one of the same recording
+    expect(page.locator("#compare option")).to_have_text(
+        ["no other jump", re.compile(r"Anna Berg, .*, Jump 1$"), re.compile(r"Anna Berg, [^,]*$")]
+    )
+    expect(page.locator("#compare-how")).to_have_text("Aligned at the measured take-off of both.")
+    expect(page.locator("#other-where")).to_have_text(re.compile("^12 .* 0.000 s"))
+    expect(page.locator("#compare-page")).to_have_attribute(
+        "href", "./api/comparison.html?first=both&first_jump=2&second=both&second_jump=1&language=en"
+    )
+    page.locator("#compare").select_option("one/1")
+    expect(page.locator("#other-where")).to_have_text(re.compile("^10 .* 0.000 s"))
+
+    choice.get_by_role("button", name="Jump 1").tap()
+    expect(where).to_have_text(re.compile("^12 / 40"))
+    expect(page.locator("#measurement-jumps .mark")).to_have_text("Measured well")
+    expect(page.locator("#measurement-files a")).to_have_text(["C3D", "CSV"])
+    expect(page.locator("#other-where")).to_have_text(re.compile("^10 .* 0.000 s"))
+    expect(page.locator("#compare-page")).to_have_attribute(
+        "href", "./api/comparison.html?first=both&first_jump=1&second=one&second_jump=1&language=en"
+    )
+    page.goto(f"{panel.url}/#/recordings/one")
+    expect(where).to_have_text(re.compile("^10 / 40"))
+    expect(choice).to_be_hidden()
 
 
 def test_a_jump_shows_what_the_start_list_had_and_where_it_goes_on(

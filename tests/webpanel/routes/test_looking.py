@@ -46,6 +46,12 @@ def test_a_recording_opens_at_the_take_off_if_it_was_measured(client: httpx.Clie
         "exact": 16.8,
     }
     assert client.get("/api/recordings/jump/moment?by_motion=true").json()["kind"] == "none"
+    pulses = [{"pulse": pulse} for pulse in (27, 28, 29)]
+    two = [{"takeoff": {"pulse": 16.8}, "pulses": []}, {"number": 2, "takeoff": {"pulse": 30.1}, "pulses": pulses}]
+    beside.write_text(json.dumps({"jumps": two}))
+    assert client.get("/api/recordings/jump/moment?jump=2").json()["exact"] == 30.1
+    by_motion = client.get("/api/recordings/jump/moment?jump=2&by_motion=true").json()
+    assert (by_motion["pulse"], by_motion["kind"]) == (28, "activity")
     for broken in ("", "[]", '{"jumps": [{"takeoff": null}]}', '{"jumps": [{"takeoff": {"pulse": 1e999}}]}'):
         beside.write_text(broken)
         assert client.get("/api/recordings/jump/moment").json()["kind"] == "none"

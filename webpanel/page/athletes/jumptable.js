@@ -59,8 +59,8 @@ function level(jump) {
  * @param {string} words
  */
 function linkTo(jump, words) {
-  const several = jump.jump > 1 ? ` (${t("athletes.jump", { jump: jump.jump })})` : "";
-  return make("a", { href: `#/recordings/${encodeURIComponent(jump.recording)}` }, words + several);
+  const [several, which] = jump.jump > 1 ? [` (${t("athletes.jump", { jump: jump.jump })})`, `/${jump.jump}`] : ["", ""];
+  return make("a", { href: `#/recordings/${encodeURIComponent(jump.recording)}${which}` }, words + several);
 }
 
 /** @param {string} name */

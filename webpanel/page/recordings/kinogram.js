@@ -5,6 +5,7 @@ import { asProblem, partOf, Problem } from "../shared/api.js";
 import { $, icon, make } from "../shared/dom.js";
 import { who } from "../shared/format.js";
 import { attempt } from "../shared/snacks.js";
+import { jumpShown } from "../viewing/jumps.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 /** @typedef {import("./types.js").Measurement} Measurement */
@@ -29,7 +30,8 @@ export function startKinogram() {
  * @param {Measurement|null} measured what is known of it
  */
 export function showKinogram(recording, measured) {
-  const names = (measured?.files ?? []).filter((name) => PICTURE.test(name)).sort((a, b) => orderOf(a) - orderOf(b));
+  const place = (measured?.figures ?? []).findIndex(({ jump }) => jump === jumpShown());
+  const names = (measured?.files ?? []).filter((name) => PICTURE.test(name) && orderOf(name) === Math.max(0, place) + 1);
   const { athlete = "", bib = "" } = recording?.session ?? {};
   const now = recording && names.length ? JSON.stringify([languageInUse(), recording.id, measured?.measured, names, athlete, bib]) : "";
   if (now === wanted) return;

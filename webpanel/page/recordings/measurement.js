@@ -8,6 +8,7 @@ import { day, number, timeOfDay } from "../shared/format.js";
 import { place } from "../shared/router.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
+import { jumpShown, offerJumps, onJump } from "../viewing/jumps.js";
 import { KINOGRAM, showKinogram } from "./kinogram.js";
 import { makeSteps } from "./steps.js";
 import { showJump } from "./jump.js";
@@ -18,6 +19,8 @@ import { showJump } from "./jump.js";
 const QUEUED = ["waiting", "measuring"];
 /** Files of the result that people open, in this order; any others come after them, folded away. */
 const FILES = [/^report\.html$/, /^overlay\.mp4$/, /\.c3d$/, /\.trc$/, /\.csv$/, /^protocol\.html$/];
+/** Of these every jump has its own; all others are of the whole recording. */
+const OF_ONE = /\.(c3d|trc)$/;
 /** What the browser shows itself instead of keeping it. */
 const SHOWN = /\.(html|txt|mp4)$/;
 
@@ -37,6 +40,7 @@ let drawn = "";
 export function startMeasurement() {
   $("measurement-measure").addEventListener("click", () => void order("POST"));
   $("measurement-cancel").addEventListener("click", () => void order("DELETE"));
+  onJump(draw);
   watch(follow);
 }
 
@@ -163,7 +167,9 @@ function inWords({ state, before, measured: then, version, figures, live, refuse
  * @param {Measurement} shown
  */
 function drawResult({ recording: id, state, problem, figures, live, files }) {
-  const now = JSON.stringify([languageInUse(), id, state === "failed" ? problem : null, figures, live, files]);
+  offerJumps(figures.map((jump) => ({ number: jump.jump, level: levelOf(jump, live) })));
+  const place = Math.max(0, figures.findIndex(({ jump }) => jump === jumpShown()));
+  const now = JSON.stringify([languageInUse(), id, state === "failed" ? problem : null, figures, live, files, place]);
   if (now === drawn) return;
   drawn = now;
   const failed = state === "failed" ? problem : null;
@@ -172,8 +178,8 @@ function drawResult({ recording: id, state, problem, figures, live, files }) {
   $("measurement-problem").replaceChildren(...failed ? [makeMark(failed.level, failed.level, text), ...advice ? [make("p", { class: "advice" }, advice)] : []] : []);
   const levels = figures.map((jump) => levelOf(jump, live));
   $("jump-verdict").replaceChildren(...levels.map((level) => makeMark(level, level, t(MARKS[level]))));
-  $("measurement-jumps").replaceChildren(...figures.map((jump) => makeJump(jump, live, figures.length > 1)));
-  const [first, rest] = sorted(files.filter((name) => !KINOGRAM.test(name)));
+  $("measurement-jumps").replaceChildren(...figures.slice(place, place + 1).map((jump) => makeJump(jump, live, figures.length > 1)));
+  const [first, rest] = sorted(files.filter((name) => !KINOGRAM.test(name)), place + 1);
   $("measurement-files").replaceChildren(...first.map((name) => makeFile(id, name)));
   $("measurement-more").hidden = !rest.length;
   $("measurement-others").replaceChildren(...rest.map((name) => makeFile(id, name)));
@@ -198,14 +204,16 @@ function makeJump(jump, live, several) {
 }
 
 /**
- * The files that people open, in order, and the others.
+ * The files of a jump that people open, in order, and the others but for those of other jumps.
  *
  * @param {string[]} files
+ * @param {number} order of the jump in its recording
  * @returns {[string[], string[]]}
  */
-function sorted(files) {
-  const first = FILES.flatMap((kind) => files.filter((name) => kind.test(name)).sort((a, b) => jumpOf(a) - jumpOf(b)));
-  return [first, files.filter((name) => !first.includes(name))];
+function sorted(files, order) {
+  const own = files.filter((name) => !OF_ONE.test(name) || jumpOf(name) === order);
+  const first = FILES.flatMap((kind) => own.filter((name) => kind.test(name)));
+  return [first, own.filter((name) => !first.includes(name))];
 }
 
 /** @param {string} name of a file: that of the first jump has no number */

@@ -9,8 +9,9 @@ import { clock, day, number, size, timeOfDay, who } from "../shared/format.js";
 import { go, place } from "../shared/router.js";
 import { attempt, clearSnacks, tell } from "../shared/snacks.js";
 import { offer } from "../viewing/comparing.js";
+import { enterJumps, jumpShown, onJump } from "../viewing/jumps.js";
 import { loadNotes } from "../viewing/notes.js";
-import { clearScrubber, scrub, setMoment } from "../viewing/scrubber.js";
+import { clearScrubber, scrub, setMoment, toMoment } from "../viewing/scrubber.js";
 import { loadVoices } from "../viewing/voice.js";
 import { remove, restore, watchCatalogue } from "./catalogue.js";
 import { loadExports } from "./exports.js";
@@ -30,6 +31,7 @@ export function startRecording() {
   makeFields($("recording-session"), "recording", (name, value) => void change({ [name]: value }));
   $("recording-tags").addEventListener("change", () => void change({ tags: $("recording-tags").value.split(",").map((/** @type {string} */ tag) => tag.trim()).filter(Boolean) }));
   $("recording-favourite").addEventListener("click", () => { if (recording) void change({ favourite: !recording.favourite }); });
+  onJump(() => void attempt(toJump));
   hear({ recordings: reload });
   watchCatalogue(reload);
 }
@@ -42,6 +44,7 @@ export function startRecording() {
 export async function enterRecording(id) {
   clearSnacks();
   clear(id, "");
+  enterJumps(place().jump);
   await attempt(() => load(id));
 }
 
@@ -104,12 +107,29 @@ async function load(id) {
     scrub(pulses);
     void loadExports(id, pulses);
     void attempt(() => offer(loaded));
-    const { pulse, kind } = await call("GET", recordingPath(id, "/moment"));
-    if (recording?.id === id && place().id === id) setMoment(pulse, kind);
+    await loadMoment(id);
   } catch (error) {
     scrubbing = false;
     throw error;
   }
+}
+
+/**
+ * Find the moment of the jump that is looked at.
+ *
+ * @param {string} id of the recording
+ */
+async function loadMoment(id) {
+  const jump = jumpShown();
+  const { pulse, kind } = await call("GET", recordingPath(id, `/moment?jump=${jump}`));
+  if (recording?.id === id && place().id === id && jump === jumpShown()) setMoment(pulse, kind);
+}
+
+/** Another jump of the recording is looked at: go to its take-off. */
+async function toJump() {
+  if (!recording || !scrubbing) return;
+  await loadMoment(recording.id);
+  toMoment();
 }
 
 /** Whether the recording is still being written: then there are no triplets to show yet. */

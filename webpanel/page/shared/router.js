@@ -14,14 +14,14 @@ const BY_ID = ["athlete", "jumps"];
 /** Views that show nothing without an id. */
 const ONLY_BY_ID = ["recording", "jump"];
 
-/** @typedef {{ view: string, id: string, trash: boolean, key: string }} Place `key`: of the link by which an athlete came */
+/** @typedef {{ view: string, id: string, trash: boolean, key: string, jump: number }} Place `key`: of the link by which an athlete came; `jump`: number of that of a recording */
 
 /** @returns {Place} */
 export function place() {
   const [name, id = "", key = ""] = location.hash.replace(/^#\//, "").split("/");
-  const found = { view: VIEWS.includes(name) && !ONLY_BY_ID.includes(name) ? name : "live", id: "", trash: false, key: "" };
+  const found = { view: VIEWS.includes(name) && !ONLY_BY_ID.includes(name) ? name : "live", id: "", trash: false, key: "", jump: 1 };
   if (name === "trash") return { ...found, view: "recordings", trash: true };
-  if (name === "recordings" && id) return { ...found, view: "recording", id: decodeURIComponent(id) };
+  if (name === "recordings" && id) return { ...found, view: "recording", id: decodeURIComponent(id), jump: Number(key) || 1 };
   if (name === "jump" && id) return { ...found, view: "jump", id: decodeURIComponent(id), key };
   return BY_ID.includes(name) ? { ...found, id: decodeURIComponent(id) } : found;
 }

@@ -6,15 +6,19 @@ import { $, make, setText } from "../shared/dom.js";
 import { day, number, who } from "../shared/format.js";
 import { attempt } from "../shared/snacks.js";
 import { makeViewer } from "../shared/viewer.js";
+import { jumpShown, onJump } from "./jumps.js";
 import { onShown, pulseShown, sinceMoment } from "./scrubber.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 /** @typedef {import("../shared/types.js").Pulses} Pulses */
 /** @typedef {{ pulse: number|null, kind: "takeoff"|"activity"|"none", from_log: boolean, exact: number|null }} Moment */
-/** @typedef {{ pulses: Pulses, zero_s: number }} Aligned a jump, and the time in it that the other's answers to */
+/** @typedef {{ pulses: Pulses, jump: number, zero_s: number }} Aligned a jump, and the time in it that the other's answers to */
+/** @typedef {{ recording: Recording, jump: number, several: boolean }} Choice a jump; `several`: its recording has more of them */
 
-/** So many jumps can be chosen among, the newest. */
+/** The jumps of so many recordings can be chosen among, the newest. */
 const CHOICES = 100;
+/** So many measured jumps are looked through for recordings with several. */
+const MEASURED = 400;
 
 /** @type {import("../shared/viewer.js").Viewer} */
 let viewer;
@@ -25,7 +29,7 @@ let ghost;
 let ghostly = false;
 /** The one shown. @type {Recording|null} */
 let shown = null;
-/** @type {Recording[]} */
+/** @type {Choice[]} */
 let choices = [];
 let loading = false;
 
@@ -40,6 +44,7 @@ export function startComparing() {
   viewer.image.addEventListener("load", () => { loading = false; draw(); });
   viewer.image.addEventListener("error", () => { loading = false; });
   onShown(draw);
+  onJump(() => { if (shown) void attempt(() => choose($("compare").value)); });
 }
 
 /**
@@ -50,27 +55,47 @@ export function startComparing() {
 export async function offer(recording) {
   if (shown?.id !== recording.id) leave();
   shown = recording;
-  const { items } = await callForPage(`recordings?limit=${CHOICES}`);
+  const [{ items }, measured] = await Promise.all([callForPage(`recordings?limit=${CHOICES}`), call("GET", `jumps?limit=${MEASURED}`)]);
   if (shown.id !== recording.id) return;
-  const same = (/** @type {Recording} */ { session }) => Number(session.athlete === recording.session.athlete);
-  choices = items.filter((/** @type {Recording} */ each) => each.id !== recording.id && each.counts.pulses && each.state !== "recording");
+  /** @type {Map<string, number[]>} */
+  const numbers = new Map();
+  for (const { jump } of measured) numbers.set(jump.recording, [...numbers.get(jump.recording) ?? [], jump.jump]);
+  const jumpsOf = (/** @type {string} */ id) => (numbers.get(id) ?? [1]).sort((one, two) => one - two);
+  const same = (/** @type {Choice} */ each) => Number(each.recording.session.athlete === recording.session.athlete);
+  const ended = [...items, ...items.some((/** @type {Recording} */ each) => each.id === recording.id) ? [] : [recording]];
+  choices = ended.filter((/** @type {Recording} */ each) => each.counts.pulses && each.state !== "recording")
+    .flatMap((/** @type {Recording} */ each) => jumpsOf(each.id).map((jump, _, all) => ({ recording: each, jump, several: all.length > 1 })));
   choices.sort((one, two) => same(two) - same(one));
   drawChoices();
 }
 
 /** Draw the choice, perhaps in another language. */
 export function drawChoices() {
-  const chosen = pair?.other.pulses.id ?? "";
+  const chosen = pair ? valueOf(pair.other.pulses.id, pair.other.jump) : "";
+  const others = choices.filter(({ recording, jump }) => recording.id !== shown?.id || jump !== jumpShown());
   $("compare").replaceChildren(
     make("option", { value: "" }, t("compare.none")),
-    ...choices.map(({ id, session, started }) => make("option", { value: id }, `${who(session, id)}${started ? `, ${day(started)}` : ""}`)),
+    ...others.map((each) => make("option", { value: valueOf(each.recording.id, each.jump) }, named(each))),
   );
-  $("compare").value = choices.some(({ id }) => id === chosen) ? chosen : "";
-  $("compare-choice").hidden = choices.length === 0;
+  $("compare").value = others.some(({ recording, jump }) => valueOf(recording.id, jump) === chosen) ? chosen : "";
+  $("compare-choice").hidden = others.length === 0;
   if (!pair) return;
   setText($("compare-how"), inWords(pair));
   $("compare-page").hidden = !pair.measured;
-  $("compare-page").href = `./api/comparison.html?${new URLSearchParams({ first: pair.own.pulses.id, second: pair.other.pulses.id, language: languageInUse() })}`;
+  $("compare-page").href = `./api/comparison.html?${new URLSearchParams({ first: pair.own.pulses.id, first_jump: String(pair.own.jump), second: pair.other.pulses.id, second_jump: String(pair.other.jump), language: languageInUse() })}`;
+}
+
+/**
+ * @param {string} id of a recording
+ * @param {number} jump
+ */
+function valueOf(id, jump) {
+  return `${id}/${jump}`;
+}
+
+/** @param {Choice} choice */
+function named({ recording: { id, session, started }, jump, several }) {
+  return [who(session, id), ...started ? [day(started)] : [], ...several ? [t("jump.number", { jump })] : []].join(", ");
 }
 
 function leave() {
@@ -84,17 +109,18 @@ function leave() {
   drawChoices();
 }
 
-/** @param {string} id of the other jump; empty: none */
-async function choose(id) {
+/** @param {string} value of the other jump; empty: none */
+async function choose(value) {
   const kept = choices;
   leave();
   choices = kept;
   drawChoices();
-  const beside = shown?.id;
-  if (!id || !beside) return;
-  $("compare").value = id;
-  const found = await align(beside, id);
-  if (shown?.id !== beside || $("compare").value !== id) return;
+  const [beside, jump] = [shown?.id, jumpShown()];
+  if (!value || !beside || value === valueOf(beside, jump)) return;
+  $("compare").value = value;
+  const [id, other] = value.split("/");
+  const found = await align([beside, id], [jump, Number(other)]);
+  if (shown?.id !== beside || jumpShown() !== jump || $("compare").value !== value) return;
   pair = found;
   const { pulses } = pair.other;
   viewer.layOut(pulses.cameras.map((name, index) => ({ name, columns: pulses.columns[index] })), pulses.shape[0]);
@@ -106,18 +132,17 @@ async function choose(id) {
 /**
  * Two jumps aligned at the take-offs that were measured of both, otherwise where most moves in each: one kind for both.
  *
- * @param {string} own
- * @param {string} other
+ * @param {string[]} both recordings
+ * @param {number[]} jumps their numbers
  */
-async function align(own, other) {
-  const both = [own, other];
+async function align(both, jumps) {
   /** @type {Pulses[]} */
   const pulses = await Promise.all(both.map((id) => call("GET", recordingPath(id, "/pulses"))));
   /** @type {Moment[]} */
-  let moments = await Promise.all(both.map((id) => call("GET", recordingPath(id, "/moment"))));
-  if (moments.some(({ kind }) => kind !== "takeoff")) moments = await Promise.all(both.map((id) => call("GET", recordingPath(id, "/moment?by_motion=true"))));
+  let moments = await Promise.all(both.map((id, place) => call("GET", recordingPath(id, `/moment?jump=${jumps[place]}`))));
+  if (moments.some(({ kind }) => kind !== "takeoff")) moments = await Promise.all(both.map((id, place) => call("GET", recordingPath(id, `/moment?by_motion=true&jump=${jumps[place]}`))));
   const kind = moments.some((moment) => moment.kind === "none") ? "none" : moments[0].kind;
-  const [one, two] = both.map((_, place) => ({ pulses: pulses[place], zero_s: kind === "none" ? 0 : timeAt(pulses[place], moments[place]) }));
+  const [one, two] = both.map((_, place) => ({ pulses: pulses[place], jump: jumps[place], zero_s: kind === "none" ? 0 : timeAt(pulses[place], moments[place]) }));
   return { own: one, other: two, kind, measured: moments.every(({ from_log }) => from_log) };
 }
 

@@ -4,8 +4,6 @@ The lists to which the last changes can be undone stand in a file of their own: 
 roll-back, reads the list all the same.
 """
 
-import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -18,6 +16,7 @@ from rig.api.statement import Statement
 from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
+from rig.host.latest import LatestWriter
 from rig.phrase import phrase, plain
 
 NAME: Final = ".svev-start-list.json"
@@ -39,9 +38,7 @@ class _Changes(Model):
 
 
 class Keeper:
-    """Writes in a thread of its own, which never keeps the process alive: the disk may hang.
-
-    Any thread may call `keep` and `wait`. Of several lists that wait for the disk only the latest is written.
+    """Writes in a thread of its own.
 
     Args:
         folder: folder of the recordings.
@@ -50,9 +47,7 @@ class Keeper:
 
     def __init__(self, folder: Path, tell: Callable[[Event], None]) -> None:
         self._path, self._undo_path, self._tell = folder / NAME, folder / UNDO_NAME, tell
-        self._changed = threading.Condition()
-        self._waiting: tuple[StartList, tuple[Change, ...]] | None = None
-        self._busy = self._failed = False
+        self._writer = LatestWriter("start list", self._lament)
 
     def load(self) -> tuple[StartList, tuple[Change, ...]]:
         """The list that was kept, with the changes that can be undone; an empty one if there is none.
@@ -78,46 +73,23 @@ class Keeper:
 
     def keep(self, start_list: StartList, changes: tuple[Change, ...]) -> None:
         """Begin to write a list, and the changes that can be undone, oldest first."""
-        with self._changed:
-            self._waiting = start_list, changes
-            if not self._busy:
-                self._busy = True
-                threading.Thread(target=self._run, name="start list", daemon=True).start()
+        kept = _Changes(version=start_list.version, changes=changes)
+
+        def write() -> None:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(self._path, start_list.model_dump_json(indent=1).encode(), links=False)
+            replace_file(self._undo_path, kept.model_dump_json().encode(), links=False)
+
+        self._writer.write(write)
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until the latest list is written; False if it is not after `timeout_s`."""
-        until = time.monotonic() + timeout_s
-        with self._changed:
-            while self._busy and (left := until - time.monotonic()) > 0:
-                self._changed.wait(left)
-            return not self._busy
-
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                found, self._waiting = self._waiting, None
-                if found is None:
-                    self._busy = False
-                    self._changed.notify_all()
-                    return
-            try:
-                start_list, changes = found
-                self._path.parent.mkdir(parents=True, exist_ok=True)
-                replace_file(self._path, start_list.model_dump_json(indent=1).encode(), links=False)
-                kept = _Changes(version=start_list.version, changes=changes)
-                replace_file(self._undo_path, kept.model_dump_json().encode(), links=False)
-            except OSError as error:
-                self._lament(error)
-            else:
-                self._failed = False
+        """Wait until the latest list is written, or refused; False if that takes longer than `timeout_s`."""
+        return self._writer.wait(timeout_s)
 
     def _lament(self, error: OSError) -> None:
-        """Say once that the list is not kept, until it is again."""
-        if not self._failed:
-            self._failed = True
-            text = "{path}: the start list cannot be kept ({why}); a restart of the service loses it"
-            said = phrase("event_list_not_kept", text, path=str(self._path), why=error.strerror or str(error))
-            self._tell(Event.now(Level.ERROR, "start list", said))
+        text = "{path}: the start list cannot be kept ({why}); a restart of the service loses it"
+        said = phrase("event_list_not_kept", text, path=str(self._path), why=error.strerror or str(error))
+        self._tell(Event.now(Level.ERROR, "start list", said))
 
     def _put_aside(self, error: Exception) -> StartList:
         aside = self._path.with_suffix(".unreadable")

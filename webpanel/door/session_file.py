@@ -1,7 +1,5 @@
 """Keeps the open sessions in a file of the recordings' folder: a page that nobody touches goes on after a restart."""
 
-import threading
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Final
@@ -11,6 +9,7 @@ from pydantic import ValidationError
 from rig.api.fields import Model
 from rig.host.disk import replace_file
 from rig.host.files import read_own
+from rig.host.latest import LatestWriter
 from rig.phrase import Phrase, phrase
 from webpanel.door.roles import Role
 
@@ -34,7 +33,7 @@ class _Kept(Model):
 
 
 class SessionFile:
-    """Reads once, and writes in a thread of its own, which never keeps the process alive: the disk may hang.
+    """Reads once, and writes in a thread of its own.
 
     Args:
         folder: of the recordings.
@@ -44,9 +43,7 @@ class SessionFile:
 
     def __init__(self, folder: Path, mark: str, lament: Callable[[Phrase], None]) -> None:
         self._path, self._mark, self._lament = folder / NAME, mark, lament
-        self._changed = threading.Condition()
-        self._waiting: _Kept | None = None
-        self._busy = self._failed = False
+        self._writer = LatestWriter("sessions", self._refused)
 
     def load(self) -> tuple[KeptSession, ...]:
         """The sessions that were kept; none if the tokens are others now, or the file is not ours."""
@@ -57,35 +54,15 @@ class SessionFile:
         return kept.sessions if kept.mark == self._mark else ()
 
     def keep(self, sessions: Iterable[KeptSession]) -> None:
-        """Begin to write the sessions, oldest first; of several that wait for the disk only the latest are written."""
-        with self._changed:
-            self._waiting = _Kept(mark=self._mark, sessions=tuple(sessions))
-            if not self._busy:
-                self._busy = True
-                threading.Thread(target=self._run, name="sessions", daemon=True).start()
+        """Begin to write the sessions, oldest first."""
+        kept = _Kept(mark=self._mark, sessions=tuple(sessions))
+        self._writer.write(lambda: replace_file(self._path, kept.model_dump_json().encode(), links=False))
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until the latest sessions are written; False if they are not after `timeout_s`."""
-        until = time.monotonic() + timeout_s
-        with self._changed:
-            while self._busy and (left := until - time.monotonic()) > 0:
-                self._changed.wait(left)
-            return not self._busy
+        """Wait until the latest sessions are written, or refused; False if that takes longer than `timeout_s`."""
+        return self._writer.wait(timeout_s)
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                kept, self._waiting = self._waiting, None
-                if kept is None:
-                    self._busy = False
-                    self._changed.notify_all()
-                    return
-            try:
-                replace_file(self._path, kept.model_dump_json().encode(), links=False)
-                self._failed = False
-            except OSError as error:
-                if not self._failed:
-                    self._failed = True
-                    text = "{path} cannot be written ({why}): after a restart of the service everybody logs in again"
-                    why = error.strerror or str(error)
-                    self._lament(phrase("event_sessions_not_kept", text, path=str(self._path), why=why))
+    def _refused(self, error: OSError) -> None:
+        text = "{path} cannot be written ({why}): after a restart of the service everybody logs in again"
+        why = error.strerror or str(error)
+        self._lament(phrase("event_sessions_not_kept", text, path=str(self._path), why=why))

@@ -1,7 +1,7 @@
 """The desk at which a log is measured by hand: its frames, its operators' sessions, and the geometry between images."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -167,6 +167,15 @@ class Desk:
             self._camera(action.camera)
         touched = session.act(action)
         return self._changed(operator, session, touched)
+
+    def put(self, operator: str, marks: Iterable[tuple[Key, Entered]], clear: Collection[Key] = ()) -> Changed:
+        """Set many marks by one action, such as those of a track or a file; one undo takes all back.
+
+        Raises:
+            StorageError: the disk refuses; nothing was changed.
+        """
+        session = self.session(operator)
+        return self._changed(operator, session, session.put(marks, clear))
 
     def changes(self, operator: str, since: int, wait_s: float) -> Changes:
         """What changed after a revision; waits for a change if there is none yet."""

@@ -7,8 +7,8 @@ from pydantic import Field
 
 from rig.api.fields import WHOLE, Model
 
-#: So many changes one action may hold: all points of a long track.
-MARKS_MAX: Final = 200_000
+#: A file of marks that is imported: 100 000 points have some 10 MB.
+MARKS_BYTES_MAX: Final = 32 << 20
 _LARGEST_PX: Final = 100_000.0
 
 Pixel = Annotated[float, Field(ge=-_LARGEST_PX, le=_LARGEST_PX, allow_inf_nan=False)]

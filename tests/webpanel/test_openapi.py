@@ -59,6 +59,8 @@ CALLS = {
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/pulses/{pulse}",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/actions",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/changes",
+    "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/import",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/export/{name}",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result/files/{name}",

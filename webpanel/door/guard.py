@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from rig.api.digitizing import MARKS_BYTES_MAX
 from rig.api.looking import VOICE_BYTES_MAX
 from rig.api.start_list import TABLE_BYTES_MAX
 from rig.phrase import Phrase, phrase
@@ -52,6 +53,10 @@ _OTHERS: Final = (
         re.compile("/api/start-list(?:/preview)?"),
         "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
         TABLE_BYTES_MAX,
+    ),
+    *(
+        _Body(re.compile("/api/recordings/[^/]+/digitizing/sessions/[^/]+/import"), kind, MARKS_BYTES_MAX)
+        for kind in ("application/json", "text/csv", "application/zip")
     ),
     _Body(re.compile("/api/recordings/[^/]+/voice-notes"), "audio/webm", VOICE_BYTES_MAX),
 )

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import anyio
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from fastapi.responses import FileResponse
 
 from analysis.digitizing.desks import Desks
@@ -55,6 +55,16 @@ _FILE: Final[Responses] = {
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     }
 }
+_BYTES: Final = {"schema": {"type": "string", "format": "binary"}}
+#: What can be imported, by its media type.
+_IMPORTED: Final = {
+    "application/json": "measurements.json",
+    "text/csv": "marks.csv",
+    "application/zip": "dltdv.zip",
+}
+Exported = Annotated[
+    Literal["measurements.json", "marks.csv", "dltdv.zip", "argus.zip"], Path(description="name of the file")
+]
 Operator = Annotated[OperatorName, Path(examples=["Anna"])]
 Pulse = Annotated[int, Path(ge=0, le=2**53, description="number of the pulse", examples=[1])]
 Coordinate = Annotated[float, Query(ge=-100_000, le=100_000, allow_inf_nan=False, description="px", examples=[320.5])]
@@ -155,6 +165,23 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -
         """What was changed after a revision, also on another page; waits up to 20 s for a change."""
         return await run_sync(partial(desk.changes, operator, since, _WAIT_S), limiter=waiters, abandon_on_cancel=True)
 
+    @router.get(base + "/export/{name}", response_class=Response, responses=_FILE | refusals(404))
+    async def export_marks(desk: AtDesk, operator: Operator, name: Exported) -> Response:
+        """The marks as a file: measurements, a table, or the folder of DLTdv or Argus Clicker."""
+        content = await run_sync(_delivered, desk, operator, name)
+        headers = {"Content-Disposition": attachment(f"{operator}-{name}")}
+        return Response(content, media_type="application/octet-stream", headers=headers)
+
+    @router.post(
+        base + "/import",
+        responses=CHANGING | refusals(404),
+        openapi_extra={"requestBody": {"required": True, "content": dict.fromkeys(_IMPORTED, _BYTES)}},
+    )
+    async def import_marks(desk: AtDesk, operator: Operator, request: Request) -> Changed:
+        """Take the marks of a file (`measurements.json`, a table, DLTdv's folder as ZIP); one undo takes all back."""
+        kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        return await run_sync(_taken_in, desk, operator, _IMPORTED.get(kind, ""), await request.body())
+
     @router.post(base + "/compute", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404))
     def compute(desk: AtDesk, operator: Operator, _: NoFields = None) -> HandResult:
         """Compute the jump from what was measured by hand, with the rest of the automatic measurement."""
@@ -177,3 +204,15 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -
         return FileResponse(
             file, headers=ALONE | offered, media_type="text/html" if shown else "application/octet-stream"
         )
+
+
+def _delivered(desk: Desk, operator: str, name: str) -> bytes:
+    from analysis.digitizing.delivery import delivered  # noqa: PLC0415 - loaded with the first desk
+
+    return delivered(desk, operator, name)
+
+
+def _taken_in(desk: Desk, operator: str, name: str, content: bytes) -> Changed:
+    from analysis.digitizing.delivery import taken_in  # noqa: PLC0415 - loaded with the first desk
+
+    return taken_in(desk, operator, name, content)

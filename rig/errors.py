@@ -33,6 +33,10 @@ class NameTakenError(BadInputError):
     """A file cannot be made because there is something of its name: choose another one."""
 
 
+class NoFitError(BadInputError):
+    """Nothing of the kind is to be seen at the place of an image that was pointed at: point elsewhere."""
+
+
 class CameraNotFoundError(BadInputError):
     """A camera that the rig file names does not answer."""
 

@@ -113,7 +113,7 @@ def static_image(camera: str, frames: Sequence[Grey]) -> StaticImage:
     n = len(distinct)
     if n < 3:
         grey = distinct.mean(axis=0, dtype=np.float32)
-        return StaticImage(camera, grey, np.full_like(grey, _spatial_noise(distinct[0])), n)
+        return StaticImage(camera, grey, np.full_like(grey, spatial_noise(distinct[0])), n)
     twice = _twice_median(distinct)
     median = np.asarray(twice / np.float32(2), np.float32)
     twice_off = [cv2.absdiff(frame.astype(twice.dtype) * 2, twice) for frame in distinct]
@@ -241,7 +241,7 @@ def _line(x: Floats, y: Floats) -> tuple[float, float]:
     return float(np.median(y - slope * x)), slope
 
 
-def _spatial_noise(frame: Grey) -> float:
+def spatial_noise(frame: Grey) -> float:
     """Noise of a single image: MAD after a filter that no plane and no straight edge along an axis passes."""
     kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
     filtered = cv2.filter2D(frame.astype(np.float32), -1, kernel)

@@ -1,0 +1,157 @@
+"""One thing, tracked from pulse to pulse in cameras that go together."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from scipy.special import chdtri
+
+from analysis.digitizing.tracking.agreement import GATE_P, agreeing
+from analysis.digitizing.tracking.candidates import Anchor, Candidate, of_automatic, of_images
+from analysis.digitizing.tracking.motion import Belief, KnownMotion, Motion, mark_observations
+from analysis.digitizing.tracking.thing_template import Picture
+from analysis.digitizing.tracking.tracks import Automatic, Mark, Track, Tracked
+from rig.errors import BadInputError
+
+_GAP = 2  # pulses without any match that are bridged
+_ALONE = 4  # pulses in sequence in which one camera alone may show a thing that several cameras track
+_MEMORY = 8  # pulses back in which further marks tell of the motion
+
+
+class Run:
+    """The tracking of one thing.
+
+    Args:
+        pictures: gives the images of a pulse by camera.
+        motion: of the thing, in its cameras.
+        marks: by hand, by pulse and camera.
+        pulses: from the first one on, which is marked.
+        automatic: what the automatic measurement found of it at a pulse, by camera.
+        known: what is known of its motion.
+    """
+
+    def __init__(
+        self,
+        pictures: Callable[[int], Mapping[str, Picture]],
+        motion: Motion,
+        marks: Mapping[int, Mapping[str, Mark]],
+        pulses: range,
+        automatic: Automatic | None,
+        known: KnownMotion | None,
+    ) -> None:
+        self._pictures, self._motion, self._views, self._pulses = pictures, motion, motion.views, pulses
+        names = motion.views.names
+        self._marks = {pulse: {name: of[name] for name in names if name in of} for pulse, of in marks.items()}
+        self._automatic, self._known = automatic, known
+        self._anchors: dict[str, Anchor] = {}
+        self._places: dict[int, dict[str, Tracked]] = {}
+
+    def track(self) -> Track:
+        """Start and go on until the end, or until something speaks against it."""
+        belief = self._started()
+        last = self._pulses[0]
+        stopped, gap, alone = "it was tracked as far as was asked", 0, 0
+        velocity = None
+        for pulse in self._pulses[1:]:
+            belief = self._motion.predicted(belief, self._pulses.step)
+            after, seen, reason = self._at(belief, pulse)
+            if after is None:
+                stopped = f"pulse {pulse}: {reason}"
+                break
+            belief = after
+            gap = 0 if seen else gap + 1
+            alone = alone + 1 if seen == 1 and len(self._views.names) > 1 else 0
+            if not gap:
+                last = pulse
+                if velocity is None and self._views.dimensions == 3:
+                    velocity = self._motion.velocity(belief)
+            if gap > _GAP or alone > _ALONE:
+                stopped = f"pulse {pulse}: {reason}"
+                break
+        return Track(self._places, stopped, last, velocity)
+
+    def _started(self) -> Belief:
+        """The belief at the first pulse, from its marks and those shortly before."""
+        first, step = self._pulses[0], self._pulses.step
+        before = [p for p in range(first - _MEMORY * step, first, step) if len(self._marks.get(p, {})) >= self._least]
+        marked = [*before, first]
+        marks = self._marks[marked[0]]
+        xy, sigma = (
+            {k: mark.xy for k, mark in marks.items()},
+            {k: float(mark.sigma.mean()) for k, mark in marks.items()},
+        )
+        belief = self._motion.begun(self._views.place(xy, sigma), self._known)
+        for previous, pulse in zip((marked[0], *marked), marked, strict=False):
+            marks = self._marks[pulse]
+            if pulse != previous:
+                belief = self._motion.predicted(belief, pulse - previous)
+            belief, square = self._with_marks(belief, marks)
+            if not square <= chdtri(2 * len(marks), GATE_P):
+                raise BadInputError(
+                    f"pulse {pulse}: the marks of {', '.join(marks)} contradict each other or those before "
+                    f"(chi-squared {square:.0f}): correct them"
+                )
+        self._anchor(belief, first, self._marks[first])
+        return belief
+
+    @property
+    def _least(self) -> int:
+        return 2 if self._views.dimensions == 3 else 1
+
+    def _with_marks(self, belief: Belief, marks: Mapping[str, Mark]) -> tuple[Belief, float]:
+        anchored = self._motion.anchored(belief, {name: np.diag(mark.sigma**2) for name, mark in marks.items()})
+        return self._motion.updated(anchored, mark_observations(tuple(marks), {k: m.xy for k, m in marks.items()}))
+
+    def _anchor(self, belief: Belief, pulse: int, marks: Mapping[str, Mark]) -> None:
+        """Take the templates of cameras from their marks."""
+        pictures = self._pictures(pulse)
+        place = self._motion.place(belief)
+        for name, mark in marks.items():
+            if name in pictures:
+                scale = self._views.px_per_m(name, place)
+                self._anchors[name] = Anchor.at_mark(pictures[name], mark.xy, np.diag(mark.sigma**2), scale)
+
+    def _at(self, belief: Belief, pulse: int) -> tuple[Belief | None, int, str]:
+        """The belief after a pulse, None if something contradicts; how many images show the thing; what is missing."""
+        marks = self._marks.get(pulse, {})
+        if marks:
+            belief, square = self._with_marks(belief, marks)
+            if not square <= chdtri(2 * len(marks), GATE_P):
+                return None, 0, f"the marks of {', '.join(marks)} contradict the track (chi-squared {square:.0f})"
+        candidates, missing = self._candidates(belief, pulse, [name for name in self._views.names if name not in marks])
+        after, chosen, reason = agreeing(self._motion, belief, candidates)
+        if after is None:
+            return None, 0, reason
+        if chosen:
+            self._places[pulse] = {}
+        for name, candidate in chosen.items():
+            after = self._motion.stepped(after, name, candidate.step)
+            if candidate.anchor is not None:
+                self._anchors[name] = candidate.anchor
+            self._places[pulse][name] = Tracked(candidate.observation.xy, candidate.sigma, candidate.origin)
+        if marks:
+            self._anchor(after, pulse, marks)
+        return after, len(chosen) + len(marks), "; ".join([*missing, reason] if reason else missing)
+
+    def _candidates(
+        self, belief: Belief, pulse: int, names: Sequence[str]
+    ) -> tuple[dict[str, list[Candidate]], list[str]]:
+        """Where cameras may see the thing, and why others do not."""
+        pictures = self._pictures(pulse)
+        measured = self._automatic(pulse) if self._automatic else {}
+        found: dict[str, list[Candidate]] = {}
+        missing = []
+        for name in names:
+            if name not in pictures:
+                missing.append(f"{name} has no frame")
+                continue
+            candidates: list[Candidate] = []
+            if name in measured:
+                candidates = of_automatic(measured[name], self._motion.seen(belief, name, with_offset=False))
+            anchor = self._anchors.get(name)
+            if not candidates and anchor is not None:
+                candidates, why = of_images(anchor, pictures[name], self._motion.seen(belief, name, with_offset=True))
+                if not candidates:
+                    missing.append(f"{name} {why}")
+            if candidates:
+                found[name] = candidates
+        return found, missing

@@ -1,0 +1,58 @@
+"""What goes into a track and what comes out of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from analysis.digitizing.tracking.candidates import Origin
+from analysis.measurements.model import PointMeasurement
+from rig.arrays import Floats
+from rig.images.picture import Grey
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mark:
+    """A mark by hand.
+
+    Attributes:
+        xy: (2,) px.
+        sigma: (2,) px.
+    """
+
+    xy: Floats
+    sigma: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """A place in one image.
+
+    Attributes:
+        xy: (2,) px.
+        sigma: (2,) px: of the mark that it goes back to, of the matches since, and of its own.
+        origin: match or automatic measurement.
+    """
+
+    xy: Floats
+    sigma: Floats
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """What was tracked.
+
+    Attributes:
+        places: by pulse and camera; without those that are marked by hand.
+        stopped: why it ends, in words.
+        last: the last pulse at which a mark or an image shows the thing.
+        velocity: (3,) m/s at the start, for other things of the same jumper; None of an image by itself.
+    """
+
+    places: Mapping[int, Mapping[str, Tracked]]
+    stopped: str
+    last: int
+    velocity: Floats | None
+
+
+Frames = Callable[[int], Mapping[str, Grey]]
+Automatic = Callable[[int], Mapping[str, PointMeasurement]]

@@ -56,6 +56,7 @@ from svev.serving.panel_doctor import PanelDoctor
 from svev.serving.systemd import JournalHandler, Notify, write_line
 from webpanel.app import create_app
 from webpanel.door.access import Access
+from webpanel.door.link_file import LinkFile
 from webpanel.door.links import Links, kept_secret
 from webpanel.door.logins import Sessions
 from webpanel.door.session_file import SessionFile
@@ -177,12 +178,13 @@ def _door(
     def warn(said: Phrase) -> None:
         hub.tell(Event.now(Level.WARNING, "access", said))
 
-    secret, tokens = kept_secret(data), settings.access.tokens
+    links = LinkFile(data, warn)
+    secret, tokens = kept_secret(data, anew=links.broken), settings.access.tokens
     if secret.problem is not None:
         warn(secret.problem)
     file = SessionFile(data, tokens.mark(secret.value, b"svev sessions 1").hex(), warn)
     stack.callback(file.wait, _KEEP_S)
-    return Links(secret.value, tokens, rig.service.share_hours * _HOUR_S), Sessions(file=file)
+    return Links(secret.value, tokens, rig.service.share_hours * _HOUR_S, file=links), Sessions(file=file)
 
 
 def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:

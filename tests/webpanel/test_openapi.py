@@ -48,6 +48,7 @@ CALLS = {
     "DELETE /api/recordings/{recording_id}/measurement",
     "GET /api/recordings/{recording_id}/measurement/files/{name}",
     "GET /api/recordings/{recording_id}/link", "POST /api/login/link",
+    "GET /api/recordings/{recording_id}/links", "DELETE /api/recordings/{recording_id}/links/{number}",
     "GET /api/athletes", "GET /api/jumps", "GET /api/jumps/comparison",
     "GET /api/comparison.html",
     "GET /api/recordings/{recording_id}/digitizing", "POST /api/recordings/{recording_id}/digitizing/orientation",

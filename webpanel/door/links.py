@@ -1,9 +1,9 @@
 """Links that open one recording to somebody without a token, until they end.
 
-A link is signed and kept nowhere: its key holds the minute at which it ends, and a signature over that minute and the
-recording. So it opens no other recording by construction, works on after a restart, and ends with the tokens of the
-service: other tokens sign otherwise. What is signed is a secret of the service's own mixed with the tokens, so that
-nobody who has a link can try out tokens against it.
+A link is signed: its key holds the minute at which it ends, and a signature over that minute and the recording. So it
+opens no other recording by construction, works on after a restart, and ends with the tokens of the service: other
+tokens sign otherwise. Which links were made is kept as well, so that each can be taken back. What is signed
+is a secret of the service's own mixed with the tokens, so that nobody who has a link can try out tokens against it.
 """
 
 import base64
@@ -13,6 +13,7 @@ import math
 import os
 import secrets
 import struct
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from typing import Final
 
 from rig.host.files import read_own
 from rig.phrase import Phrase, phrase
+from webpanel.door.link_file import KeptLink, LinkFile
 from webpanel.door.tokens import Tokens
 
 #: Name of the file with the secret, in the folder of the recordings.
@@ -32,6 +34,10 @@ _MINUTES: Final = struct.Struct(">I")
 #: 128 bits cannot be guessed (RFC 2104, 5: half of the hash is enough), and make a small QR code.
 _SIGNATURE_BYTES: Final = 16
 _MINUTE_S: Final = 60
+#: A link is given again for this part of its time, one hour of a day.
+_SAME: Final = 24
+#: So many links are known; of more than that the oldest cannot be taken back any more.
+_MOST: Final = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +53,17 @@ class Secret:
     problem: Phrase | None = None
 
 
-def kept_secret(folder: Path) -> Secret:
-    """The secret of the service that records into a folder, made at the first time; only its own user can read it."""
+def kept_secret(folder: Path, *, anew: bool = False) -> Secret:
+    """The secret of the service that records into a folder, made at the first time; only its own user can read it.
+
+    Args:
+        folder: the folder.
+        anew: make another one, which ends all links and sessions.
+    """
     path = folder / SECRET_NAME
     try:
+        if anew:
+            path.unlink(missing_ok=True)
         try:
             value = read_own(path, _SECRET_BYTES)
         except FileNotFoundError:
@@ -75,24 +88,86 @@ def _make_secret(path: Path) -> bytes:
 
 
 class Links:
-    """Makes and checks the keys of links.
+    """Makes and checks the keys of links, and takes them back. Any thread may call any method.
 
     Args:
         secret: random bytes that no client knows.
         tokens: the tokens of the service.
         share_s: how long a link opens its recording, s.
         clock: UNIX time, s.
+        file: keeps which links were made, and taken back; None: nobody does.
     """
 
-    def __init__(self, secret: bytes, tokens: Tokens, share_s: float, clock: Callable[[], float] = time.time) -> None:
+    def __init__(
+        self,
+        secret: bytes,
+        tokens: Tokens,
+        share_s: float,
+        clock: Callable[[], float] = time.time,
+        file: LinkFile | None = None,
+    ) -> None:
         self._signing = tokens.mark(secret, b"svev link 1")
-        self._share_s, self._clock = share_s, clock
+        self._share_s, self._clock, self._file = share_s, clock, file
+        self._made = {(link.recording, link.minute): link for link in (() if file is None else file.links)}
+        self._lock = threading.Lock()
 
     def make(self, recording: str) -> tuple[str, float]:
-        """The key of a link to a recording, and the UNIX time at which it ends, s: a whole minute."""
-        minute = math.ceil((self._clock() + self._share_s) / _MINUTE_S)
+        """The key of a link to a recording, and the UNIX time at which it ends, s: a whole minute.
+
+        A screen that shows its code anew again and again gets the same one for a while.
+        """
+        now = self._clock()
+        with self._lock:
+            fresh = [link for link in self._open(recording) if 0 <= now - link.made < self._share_s / _SAME]
+            if fresh:
+                minute = fresh[-1].minute
+            else:
+                minute = math.ceil((now + self._share_s) / _MINUTE_S)
+                while (recording, minute) in self._made:  # taken back
+                    minute += 1
+                self._made[recording, minute] = KeptLink(recording=recording, minute=minute, made=now)
+                self._keep()
         ends = _MINUTES.pack(minute)
         return _as_text(ends + self._sign(recording, ends)), minute * float(_MINUTE_S)
+
+    def open_links(self, recording: str) -> list[KeptLink]:
+        """The links that open a recording, the oldest first."""
+        with self._lock:
+            return self._open(recording)
+
+    def take_back(self, recording: str, minute: int) -> bool | None:
+        """Let a link open nothing any more, from now on.
+
+        Returns:
+            Whether the disk keeps that for the next start; None: there is no such link, or it is not open.
+        """
+        with self._lock:
+            link = next((each for each in self._open(recording) if each.minute == minute), None)
+            if link is None:
+                return None
+            self._made[recording, minute] = link.model_copy(update={"taken_back": True})
+            self._keep()
+        return self._file is None or self._file.is_kept()
+
+    def is_taken_back(self, recording: str, ends: float) -> bool:
+        """Whether the link to a recording that ends at this UNIX time, s, was taken back."""
+        link = self._made.get((recording, round(ends / _MINUTE_S)))
+        return link is not None and link.taken_back
+
+    def _open(self, recording: str) -> list[KeptLink]:
+        return [
+            link
+            for link in self._made.values()
+            if link.recording == recording and not link.taken_back and self.left_s(link.minute * float(_MINUTE_S))
+        ]
+
+    def _keep(self) -> None:
+        """Forget those that have ended and, of too many, the oldest that were not taken back."""
+        known = [link for link in self._made.values() if self.left_s(link.minute * float(_MINUTE_S))]
+        surplus = [link for link in known if not link.taken_back][: max(0, len(known) - _MOST)]
+        self._made = {(link.recording, link.minute): link for link in known if link not in surplus}
+        if self._file is not None:
+            self._file.keep(self._made.values())
 
     def ends(self, recording: str, key: str) -> float | None:
         """The UNIX time at which a key ends or has ended, s; None: it was not made here, or for another recording."""

@@ -192,11 +192,13 @@ class Door:
             The UNIX time at which it ends, and the seconds until then.
 
         Raises:
-            ProblemError: 401, it is none of this recording, or has ended.
+            ProblemError: 401, it is none of this recording, has ended, or was taken back.
         """
         ends = None if self.links is None else self.links.ends(recording, key)
         if self.links is None or ends is None:
             raise _unauthorized("wrong_link", "this link opens nothing, or no more: scan the code of the jump again")
+        if self.links.is_taken_back(recording, ends):
+            raise _unauthorized("link_taken_back", "this link was taken back: ask the coach for the code of the jump")
         left_s = self.links.left_s(ends)
         if not left_s:
             raise _unauthorized("link_ended", "this link has ended: scan the code of the jump again")

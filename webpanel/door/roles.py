@@ -110,6 +110,12 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
             "act_digitized", "asked for recording {recording}, measured by hand, to be computed", recording=recording
         ),
     ),
+    (
+        r"DELETE /api/recordings/([^/]+)/links/.*",
+        lambda recording: phrase(
+            "act_link_taken_back", "took back a link to recording {recording}", recording=recording
+        ),
+    ),
     (r"DELETE /api/exports/[^/]+", lambda: phrase("act_export_ended", "ended or removed an export")),
     (r"[A-Z]+ /api/next-jumper(?:/.*)?", lambda: phrase("act_next_jumper", "edited the next jumper")),
     (r"POST /api/start-list/preview", lambda: phrase("act_list_looked", "looked at a start list before loading it")),

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from http import HTTPStatus
 from ipaddress import ip_address
-from typing import Final
+from typing import Annotated, Final
 from urllib.parse import quote
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Path, Request, Response
 from pydantic import Field
 
 from rig.api.fields import Model
@@ -19,7 +19,7 @@ from webpanel.door.links import KEY_LENGTH
 from webpanel.door.logins import LINK_COOKIE, Door
 from webpanel.problems import ProblemError
 from webpanel.qr_code import qr_svg
-from webpanel.routes.common import RecordingId, refusals, strict_router
+from webpanel.routes.common import CHANGING, RecordingId, refusals, strict_router
 
 #: What JavaScript's encodeURIComponent leaves as it is, and `quote` does not: the page and the cookie write ids alike.
 _UNQUOTED: Final = "!'()"
@@ -33,6 +33,14 @@ class JumpLink(Model):
     link: str = Field(description="address to open on a phone")
     ends: datetime = Field(description="when it ends, UTC")
     code: str = Field(description="the address as a QR code, SVG")
+
+
+class OpenLink(Model):
+    """A link that opens a recording; its key is shown to nobody again."""
+
+    number: int = Field(description="which link of the recording it is")
+    made: datetime = Field(description="when its code was shown first, UTC")
+    ends: datetime = Field(description="when it ends, UTC")
 
 
 class LinkLogin(Model):
@@ -73,7 +81,35 @@ def links_router(door: Door, service: RigService) -> APIRouter:
             raise ProblemError(HTTPStatus.CONFLICT, "no_phones", text)
         key, ends = door.links.make(recording_id)
         link = f"{address}/#/jump/{quote(recording_id, safe=_UNQUOTED)}/{key}"
-        return JumpLink(link=link, ends=datetime.fromtimestamp(ends, UTC), code=qr_svg(link))
+        return JumpLink(link=link, ends=_utc(ends), code=qr_svg(link))
+
+    @router.get("/recordings/{recording_id}/links", responses=refusals(404))
+    def list_links(recording_id: RecordingId) -> list[OpenLink]:
+        """The links that open this recording, the oldest first. A code that is shown again soon is the same link."""
+        service.recording(recording_id)
+        found = [] if door.links is None else door.links.open_links(recording_id)
+        return [OpenLink(number=each.minute, made=_utc(each.made), ends=_utc(60.0 * each.minute)) for each in found]
+
+    @router.delete(
+        "/recordings/{recording_id}/links/{number}",
+        status_code=HTTPStatus.NO_CONTENT,
+        responses=CHANGING | refusals(404, 503),
+    )
+    def take_link_back(
+        recording_id: RecordingId, number: Annotated[int, Path(ge=0, lt=1 << 32, description="`number` of the link")]
+    ) -> None:
+        """Let a link open nothing any more, also where it is open now. The next code of the recording is another one.
+
+        503: it is taken back, but the disk refuses to keep that, so that a restart of the service would open it again.
+        """
+        service.recording(recording_id)
+        kept = None if door.links is None else door.links.take_back(recording_id, number)
+        if kept is None:
+            text = "there is no such link, or it opens nothing any more: look at the list again"
+            raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_link", text)
+        if not kept:
+            text = "the link is taken back until the service is restarted, no longer: its disk refuses; make room on it"
+            raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "link_not_kept", text)
 
     @router.post("/login/link", responses=refusals(413, 415))
     def log_in_by_link(request: Request, response: Response, given: LinkLogin) -> Visit:
@@ -83,9 +119,13 @@ def links_router(door: Door, service: RigService) -> APIRouter:
             LINK_COOKIE, given.key, max_age=int(left_s), httponly=True, samesite="strict",
             path=f"/api/recordings/{quote(given.recording, safe=_UNQUOTED)}", secure=door.access.is_https(request),
         )  # fmt: skip
-        return Visit(recording=given.recording, ends=datetime.fromtimestamp(ends, UTC))
+        return Visit(recording=given.recording, ends=_utc(ends))
 
     return router
+
+
+def _utc(time_s: float) -> datetime:
+    return datetime.fromtimestamp(time_s, UTC)
 
 
 def visiting(service: RigService) -> Callable[[str, str], None]:

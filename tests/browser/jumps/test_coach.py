@@ -173,6 +173,32 @@ def test_a_link_shows_its_jump_and_nothing_else(hill: Hill, service: MemoryServi
     expect(page.locator("#visit-who")).to_have_text("Svev")
 
 
+def test_a_link_is_taken_back_on_the_page_of_its_jump(hill: Hill, open_page: Open) -> None:
+    with hill.panel.client(headers={"Authorization": f"Bearer {TOKEN}", "Host": f"{NAME}:{hill.panel.port}"}) as coach:
+        link = coach.get("/api/recordings/jump-2/link").json()["link"]
+    phone = open_page(link, width=360, height=780)
+    expect(phone.locator("#visit-who")).to_have_text("4 · Ola <b>Nordmann</b>")
+    page = open_page(f"{hill.url}/#/recordings/jump-2", width=360, height=780, locale="nb-NO")
+    hill.log_in(page)
+    links, code = page.locator("#share-links li"), page.locator("#share-code")
+    expect(links).to_have_text([re.compile(r", \d\d:\d\d, til .*, \d\d:\d\dTrekk tilbake$")])
+    hill.clock.now += 600
+    page.get_by_role("button", name="Vis koden").click()
+    expect(code).to_be_visible()
+    expect(links).to_have_count(2)
+    assert_fits_a_phone(page)
+    page.evaluate(AXE.read_text())
+    assert page.evaluate("axe.run().then(found => found.violations.map(each => each.id))") == []
+    links.first.get_by_role("button").click()
+    expect(links).to_have_count(1)
+    expect(code).to_be_hidden()  # perhaps it is the one that opens nothing any more
+    phone.reload()
+    expect(phone.locator("#visit-problem")).to_have_text(
+        "this link was taken back: ask the coach for the code of the jump"
+    )
+    expect(phone.locator("#visit-jump")).to_be_hidden()
+
+
 def test_the_delayed_picture_takes_bounded_memory_and_keeps_its_time(hill: Hill, open_page: Open) -> None:
     page = open_page(f"{hill.url}/#/jump/none")
     found = page.evaluate("""async () => {

@@ -3,7 +3,7 @@
 import logging
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
@@ -21,8 +21,9 @@ from tests.support.loopback import Loopback
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused, serving
 from webpanel.door.access import Access
+from webpanel.door.link_file import NAME, LinkFile
 from webpanel.door.links import SECRET_NAME, Links, kept_secret
-from webpanel.door.roles import Role
+from webpanel.door.roles import Role, needed_role
 from webpanel.door.tokens import Tokens
 from webpanel.qr_code import qr_svg
 from webpanel.routes.links import address_for_phones
@@ -84,11 +85,13 @@ def _parts(link: str) -> tuple[str, str]:
 
 
 @contextmanager
-def sharing(service: MemoryService, host: str, secret: bytes = b"s" * 32, token: str = TOKEN) -> Iterator[Shared]:
+def sharing(
+    service: MemoryService, host: str, secret: bytes = b"s" * 32, token: str = TOKEN, file: LinkFile | None = None
+) -> Iterator[Shared]:
     """Serve meanwhile, on loopback behind a proxy, as phones in the network would see it."""
     access = Access.for_address(host, None, [PHONES], {"SVEV_TOKEN": token}, proxies=["127.0.0.1"])
     clock = Clock()
-    with serving(service, access, links=Links(secret, access.tokens, HOUR_S, clock)) as panel:
+    with serving(service, access, links=Links(secret, access.tokens, HOUR_S, clock, file)) as panel:
         yield Shared(panel, clock)
 
 
@@ -107,7 +110,7 @@ def shared(service: MemoryService, loopback: Loopback) -> Iterator[Shared]:
 SHOWN = ("", "/measurement?jumps=false", "/measurement/files/report.html", "/pulses", "/pulses/1.jpg?width=64",
          "/moment", "/thumbnail.jpg")  # fmt: skip
 #: What a link does not open of its own recording.
-HIDDEN = ("/file", "/file.sha256", "/notes", "/voice-notes", "/pulses/1.png", "/link", "/exports")
+HIDDEN = ("/file", "/file.sha256", "/notes", "/voice-notes", "/pulses/1.png", "/link", "/links", "/exports")
 
 
 def test_a_link_opens_the_page_of_its_jump(shared: Shared) -> None:
@@ -136,7 +139,8 @@ def test_a_link_opens_nothing_else_of_its_recording_and_changes_nothing(shared: 
             assert refused(phone.get(f"/api/recordings/jump-1{part}"), 403).code == "link_forbids", part
         for method, part in (
             ("PATCH", ""), ("DELETE", ""), ("POST", "/stop"), ("POST", "/restore"), ("POST", "/measurement"),
-            ("DELETE", "/measurement"), ("POST", "/exports"), ("PUT", "/notes/1"), ("POST", "/voice-notes?pulse=1"),
+            ("DELETE", "/measurement"), ("DELETE", "/links/1"),
+            ("POST", "/exports"), ("PUT", "/notes/1"), ("POST", "/voice-notes?pulse=1"),
             ("OPTIONS", ""), ("TRACE", ""), ("GETX", ""),
         ):  # fmt: skip
             refused(phone.request(method, f"/api/recordings/jump-1{part}", json={}), 403)
@@ -227,6 +231,121 @@ def test_a_link_works_on_after_a_restart_and_ends_with_the_tokens(service: Memor
     ):  # fmt: skip
         with sharing(service, loopback.host, secret, token) as again, again.phone() as visitor:
             assert visitor.get("/api/recordings/jump-1", headers=cookie).status_code == status
+
+
+def _listed(shared: Shared, recording: str = "jump-1") -> list[int]:
+    """The links that open a recording."""
+    with shared.panel.client(headers=BEARER) as coach:
+        return [each["number"] for each in coach.get(f"/api/recordings/{recording}/links").json()]
+
+
+def _taken_back(shared: Shared, number: int, recording: str = "jump-1") -> httpx.Response:
+    with shared.panel.client(headers=BEARER) as coach:
+        return coach.delete(f"/api/recordings/{recording}/links/{number}")
+
+
+def test_one_link_is_taken_back_and_no_other_one(shared: Shared) -> None:
+    _, key = _parts(shared.link("jump-1"))
+    with shared.opened("jump-1") as phone, shared.opened("jump-2") as other_jump:
+        shared.clock.now += 180  # a code that is shown within two and a half minutes of an hour is the same link
+        with shared.opened("jump-1") as later:
+            first, second = _listed(shared)
+            assert _taken_back(shared, first).status_code == 204
+            for part in SHOWN:
+                answer = phone.get(f"/api/recordings/jump-1{part}")
+                assert refused(answer, 401).code == "link_taken_back", part
+            again = phone.post("/api/login/link", json={"recording": "jump-1", "key": key})
+            assert refused(again, 401).code == "link_taken_back"
+            assert later.get("/api/recordings/jump-1").status_code == 200
+            assert other_jump.get("/api/recordings/jump-2").status_code == 200
+            assert _listed(shared) == [second]
+            assert _taken_back(shared, second).status_code == 204
+            refused(later.get("/api/recordings/jump-1"), 401)
+    assert _parts(shared.link("jump-1"))[1] != key  # nor is the next one the same by chance of the clock
+    with shared.opened("jump-1") as phone:
+        assert phone.get("/api/recordings/jump-1").status_code == 200
+
+
+def test_the_next_code_is_another_link_also_within_the_minute(shared: Shared) -> None:
+    keys = set()
+    for _ in range(3):
+        keys.add(_parts(shared.link("jump-1"))[1])
+        assert _parts(shared.link("jump-1"))[1] in keys
+        (number,) = _listed(shared)
+        assert _taken_back(shared, number).status_code == 204
+    assert len(keys) == 3
+    with shared.phone() as phone:
+        for key in keys:
+            refused(phone.get("/api/recordings/jump-1", headers={"Cookie": f"svev_link={key}"}), 401)
+
+
+def test_nobody_takes_a_link_back_who_may_not(shared: Shared) -> None:
+    with shared.opened("jump-1") as phone:
+        (number,) = _listed(shared)
+        path = f"/api/recordings/jump-1/links/{number}"
+        assert refused(phone.delete(path), 403).code == "link_forbids"
+        refused(phone.delete(f"/api/recordings/jump-2/links/{number}"), 401)
+        foreign = {"Origin": "http://evil.org"} | BEARER
+        with shared.panel.client() as site:
+            assert refused(site.delete(path, headers=foreign), 403).code == "foreign_origin"
+            refused(site.delete(path), 401)
+        assert phone.get("/api/recordings/jump-1").status_code == 200
+    assert _listed(shared) == [number]
+    assert needed_role("DELETE", path) is Role.OPERATE
+
+
+def test_only_a_link_that_is_open_is_taken_back(shared: Shared) -> None:
+    shared.link("jump-1")
+    (number,) = _listed(shared)
+    for wrong in (number + 1, 0, 2**32 - 1):
+        assert refused(_taken_back(shared, wrong), 404).code == "unknown_link"
+    assert refused(_taken_back(shared, number, "jump-2"), 404).code == "unknown_link"
+    refused(_taken_back(shared, number, "nobody"), 404)
+    for wrong in (-1, 2**32):
+        refused(_taken_back(shared, wrong), 422)
+    assert _taken_back(shared, number).status_code == 204
+    assert refused(_taken_back(shared, number), 404).code == "unknown_link"
+    shared.link("jump-2")
+    shared.clock.now += 2 * HOUR_S
+    assert _listed(shared, "jump-2") == []
+
+
+def test_what_was_taken_back_stays_so_after_a_restart(service: MemoryService, loopback: Loopback) -> None:
+    folder, told = service.catalogue.directory, []
+    write_recording(folder, "jump-1")
+
+    def served() -> AbstractContextManager[Shared]:
+        return sharing(service, loopback.host, file=LinkFile(folder, lambda said: told.append(said.code)))
+
+    with served() as before, before.opened("jump-1") as phone:
+        stolen = {"Cookie": f"svev_link={phone.cookies['svev_link']}"}
+        (number,) = _listed(before)
+        assert _taken_back(before, number).status_code == 204
+        good = {"Cookie": f"svev_link={_parts(before.link('jump-1'))[1]}"}
+    with served() as after, after.phone() as phone:
+        assert refused(phone.get("/api/recordings/jump-1", headers=stolen), 401).code == "link_taken_back"
+        assert phone.get("/api/recordings/jump-1", headers=good).status_code == 200
+        assert len(_listed(after)) == 1
+        assert told == []
+        (folder / NAME).unlink()
+        (folder / NAME).mkdir()  # the disk refuses
+        (number,) = _listed(after)
+        assert refused(_taken_back(after, number), 503).code == "link_not_kept"
+        assert refused(phone.get("/api/recordings/jump-1", headers=good), 401).code == "link_taken_back"
+        assert told == ["event_links_not_kept"]
+
+
+def test_a_list_that_cannot_be_read_ends_all_links(tmp_path: Path) -> None:
+    before = kept_secret(tmp_path)
+    for broken in (b"{", b'{"links": [{"recording": "a", "minute": -1, "made": 0}]}', b"\xff"):
+        (tmp_path / NAME).write_bytes(broken)
+        told: list[str] = []
+        file = LinkFile(tmp_path, lambda said, told=told: told.append(said.code))  # type: ignore[misc]
+        assert (file.broken, file.links, told) == (True, (), ["event_links_unreadable"])
+        after = kept_secret(tmp_path, anew=file.broken)
+        assert after.value != before.value
+        assert kept_secret(tmp_path).value == after.value
+        before = after
 
 
 def test_what_is_deleted_is_shown_to_nobody(shared: Shared) -> None:

@@ -37,6 +37,10 @@ export const jump = {
   "share.hide": "Hide the code",
   "share.alt": "QR code that opens this jump",
   "share.until": "This jump on your phone: scan the code. It holds until {day}, {time}.",
+  "share.open": "Links that open this jump",
+  "share.from": "{made}, until {day}, {time}",
+  "share.back": "Take back",
+  "share.taken": "Taken back. The code that is shown next is another one.",
 
   "visit.until": "This page opens until {day}, {time}.",
   "visit.lost": "No connection: are you still in the network of the hill? It is tried again by itself.",

@@ -37,6 +37,10 @@ export const jump = {
   "share.hide": "Skjul koden",
   "share.alt": "QR-kode som åpner dette hoppet",
   "share.until": "Dette hoppet på telefonen din: skann koden. Den gjelder til {day}, {time}.",
+  "share.open": "Lenker som åpner dette hoppet",
+  "share.from": "{made}, til {day}, {time}",
+  "share.back": "Trekk tilbake",
+  "share.taken": "Trukket tilbake. Koden som vises neste gang, er en annen.",
 
   "visit.until": "Siden kan åpnes til {day}, {time}.",
   "visit.lost": "Ingen forbindelse: er du fortsatt i nettverket i bakken? Det prøves igjen av seg selv.",

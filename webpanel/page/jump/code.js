@@ -2,8 +2,9 @@
 
 import { say, t } from "../i18n/i18n.js";
 import { call, Problem, recordingPath } from "../shared/api.js";
-import { $, setText } from "../shared/dom.js";
+import { $, make, setText } from "../shared/dom.js";
 import { day, timeOfMinute } from "../shared/format.js";
+import { attempt, tell } from "../shared/snacks.js";
 
 /**
  * Show the code of a recording in an image, and say until when it opens the jump.
@@ -68,6 +69,8 @@ export function enterShare(id) {
   page = id;
   clearCode($("share-code"), $("share-words"));
   draw();
+  $("share-open").hidden = true;
+  if (id) void attempt(drawLinks);
 }
 
 /** Draw the words anew, in another language. */
@@ -80,6 +83,32 @@ async function toggle() {
   if (!$("share-code").hidden) return enterShare(id);
   await showCode(id, $("share-code"), $("share-words"), () => page === id);
   draw();
+  await attempt(drawLinks);
+}
+
+/** Draw the links that open the jump, each with a button that takes it back. */
+async function drawLinks() {
+  const id = page;
+  /** @type {{ number: number, made: string, ends: string }[]} */
+  const links = await call("GET", recordingPath(id, "/links"));
+  if (page !== id) return;
+  $("share-open").hidden = !links.length;
+  $("share-links").replaceChildren(...links.map(({ number, made, ends }) => make("li", {},
+    make("span", {}, t("share.from", { made: `${day(made)}, ${timeOfMinute(made)}`, day: day(ends), time: timeOfMinute(ends) })),
+    make("button", { type: "button", "data-needs": "operate", onclick: () => void attempt(() => takeBack(id, number)) }, t("share.back")))));
+}
+
+/**
+ * @param {string} id of the recording
+ * @param {number} number of the link
+ */
+async function takeBack(id, number) {
+  try {
+    await call("DELETE", recordingPath(id, `/links/${number}`));
+    tell("good", t("share.taken"));
+  } finally {
+    if (page === id) enterShare(id); // the code in sight may be the one that opens nothing any more
+  }
 }
 
 function draw() {

@@ -282,6 +282,11 @@ class Desk:
                 self._by_pulse = {int(pulse.pulse): pulse for jump in found.jumps for pulse in jump.pulses}
             return self._automatic[1]
 
+    def automatic_at(self, pulse: int) -> PulseMeasurements | None:
+        """What was measured automatically at a pulse; None: nothing."""
+        self.automatic()
+        return self._by_pulse.get(pulse)
+
     def oriented(self) -> CameraSystem:
         """The oriented cameras.
 
@@ -301,8 +306,7 @@ class Desk:
         )
 
     def _marks(self, session: Session, pulse: int) -> PulseMarks:
-        self.automatic()
-        return PulseMarks(pulse, self.log.times[pulse], session.at(pulse), self._by_pulse.get(pulse))
+        return PulseMarks(pulse, self.log.times[pulse], session.at(pulse), self.automatic_at(pulse))
 
     def _worst(self, operator: str, session: Session) -> list[Worst]:
         """The rays that fit worst, of all pulses that were looked at or marked."""

@@ -68,6 +68,17 @@ class OpenedLog:
         """The frames of a pulse by camera, grey values to measure in; those that are not there are left out."""
         return self._read(pulse)[0]
 
+    def frame(self, pulse: int, camera: str) -> Grey:
+        """The frame of a camera, (rows, columns) grey values to measure in.
+
+        Raises:
+            NoFrameError: there is none.
+        """
+        frames = self._read(pulse)[0]
+        if camera not in frames:
+            raise NoFrameError(self._why_none(pulse, camera))
+        return frames[camera]
+
     def png(self, pulse: int, camera: str, *, difference: bool = False) -> bytes:
         """A frame as a PNG file without loss, or its difference from the background.
 

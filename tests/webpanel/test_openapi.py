@@ -61,6 +61,8 @@ CALLS = {
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/actions",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/changes",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/import",
+    "POST /api/recordings/{recording_id}/digitizing/refine",
+    "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/track",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/export/{name}",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result",

@@ -23,9 +23,13 @@ from rig.api.digitizing import (
     OperatorName,
     OrientationState,
     PulseView,
+    Refined,
+    RefineOrder,
     Repeatability,
     SessionView,
     TapeOrder,
+    Tracked,
+    TrackOrder,
 )
 from webpanel.problems import ProblemError
 from webpanel.routes.common import ALONE, CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
@@ -120,6 +124,13 @@ def digitizing_router(desks: Desks) -> APIRouter:
         """The distance between two things, each clicked in two images or more; keeps nothing."""
         return desk.tape(order)
 
+    @router.post(base + "/refine", responses=CHANGING | refusals(404))
+    def refine_place(desk: AtDesk, order: RefineOrder) -> Refined:
+        """Find the disc or edge near a click to a part of a pixel, with its sigma; 422 says why there is none."""
+        from analysis.digitizing.following import refined  # noqa: PLC0415 - loaded with the first desk
+
+        return refined(desk, order)
+
     @router.get(base + "/repeatability", responses=refusals(404))
     def compare_operators(
         desk: AtDesk,
@@ -164,6 +175,13 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -
     ) -> Changes:
         """What was changed after a revision, also on another page; waits up to 20 s for a change."""
         return await run_sync(partial(desk.changes, operator, since, _WAIT_S), limiter=waiters, abandon_on_cancel=True)
+
+    @router.post(base + "/track", responses=CHANGING | refusals(404))
+    def track_things(desk: AtDesk, operator: Operator, order: TrackOrder) -> Tracked:
+        """Follow things through the images from where they are marked; one undo takes all back."""
+        from analysis.digitizing.following import follow  # noqa: PLC0415 - loaded with the first desk
+
+        return follow(desk, operator, order)
 
     @router.get(base + "/export/{name}", response_class=Response, responses=_FILE | refusals(404))
     async def export_marks(desk: AtDesk, operator: Operator, name: Exported) -> Response:

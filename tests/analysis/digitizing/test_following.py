@@ -1,0 +1,63 @@
+"""A hand-made start is carried through the jump; what cannot be told is not kept, and a person's own marks stay."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis.digitizing.desk import Desk
+from analysis.digitizing.following import follow, refined
+from bench.analysis.hill_logs import HillLog
+from rig.api.digitizing import MarkSource, PlaceAction, RefineOrder, TrackOrder, UndoAction
+from rig.errors import BadInputError, NoFitError
+from tests.analysis.digitizing.hill import clicks
+
+START = 20
+THINGS = ["P1", "P2", "P3", "P4", "right ski", "left ski"]
+
+
+def test_a_start_by_hand_is_carried_through_thirty_pulses(desk: Desk, jump: HillLog) -> None:
+    for click in clicks(desk, jump, 11, range(START, START + 1)):
+        desk.session("Anna").act(click.action())
+    by_hand = dict(desk.session("Anna").at(START))
+    for direction in (1, -1):
+        told = follow(desk, "Anna", TrackOrder(things=THINGS, pulse=START, direction=direction, most=18))
+        assert set(told.stopped) == set(THINGS)
+    assert desk.session("Anna").at(START) == by_hand
+    points, skis = [], []
+    for pulse in (p for p in desk.log.pulses if "points" in jump.truth[p]):
+        view, truth = desk.view("Anna", pulse), jump.truth[pulse]
+        for name, point in view.space.items():
+            if point.X is not None and point.sigma is not None:
+                points.append(np.abs(np.subtract(point.X, truth["points"][name]) / point.sigma).max())
+        for name, line in view.lines.items():
+            if line.slope is not None and pulse != START:
+                true = math.degrees(math.asin(truth["skis"][name.partition(" ")[0]]["direction"][2]))
+                skis.append(abs(line.slope.value - true) / line.slope.sigma)
+    assert len(points) > 4 * 28
+    assert max(points) < 5
+    assert skis
+    assert max(skis) < 5
+    sources = {entered.source for key, entered in desk.session("Anna").everything() if key.pulse != START}
+    assert sources == {MarkSource.TRACKED}
+    for _ in range(2):
+        desk.act("Anna", UndoAction(do="undo"))
+    assert dict(desk.session("Anna").everything()) == by_hand
+
+
+def test_what_is_not_marked_is_not_followed(desk: Desk) -> None:
+    with pytest.raises(BadInputError, match="none of these things is marked there"):
+        follow(desk, "Anna", TrackOrder(things=THINGS, pulse=START, direction=1))
+    desk.act("Anna", PlaceAction(do="place", pulse=START, camera="K1", thing="right ski", xy=(10, 10)))
+    told = follow(desk, "Anna", TrackOrder(things=["right ski"], pulse=START, direction=1))
+    assert told.stopped == {"right ski": "pulse 20: a ski needs two points in an image"}
+
+
+def test_a_click_on_a_marker_is_refined_and_one_beside_everything_refused(desk: Desk, jump: HillLog) -> None:
+    camera = desk.oriented()["K2"]
+    true = camera.project(np.array(jump.truth[START]["points"]["P1"]))
+    for dx, dy in ((1.2, -0.8), (-0.9, 0.4)):
+        place = refined(desk, RefineOrder(pulse=START, camera="K2", x=true[0] + dx, y=true[1] + dy, kind="disc"))
+        assert np.hypot(*(np.array(place.xy) - true)) < 0.5
+    with pytest.raises(NoFitError, match="no disc here"):
+        refined(desk, RefineOrder(pulse=START, camera="K2", x=600, y=20, kind="disc"))

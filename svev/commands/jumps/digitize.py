@@ -63,5 +63,5 @@ def digitize_command(
 
         for number in ENDINGS:
             signal.signal(number, end)
-        console.say(f"svev: measure at {url(listener, 'http')}{page}")
+        console.say(f"svev: measure at {url(listener, 'http').rstrip('/')}{page}")
         server.run(sockets=[listener])

@@ -1,18 +1,13 @@
 """Hands an operator's marks to other programs and takes them back: measurements, tables, folders of digitizers."""
 
 import tempfile
-import zipfile
-from collections.abc import Callable, Mapping
-from io import BytesIO
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from analysis.digitizing.desk import Desk
-from analysis.digitizing.exchange.argus import argus_files, read_argus
-from analysis.digitizing.exchange.csv_file import csv_of, read_csv
-from analysis.digitizing.exchange.dltdv import dltdv_files, read_dltdv
+from analysis.digitizing.exchange.formats import exported, imported
 from analysis.digitizing.journal import Entered, Key
 from analysis.digitizing.things import LINES
 from analysis.measurements.file import read_measurements, write_measurements
@@ -21,10 +16,6 @@ from rig.api.digitizing import Changed, MarkSource, MarkState
 from rig.errors import BadInputError
 
 MEASUREMENTS: Final = "measurements.json"
-DLTDV: Final = "dltdv.zip"
-_ARGUS_MARK: Final = b"_cam_1_x"
-#: All files of a folder of DLTdv together; ours have some hundred kB.
-_UNPACKED_MAX: Final = 64 << 20
 _SOURCES: Final = {Source.BY_HAND: MarkSource.HAND, Source.AUTOMATIC: MarkSource.AUTOMATIC}
 
 
@@ -39,7 +30,10 @@ def delivered(desk: Desk, operator: str, name: str) -> bytes:
     Raises:
         BadInputError: the marks do not go into such a file.
     """
-    return _WRITERS[name](desk, operator)
+    if name == MEASUREMENTS:
+        return _measurements(desk, operator)
+    marks, system = desk.session(operator).everything(), desk.orienting.system
+    return exported(name, marks, _sizes(desk), _range(desk), system)
 
 
 def taken_in(desk: Desk, operator: str, name: str, content: bytes) -> Changed:
@@ -48,14 +42,20 @@ def taken_in(desk: Desk, operator: str, name: str, content: bytes) -> Changed:
     Args:
         desk: of the log.
         operator: whose marks they become.
-        name: `measurements.json`, `marks.csv` (also of Argus Clicker), or `dltdv.zip`.
+        name: `measurements.json`; of every other name the content says what it is, a table, or points or a packed
+            folder of DLTdv or Argus Clicker.
         content: of the file.
 
     Raises:
         BadInputError: the file is none of these, or belongs to another recording.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        marks = _read(desk, Path(folder), name, content)
+    if name == MEASUREMENTS:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, name)
+            path.write_bytes(content)
+            marks = marks_of(path)
+    else:
+        marks = imported(content, _sizes(desk), _range(desk), desk.orienting.system)
     strange = next((key for key, _ in marks if key.pulse not in desk.log.times), None)
     if strange is not None:
         first, last = desk.log.pulses[0], desk.log.pulses[-1]
@@ -88,69 +88,11 @@ def marks_of(path: Path) -> list[tuple[Key, Entered]]:
     return marks
 
 
-def _read(desk: Desk, folder: Path, name: str, content: bytes) -> list[tuple[Key, Entered]]:
-    path = folder / name
-    cameras, pulses = list(desk.log.facts.cameras), _range(desk)
-    if name == DLTDV:
-        _unpack(content, folder)
-        found = next(iter(sorted(folder.glob("*xypts.csv"))), None)
-        if found is None:
-            raise BadInputError(f"{name}: holds no ...xypts.csv; pack the folder that DLTdv saved")
-        return read_dltdv(found, cameras, pulses, desk.orienting.system)
-    path.write_bytes(content)
-    if name == MEASUREMENTS:
-        return marks_of(path)
-    if _ARGUS_MARK in content[:4096]:
-        return read_argus(path, cameras, pulses, sizes=_sizes(desk))
-    return read_csv(path)
-
-
-def _unpack(content: bytes, folder: Path) -> None:
-    """Take the tables out of an archive; names of folders in it do not matter.
-
-    Raises:
-        BadInputError: it is no archive, or too large.
-    """
-    try:
-        with zipfile.ZipFile(BytesIO(content)) as archive:
-            tables = [each for each in archive.infolist() if each.filename.endswith((".csv", ".tsv"))]
-            if sum(each.file_size for each in tables) > _UNPACKED_MAX:
-                raise BadInputError(f"{DLTDV}: holds more than {_UNPACKED_MAX >> 20} MiB; pack the tables alone")
-            for each in tables:
-                (folder / Path(each.filename).name).write_bytes(archive.read(each))
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
-        raise BadInputError(f"{DLTDV}: cannot be unpacked ({error}); pack the folder again") from None
-
-
 def _measurements(desk: Desk, operator: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / MEASUREMENTS
         write_measurements(desk.measurements(operator), path)
         return path.read_bytes()
-
-
-def _table(desk: Desk, operator: str) -> bytes:
-    return csv_of(desk.session(operator).everything())
-
-
-def _dltdv(desk: Desk, operator: str) -> bytes:
-    marks = desk.session(operator).everything()
-    return _packed(*dltdv_files(marks, list(desk.log.facts.cameras), _range(desk), desk.orienting.system))
-
-
-def _argus(desk: Desk, operator: str) -> bytes:
-    marks, system = desk.session(operator).everything(), desk.orienting.system
-    return _packed(*argus_files(marks, list(desk.log.facts.cameras), _range(desk), system, sizes=_sizes(desk)))
-
-
-def _packed(files: Mapping[str, bytes], notes: tuple[str, ...]) -> bytes:
-    out = BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-        if notes:
-            archive.writestr("notes.txt", "\n".join(notes) + "\n")
-    return out.getvalue()
 
 
 def _range(desk: Desk) -> range:
@@ -159,11 +101,3 @@ def _range(desk: Desk) -> range:
 
 def _sizes(desk: Desk) -> dict[str, tuple[int, int]]:
     return {name: camera.size for name, camera in desk.log.facts.cameras.items()}
-
-
-_WRITERS: Final[Mapping[str, Callable[[Desk, str], bytes]]] = {
-    MEASUREMENTS: _measurements,
-    "marks.csv": _table,
-    DLTDV: _dltdv,
-    "argus.zip": _argus,
-}

@@ -8,7 +8,7 @@ Clicker loads; DLT coefficients, 11 rows with a column for each camera; and the 
 focal length, width, height, principal point, aspect, k1, k2, p1, p2, k3 (of the model of OpenCV).
 
 Clicker counts pixels from 0, from the bottom left corner, y up: it takes the place of the pointer in its window as it
-is. It reads points with 11 bits, i.e. to 1 px from 1024 px on, and takes 0 for no point; the files hold all digits.
+is. It reads points with 11 bits, i.e. to 0.5 px below 1024 px, and takes 0 for no point; the files hold all digits.
 
 Points are those of the images; the profile removes their distortion before the coefficients are used. It is our lens'
 but for the names if distortion is "projected" and there is neither affinity nor shear; otherwise the nearest one, and

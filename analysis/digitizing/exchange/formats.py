@@ -64,25 +64,17 @@ def imported(
         system: the oriented cameras; None: there are none.
 
     Raises:
-        BadInputError: it holds no marks, or such as do not fit the log.
+        BadInputError: it holds no marks.
     """
     with TemporaryDirectory(prefix="svev-marks-") as folder:
         try:
             if content.startswith(b"PK"):
-                marks = _read(_unpacked(content, Path(folder)), sizes, pulses, system)
-            else:
-                path = Path(folder, "xypts.csv")
-                path.write_bytes(content)
-                marks = _read(path, sizes, pulses, system)
+                return _read(_unpacked(content, Path(folder)), sizes, pulses, system)
+            path = Path(folder, "xypts.csv")
+            path.write_bytes(content)
+            return _read(path, sizes, pulses, system)
         except BadInputError as error:
             raise BadInputError(str(error).replace(f"{folder}/", "")) from None
-    for key, _ in marks:
-        if key.camera not in sizes or key.pulse not in pulses:
-            raise BadInputError(
-                f"{key.thing} is marked at pulse {key.pulse} in {key.camera}, and the log has {', '.join(sizes)} from "
-                f"{pulses.start} to {pulses[-1]}: choose a file of this recording"
-            )
-    return marks
 
 
 def _read(

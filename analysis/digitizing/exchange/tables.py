@@ -11,7 +11,7 @@ from rig.errors import BadInputError
 from rig.settings.strict_toml import read_bytes
 
 #: A sparse file may claim so many cells at most, so that no file can use up the memory.
-_CELLS_MAX = 50_000_000
+_CELLS_MAX = 20_000_000
 
 
 def table(headings: Sequence[str] | None, values: Floats, separator: str = ",") -> bytes:
@@ -54,8 +54,9 @@ def _number(word: str) -> float:
 
 
 def _dense(path: Path, entries: Floats) -> Floats:
-    rows, columns = (int(number) for number in entries[0, :2])
-    if not 0 <= rows * columns <= _CELLS_MAX or min(rows, columns) < 0 or entries.shape[1] != 3:
+    whole = entries.shape[1] == 3 and bool((np.abs(entries[:, :2]) <= _CELLS_MAX).all())
+    rows, columns = entries[0, :2].astype(int).tolist() if whole else (-1, -1)
+    if not (rows > 0 and columns > 0 and rows * columns <= _CELLS_MAX):
         raise BadInputError(f"{path}: is no sparse table of DLTdv; save the points again")
     places = entries[1:, :2].astype(int) - 1
     if ((places < 0) | (places >= (rows, columns))).any():

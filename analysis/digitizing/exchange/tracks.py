@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from pydantic import ValidationError
 
 from analysis.digitizing.journal import Entered, Key
 from analysis.digitizing.things import is_line
-from rig.api.digitizing import MarkState
+from rig.api.digitizing import Mark, MarkState
 from rig.arrays import Floats
+from rig.errors import BadInputError
 
 _VERTEX: Final = re.compile(r"(.+) ([0-9]{1,3})")
 
@@ -36,12 +38,22 @@ class Tracks:
     xy: Floats
 
     def marks(self) -> list[tuple[Key, Entered]]:
-        """The marks, all of them measured by hand, in the order of their keys."""
+        """The marks, all of them measured by hand, in the order of their keys.
+
+        Raises:
+            BadInputError: a name is none of a thing, or a place lies far outside of every image.
+        """
         found = []
         for frame, track, camera in np.argwhere(np.isfinite(self.xy).all(-1)).tolist():
             thing, vertex = _thing(self.names[track])
             x, y = self.xy[frame, track, camera].tolist()
             key = Key(self.first_pulse + frame, self.cameras[camera], thing, vertex)
+            try:
+                Mark(pulse=key.pulse, camera=key.camera, thing=thing, xy=(x, y))
+            except ValidationError as error:
+                first = error.errors()[0]
+                where = f"{thing!r} at pulse {key.pulse} in {key.camera}"
+                raise BadInputError(f"{where}: {first['loc'][0]}: {first['msg']}; correct it") from None
             found.append((key, Entered(MarkState.MEASURED, (x, y))))
         return sorted(found, key=lambda item: item[0])
 

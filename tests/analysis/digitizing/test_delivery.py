@@ -44,8 +44,10 @@ def test_argus_gets_its_folder_and_gives_the_points_back(desk: Desk, jump: HillL
         names = archive.namelist()
         points = archive.read(next(name for name in names if name.endswith("-xypts.csv")))
     assert any(name.endswith("-config.yaml") for name in names)
-    taken_in(desk, "Bo", "marks.csv", points)
-    assert [key for key, _ in desk.session("Bo").everything()] == [key for key, _ in desk.session("Anna").everything()]
+    keys = [key for key, _ in desk.session("Anna").everything()]
+    for operator, content in (("Bo", points), ("Cato", delivered(desk, "Anna", "argus.zip"))):
+        taken_in(desk, operator, "marks.csv", content)
+        assert [key for key, _ in desk.session(operator).everything()] == keys
 
 
 @pytest.mark.parametrize(

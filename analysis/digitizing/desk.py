@@ -56,13 +56,16 @@ class Desk:
     Args:
         files: the log and what lies beside it.
         source: reads survey or poses; gives None if nobody named any.
+        busy: whether a recording runs, which nothing here may disturb: what takes seconds is refused then.
 
     Raises:
         BadInputError: no such log, or it holds no pulse.
     """
 
-    def __init__(self, files: DeskFiles, source: Callable[[], Source | None]) -> None:
-        self.files = files
+    def __init__(
+        self, files: DeskFiles, source: Callable[[], Source | None], busy: Callable[[], bool] = lambda: False
+    ) -> None:
+        self.files, self._busy = files, busy
         self.log = OpenedLog(files.log)
         self.orienting = Orienting(self.log, source)
         self.computing = Computing(files.log, files.folder)
@@ -71,7 +74,19 @@ class Desk:
         self._lock = threading.Lock()
         self._automatic: tuple[tuple[int, int] | None, Measurements | None] = (None, None)
         self._by_pulse: dict[int, PulseMeasurements] = {}
-        self.orienting.begin()
+        if busy():
+            self.orienting.wait_for_order()
+        else:
+            self.orienting.begin()
+
+    def require_idle(self) -> None:
+        """Refuse what takes seconds while a recording runs.
+
+        Raises:
+            StateForbidsError: one runs.
+        """
+        if self._busy():
+            raise StateForbidsError("a recording runs, and this would take the computer's time: try again after it")
 
     def close(self) -> None:
         """Let other programs measure in this log."""
@@ -100,7 +115,12 @@ class Desk:
         )
 
     def orient(self, operator: str | None) -> OrientationState:
-        """Orient the cameras again: by the balls that an operator clicked, or by those that the images show."""
+        """Orient the cameras again: by the balls that an operator clicked, or by those that the images show.
+
+        Raises:
+            StateForbidsError: a recording runs.
+        """
+        self.require_idle()
         if operator is None:
             return self.orienting.begin()
         marks = {key: entered for key, entered in self.session(operator).everything() if key.thing.startswith(BALL)}
@@ -256,8 +276,9 @@ class Desk:
         """Begin to compute from an operator's marks.
 
         Raises:
-            StateForbidsError: nobody told where the balls are.
+            StateForbidsError: nobody told where the balls are, or a recording runs.
         """
+        self.require_idle()
 
         def order() -> tuple[Measurements, Source]:
             source = self.orienting.for_analysis

@@ -24,10 +24,16 @@ class Desks:
     Args:
         find: gives the files of a recording.
         source: reads survey or poses; gives None if nobody named any.
+        busy: whether the computer has something better to do, such as a recording; what takes seconds is refused then.
     """
 
-    def __init__(self, find: Callable[[str], DeskFiles], source: "Callable[[], Source | None]") -> None:
-        self._find, self._source = find, source
+    def __init__(
+        self,
+        find: Callable[[str], DeskFiles],
+        source: "Callable[[], Source | None]",
+        busy: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._find, self._source, self._busy = find, source, busy
         self._desks: OrderedDict[DeskFiles, Desk] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -43,7 +49,7 @@ class Desks:
         files = self._find(recording)
         with self._lock:
             if files not in self._desks:
-                self._desks[files] = Desk(files, self._source)
+                self._desks[files] = Desk(files, self._source, self._busy)
                 while len(self._desks) > _OPEN:
                     self._desks.popitem(last=False)[1].close()
             self._desks.move_to_end(files)

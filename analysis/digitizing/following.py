@@ -53,8 +53,10 @@ def follow(desk: Desk, operator: str, order: TrackOrder) -> Tracked:
     Raises:
         BadInputError: none of the things is marked there, or their marks contradict each other.
         UnknownRecordingError: the log has no such pulse.
+        StateForbidsError: a recording runs.
         StorageError: the disk refuses; nothing was kept.
     """
+    desk.require_idle()
     session = desk.session(operator)
     desk.view(operator, order.pulse)  # refuses a pulse that is none of the log
     marks = session.everything()

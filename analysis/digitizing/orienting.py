@@ -29,6 +29,7 @@ from rig.errors import BadInputError, LogDamagedError
 _FEWEST_BALLS: Final = 4
 _FAILURES: Final = (BadInputError, LogDamagedError, NotSolvableError, NotConvergedError, RefusedError)
 _NO_SOURCE: Final = "nobody told where the balls are: name the survey with --survey, or in [analysis] of the rig file"
+_RECORDING: Final = "a recording runs: orient the cameras when it has ended"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +70,10 @@ class Orienting:
         """The surveyed balls; None: no survey."""
         return self._given.surveyed() if isinstance(self._given, Survey) else None
 
+    def wait_for_order(self) -> None:
+        """Say that nothing begins by itself, since a recording runs."""
+        self._known = _Known(OrientationState(state="none", message=_RECORDING))
+
     def begin(self, marks: Mapping[Key, Entered] | None = None) -> OrientationState:
         """Begin to orient; while it works, nothing else begins.
 
@@ -84,6 +89,7 @@ class Orienting:
                 self._known = _Known(OrientationState(state="failed", message=str(error)))
                 return self.state
             if self._given is None:
+                self._known = _Known(OrientationState(state="none", message=_NO_SOURCE))
                 return self.state
             self._known = replace(self._known, state=OrientationState(state="working"))
             self._thread = threading.Thread(target=self._work, args=(self._given, marks), name="orienting", daemon=True)

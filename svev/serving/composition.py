@@ -229,7 +229,7 @@ def _desks(catalogue: Catalogue, supervisor: Supervisor) -> Desks:
             return None
         return read_source(given.survey, given.calibration)
 
-    return Desks(find, source)
+    return Desks(find, source, lambda: supervisor.status.recording is not None)
 
 
 def _telling(

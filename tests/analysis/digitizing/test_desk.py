@@ -1,6 +1,7 @@
 """An operator measures a jump: what follows in space is true, also while he drags, and nothing of it is lost."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +10,13 @@ import pytest
 
 from analysis.digitizing.desk import Desk
 from analysis.digitizing.epipolar import epipolar_curves
+from analysis.digitizing.files import DeskFiles
+from analysis.digitizing.following import follow
 from analysis.measurements.file import write_measurements
 from analysis.scene.camera_system import CameraSystem
 from bench.analysis.hill_logs import HillLog
 from photogrammetry.geometry.camera_model import INTERIOR
-from rig.api.digitizing import PlaceAction, StateAction, TapeOrder, UndoAction
+from rig.api.digitizing import PlaceAction, StateAction, TapeOrder, TrackOrder, UndoAction
 from rig.errors import BadInputError, StateForbidsError
 from tests.analysis.digitizing.hill import MEASURED, clicks, opened
 from tests.support.waiting import wait_until
@@ -169,6 +172,25 @@ def test_without_a_survey_images_are_measured_and_nothing_in_space(jump: HillLog
         desk.geometry("Anna", 20, "K1", "P1", (10, 20))
     with pytest.raises(StateForbidsError, match="nothing can be computed in space"):
         desk.compute("Anna")
+    desk.close()
+
+
+def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
+    recording = True
+    files = DeskFiles(jump.path, jump.path.with_suffix(".digitized"), jump.path.with_suffix(".measured"))
+    desk = Desk(files, lambda: None, lambda: recording)
+    assert desk.opening().orientation.message == "a recording runs: orient the cameras when it has ended"
+    calls: list[Callable[[], object]] = [
+        lambda: desk.orient(None),
+        lambda: desk.compute("Anna"),
+        lambda: follow(desk, "Anna", TrackOrder(things=["P1"], pulse=20, direction=1)),
+    ]
+    for call in calls:
+        with pytest.raises(StateForbidsError, match="a recording runs"):
+            call()
+    desk.act("Anna", PlaceAction(do="place", pulse=20, camera="K1", thing="P1", xy=(10, 20)))
+    recording = False
+    assert "--survey" in str(desk.orient(None).message)
     desk.close()
 
 

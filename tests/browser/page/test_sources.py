@@ -12,7 +12,18 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.api import athletes, comparison, jump, measuring, recordings, rehearsal, start_list, statement, status
+from rig.api import (
+    athletes,
+    comparison,
+    digitizing,
+    jump,
+    measuring,
+    recordings,
+    rehearsal,
+    start_list,
+    statement,
+    status,
+)
 from rig.api.cameras import aids, balls, light
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -62,7 +73,7 @@ def _placeholders(text: str) -> set[str]:
 
 def _sources() -> str:
     own_words = {PAGE / "i18n" / f"{language}{part}.js" for language in ("en", "nb") for part in PARTS}
-    return "\n".join(path.read_text() for path in [PAGE / "index.html", *MODULES] if path not in own_words)
+    return "\n".join(path.read_text() for path in [*sorted(PAGE.glob("*.html")), *MODULES] if path not in own_words)
 
 
 def test_the_types_of_the_modules_fit_together() -> None:
@@ -198,7 +209,7 @@ def _types() -> dict[str, list[str]]:
     types: dict[str, list[str]] = {}
     name = ""
     for line in "".join(
-        (PAGE / room / "types.js").read_text() for room in ("shared", "system", "recordings", "athletes")
+        (PAGE / room / "types.js").read_text() for room in ("shared", "system", "recordings", "athletes", "digitize")
     ).splitlines():
         if found := re.search(r"@typedef \{object\} (\w+)", line):
             name = found[1]
@@ -211,6 +222,7 @@ def _types() -> dict[str, list[str]]:
 @pytest.mark.parametrize("name", sorted(_types()))
 def test_the_shapes_are_those_of_the_api(name: str) -> None:
     rooms = (
+        digitizing,
         athletes,
         comparison,
         aids,
@@ -235,6 +247,7 @@ def test_modules_import_each_other_one_way() -> None:
     """Views see what is shared, never each other; only what is around them (`frame`, `main.js`) sees several."""
     sees = {
         "": {"athletes", "frame", "i18n", "jump", "live", "recordings", "shared", "system", "viewing"},
+        "digitize": {"digitize", "frame", "i18n", "shared"},
         "frame": {"frame", "i18n", "live", "recordings", "shared", "viewing"},
         **{view: {view, "i18n", "shared"} for view in ("athletes", "jump", "live", "system", "viewing")},
         "recordings": {"recordings", "viewing", "i18n", "shared"},
@@ -268,7 +281,7 @@ def test_modules_are_short(path: Path) -> None:
 
 def test_icons_that_are_shown_exist() -> None:
     drawn = set(re.findall(r'<symbol id="([\w-]+)"', (PAGE / "icons.svg").read_text()))
-    shown = set(re.findall(r"icons\.svg#([\w-]+)", (PAGE / "index.html").read_text()))
+    shown = set(re.findall(r"icons\.svg#([\w-]+)", _sources()))
     shown |= set(re.findall(r'\bicon(?:\(|: )"([\w-]+)"', _sources()))
     shown |= {state.value for state in status.State} - {"disarming"} | {level.value for level in statement.Level}
     assert shown <= drawn

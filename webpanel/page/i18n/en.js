@@ -2,6 +2,7 @@
 
 import { athletes } from "./en-athletes.js";
 import { check } from "./en-check.js";
+import { digitize } from "./en-digitize.js";
 import { jump } from "./en-jump.js";
 import { kinogram } from "./en-kinogram.js";
 import { log } from "./en-log.js";
@@ -12,6 +13,7 @@ import { viewing } from "./en-viewing.js";
 export const en = {
   ...athletes,
   ...check,
+  ...digitize,
   ...jump,
   ...kinogram,
   ...log,

@@ -89,6 +89,7 @@ export const statements = {
   confirm_first: ["opptaket har akkurat begynt og fortsetter: hold knappen inne for å stoppe det likevel"],
   unknown_line: ["denne linjen finnes ikke (lenger) i startlisten"],
   unknown_recording: ["dette opptaket finnes ikke (lenger): se i listen og i papirkurven"],
+  unknown_file: ["denne filen finnes ikke: regn ut først"],
   still_recording: ["opptaket er ikke ferdig: stopp det først"],
   storage: ["det kan ikke skrives på disken: sjekk plass og feste"],
   log_damaged: ["dette bildet kan ikke leses: kjør svev verify på opptaket"],

@@ -2,6 +2,7 @@
 
 import { athletes } from "./nb-athletes.js";
 import { check } from "./nb-check.js";
+import { digitize } from "./nb-digitize.js";
 import { jump } from "./nb-jump.js";
 import { kinogram } from "./nb-kinogram.js";
 import { log } from "./nb-log.js";
@@ -12,6 +13,7 @@ import { viewing } from "./nb-viewing.js";
 export const nb = {
   ...athletes,
   ...check,
+  ...digitize,
   ...jump,
   ...kinogram,
   ...log,

@@ -158,10 +158,12 @@ export function draw() {
   $("recording-verdict").replaceChildren(makeMark(verdict.level, verdict.level, [text, advice].filter(Boolean).join(" – ")));
   writeFields($("recording-session"), session);
   drawFacts(recording);
-  $("recording-buttons").replaceChildren(...isRunning() ? [] : [
+  const buttons = isRunning() ? [] : [
     make("a", { class: "button primary", href: partOf(id, "file"), download: "" }, icon("download"), make("span", {}, t("recording.download"))),
+    recording.deleted || empty ? null : make("a", { class: "button", id: "recording-digitize", href: `./digitize.html?recording=${encodeURIComponent(id)}`, "data-needs": "operate" }, icon("zoom-in"), make("span", {}, t("digitize.link"))),
     recording.deleted ? makeButton("restore", t("trash.restore"), restoreShown) : makeButton("trash", t("recording.delete"), deleteShown),
-  ]);
+  ];
+  $("recording-buttons").replaceChildren(...buttons.filter((button) => button !== null));
 }
 
 /**

@@ -1,0 +1,163 @@
+"""Measuring with the mouse, with keys alone, with a finger, and in two browsers at once."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from rig.arrays import Floats
+from tests.browser.conftest import Open
+from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_of, enter, screen, seen, settled
+
+#: Colour of the curves that come from K1, as `overlay.js` has it.
+RED = np.array([255, 107, 107])
+
+
+def _thing(page: Page, thing: str) -> Any:
+    return page.locator(f'[data-thing="{thing}"]')
+
+
+def _signs(page: Page, thing: str) -> list[str | None]:
+    return [sign.get_attribute("data-letter") for sign in _thing(page, thing).locator(".sign").all()]
+
+
+def _curve_height(page: Page, camera: str, at: Floats) -> float:
+    """How far below (or above) a place on the page a curve from K1 is drawn, CSS px."""
+    alike = np.abs(seen(page, at, (2.5, 60.5)) - RED).max(axis=2) < 40
+    assert alike.any(), f"no curve in {camera}"
+    return float(np.nonzero(alike.any(axis=1))[0].mean() - 60)
+
+
+def test_a_point_in_three_views_with_curves_and_a_length(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=1700, height=900)
+    page.locator("#advance").select_option("view")
+    page.locator("#loupe").select_option("0")
+    where = {camera: screen(page, camera, desk.true(camera, "P1")) for camera in ("K1", "K2", "K3")}
+    page.mouse.move(*where["K1"])
+    expect(page.locator('[data-of="P1"][data-live="true"]')).to_be_visible()
+    settled(page)
+    assert abs(_curve_height(page, "K2", where["K2"])) < 2, "while the pointer moves"
+    page.mouse.click(*where["K1"])
+    expect(page.locator('.pane[data-camera="K2"]')).to_have_class(re.compile("active"))
+    page.mouse.move(5, 5)
+    settled(page)
+    expect(page.locator('[data-of="P1"]')).to_contain_text("one ray")
+    assert abs(_curve_height(page, "K2", where["K2"])) < 2, "of the mark"
+    page.mouse.click(*where["K2"])
+    page.mouse.click(*where["K3"])
+    page.mouse.move(5, 5)
+    expect(page.locator('[data-of="P1"]')).to_contain_text("controlled")
+    expect(_thing(page, "P2")).to_have_attribute("aria-pressed", "true")
+    found = desk.view()["space"]["P1"]
+    off = np.array(found["X"]) - desk.log.truth[PULSE]["points"]["P1"]
+    assert (np.abs(off) < 5 * np.array(found["sigma"])).all()
+    page.locator("#tape").click()
+    for camera in ("K1", "K2"):
+        page.mouse.click(*screen(page, camera, desk.true(camera, "P3")))
+    for camera in ("K1", "K2"):
+        page.mouse.click(*screen(page, camera, desk.true(camera, "P4")))
+    length = np.linalg.norm(np.subtract(*(desk.log.truth[PULSE]["points"][name] for name in ("P3", "P4"))))
+    expect(page.locator("#tape-says")).to_contain_text(re.compile(rf"Length {length:.1f}"))
+
+
+def test_a_jump_measured_with_keys_alone(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=1280, height=900, reduced_motion="reduce")
+    page.keyboard.press("Enter")  # the crosshair is in the middle
+    for _ in range(3):
+        page.keyboard.press("l")
+    page.keyboard.press("Enter")
+    expect(_thing(page, "P2")).to_have_attribute("aria-pressed", "true")
+    desk.wait_for(1)
+    first = desk.mark("K1", "P1")
+    assert first is not None
+    page.keyboard.press("ArrowRight")  # what was placed last, as nothing is said of the next one
+    page.keyboard.press("Shift+ArrowUp")
+    page.keyboard.press(".")
+    expect(page.locator("#sigma")).to_have_value("0.625")
+    desk.wait_for(4)
+    moved = desk.mark("K1", "P1")
+    assert moved is not None
+    assert np.subtract(moved["xy"], first["xy"]) == pytest.approx([0.1, -1.0], abs=1e-9)
+    assert moved["sigma"] == [0.625, 0.625]
+    page.keyboard.press("c")
+    expect(_thing(page, "P3")).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("v")
+    page.keyboard.press("b")
+    expect(page.locator("#guess-next")).to_be_visible()
+    page.keyboard.press("Enter")
+    expect(_thing(page, "right ski")).to_have_attribute("aria-pressed", "true")
+    for _ in range(2):
+        page.keyboard.press("l")
+        page.keyboard.press("Enter")
+    expect(_thing(page, "left ski")).to_have_attribute("aria-pressed", "true")
+    assert [_signs(page, name)[0] for name in ("P1", "P2", "P3", "P4", "right ski")] == ["m", "h", "n", "g", "m"]
+    expect(page.locator(".pane.active .pane-stated")).to_have_text("P2 hidden, P3 not visible")
+    desk.wait_for(9)
+    kept = desk.session()
+    done = kept["undo"]
+    assert done == 9
+    for _ in range(done):
+        page.keyboard.press("z")
+    desk.wait_for(2 * done)
+    expect(page.locator("#undo")).to_be_disabled()
+    assert not any(desk.view()["marks"].values())
+    for _ in range(done):
+        page.keyboard.press("Shift+Z")
+    desk.wait_for(3 * done)
+    expect(page.locator("#redo")).to_be_disabled()
+    assert desk.session()["coverage"] == kept["coverage"]
+    page.keyboard.press("x")
+    page.keyboard.press("?")
+    expect(page.get_by_role("heading", name="Help and keys")).to_be_visible()
+    expect(page.locator("#keys-list")).to_contain_text("measure here next")
+    page.keyboard.press("Escape")
+    page.keyboard.press("End")
+    expect(page.locator("#pulse-number")).to_have_text("20")
+    page.keyboard.press("p")
+    expect(page.locator("#play")).to_have_attribute("aria-label", "Pause")
+    page.keyboard.press("p")
+
+
+def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=820, height=1100, has_touch=True)
+    client = page.context.new_cdp_session(page)
+    box = canvas_of(page, "K1")
+    middle = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+
+    def touch(kind: str, *places: Any) -> None:
+        points = [{"x": float(x), "y": float(y), "id": index} for index, (x, y) in enumerate(places)]
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", middle)
+    for step in range(1, 6):
+        touch("touchMove", np.add(middle, [6 * step, 0]))
+    settled(page)
+    assert desk.mark("K1", "P1") is None, "while the finger is down"
+    touch("touchEnd")
+    expect(_thing(page, "P2")).to_have_attribute("aria-pressed", "true")
+    desk.wait_for(1)
+    mark = desk.mark("K1", "P1")
+    assert mark is not None
+    assert np.abs(screen(page, "K1", np.array(mark["xy"])) - np.add(middle, [30, 0])).max() < 0.05
+    touch("touchStart", np.subtract(middle, [40, 0]))
+    touch("touchStart", np.subtract(middle, [40, 0]), np.add(middle, [40, 0]))
+    for step in range(1, 6):
+        touch("touchMove", np.subtract(middle, [40 + 16 * step, 0]), np.add(middle, [40 + 16 * step, 0]))
+    touch("touchEnd")
+    expect(page.locator(".pane.active .pane-where")).to_contain_text(re.compile(r"2\.\d\u00d7"))
+    assert desk.session()["revision"] == 1, "two fingers measure nothing"
+
+
+def test_two_browsers_on_one_session_see_each_other(desk: Desk, open_page: Open) -> None:
+    first = enter(open_page, desk)
+    second = enter(open_page, desk)
+    at = screen(first, "K1", desk.true("K1", "P1"))
+    first.mouse.click(*at)
+    expect(_thing(second, "P1").locator(".sign").first).to_have_attribute("data-letter", "m")
+    second.keyboard.press("c")
+    second.keyboard.press("z")
+    second.keyboard.press("z")
+    expect(_thing(first, "P1").locator(".sign").first).to_have_attribute("data-letter", "")
+    assert desk.session(OPERATOR)["redo"] == 2

@@ -1,0 +1,71 @@
+/** Puts the page of measuring by hand together: `digitize.html?recording=ID`. */
+
+import { startLogin } from "../frame/login.js";
+import { say, startLanguage, t } from "../i18n/i18n.js";
+import { Problem } from "../shared/api.js";
+import { $, setText } from "../shared/dom.js";
+import { startFiles } from "./files.js";
+import { startGeometry } from "./geometry.js";
+import { startKeys } from "./keys.js";
+import { accept, refineTarget } from "./marking.js";
+import { startNumbers } from "./numbers.js";
+import { startOperator } from "./operator.js";
+import { startOrientation } from "./orientation.js";
+import { startPanes } from "./panes.js";
+import { startPicture } from "./picture.js";
+import { drawSpeeds, startPulses } from "./pulses.js";
+import { drawResult, startResults } from "./results.js";
+import { getOpening, recording } from "./server.js";
+import { takeBack } from "./session.js";
+import { cameras, change, redraw, state, watch } from "./state.js";
+import { startTape } from "./tape.js";
+import { startThings } from "./things.js";
+import { startTracking } from "./tracking.js";
+
+startLanguage();
+startLogin(() => location.reload());
+void begin();
+
+async function begin() {
+  try {
+    await open();
+  } catch (error) {
+    if (!(error instanceof Problem)) throw error;
+    setText($("opening"), say({ code: error.code, text: error.message }).text);
+  }
+}
+
+async function open() {
+  const opening = await getOpening();
+  document.title = t("digitize.title_of", { recording });
+  setText($("recording"), opening.recording);
+  change({
+    opening,
+    pulse: opening.jump?.takeoff ?? opening.jump?.first ?? opening.pulses[0],
+    camera: opening.cameras[0].name,
+    thing: opening.things[0].name,
+    group: opening.things[0].group,
+  });
+  $("opening").hidden = true;
+  $("desk").hidden = false;
+  startPanes();
+  for (const start of [startThings, startPulses, startNumbers, startPicture, startGeometry, startOrientation, startTracking, startResults, startFiles, startTape]) start();
+  startKeys(() => { drawSpeeds(); drawResult(); redraw(); });
+  $("undo").addEventListener("click", () => void takeBack("undo"));
+  $("redo").addEventListener("click", () => void takeBack("redo"));
+  $("act-refine").addEventListener("click", () => void refineTarget());
+  $("act-accept").addEventListener("click", () => void accept(false));
+  $("act-accept-all").addEventListener("click", () => void accept(true));
+  watch(drawHead);
+  startOperator();
+}
+
+function drawHead() {
+  const { session, busy, cut } = state;
+  $("undo").disabled = !session?.undo;
+  $("redo").disabled = !session?.redo;
+  $("act-accept").disabled = !state.view?.automatic[state.camera]?.[state.thing];
+  $("act-accept-all").disabled = !cameras().some((camera) => Object.keys(state.view?.automatic[camera] ?? {}).length);
+  setText($("busy"), cut ? t("digitize.cut") : busy ? t(busy) : "");
+  $("busy").hidden = !cut && !busy;
+}

@@ -1,0 +1,102 @@
+/**
+ * Mouse, pen and fingers on the picture of a camera.
+ *
+ * One finger, the pen or the left button measures; two fingers, the middle button, or the left one while the space key is
+ * held move the picture; wheel and two fingers zoom.
+ *
+ * @typedef {[number, number]} Place CSS px in the canvas
+ * @typedef {object} Hand
+ * @property {(at: Place, finger: boolean) => void} hover
+ * @property {() => void} leave
+ * @property {(at: Place, finger: boolean) => void} press
+ * @property {(at: Place, finger: boolean, begun: Place) => void} drag
+ * @property {(at: Place, begun: Place, path: Place[]) => void} release with the places passed on the way; two or fewer for a click
+ * @property {() => void} cancel
+ * @property {(dx: number, dy: number) => void} pan
+ * @property {(factor: number, at: Place) => void} zoom
+ */
+
+const WHEEL_STEP = 0.0018;
+/** A hand that moves less than this, CSS px, does not drag: mouse, and finger. */
+const [STILL_MOUSE, STILL_FINGER] = [3, 8];
+
+let spaceHeld = false;
+addEventListener("keydown", (event) => { if (event.key === " ") spaceHeld = true; });
+addEventListener("keyup", (event) => { if (event.key === " ") spaceHeld = false; });
+addEventListener("blur", () => { spaceHeld = false; });
+
+/**
+ * @param {HTMLElement} canvas
+ * @param {Hand} hand
+ */
+export function watchPointer(canvas, hand) {
+  /** @type {Map<number, Place>} */
+  const down = new Map();
+  /** @type {{ begun: Place, path: Place[], dragging: boolean }|null} */
+  let measuring = null;
+
+  /** @param {MouseEvent} event @returns {Place} */
+  function placeOf(event) {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  canvas.addEventListener("pointerdown", (event) => {
+    const at = placeOf(event);
+    const moving = event.button === 1 || spaceHeld;
+    if (!moving && event.button !== 0) return;
+    event.preventDefault();
+    canvas.focus({ preventScroll: true });
+    canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, at);
+    if (down.size > 1 || moving) {
+      if (measuring) hand.cancel();
+      measuring = null;
+      return;
+    }
+    measuring = { begun: at, path: [at], dragging: false };
+    hand.press(at, event.pointerType === "touch");
+  });
+
+  canvas.addEventListener("pointermove", (event) => {
+    const [at, before, finger] = [placeOf(event), down.get(event.pointerId), event.pointerType === "touch"];
+    if (!before) {
+      if (!finger) hand.hover(at, false);
+      return;
+    }
+    const other = [...down].find(([id]) => id !== event.pointerId)?.[1];
+    down.set(event.pointerId, at);
+    if (measuring) {
+      measuring.dragging ||= Math.hypot(at[0] - measuring.begun[0], at[1] - measuring.begun[1]) > (finger ? STILL_FINGER : STILL_MOUSE);
+      if (!measuring.dragging) return;
+      measuring.path.push(at);
+      hand.drag(at, finger, measuring.begun);
+    } else if (other) {
+      const was = Math.hypot(before[0] - other[0], before[1] - other[1]);
+      hand.pan((at[0] - before[0]) / 2, (at[1] - before[1]) / 2);
+      if (was > 0) hand.zoom(Math.hypot(at[0] - other[0], at[1] - other[1]) / was, [(at[0] + other[0]) / 2, (at[1] + other[1]) / 2]);
+    } else hand.pan(at[0] - before[0], at[1] - before[1]);
+  });
+
+  canvas.addEventListener("pointerup", (event) => {
+    down.delete(event.pointerId);
+    if (!measuring) return;
+    const { begun, path, dragging } = measuring;
+    measuring = null;
+    hand.release(dragging ? placeOf(event) : begun, begun, dragging ? path : [begun]);
+    if (event.pointerType === "touch") hand.leave();
+  });
+
+  canvas.addEventListener("pointercancel", (event) => {
+    down.delete(event.pointerId);
+    measuring = null;
+    hand.cancel();
+  });
+
+  canvas.addEventListener("pointerleave", (event) => { if (!down.has(event.pointerId)) hand.leave(); });
+
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    hand.zoom(Math.exp(-event.deltaY * WHEEL_STEP), placeOf(event));
+  }, { passive: false });
+}

@@ -1,0 +1,168 @@
+/**
+ * The shapes of the answers about measuring by hand, as in rig/api/digitizing.py (a test compares them).
+ *
+ * @typedef {[number, number]} Place px; (0, 0) is the centre of the top-left pixel
+ * @typedef {"measured"|"guess"|"hidden"|"not visible"} MarkState
+ * @typedef {"hand"|"refined"|"tracked"|"automatic"} MarkSource
+ *
+ * @typedef {object} Estimate
+ * @property {number} value
+ * @property {number} sigma
+ *
+ * @typedef {object} Mark
+ * @property {number} pulse
+ * @property {string} camera
+ * @property {string} thing
+ * @property {number|null} vertex
+ * @property {MarkState} state
+ * @property {Place|null} xy
+ * @property {[number, number]|null} sigma
+ * @property {MarkSource} source
+ *
+ * @typedef {object} LineMarks
+ * @property {MarkState} state
+ * @property {Mark[]} vertices
+ *
+ * @typedef {object} AutomaticPoint
+ * @property {Place} xy
+ * @property {[number, number]} sigma
+ * @typedef {object} AutomaticLine
+ * @property {Place[]} xy
+ *
+ * @typedef {object} SpacePoint
+ * @property {[number, number, number]|null} X
+ * @property {[number, number, number]|null} sigma
+ * @property {string} status
+ * @property {string[]} rays
+ * @property {Record<string, Place>} residuals
+ * @property {Record<string, number>} w
+ * @property {string|null} finding
+ *
+ * @typedef {object} SideCheck
+ * @property {boolean} ok
+ * @property {string} message
+ * @typedef {object} SpaceLine
+ * @property {Estimate|null} slope
+ * @property {Estimate|null} heading
+ * @property {string} status
+ * @property {Record<string, number>} w
+ * @property {string|null} finding
+ * @property {SideCheck|null} sides
+ *
+ * @typedef {object} PredictedPoint
+ * @property {Place} xy
+ * @property {[number, number, number]} ellipse
+ * @property {"rays"|"time"} source
+ *
+ * @typedef {object} PulseView
+ * @property {number} revision
+ * @property {number} pulse
+ * @property {Record<string, Record<string, Mark|LineMarks>>} marks
+ * @property {Record<string, Record<string, AutomaticPoint|AutomaticLine>>} automatic
+ * @property {Record<string, SpacePoint>} space
+ * @property {Record<string, SpaceLine>} lines
+ * @property {Record<string, Record<string, PredictedPoint>>} predicted
+ * @property {Record<string, Record<string, Place[]>>} previous
+ * @property {Record<string, Estimate>} figures
+ *
+ * @typedef {object} Touched
+ * @property {number} pulse
+ * @property {string} camera
+ * @property {string} thing
+ * @typedef {object} Changed
+ * @property {number} revision
+ * @property {number} undo
+ * @property {number} redo
+ * @property {Touched|null} touched
+ * @property {PulseView|null} view
+ * @typedef {object} Changes
+ * @property {number} revision
+ * @property {Touched[]} touched
+ *
+ * @typedef {object} Worst
+ * @property {number} pulse
+ * @property {string} camera
+ * @property {string} thing
+ * @property {number} w
+ * @typedef {object} SessionView
+ * @property {number} revision
+ * @property {number} undo
+ * @property {number} redo
+ * @property {Record<string, Record<string, Record<string, string>>>} coverage
+ * @property {Worst[]} worst
+ * @property {Record<string, Record<string, Mark>>} balls
+ *
+ * @typedef {object} Thing
+ * @property {string} name
+ * @property {"point"|"line"|"ball"} kind
+ * @property {string} title
+ * @property {string} group
+ *
+ * @typedef {object} OrientationState
+ * @property {"none"|"working"|"done"|"failed"} state
+ * @property {string|null} message
+ * @property {string[]} findings
+ *
+ * @typedef {object} ViewedCamera
+ * @property {string} name
+ * @property {[number, number]} size
+ * @property {boolean} oriented
+ * @typedef {object} JumpSpan
+ * @property {number} first
+ * @property {number} last
+ * @property {number|null} takeoff
+ *
+ * @typedef {object} Opening
+ * @property {string} recording
+ * @property {number} rate_hz
+ * @property {ViewedCamera[]} cameras
+ * @property {number[]} pulses
+ * @property {Record<string, string>} status
+ * @property {Thing[]} things
+ * @property {OrientationState} orientation
+ * @property {string[]} operators
+ * @property {JumpSpan|null} jump
+ *
+ * @typedef {object} Curve
+ * @property {Place[]} line
+ * @property {Place[]} low
+ * @property {Place[]} high
+ * @typedef {object} Geometry
+ * @property {Record<string, Curve>} curves
+ * @property {SpacePoint|null} space
+ * @property {Record<string, PredictedPoint>} predicted
+ *
+ * @typedef {object} Refined
+ * @property {Place} xy
+ * @property {[number, number]} sigma
+ * @property {string} kind
+ * @typedef {object} Tracked
+ * @property {number} revision
+ * @property {Record<string, number[]>} tracked
+ * @property {Record<string, string>} stopped
+ * @typedef {object} Suggestion
+ * @property {number} pulse
+ * @property {string} camera
+ * @property {string} thing
+ * @property {string} why
+ *
+ * @typedef {object} CurvePoint
+ * @property {number} pulse
+ * @property {number} value
+ * @property {number} sigma
+ * @typedef {object} HandResult
+ * @property {"none"|"computing"|"done"|"failed"} state
+ * @property {string|null} message
+ * @property {string|null} verdict
+ * @property {Record<string, CurvePoint[]>} curves
+ * @property {string[]} files
+ *
+ * @typedef {object} Repeatability
+ * @property {string[]} operators
+ * @property {Record<string, Estimate>} points
+ * @property {Record<string, number>} count
+ * @property {Record<string, Estimate>} angles
+ * @property {string} message
+ */
+
+export {};

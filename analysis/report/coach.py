@@ -55,13 +55,16 @@ _MORE: Final = Said(
     "How the cameras were oriented, and the test of every ray: protocol.html.",
     "Hvordan kameraene ble orientert, og testen av hver stråle: protocol.html (på engelsk).",
 )
+#: Fields of a session that are not on the page, which is sent on and opened by the link to a jump: what was noted about
+#: the athlete, by whom, and how the recording is found again.
+_UNSAID: Final = frozenset({"athlete", "recording", "notes", "operator", "tags", "favourite"})
+#: How the fields of notes at single pulses begin.
+_NOTE: Final = "note."
 #: Fields of a session as a coach calls them.
 _FIELDS: Final = {
     "bib": Said("bib", "startnummer"),
     "gate": Said("gate", "bom"),
     "wind": Said("wind", "vind"),
-    "notes": Said("notes", "merknad"),
-    "operator": Said("operator", "operatør"),
     "club": Said("club", "klubb"),
     "round": Said("round", "omgang"),
     "session": Said("session", "økt"),
@@ -166,11 +169,10 @@ def _recording(result: MeasuredRecording) -> Said:
 
 
 def _head(result: MeasuredRecording) -> str:
-    elsewhere = {"athlete", "recording"}
     facts = [
         Said(f"{name.english} {value}", f"{name.norwegian} {value}")
         for key, value in result.session.items()
-        if key not in elsewhere and value.strip() and (name := _FIELDS.get(key, same(key)))
+        if key not in _UNSAID and not key.startswith(_NOTE) and value.strip() and (name := _FIELDS.get(key, same(key)))
     ]
     times = [pulse.time for jump in result.jumps for pulse in jump.pulses[:1]]
     if times:

@@ -30,9 +30,9 @@ _ADMINISTERING: Final = (
     re.compile(r"POST /api/recordings/[^/]+/restore"),
     re.compile(r"[A-Z]+ /api/(rig|service)(/.*)?"),
 )
-#: What the link to a recording shows of it; neither the log itself nor what was noted about it.
+#: What the link to a recording shows of it; neither the log itself nor what was noted about it, as in `jumper.json`.
 _SHOWN_BY_LINK: Final = re.compile(
-    r"/api/recordings/([^/]+)(?:/measurement|/measurement/files/[^/]+|/pulses|/pulses/[^/]+\.jpg|/moment|/thumbnail\.jpg)?"
+    r"/api/recordings/([^/]+)(?:/measurement|/measurement/files/(?!jumper\.json)[^/]+|/pulses|/pulses/[^/]+\.jpg|/moment|/thumbnail\.jpg)?"
 )
 #: What calls did, in words; a call about a recording has its id as the first group.
 _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (

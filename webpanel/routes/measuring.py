@@ -3,11 +3,12 @@
 from http import HTTPStatus
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path, Query
+from fastapi import APIRouter, Depends, Path, Query, Request
 from fastapi.responses import FileResponse
 
 from rig.api.measuring import Measurement
 from service.seam.rig import RigService
+from webpanel.door.roles import shown_by_link
 from webpanel.door.streams import Streams
 from webpanel.routes.common import ALONE, CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.files import attachment
@@ -38,14 +39,19 @@ def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
     router = strict_router("Measurements")
 
     @router.get("/recordings/{recording_id}/measurement", responses=refusals(404, 409))
-    def get_measurement(recording_id: RecordingId, jumps: WithJumps = True) -> Measurement:
+    def get_measurement(recording_id: RecordingId, request: Request, jumps: WithJumps = True) -> Measurement:
         """What is known of the jumps of a recording, and how far its measuring is.
 
         The log of every recording is measured by itself after its end, if the rig file has `[analysis]`; until then the
         figures are those that were measured live (`live`), and `jumps` is empty. Progress is in `measuring` of
         `GET /status` and its events.
         """
-        return service.measurement(recording_id, jumps=jumps)
+        found, caller = service.measurement(recording_id, jumps=jumps), request.state.caller
+        own = f"/api/recordings/{recording_id}/measurement/files"
+        files = [
+            name for name in found.files if not caller.recording or shown_by_link("GET", f"{own}/{name}", recording_id)
+        ]
+        return found.model_copy(update={"files": tuple(files)})
 
     @router.post(
         "/recordings/{recording_id}/measurement", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404)

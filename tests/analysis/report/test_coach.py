@@ -27,7 +27,8 @@ from tests.analysis.result.recordings import without_takeoff
 from tests.analysis.simulated import RATE_HZ, true_cameras
 
 PERPENDICULAR = {1: Quantity(2.314, 0.082)}
-NASTY = {"athlete": "Ola </script><b>Nordmann</b>", "bib": '1"7', "notes": "<img src=x onerror=alert(1)>", "gate": ""}
+NASTY = {"athlete": "Ola </script><b>Nordmann</b>", "bib": '1"7', "club": "<img src=x onerror=alert(1)>", "gate": ""}
+NOTED = {"notes": "sore knee", "operator": "Kari", "tags": "fall", "favourite": "yes", "note.31": "ski opens"}
 
 
 def _page(log: Path, result: MeasuredRecording) -> str:
@@ -37,7 +38,15 @@ def _page(log: Path, result: MeasuredRecording) -> str:
 @pytest.fixture(scope="module")
 def page(jump_log: Path) -> str:
     """The page of one jump."""
-    return _page(jump_log, replace(measured_recording(), session=NASTY))
+    return _page(jump_log, replace(measured_recording(), session=NASTY | NOTED))
+
+
+def test_what_was_noted_about_the_athlete_is_not_on_a_page_that_is_sent_on(page: str) -> None:
+    assert not [
+        text
+        for text in ("sore knee", "Kari", "fall", "favourite", "note.31")
+        if re.search(rf">[^<]*{text}[^<]*<", page)
+    ]
 
 
 def _frames(page: str) -> list[dict[str, Any]]:

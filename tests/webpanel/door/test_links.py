@@ -110,7 +110,17 @@ def shared(service: MemoryService, loopback: Loopback) -> Iterator[Shared]:
 SHOWN = ("", "/measurement?jumps=false", "/measurement/files/report.html", "/pulses", "/pulses/1.jpg?width=64",
          "/moment", "/thumbnail.jpg")  # fmt: skip
 #: What a link does not open of its own recording.
-HIDDEN = ("/file", "/file.sha256", "/notes", "/voice-notes", "/pulses/1.png", "/link", "/links", "/exports")
+HIDDEN = (
+    "/file",
+    "/file.sha256",
+    "/notes",
+    "/voice-notes",
+    "/pulses/1.png",
+    "/link",
+    "/links",
+    "/exports",
+    "/measurement/files/jumper.json",
+)
 
 
 def test_a_link_opens_the_page_of_its_jump(shared: Shared) -> None:
@@ -131,6 +141,10 @@ def test_what_was_noted_about_the_athlete_is_not_shown(shared: Shared) -> None:
         session = phone.get("/api/recordings/jump-1").json()["session"]
         assert (session["athlete"], session["notes"], session["operator"]) == ("Anna Berg", "", "")
         assert coach.get("/api/recordings/jump-1").json()["session"]["notes"] == "sore knee"
+        files = phone.get("/api/recordings/jump-1/measurement?jumps=false").json()["files"]
+        assert "report.html" in files
+        assert "jumper.json" not in files  # which has the whole session
+        assert "jumper.json" in coach.get("/api/recordings/jump-1/measurement?jumps=false").json()["files"]
 
 
 def test_a_link_opens_nothing_else_of_its_recording_and_changes_nothing(shared: Shared) -> None:

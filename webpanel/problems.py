@@ -24,6 +24,7 @@ from rig.errors import (
     UnknownLineError,
     UnknownRecordingError,
 )
+from rig.phrase import Phrase
 
 _PAGE_POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; media-src 'self'; "
@@ -78,6 +79,7 @@ class Problem(BaseModel):
     detail: str
     instance: str = ""
     code: str
+    said: Phrase | None = Field(None, description="`detail` with a code of its own, where it has one")
     errors: tuple[FieldError, ...] = Field((), description="with status 422: what is wrong, one by one")
 
 
@@ -99,9 +101,11 @@ def problem(
     detail: str,
     headers: Mapping[str, str] | None = None,
     errors: tuple[FieldError, ...] = (),
+    said: Phrase | None = None,
 ) -> JSONResponse:
     """The answer to a request that is refused or failed; `detail` says what to do."""
-    body = Problem(title=status.phrase, status=status, detail=detail, code=code, errors=errors)
+    told = said if said is not None and said.code else None
+    body = Problem(title=status.phrase, status=status, detail=detail, code=code, said=told, errors=errors)
     return JSONResponse(
         body.model_dump(mode="json", exclude_defaults=True) | {"type": body.type}, status, headers, MEDIA_TYPE
     )
@@ -123,7 +127,7 @@ def handle_errors(app: FastAPI, routes: Iterable[APIRoute]) -> None:
     @app.exception_handler(SvevError)
     async def _svev(_: Request, error: SvevError) -> JSONResponse:
         status = next(status for kind, status in _STATUSES if isinstance(error, kind))
-        return problem(status, code_of(error), str(error))
+        return problem(status, code_of(error), str(error), said=error.said)
 
     @app.exception_handler(HTTPException)
     async def _framework(request: Request, error: HTTPException) -> JSONResponse:

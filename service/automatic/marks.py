@@ -121,7 +121,7 @@ class Marks:
             self._supervisor.commands.ask(at_once(self._supervisor.moved), _NOTED_S)
         except SvevError as error:
             text = "something moved, but no recording could begin: {why}"
-            self._tell(Level.WARNING, "motion", phrase("event_motion_unrecorded", text, why=str(error)))
+            self._tell(Level.WARNING, "motion", phrase("event_motion_unrecorded", text, why=error.said))
 
     def _crossed(self, time: HostNs) -> None:
         """Begin a recording, because the light barrier is interrupted; its thread goes on whatever happens."""
@@ -129,7 +129,7 @@ class Marks:
             self.mark(_mark("light barrier", time))
         except SvevError as error:
             text = "the light barrier was interrupted, but no recording could begin: {why}"
-            self._tell(Level.WARNING, "mark", phrase("event_barrier_unrecorded", text, why=str(error)))
+            self._tell(Level.WARNING, "mark", phrase("event_barrier_unrecorded", text, why=error.said))
 
     def _tell(self, level: Level, name: str, said: Phrase) -> None:
         self._supervisor.hub.tell(Event.now(level, name, said))

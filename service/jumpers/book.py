@@ -22,6 +22,7 @@ from rig.api.start_list import (
 )
 from rig.api.statement import Statement
 from rig.errors import BadInputError, ChangedMeanwhileError, StateForbidsError
+from rig.phrase import phrase
 from service.jumpers import moves
 from service.jumpers.keeper import Change, Keeper
 from service.jumpers.preview import previewed
@@ -158,7 +159,8 @@ class JumperBook:
         """
         with self._lock:
             if len(self._list.lines) >= LINES_MAX:
-                raise StateForbidsError(f"the start list has {LINES_MAX} lines, which is the most: remove some")
+                text = "the start list has {most} lines, which is the most: remove some"
+                raise StateForbidsError(phrase("list_full", text, most=LINES_MAX))
             self._free_bib(new.bib)
             said = _statement("undo_add", f"{who(new)} was added", new)
             self._put(moves.with_lines(self._list, (new,)), said)
@@ -215,9 +217,8 @@ class JumperBook:
         if content.strip():
             table = read_table(content, encoding, sheet)
             if not table.lines:
-                raise BadInputError(
-                    "the table is a heading alone, without a jumper: to empty the start list send empty content"
-                )
+                text = "the table is a heading alone, without a jumper: to empty the start list send empty content"
+                raise BadInputError(phrase("list_heading_alone", text))
         with self._lock:
             said = Statement(
                 code="undo_import",
@@ -256,7 +257,8 @@ class JumperBook:
                     "the start list has changed since: look at it, then undo what is to be undone"
                 )
             if not self._changes:
-                raise StateForbidsError("there is nothing to undo: no earlier start list is kept")
+                text = "there is nothing to undo: no earlier start list is kept"
+                raise StateForbidsError(phrase("list_nothing_to_undo", text))
             before = self._changes.pop().before
             number = self._list.next.number + 1
             back = before.model_copy(update={"next": before.next.model_copy(update={"number": number})})
@@ -297,9 +299,8 @@ class JumperBook:
     def _free_bib(self, bib: str, line: int | None = None) -> None:
         holder = next((each for each in self._list.lines if bib and each.bib == bib and each.id != line), None)
         if holder is not None:
-            raise StateForbidsError(
-                f"bib {bib} is that of {who(holder)} in the start list: choose another, or remove it"
-            )
+            text = "bib {bib} is that of {who} in the start list: choose another, or remove it"
+            raise StateForbidsError(phrase("list_bib_taken", text, bib=bib, who=who(holder)))
 
 
 def _statement(code: str, text: str, fields: SessionFields | StartLine | NewLine) -> Statement:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 #: Encodings that a caller may name: Windows (with Latin-1), Mac Roman, DOS, and those that prove themselves.
 ONE_BYTE: Final = ("windows-1252", "mac-roman", "cp850")
@@ -63,7 +64,8 @@ def texts_of(content: bytes, encoding: str | None = None) -> tuple[Text, ...]:
     """
     if encoding is not None:
         if encoding not in ENCODINGS:
-            raise BadInputError(f"encoding {encoding}: there is {', '.join(ENCODINGS)}; name one of these")
+            known = "encoding {encoding}: there is {encodings}; name one of these"
+            raise BadInputError(phrase("list_encoding", known, encoding=encoding, encodings=", ".join(ENCODINGS)))
         return (Text(encoding, _decoded(content, encoding)),)
     for mark, marked in _MARKS:
         if content.startswith(mark):
@@ -77,7 +79,8 @@ def texts_of(content: bytes, encoding: str | None = None) -> tuple[Text, ...]:
         return unicode
     found = unicode + tuple(text for each in ONE_BYTE if (text := _words(content, each)) is not None)
     if not found:
-        raise BadInputError(f"letters of the start list cannot be told (æ, ø, å, é …): {_SAVE}")
+        unknown = "letters of the start list cannot be told (æ, ø, å, é …): " + _SAVE
+        raise BadInputError(phrase("list_letters_unknown", unknown))
     return found
 
 
@@ -90,9 +93,10 @@ def _decoded(content: bytes, encoding: str) -> str:
     try:
         text = content.decode(encoding).removeprefix("\ufeff")
     except UnicodeDecodeError:
-        raise BadInputError(f"the start list is no text in {encoding}: {_SAVE}") from None
+        wrong = "the start list is no text in {encoding}: " + _SAVE
+        raise BadInputError(phrase("list_other_encoding", wrong, encoding=encoding)) from None
     if "\0" in text:
-        raise BadInputError(f"the start list is no text: {_SAVE}")
+        raise BadInputError(phrase("list_no_text", "the start list is no text: " + _SAVE))
     return _composed(text)
 
 
@@ -132,7 +136,7 @@ def _without_mark(content: bytes) -> Text:
         if any(each in text for each in ";,\t\n") and all(each.isprintable() or each in "\t\r\n" for each in text):
             found.append(Text(encoding, text))
     if len(found) != 1:
-        raise BadInputError(f"the start list is no text: {_SAVE}")
+        raise BadInputError(phrase("list_no_text", "the start list is no text: " + _SAVE))
     return found[0]
 
 

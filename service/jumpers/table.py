@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from rig.api.start_list import COLUMN_NAME_MAX, COLUMNS_MAX, LINES_MAX, NewLine
 from rig.errors import BadInputError
+from rig.phrase import phrase
 from service.jumpers.encodings import texts_of
 from service.jumpers.workbook import MAGIC, OLD_MAGIC, Row, Sheet, sheets_of
 
@@ -91,7 +92,9 @@ def readings_of(content: bytes, encoding: str | None = None, sheet: str | None =
     if content.startswith(MAGIC):
         return _sheets(sheets_of(content), sheet)
     if content.startswith(OLD_MAGIC):
-        raise BadInputError("the start list is a workbook of an old Excel (.xls): save it as .xlsx, and load that")
+        raise BadInputError(
+            phrase("list_xls", "the start list is a workbook of an old Excel (.xls): save it as .xlsx, and load that")
+        )
     found: list[Reading] = []
     problem: BadInputError | None = None
     for text in texts_of(content, encoding):
@@ -117,22 +120,24 @@ def read_table(content: bytes, encoding: str | None = None, sheet: str | None = 
     if len(found) == 1 and found[0].table is not None:
         return found[0].table
     if found[0].sheet:
-        raise BadInputError(
-            f"several sheets hold a list ({', '.join(each.sheet for each in found)}): say which `sheet`"
-        )
-    raise BadInputError(
-        f"its letters can be read in several ways ({', '.join(each.encoding for each in found)}): give the `encoding`, "
-        'or save the list as "CSV UTF-8" or as an Excel workbook'
+        text = "several sheets hold a list ({sheets}): say which `sheet`"
+        raise BadInputError(phrase("list_sheets", text, sheets=", ".join(each.sheet for each in found)))
+    text = (
+        'its letters can be read in several ways ({encodings}): give the `encoding`, or save the list as "CSV UTF-8" '
+        "or as an Excel workbook"
     )
+    raise BadInputError(phrase("list_letters", text, encodings=", ".join(each.encoding for each in found)))
 
 
 def _sheets(sheets: tuple[Sheet, ...], wanted: str | None) -> tuple[Reading, ...]:
     if not sheets:
-        raise BadInputError(f"the workbook is empty: a line of it names the columns, {_EXAMPLE}")
+        text = "the workbook is empty: a line of it names the columns, {example}"
+        raise BadInputError(phrase("list_book_empty", text, example=_EXAMPLE))
     if wanted is not None:
         sheets = tuple(sheet for sheet in sheets if sheet.name == wanted)
         if not sheets:
-            raise BadInputError(f'the workbook has no sheet "{wanted}" that holds something: name another one')
+            text = 'the workbook has no sheet "{sheet}" that holds something: name another one'
+            raise BadInputError(phrase("list_no_sheet", text, sheet=wanted))
     headed = [sheet for sheet in sheets if _heading(sheet.rows) is not None] or list(sheets[:1])
     if len(headed) > 1:
         return tuple(Reading("", sheet.name, None) for sheet in headed)
@@ -178,7 +183,9 @@ def _rows(lines: Sequence[str], separator: str, skipped: int) -> Sequence[Row]:
             if any(fields):
                 rows.append((reader.line_num + skipped, fields))
     except csv.Error as error:
-        raise BadInputError(f"line {reader.line_num + skipped}: {error}; look at its quotation marks") from None
+        text = "line {line}: {why}; look at its quotation marks"
+        line = reader.line_num + skipped
+        raise BadInputError(phrase("list_quotes", text, line=line, why=str(error))) from None
     return rows
 
 
@@ -201,14 +208,16 @@ def _bare(name: str) -> str:
 
 def _table(rows: Sequence[Row]) -> Table:
     if not rows:
-        raise BadInputError(f"the start list is empty: a line of it names the columns, {_EXAMPLE}")
+        text = "the start list is empty: a line of it names the columns, {example}"
+        raise BadInputError(phrase("list_empty", text, example=_EXAMPLE))
     heading = _heading(rows)
     number, header = rows[heading or 0]
     columns = _columns(header)
     rest = rows[(heading or 0) + 1 :]
     lines = tuple(_line(number, row, columns) for number, row in rest)
     if len(lines) > LINES_MAX:
-        raise BadInputError(f"the start list has {len(lines)} jumpers: {LINES_MAX} at most, so make several of it")
+        text = "the start list has {jumpers} jumpers: {most} at most, so make several of it"
+        raise BadInputError(phrase("list_long", text, jumpers=len(lines), most=LINES_MAX))
     _check_bibs([number for number, _ in rest], lines)
     named = tuple(name.replace("\0", "") for name in columns if name)
     return Table(tuple(name for name in columns if name and name not in _NAMES), lines, named, number)
@@ -219,20 +228,25 @@ def _columns(header: Sequence[str]) -> list[str]:
     columns = [_KNOWN.get(_bare(name), name) for name in header]
     listed = ", ".join(f'"{name}"' for name in header)
     if not {"bib", "athlete", _FIRST, _LAST} & set(columns):
-        raise BadInputError(
-            f'no line names a column "bib" or "athlete"; the first one has {listed}: name the columns above the '
-            f"jumpers, {_EXAMPLE}"
+        text = (
+            'no line names a column "bib" or "athlete"; the first one has {listed}: name the columns above the '
+            "jumpers, {example}"
         )
+        raise BadInputError(phrase("list_no_columns", text, listed=listed, example=_EXAMPLE))
     for name, count in Counter(columns).items():
         if name and count > 1:
             what = name.replace("\0", "") + " name" if "\0" in name else name
-            raise BadInputError(f'column "{what}" is there twice in {listed}: keep one')
+            text = 'column "{column}" is there twice in {listed}: keep one'
+            raise BadInputError(phrase("list_column_twice", text, column=what, listed=listed))
         if name in _RESERVED:
-            raise BadInputError(f'column "{name}" has a name that every jump uses for something else: rename it')
+            text = 'column "{column}" has a name that every jump uses for something else: rename it'
+            raise BadInputError(phrase("list_column_taken", text, column=name))
         if len(name) > COLUMN_NAME_MAX:
-            raise BadInputError(f'column "{name[:20]}…" has a name of {len(name)} characters: shorten it')
+            text = 'column "{column}…" has a name of {length} characters: shorten it'
+            raise BadInputError(phrase("list_column_long", text, column=name[:20], length=len(name)))
     if len(own := [name for name in columns if name and name not in _NAMES]) > COLUMNS_MAX:
-        raise BadInputError(f"{len(own)} own columns: {COLUMNS_MAX} at most, so remove some, e.g. {own[-1]}")
+        text = "{columns} own columns: {most} at most, so remove some, e.g. {last}"
+        raise BadInputError(phrase("list_columns", text, columns=len(own), most=COLUMNS_MAX, last=own[-1]))
     return columns
 
 
@@ -240,16 +254,17 @@ def _line(number: int, row: Sequence[str], columns: Sequence[str]) -> NewLine:
     while len(row) > len(columns) and not row[-1]:
         row = row[:-1]
     if len(row) > len(columns):
-        raise BadInputError(
-            f"line {number} has {len(row)} fields, and the heading names {len(columns)} columns: correct it"
-        )
+        text = "line {line} has {fields} fields, and the heading names {columns} columns: correct it"
+        raise BadInputError(phrase("list_fields", text, line=number, fields=len(row), columns=len(columns)))
     fields = {name: text for name, text in zip(columns, row, strict=False) if text}
     for name in _NUMBERS & fields.keys():
         fields[name] = re.sub(r"(\d+)\.0+", r"\1", fields[name])  # as programs write whole numbers
     if _DATE.fullmatch(fields.get("bib", "")):
-        raise BadInputError(f"line {number}: the bib {fields['bib']} is a date: give the column the format of a number")
+        text = "line {line}: the bib {bib} is a date: give the column the format of a number"
+        raise BadInputError(phrase("list_bib_date", text, line=number, bib=fields["bib"]))
     if unnamed := fields.pop("", ""):
-        raise BadInputError(f'line {number} has "{unnamed[:40]}" in a column without a name: name it in the heading')
+        text = 'line {line} has "{field}" in a column without a name: name it in the heading'
+        raise BadInputError(phrase("list_unnamed", text, line=number, field=unnamed[:40]))
     names = [fields.pop(name, "") for name in (_FIRST, _LAST)]
     fields.setdefault("athlete", " ".join(name for name in names if name))
     more = {name: fields.pop(name) for name in list(fields) if name not in _NAMES}
@@ -258,12 +273,14 @@ def _line(number: int, row: Sequence[str], columns: Sequence[str]) -> NewLine:
     except ValidationError as error:
         first = error.errors()[0]
         column = ".".join(str(part) for part in first["loc"])
-        raise BadInputError(f"line {number}, column {column}: {first['msg']}; correct it") from None
+        text = "line {line}, column {column}: {why}; correct it"
+        raise BadInputError(phrase("list_field", text, line=number, column=column, why=first["msg"])) from None
 
 
 def _check_bibs(numbers: Sequence[int], lines: Sequence[NewLine]) -> None:
     seen: dict[str, int] = {}
     for number, line in zip(numbers, lines, strict=True):
         if line.bib and line.bib in seen:
-            raise BadInputError(f"bib {line.bib} stands in lines {seen[line.bib]} and {number}: give each its own")
+            text = "bib {bib} stands in lines {first} and {second}: give each its own"
+            raise BadInputError(phrase("list_bib_twice", text, bib=line.bib, first=seen[line.bib], second=number))
         seen[line.bib] = number

@@ -15,6 +15,7 @@ from datetime import date, datetime, time
 from typing import Any, Final
 
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 #: What a workbook begins with, and what one of Excel before 2007 does.
 MAGIC: Final = b"PK\x03\x04"
@@ -77,9 +78,11 @@ def _parts(content: bytes) -> dict[str, bytes]:
             listed = archive.infolist()
             names = {part.filename for part in listed}
             if _WORKBOOK not in names:
-                raise BadInputError(f"the start list is an archive, but no Excel workbook: {_SAVE}")
+                raise BadInputError(
+                    phrase("list_archive", "the start list is an archive, but no Excel workbook: " + _SAVE)
+                )
             if len(listed) > _PARTS_MAX or len(names) < len(listed):
-                raise BadInputError(f"the workbook has more parts than a list needs: {_SAVE}")
+                raise BadInputError(phrase("list_parts", "the workbook has more parts than a list needs: " + _SAVE))
             for part in listed:
                 if _NEEDED.fullmatch(part.filename):
                     kind = (
@@ -89,7 +92,8 @@ def _parts(content: bytes) -> dict[str, bytes]:
                     left[kind] -= len(parts[part.filename])
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError) as error:
         # RuntimeError: it has a password.
-        raise BadInputError(f"the workbook cannot be unpacked ({error}): {_SAVE}") from None
+        text = "the workbook cannot be unpacked ({why}): " + _SAVE
+        raise BadInputError(phrase("list_packed", text, why=str(error))) from None
     for unpacked in parts.values():
         _check_declarations(unpacked)
     return parts
@@ -97,24 +101,25 @@ def _parts(content: bytes) -> dict[str, bytes]:
 
 def _unpacked(archive: zipfile.ZipFile, part: zipfile.ZipInfo, most: int) -> bytes:
     if part.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
-        raise BadInputError(f"the workbook is packed as Excel packs none: {_SAVE}")
+        raise BadInputError(phrase("list_packing", "the workbook is packed as Excel packs none: " + _SAVE))
     with archive.open(part) as packed:
         # Never without a length: what the archive says of its own sizes may be wrong.
         content = packed.read(most + 1) if part.file_size <= most else b""
     if part.file_size > most or len(content) > most:
-        raise BadInputError(
-            "the workbook is too large for a start list: copy the list alone into a new one, and load that"
-        )
+        text = "the workbook is too large for a start list: copy the list alone into a new one, and load that"
+        raise BadInputError(phrase("list_book_large", text))
     return content
 
 
 def _check_declarations(part: bytes) -> None:
     """Refuse declarations of entities, and encodings in which they could hide."""
     if b"<!" in part.replace(b"<![CDATA[", b"").replace(b"<!--", b"") or b"\0" in part:
-        raise BadInputError(f"the workbook declares what no list needs (DOCTYPE): {_SAVE}")
+        raise BadInputError(phrase("list_doctype", "the workbook declares what no list needs (DOCTYPE): " + _SAVE))
     declared = _ENCODING.match(part.removeprefix(b"\xef\xbb\xbf")[:200])
     if declared is not None and declared[1].lower() not in _UTF8:
-        raise BadInputError(f"the workbook is in an encoding that Excel does not use: {_SAVE}")
+        raise BadInputError(
+            phrase("list_book_encoding", "the workbook is in an encoding that Excel does not use: " + _SAVE)
+        )
 
 
 def _archive_of(parts: dict[str, bytes]) -> bytes:
@@ -141,7 +146,8 @@ def _load(parts: dict[str, bytes], *, results: bool) -> tuple[Sheet, ...]:
     except BadInputError:
         raise
     except Exception as error:  # noqa: BLE001 - whatever a damaged part makes of openpyxl
-        raise BadInputError(f"the workbook cannot be read ({type(error).__name__}: {error}): {_SAVE}") from None
+        text = "the workbook cannot be read ({why}): " + _SAVE
+        raise BadInputError(phrase("list_book", text, why=f"{type(error).__name__}: {error}")) from None
 
 
 def _rows(sheet: Any) -> list[Row]:
@@ -149,17 +155,17 @@ def _rows(sheet: Any) -> list[Row]:
     rows: list[Row] = []
     for number, cells in enumerate(sheet.iter_rows(values_only=True), start=1):
         if number > _ROWS_MAX or len(cells) > _CELLS_MAX:
-            raise BadInputError(
-                f'sheet "{sheet.title}" has more than {_ROWS_MAX} rows or {_CELLS_MAX} columns: copy the list alone '
-                "into a new workbook, and load that"
+            text = (
+                'sheet "{sheet}" has more than {rows} rows or {columns} columns: copy the list alone into a '
+                "new workbook, and load that"
             )
+            raise BadInputError(phrase("list_sheet", text, sheet=sheet.title, rows=_ROWS_MAX, columns=_CELLS_MAX))
         texts = [_text(cell) for cell in cells]
         while texts and not texts[-1]:
             texts.pop()
         if wrong := next((text for text in texts if text in _ERRORS), None):
-            raise BadInputError(
-                f'sheet "{sheet.title}", row {number} holds the error {wrong}: correct it in the workbook'
-            )
+            text = 'sheet "{sheet}", row {row} holds the error {error}: correct it in the workbook'
+            raise BadInputError(phrase("list_cell", text, sheet=sheet.title, row=number, error=wrong))
         if texts:
             rows.append((number, texts))
     return rows
@@ -172,7 +178,8 @@ def _fill_merged(rows: list[Row], part: bytes) -> None:
     for column, first, last in _MERGED.findall(part):
         left -= max(0, int(last) - int(first))
         if left < 0:
-            raise BadInputError("the workbook merges more cells than a list does: undo that, and load it again")
+            merged = "the workbook merges more cells than a list does: undo that, and load it again"
+            raise BadInputError(phrase("list_merged", merged))
         place = _place(column)
         above = by_number.get(int(first), [])
         text = above[place] if place < len(above) else ""
@@ -213,7 +220,8 @@ def _check_results(results: tuple[Sheet, ...], formulas: tuple[Sheet, ...]) -> N
             row = known.get(number, [])
             for place, text in enumerate(texts):
                 if text.startswith("=") and not (place < len(row) and row[place]):
-                    raise BadInputError(
-                        f'sheet "{shown.name}", row {number} holds a formula without a result: open the workbook in '
-                        "Excel or LibreOffice, save it, and load that"
+                    wrong = (
+                        'sheet "{sheet}", row {row} holds a formula without a result: open the workbook in Excel or '
+                        "LibreOffice, save it, and load that"
                     )
+                    raise BadInputError(phrase("list_formula", wrong, sheet=shown.name, row=number))

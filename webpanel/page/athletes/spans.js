@@ -1,6 +1,6 @@
 /** "Better than chance?": two days or spans of an athlete's jumps, compared by the service with the test of `svev compare`. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { call, Problem } from "../shared/api.js";
 import { $, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
@@ -60,7 +60,7 @@ async function compare() {
     if (whose === athlete) found = answer;
   } catch (error) {
     if (error instanceof Problem && error.status === 409) tell("error", t("spans.busy"));
-    else if (error instanceof Problem && error.status === 422) tell("error", t("spans.refused", { why: error.message }));
+    else if (error instanceof Problem && error.status === 422) tell("error", t("spans.refused", { why: say(error.detail).text }));
     else tellProblem(error);
   } finally {
     asking = false;

@@ -5,6 +5,7 @@ import { en } from "./en.js";
 import { analysis as nbAnalysis } from "./nb-analysis.js";
 import { events as nbEvents } from "./nb-events.js";
 import { findings as nbFindings } from "./nb-findings.js";
+import { refusals as nbRefusals } from "./nb-refusals.js";
 import { statements as nbStatements } from "./nb-statements.js";
 import { nb } from "./nb.js";
 
@@ -13,7 +14,7 @@ import { nb } from "./nb.js";
 
 const LANGUAGES = { en, nb };
 /** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis } };
+const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals } };
 
 /** @type {"en"|"nb"} */
 let language = "en";

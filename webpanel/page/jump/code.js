@@ -27,7 +27,7 @@ export async function showCode(id, image, words, wanted) {
     if (!wanted()) return true;
     if (error.status === 0) return false; // a code of this jump that is there is still good
     clearCode(image, words);
-    setText(words, say({ code: error.code, text: error.message }).text);
+    setText(words, say(error.said).text);
   }
   return true;
 }

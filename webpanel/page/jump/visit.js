@@ -97,7 +97,7 @@ export function drawVisit() {
   const figures = measured?.figures.at(-1) ?? null;
   const lost = wrong !== null && (wrong.status === 0 || wrong.status >= 500);
   const shown = wrong && !lost ? null : recording;
-  setText($("visit-problem"), !wrong ? "" : lost ? t("visit.lost") : say({ code: wrong.code, text: wrong.message }).text);
+  setText($("visit-problem"), !wrong ? "" : lost ? t("visit.lost") : say(wrong.said).text);
   $("visit-problem").hidden = !wrong;
   $("visit-jump").hidden = !shown;
   setText($("visit-who"), shown ? named(shown.session) : "Svev");

@@ -120,7 +120,7 @@ async function perform(words, action) {
     await action();
     update({ status: await call("GET", "status"), heard: Date.now() });
   } catch (error) {
-    if (error instanceof Problem && SECOND_TAPS.includes(error.code)) refuse(say({ code: error.code, text: error.message }).text);
+    if (error instanceof Problem && SECOND_TAPS.includes(error.code)) refuse(say(error.said).text);
     else tellProblem(error);
   } finally {
     update({ busy: "" });

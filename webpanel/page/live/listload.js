@@ -1,6 +1,6 @@
 /** Loading a start list from a file: it is looked at first, and replaces the present one when somebody says so. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { call, Problem } from "../shared/api.js";
 import { $, make, setText } from "../shared/dom.js";
 import { tell, tellProblem } from "../shared/snacks.js";
@@ -87,7 +87,7 @@ function query() {
 function refuse(error) {
   $("list-preview").close();
   // Which column or line is wrong stands in the service's words only.
-  if (error instanceof Problem && error.code === "bad_input") tell("error", t("list.refused", { why: error.message }));
+  if (error instanceof Problem && error.code === "bad_input") tell("error", t("list.refused", { why: say(error.detail).text }));
   else tellProblem(error);
 }
 

@@ -92,8 +92,7 @@ async function order(method) {
   try {
     await take(method);
   } catch (error) {
-    // What the rig file lacks stands in the service's words only.
-    if (error instanceof Problem && error.code === "state_forbids") tell("error", t("measurement.refused", { why: error.message }));
+    if (error instanceof Problem && error.code === "state_forbids") tell("error", t("measurement.refused", { why: say(error.detail).text }));
     else tellProblem(error);
   } finally {
     ordering = false;

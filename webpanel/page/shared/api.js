@@ -4,17 +4,24 @@
 export const API = new URL("../api/", import.meta.url).href;
 const DEADLINE_MS = 10_000;
 
+/** @typedef {{ code: string, text: string, values?: import("./types.js").Values }} Said */
+
 /** An error to show: `code` for its translation, the message in English. */
 export class Problem extends Error {
   /**
    * @param {number} status HTTP status; 0: there was no answer
    * @param {string} code
    * @param {string} detail
+   * @param {Said|null} [told] the detail with a code of its own and the values in it
    */
-  constructor(status, code, detail) {
+  constructor(status, code, detail, told = null) {
     super(detail);
     this.status = status;
     this.code = code;
+    /** To be said: in words of its kind, where the detail itself has no code. @type {Said} */
+    this.said = told ?? { code, text: detail };
+    /** To be said within a sentence: the detail itself. @type {Said} */
+    this.detail = told ?? { code: "", text: detail };
   }
 }
 
@@ -107,8 +114,8 @@ export async function asProblem(answer) {
   if (!answer.headers.get("Content-Type")?.includes("json")) {
     return new Problem(answer.status, "page_strange", `the service answers ${answer.status} ${answer.statusText}: look at its log`);
   }
-  const { code, detail, title } = await answer.json();
-  return new Problem(answer.status, code ?? "", detail || title);
+  const { code, detail, title, said } = await answer.json();
+  return new Problem(answer.status, code ?? "", detail || title, said ?? null);
 }
 
 /**

@@ -41,7 +41,7 @@ export function tell(level, text, offer) {
 export function tellProblem(error) {
   if (!(error instanceof Problem)) throw error;
   if (error.status === 401) return; // the login opens
-  tell("error", say({ code: error.code, text: error.message }).text);
+  tell("error", say(error.said).text);
 }
 
 /**

@@ -93,11 +93,11 @@ def create_app(
         exports_router(service, streams.downloads),
         measuring_router(service, streams.downloads),
         athletes_router(service),
-        digitizing_router(desks or Desks(_nothing_to_measure, lambda: None)),
+        digitizing_router(desks or Desks(_nothing_to_measure, lambda: None), streams.events),
         preview_router(service, streams),
         cameras_router(service, streams),
         events_router(service, changes, streams.events),
-        login_router(door, service),
+        login_router(door, service.tell),
         links_router(door, service),
         observing_router(service, metrics),
     )

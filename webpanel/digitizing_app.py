@@ -9,7 +9,6 @@ from fastapi.responses import RedirectResponse
 from fastapi.routing import APIRoute
 
 from analysis.digitizing.desks import Desks
-from rig.phrase import Phrase
 from webpanel.app import serve_page
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard
@@ -18,6 +17,7 @@ from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
 from webpanel.routes.common import COMMON
 from webpanel.routes.digitizing import digitizing_router
+from webpanel.routes.login import login_router
 
 
 def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
@@ -37,16 +37,17 @@ def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
         title="Svev: measuring by hand", version=version("svev"), docs_url=None, redoc_url=None, redirect_slashes=False,
         lifespan=lifespan, responses=COMMON, generate_unique_id_function=lambda route: route.name,
     )  # fmt: skip
-    app.state.streams = OpenStreams()
-    router = digitizing_router(desks)
+    streams = app.state.streams = OpenStreams()
 
-    app.include_router(router)
-    handle_errors(app, [route for route in router.routes if isinstance(route, APIRoute)])
-
-    def unheard(_: Phrase) -> None:
+    def unheard(*_: object) -> None:
         """Who measures sees on the page what he did."""
 
-    app.add_middleware(Guard, door=Door(access, unheard), note=unheard, visit=lambda _recording, _path: None)
+    door = Door(access, unheard)
+    routers = digitizing_router(desks, streams.events), login_router(door, unheard)
+    for router in routers:
+        app.include_router(router)
+    handle_errors(app, [route for router in routers for route in router.routes if isinstance(route, APIRoute)])
+    app.add_middleware(Guard, door=door, note=unheard, visit=unheard)
 
     @app.get("/", include_in_schema=False)
     def lead() -> RedirectResponse:

@@ -18,9 +18,10 @@ from analysis.digitizing.pulse_view import PulseMarks, as_mark, pulse_view
 from analysis.digitizing.repeatability import repeatability
 from analysis.digitizing.session import Session
 from analysis.digitizing.space import Ray, intersected, predicted_points, space_points
+from analysis.digitizing.suggesting import MarkedPulse, suggested
 from analysis.digitizing.things import BALL, things
 from analysis.measurements.file import read_measurements
-from analysis.measurements.model import Measurements, PulseMeasurements
+from analysis.measurements.model import POINTS, Measurements, PulseMeasurements
 from analysis.scene.camera_system import CameraSystem
 from rig.api.digitizing import (
     Action,
@@ -37,17 +38,21 @@ from rig.api.digitizing import (
     PulseView,
     Repeatability,
     SessionView,
+    Suggestion,
     TapeOrder,
     Touched,
     ViewedCamera,
     Worst,
 )
 from rig.arrays import Floats
+from rig.clocks import NS_PER_S
 from rig.errors import BadInputError, StateForbidsError, UnknownCameraError, UnknownRecordingError
 
 #: So many of the rays that fit worst are told.
 _WORST: Final = 20
 _NOTABLE_W: Final = 2.0
+#: So many pulses are looked at for the next click; a jump has a hundred or two.
+_SUGGESTED_PULSES: Final = 300
 
 
 class Desk:
@@ -196,6 +201,27 @@ class Desk:
         """
         session = self.session(operator)
         return self._changed(operator, session, session.put(marks, clear))
+
+    def suggestion(self, operator: str) -> Suggestion | None:
+        """Where one more click lowers the sigmas most; None: nowhere, or no point is known in space yet.
+
+        Raises:
+            StateForbidsError: no camera is oriented.
+        """
+        system, session = self.oriented(), self.session(operator)
+        marked = session.pulses()
+        span = self._span()
+        ends = [*marked, *((span.first, span.last) if span else ())]
+        if not ends:
+            return None
+        pulses = []
+        for pulse in self.log.pulses[self._index(min(ends)) : self._index(max(ends)) + 1][:_SUGGESTED_PULSES]:
+            marks = self._marks(session, pulse)
+            closed = {(key.thing, key.camera) for key, entered in marks.marks.items() if entered.xy is None} | {
+                (thing, camera) for camera in system.names for thing in POINTS if not self.log.has(pulse, camera)
+            }
+            pulses.append(MarkedPulse(pulse, self.log.times[pulse] / NS_PER_S, marks.rays(), frozenset(closed)))
+        return suggested(system, pulses, POINTS)
 
     def changes(self, operator: str, since: int, wait_s: float) -> Changes:
         """What changed after a revision; waits for a change if there is none yet."""

@@ -1,6 +1,7 @@
 """A log that is being measured by hand: its pulses, what became of each frame, and frames one by one."""
 
 import threading
+from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Mapping
 from pathlib import Path
@@ -78,6 +79,11 @@ class OpenedLog:
         if camera not in frames:
             raise NoFrameError(self._why_none(pulse, camera))
         return frames[camera]
+
+    def has(self, pulse: int, camera: str) -> bool:
+        """Whether a camera delivered a frame of a pulse of the log."""
+        at = bisect_left(self.pulses, pulse)
+        return self.status[camera][at] == LETTERS[FrameStatus.OK]
 
     def png(self, pulse: int, camera: str, *, difference: bool = False) -> bytes:
         """A frame as a PNG file without loss, or its difference from the background.

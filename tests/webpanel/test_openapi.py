@@ -62,6 +62,7 @@ CALLS = {
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/changes",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/import",
     "POST /api/recordings/{recording_id}/digitizing/refine",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/next",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/track",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/export/{name}",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",

@@ -1,7 +1,6 @@
 """Routes of measuring by hand: frames without loss, marks of operators, geometry between images, results."""
 
 from collections.abc import Callable
-from functools import partial
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -27,10 +26,12 @@ from rig.api.digitizing import (
     RefineOrder,
     Repeatability,
     SessionView,
+    Suggestion,
     TapeOrder,
     Tracked,
     TrackOrder,
 )
+from webpanel.door.streams import Streams
 from webpanel.problems import ProblemError
 from webpanel.routes.common import ALONE, CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
 from webpanel.routes.files import attachment
@@ -45,6 +46,8 @@ else:
 _KEPT: Final = {"Cache-Control": "private, max-age=31536000, immutable"}
 #: So long an answer about changes waits for one, s.
 _WAIT_S: Final = 20.0
+#: After so long a wait looks whether the service ends, s.
+_SLICE_S: Final = 1.0
 #: Threads that wait for changes: those of so many pages.
 _WAITING: Final = 32
 _PNG: Final[Responses] = {
@@ -74,8 +77,13 @@ Pulse = Annotated[int, Path(ge=0, le=2**53, description="number of the pulse", e
 Coordinate = Annotated[float, Query(ge=-100_000, le=100_000, allow_inf_nan=False, description="px", examples=[320.5])]
 
 
-def digitizing_router(desks: Desks) -> APIRouter:
-    """The routes of measuring by hand."""
+def digitizing_router(desks: Desks, streams: Streams) -> APIRouter:
+    """The routes of measuring by hand.
+
+    Args:
+        desks: the logs that are measured.
+        streams: end waits for changes when the service ends.
+    """
     router = strict_router("Measuring by hand")
 
     def opened(recording_id: RecordingId) -> Desk:
@@ -144,11 +152,12 @@ def digitizing_router(desks: Desks) -> APIRouter:
         """How operators agree in what all of them measured: scatter of a click, bias of each, effect on angles."""
         return desk.repeatability(list(dict.fromkeys(name.strip() for name in operators.split(",") if name.strip())))
 
-    _add_sessions(router, opened, base + "/sessions/{operator}")
+    _add_sessions(router, opened, base + "/sessions/{operator}", streams)
+    _add_results(router, opened, base + "/sessions/{operator}")
     return router
 
 
-def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -> None:
+def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str, streams: Streams) -> None:
     waiters = anyio.CapacityLimiter(_WAITING)
     AtDesk = Annotated[Desk, Depends(opened)]  # noqa: N806 - a type
 
@@ -167,6 +176,11 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -
         """Set or remove a mark, undo or redo. It is on the disk when this is answered."""
         return desk.act(operator, action)
 
+    @router.get(base + "/next", responses=refusals(404, 409))
+    def suggest_next(desk: AtDesk, operator: Operator) -> Suggestion | None:
+        """Where one more click lowers the sigmas most; null: nowhere, or nothing is known in space yet."""
+        return desk.suggestion(operator)
+
     @router.get(base + "/changes", responses=refusals(404))
     async def await_changes(
         desk: AtDesk,
@@ -174,7 +188,12 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -
         since: Annotated[int, Query(ge=0, description="revision that is known")],
     ) -> Changes:
         """What was changed after a revision, also on another page; waits up to 20 s for a change."""
-        return await run_sync(partial(desk.changes, operator, since, _WAIT_S), limiter=waiters, abandon_on_cancel=True)
+        left_s = _WAIT_S
+        while True:
+            found = await run_sync(desk.changes, operator, since, _SLICE_S, limiter=waiters)
+            left_s -= _SLICE_S
+            if found.revision > since or streams.ending or left_s <= 0:
+                return found
 
     @router.post(base + "/track", responses=CHANGING | refusals(404))
     def track_things(desk: AtDesk, operator: Operator, order: TrackOrder) -> Tracked:
@@ -182,6 +201,10 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str) -
         from analysis.digitizing.following import follow  # noqa: PLC0415 - loaded with the first desk
 
         return follow(desk, operator, order)
+
+
+def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) -> None:
+    AtDesk = Annotated[Desk, Depends(opened)]  # noqa: N806 - a type
 
     @router.get(base + "/export/{name}", response_class=Response, responses=_FILE | refusals(404))
     async def export_marks(desk: AtDesk, operator: Operator, name: Exported) -> Response:

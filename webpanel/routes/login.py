@@ -1,14 +1,15 @@
 """The routes of the page's login: the browser sends the token once, and gets a cookie that scripts cannot read."""
 
+from collections.abc import Callable
 from http import HTTPStatus
+from typing import Literal
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from rig.api.fields import Model
-from rig.phrase import phrase
-from service.seam.rig import RigService
+from rig.phrase import Phrase, phrase
 from webpanel.door.logins import COOKIE, SESSION_S, Caller, Door
 from webpanel.door.roles import Role
 from webpanel.routes.common import NoFields, refusals, strict_router
@@ -27,8 +28,13 @@ class OwnAccess(Model):
     logged_in: bool = Field(description="by the session cookie, which `POST /api/logout` ends")
 
 
-def login_router(door: Door, service: RigService) -> APIRouter:
-    """The routes that log a browser in and out."""
+def login_router(door: Door, tell: Callable[[Literal["info"], str, Phrase], None]) -> APIRouter:
+    """The routes that log a browser in and out.
+
+    Args:
+        door: decides who gets in.
+        tell: told level, component and words of who has come and gone.
+    """
     router = strict_router("Login")
 
     @router.post("/login", status_code=HTTPStatus.NO_CONTENT, responses=refusals(413, 415))
@@ -38,7 +44,7 @@ def login_router(door: Door, service: RigService) -> APIRouter:
         role = door.check_token(login.token, client)
         if door.access.tokens:
             said = phrase("event_logged_in", "logged in ({caller})", caller=str(Caller(role, client)))
-            await run_in_threadpool(service.tell, "info", "access", said)
+            await run_in_threadpool(tell, "info", "access", said)
         response.set_cookie(
             COOKIE, door.sessions.begin(role), max_age=int(SESSION_S), httponly=True, samesite="strict",
             secure=door.access.is_https(request),
@@ -53,7 +59,7 @@ def login_router(door: Door, service: RigService) -> APIRouter:
         if role is not None and door.access.tokens:
             caller = Caller(role, door.access.client_of(request))
             said = phrase("event_logged_out", "logged out ({caller})", caller=str(caller))
-            await run_in_threadpool(service.tell, "info", "access", said)
+            await run_in_threadpool(tell, "info", "access", said)
         response.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=door.access.is_https(request))
 
     @router.get("/access")

@@ -131,6 +131,30 @@ def test_two_rays_predict_the_third_and_two_pulses_the_next(desk: Desk, jump: Hi
     assert geometry.space.status == "controlled"
 
 
+def test_the_next_click_is_where_a_third_ray_is_missing(desk: Desk, jump: HillLog) -> None:
+    assert desk.suggestion("Anna") is None
+    for click in clicks(desk, jump, 5, range(15, 22)):
+        if (click.pulse, click.thing) != (18, "P1") or click.camera == "K1":
+            desk.act("Anna", click.action())
+    # All else has three rays: this one has the largest sigma, but P2 at the hidden hip may have fewer.
+    told = desk.suggestion("Anna")
+    assert told is not None
+    rays = desk.view("Anna", told.pulse).space[told.thing].rays
+    assert told.camera not in rays
+    assert len(rays) < 3
+    before = _trace(desk, told.pulse, told.thing)
+    truth = np.array(jump.truth[told.pulse]["points"][told.thing])
+    x, y = desk.oriented()[told.camera].project(truth)
+    desk.act("Anna", PlaceAction(do="place", pulse=told.pulse, camera=told.camera, thing=told.thing, xy=(x, y)))
+    assert _trace(desk, told.pulse, told.thing) < before
+    assert desk.suggestion("Anna") != told
+
+
+def _trace(desk: Desk, pulse: int, thing: str) -> float:
+    sigma = desk.view("Anna", pulse).space[thing].sigma
+    return np.inf if sigma is None else float(np.square(sigma).sum())
+
+
 def test_a_tape_gives_a_length_with_its_sigma(desk: Desk, jump: HillLog) -> None:
     system, points = desk.oriented(), jump.truth[20]["points"]
     ends = {

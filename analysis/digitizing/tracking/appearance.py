@@ -33,7 +33,10 @@ _BLOCK = 3  # px; residuals farther apart are independent
 _APART = 2.0  # px between two peaks of the correlation
 _RIVAL = 0.25  # of the correlation, by which a peak may be lower than the highest one: it is taken on whole pixels
 _UNKNOWNS = 8  # x, y, A, gain, offset
-_FEWEST = 20  # pixels that count
+_LEAST = 0.25  # of the weight of the template, that must agree
+_UNEXPLAINED = 1.5  # times the noise: larger residuals say that what surrounds the thing may move otherwise
+_CORE = 0.35  # of the half size of a template: the thing itself
+_DETERMINED_PX = 1.0  # sigma of a match of the core alone, at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,39 +114,89 @@ def match(of: Template, picture: Picture, start: Floats, affine: Floats) -> Matc
         return None
     corner = np.floor(start - reach).astype(int)
     layers = _layers(picture, corner, np.ceil(start + reach).astype(int))
-    theta = np.concatenate((start - corner, affine.ravel(), (1.0, 0.0)))
+    expected = np.concatenate((start - corner, affine.ravel(), (1.0, 0.0)))
+    scale = float(np.hypot(of.noise, picture.noise))
+    whole = _fitted(of, layers, of.weight, expected, expected, scale)
+    if whole is None or not picture.holds(whole.theta[:2] + corner, 2.0):
+        return None
+    covariance = whole.covariance
+    if whole.spread > _UNEXPLAINED * scale:
+        core = _fitted(of, layers, of.weight * _core(of), whole.theta, expected, scale)
+        if core is not None and np.trace(core.covariance) < _DETERMINED_PX**2:
+            off = (core.theta - whole.theta)[:2]
+            covariance = covariance + np.outer(off, off)
+    return Match(
+        whole.theta[:2] + corner,
+        covariance,
+        covariance + whole.drift,
+        whole.theta[2:6].reshape(2, 2),
+        _correlation(of.grey, whole.theta[6] * of.grey - whole.v, of.weight * whole.inside),
+        _score(of, whole.v, whole.inside, scale),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """A template adjusted to an image.
+
+    Attributes:
+        theta: (8,) place, A, gain and offset.
+        v: (k,) residuals.
+        inside: (k,) 1 for the pixels that lie in the window.
+        spread: of the residuals, robust.
+        covariance: (2, 2) px^2 of the place.
+        drift: (2, 2) px^2, see `_drift`.
+    """
+
+    theta: Floats
+    v: Floats
+    inside: Floats
+    spread: float
+    covariance: Floats
+    drift: Floats
+
+
+def _fitted(
+    of: Template, layers: list[GreyImage], weights: Floats, start: Floats, expected: Floats, scale: float
+) -> _Fit | None:
+    """Adjust place, A, gain and offset; None if the place leaves its start, or too little of the thing is seen.
+
+    Args:
+        of: the template.
+        layers: of the window.
+        weights: (k,) of its pixels.
+        start: (8,) unknowns, px of the window.
+        expected: (8,) that A, gain and offset are expected near.
+        scale: noise of a residual.
+    """
     prior = np.array((0, 0, *[_AFFINE_SPREAD**-2] * 4, _GAIN_SPREAD**-2, _OFFSET_SPREAD**-2))
-    expected = theta.copy()
-    scale = np.hypot(of.noise, picture.noise)
+    theta, spread = start, scale
     for _ in range(_STEPS):
         v, design, inside = _residuals(of, layers, theta)
         spread = max(scale, 1.4826 * float(np.median(np.abs(v))))
-        weight = of.weight * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
+        weight = weights * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
         weighted = design * weight[:, None] / spread**2
-        normal = weighted.T @ design + np.diag(prior)
-        step = np.linalg.solve(normal + 1e-9 * np.eye(_UNKNOWNS), weighted.T @ v + prior * (expected - theta))
+        normal = weighted.T @ design + np.diag(prior) + 1e-9 * np.eye(_UNKNOWNS)
+        step = np.linalg.solve(normal, weighted.T @ v + prior * (expected - theta))
         size = float(np.hypot(*step[:2]))
         theta = theta + step * min(1.0, _LARGEST_STEP / max(size, 1e-9))
         if size < _ENOUGH:
             break
-    xy = theta[:2] + corner
-    if not np.isfinite(theta).all() or np.hypot(*(xy - start)) > _FARTHEST or not picture.holds(xy, 2.0):
+    if not np.isfinite(theta).all() or np.hypot(*(theta - start)[:2]) > _FARTHEST:
         return None
     v, design, inside = _residuals(of, layers, theta)
-    weight = of.weight * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
-    if weight.sum() < _FEWEST:
+    weight = weights * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
+    if weight.sum() < _LEAST * weights.sum():
         return None
     weighted = design * weight[:, None] / spread**2
-    inverse = np.linalg.inv(weighted.T @ design + np.diag(prior) + 1e-9 * np.eye(_UNKNOWNS))
+    inverse = np.asarray(np.linalg.inv(weighted.T @ design + np.diag(prior) + 1e-9 * np.eye(_UNKNOWNS)), float)
     covariance = _covariance(of, weighted, v, inverse, scale / spread)
-    return Match(
-        xy,
-        covariance,
-        covariance + _drift(of, design, weight),
-        theta[2:6].reshape(2, 2),
-        _correlation(of.grey, theta[6] * of.grey - v, of.weight * inside),
-        _score(of, v, inside, scale),
-    )
+    return _Fit(theta, v, inside, spread, covariance, _drift(of, design, weight))
+
+
+def _core(of: Template) -> Floats:
+    """Weights (k,) of the pixels next to the thing."""
+    return np.asarray(np.exp(-(of.places**2).sum(axis=1) / (2 * (_CORE * of.half) ** 2)))
 
 
 def _patch(of: Template, affine: Floats, half: int) -> tuple[GreyImage, GreyImage]:

@@ -154,7 +154,8 @@ def _worst(found: Match) -> float:
 
 
 def _candidate(anchor: Anchor, picture: Picture, found: Match, step: Floats) -> Candidate:
-    sigma = np.sqrt(np.diagonal(anchor.covariance + found.covariance))
-    observation = Observation(found.xy, found.covariance + step)
+    sigma = np.sqrt(np.diagonal(anchor.covariance + found.drift + found.covariance))
+    drifted = step + found.drift
+    observation = Observation(found.xy, found.covariance + drifted)
     after = anchor.matched(picture, found)
-    return Candidate(observation, sigma, Origin.TRACKED, found.score, after, step + found.drift)
+    return Candidate(observation, sigma, Origin.TRACKED, found.score, after, drifted)

@@ -151,6 +151,19 @@ class Motion:
         covariance[np.ix_(at, at)] += step
         return Belief(belief.mean, covariance)
 
+    def strain(self, belief: Belief, anchors: Mapping[str, Floats]) -> float:
+        """Chi-squared of the offsets as they are estimated, against the covariances (2, 2) px^2 that they may have.
+
+        What the cameras show differs from one thing by that; redundancy 2 for each camera, minus the dimensions.
+        """
+        names = tuple(anchors)
+        at: Integers = np.concatenate([self._offset(name) for name in names])
+        allowed = self.views.shared(names, self.place(belief))
+        for i, anchor in enumerate(anchors.values()):
+            allowed[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += anchor
+        offsets = belief.mean[at]
+        return float(offsets @ np.linalg.solve(allowed, offsets))
+
     def _offset(self, name: str) -> Integers:
         first = self._moving + 2 * self.views.names.index(name)
         return np.array((first, first + 1))

@@ -14,6 +14,8 @@ from rig.errors import BadInputError
 
 _GAP = 2  # pulses without any match that are bridged
 _ALONE = 4  # pulses in sequence in which one camera alone may show a thing that several cameras track
+_STRAIN_P = 1e-3  # probability of offsets between the cameras that are larger than their marks and matches allow
+_STRAINED_P = 0.05  # probability of those from which on places are taken back when they become too large
 _MEMORY = 8  # pulses back in which further marks tell of the motion
 
 
@@ -44,6 +46,7 @@ class Run:
         self._automatic, self._known = automatic, known
         self._anchors: dict[str, Anchor] = {}
         self._places: dict[int, dict[str, Tracked]] = {}
+        self._strained: list[int] = []  # the last pulses in which the offsets of the cameras were doubtful
 
     def track(self) -> Track:
         """Start and go on until the end, or until something speaks against it."""
@@ -130,6 +133,16 @@ class Run:
             self._places[pulse][name] = Tracked(candidate.observation.xy, candidate.sigma, candidate.origin)
         if marks:
             self._anchor(after, pulse, marks)
+        anchors = {name: anchor.covariance for name, anchor in self._anchors.items()}
+        redundancy = 2 * len(anchors) - self._views.dimensions
+        if redundancy > 0:
+            strain = self._motion.strain(after, anchors)
+            if strain > chdtri(redundancy, _STRAIN_P):
+                for doubtful in self._strained:
+                    self._places.pop(doubtful, None)
+                self._places.pop(pulse, None)
+                return None, 0, f"{', '.join(anchors)} follow different things by now (chi-squared {strain:.0f})"
+            self._strained = [*self._strained, pulse] if strain > chdtri(redundancy, _STRAINED_P) else []
         return after, len(chosen) + len(marks), "; ".join([*missing, reason] if reason else missing)
 
     def _candidates(

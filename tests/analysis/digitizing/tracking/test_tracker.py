@@ -129,6 +129,21 @@ def test_things_of_one_jumper_are_tracked_together() -> None:
         of.tracker.track_together(marks, start + 1, 1, FEW)
 
 
+def test_cameras_that_follow_different_things_end_the_track() -> None:
+    """The images of one camera sink by half a px in each pulse: what it shows is no longer the same place in space."""
+    of = hill(21)
+    start = _start(of, "P1")
+
+    def slipping(pulse: int) -> dict[str, NDArray[np.uint8]]:
+        images = of.frames(pulse)
+        return {**images, "K3": np.roll(images["K3"], max(0, pulse - start) // 2, axis=0)}
+
+    tracker = Tracker(slipping, RATE_HZ, of.system)
+    (track,) = tracker.track({start: of.marks(start, "P1")}, start, 1, 20)
+    assert len(track.places) < 10
+    assert "contradict each other or the motion" in track.stopped or "follow different things" in track.stopped
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("markers", [True, False])
 def test_thirty_pulses_are_carried_with_honest_sigmas(markers: bool) -> None:

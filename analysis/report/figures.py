@@ -14,6 +14,7 @@ _MINUS = "\N{MINUS SIGN}"
 _MISSING = "\N{EN DASH}"
 #: The most decimals that are ever shown: smaller sigmas are those of exact numbers.
 _MOST_DECIMALS = 6
+_MOST_OF_ANGLES = 1
 
 
 def decimals(sigma: float) -> int:
@@ -38,17 +39,17 @@ def fixed(value: float, places: int) -> str:
     return text.replace("-", _MINUS) if float(text) else text.lstrip("-")
 
 
-def value_and_sigma(quantity: Quantity) -> tuple[str, str]:
-    """Both numbers with the digits that sigma allows."""
+def value_and_sigma(quantity: Quantity, unit: str = "") -> tuple[str, str]:
+    """Both numbers with the digits that sigma allows; an angle with one decimal at most, as coaches say it."""
     places = decimals(quantity.sigma)
-    return fixed(quantity.value, places), fixed(quantity.sigma, places)
+    return fixed(quantity.value, min(places, _MOST_OF_ANGLES) if unit == "°" else places), fixed(quantity.sigma, places)
 
 
 def plus_minus(quantity: Quantity | None, unit: str = "") -> str:
     """`26.12 ± 0.13 m/s`; a dash if there is no number. The degree sign follows without a space."""
     if quantity is None:
         return _MISSING
-    value, sigma = value_and_sigma(quantity)
+    value, sigma = value_and_sigma(quantity, unit)
     if unit == "°":
         return f"{value}° ± {sigma}°"
     return f"{value} ± {sigma} {unit}".strip()

@@ -95,7 +95,7 @@ def _five(figures: Sequence[Figure]) -> str:
 def _figure(figure: Figure) -> str:
     number = f'<span class="value none">{shown(Said("not measured", "ikke målt"))}</span>'
     if figure.quantity is not None:
-        value, sigma = value_and_sigma(figure.quantity)
+        value, sigma = value_and_sigma(figure.quantity, figure.unit)
         degree, unit = ("°", "") if figure.unit == "°" else ("", f' <span class="unit">{escape(figure.unit)}</span>')
         number = f'<span class="value">{value}{degree}</span> <span class="sigma">± {sigma}{degree}</span>{unit}'
     return (

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,15 @@ from analysis.result.model import JumperState, Status
 from analysis.scene.camera_system import PlacedCamera
 from rig.arrays import Floats
 
+#: Red, green, blue.
+Colour = tuple[int, int, int]
+#: Of the parts of the stick figure, in pictures, pages and videos.
+COLOURS: Final[Mapping[str, Colour]] = {
+    "body": (255, 243, 92),
+    "feet": (255, 243, 92),
+    "right": (255, 157, 46),
+    "left": (89, 194, 255),
+}
 #: Length of a ski, m (section 3 of the paper); the binding is at its middle.
 SKI_LENGTH_M = 2.63
 #: Drawn sizes of standard deviations: the true ones are smaller than a pixel.

@@ -24,7 +24,7 @@ from analysis.report.course import Course, course_of
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, Windows, windows_of
 from analysis.report.figures import fixed
 from analysis.report.frames import Grey, frames_of
-from analysis.report.overlay import SHIFT, Overlay, fine, half_axes
+from analysis.report.overlay import COLOURS, SHIFT, Overlay, fine, half_axes
 from analysis.report.scrubbing import overlays_of
 from analysis.result.model import MeasuredRecording
 from analysis.scene.camera_system import CameraSystem
@@ -44,13 +44,8 @@ _WIDEST_PX: Final = 1920
 #: Phones play H.264 in MP4.
 _CODECS: Final = {".mp4": h264(23), ".webm": VP9, ".mkv": VP9}
 _LETTERS: Final = 0.6  # size of words, in units of the font
-#: Blue, green, red.
-_COLOURS: Final[Mapping[str, _Colour]] = {
-    "body": (92, 243, 255),
-    "feet": (92, 243, 255),
-    "right": (46, 157, 255),
-    "left": (255, 194, 89),
-}
+#: Blue, green, red, as OpenCV and the encoder take them.
+_COLOURS: Final[Mapping[str, _Colour]] = {part: (blue, green, red) for part, (red, green, blue) in COLOURS.items()}
 _POINT: Final[_Colour] = (168, 92, 255)
 _INK: Final[_Colour] = (255, 255, 255)
 

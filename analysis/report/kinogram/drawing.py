@@ -7,18 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.report.overlay import SHIFT, Overlay, fine
+from analysis.report.overlay import COLOURS, SHIFT, Colour, Overlay, fine
 from rig.arrays import Floats
 
 Picture = NDArray[np.uint8]
-#: Red, green, blue.
-Colour = tuple[int, int, int]
-COLOURS: Final[dict[str, Colour]] = {
-    "body": (255, 243, 92),
-    "feet": (255, 243, 92),
-    "right": (255, 157, 46),
-    "left": (89, 194, 255),
-}
 DARK: Final[Colour] = (0, 0, 0)
 LIGHT: Final[Colour] = (255, 255, 255)
 #: Widths of lines: light edge, dark edge, colour, px.

@@ -5,31 +5,13 @@ from typing import Final
 import cv2
 import numpy as np
 
-from analysis.report.kinogram.drawing import COLOURS, DARK, LIGHT, Colour, Picture, draw
+from analysis.report.kinogram import words
+from analysis.report.kinogram.drawing import DARK, LIGHT, Picture, draw
 from analysis.report.kinogram.figures import Word
 from analysis.report.kinogram.model import Kinogram
 from analysis.report.kinogram.shots import HEIGHT, WIDTH, Shot
-from analysis.report.kinogram.words import (
-    BODY,
-    DOUBTFUL,
-    GOOD,
-    LEFT,
-    METRE,
-    MISSING,
-    NOT_MEASURED,
-    PREDICTED,
-    RIGHT,
-    SIGMA,
-    TITLES,
-    facts_words,
-    mark_words,
-    name_words,
-    number_words,
-    place_words,
-    reference_words,
-    where_words,
-)
 from analysis.report.language import Said
+from analysis.report.overlay import COLOURS, Colour
 from analysis.result.model import MeasuredRecording
 
 _GAP: Final = 16
@@ -115,10 +97,10 @@ class _Sheet:
 
 
 def _head(sheet: _Sheet, kinogram: Kinogram, result: MeasuredRecording, hill: str) -> None:
-    name = name_words(result)
+    name = words.name_words(result)
     who = name.english if name.english == name.norwegian else f"{name.english} · {name.norwegian}"
     sheet.write(who, (_GAP + 4, 56), 46, _BOLD, most=_ACROSS - 3 * _GAP)
-    line = "   ".join(_both(fact) for fact in facts_words(kinogram, result, hill))
+    line = "   ".join(_both(fact) for fact in words.facts_words(kinogram, result, hill))
     sheet.write(line, (_GAP + 4, 94), 24, colour=_SOFT, most=_ACROSS - 3 * _GAP)
 
 
@@ -127,17 +109,17 @@ def _picture(sheet: _Sheet, shot: Shot, at: tuple[int, int]) -> None:
     if shot.picture is None or shot.overlay is None or shot.missing is not None:
         sheet.box(at, (WIDTH, HEIGHT), (211, 220, 230))
         if shot.missing is not None:
-            said = MISSING[shot.missing]
+            said = words.MISSING[shot.missing]
             sheet.write(said.english, (x + 24, y + HEIGHT // 2), 28, colour=_SOFT, most=WIDTH - 48)
             sheet.write(said.norwegian, (x + 24, y + HEIGHT // 2 + 34), 22, colour=_SOFT, most=WIDTH - 48)
     else:
         part = np.ascontiguousarray(np.broadcast_to(shot.picture[:, :, np.newaxis], (HEIGHT, WIDTH, 3)))
         draw(part, shot.overlay)
         sheet.pixels[y : y + HEIGHT, x : x + WIDTH] = part
-    label = _both(place_words(shot))
+    label = _both(words.place_words(shot))
     sheet.box(at, (sheet.width(label, 34, _BOLD) + 28, 52), _INK)
     sheet.write(label, (x + 14, y + 38), 34, _BOLD, colour=LIGHT, most=WIDTH)
-    if where := where_words(shot):
+    if where := words.where_words(shot):
         wide = sheet.width(where, 20) + 20
         sheet.box((x + WIDTH - wide, y + HEIGHT - 32), (wide, 32), _INK)
         sheet.write(where, (x + WIDTH - wide + 10, y + HEIGHT - 10), 20, colour=LIGHT, most=WIDTH)
@@ -149,17 +131,17 @@ def _key(sheet: _Sheet, kinogram: Kinogram, at: tuple[int, int]) -> None:
     ok = kinogram.jump.verdict.ok
     sheet.box(at, (WIDTH, HEIGHT), _CARD)
     sheet.box(at, (WIDTH, 92), _GREEN if ok else _RED)
-    said = GOOD if ok else DOUBTFUL
+    said = words.GOOD if ok else words.DOUBTFUL
     sheet.write(said.english, (x + 20, y + 42), 32, _BOLD, colour=LIGHT, most=WIDTH - 40)
     sheet.write(said.norwegian, (x + 20, y + 76), 25, colour=LIGHT, most=WIDTH - 40)
     y += 124
-    for part, words in (("right", RIGHT), ("left", LEFT), ("body", BODY)):
+    for part, named in (("right", words.RIGHT), ("left", words.LEFT), ("body", words.BODY)):
         cv2.line(sheet.pixels, (x + 20, y), (x + 84, y), DARK, 8, cv2.LINE_AA)
         cv2.line(sheet.pixels, (x + 20, y), (x + 84, y), COLOURS[part], 4, cv2.LINE_AA)
-        y = _key_words(sheet, words, (x, y))
+        y = _key_words(sheet, named, (x, y))
     cv2.circle(sheet.pixels, (x + 52, y), 9, DARK, -1, cv2.LINE_AA)
     cv2.circle(sheet.pixels, (x + 52, y), 6, COLOURS["body"], 2, cv2.LINE_AA)
-    y = _key_words(sheet, PREDICTED, (x, y))
+    y = _key_words(sheet, words.PREDICTED, (x, y))
     scale = next((shot.px_per_m for shot in kinogram.shots if shot.px_per_m is not None), None)
     if scale is not None:
         length = 1.0 if scale < _WIDEST_METRE else 0.5
@@ -168,36 +150,36 @@ def _key(sheet: _Sheet, kinogram: Kinogram, at: tuple[int, int]) -> None:
         for end in (x + 20, x + 20 + metre):
             cv2.line(sheet.pixels, (end, y - 8), (end, y + 8), _INK, 3)
         beside = sheet.write(f"{length:g} m", (x + 30 + metre, y + 2), 20, _BOLD, most=60) + 14
-        sheet.write(METRE.english, (beside, y - 2), 18, most=x + WIDTH - 12 - beside)
-        sheet.write(METRE.norwegian, (beside, y + 20), 16, colour=_SOFT, most=x + WIDTH - 12 - beside)
+        sheet.write(words.METRE.english, (beside, y - 2), 18, most=x + WIDTH - 12 - beside)
+        sheet.write(words.METRE.norwegian, (beside, y + 20), 16, colour=_SOFT, most=x + WIDTH - 12 - beside)
 
 
-def _key_words(sheet: _Sheet, words: Said, at: tuple[int, int]) -> int:
+def _key_words(sheet: _Sheet, said: Said, at: tuple[int, int]) -> int:
     x, y = at
-    sheet.write(words.english, (x + 104, y + 1), 21, most=WIDTH - 116)
-    sheet.write(words.norwegian, (x + 104, y + 23), 17, colour=_SOFT, most=WIDTH - 116)
+    sheet.write(said.english, (x + 104, y + 1), 21, most=WIDTH - 116)
+    sheet.write(said.norwegian, (x + 104, y + 23), 17, colour=_SOFT, most=WIDTH - 116)
     return y + 56
 
 
 def _figure(sheet: _Sheet, kinogram: Kinogram, name: str, at: tuple[int, int]) -> None:
     x, y = at
     sheet.box(at, (WIDTH, _FIGURE), _CARD)
-    title, quantity, mark = TITLES[name], kinogram.figures[name], kinogram.marks.get(name)
+    title, quantity, mark = words.TITLES[name], kinogram.figures[name], kinogram.marks.get(name)
     sheet.write(title.english, (x + 18, y + 30), 23, 600, most=WIDTH - 36)
     sheet.write(title.norwegian, (x + 18, y + 53), 18, colour=_SOFT, most=WIDTH - 36)
     if quantity is None:
-        sheet.write(_both(NOT_MEASURED), (x + 18, y + 98), 24, colour=_SOFT, most=WIDTH - 36)
+        sheet.write(_both(words.NOT_MEASURED), (x + 18, y + 98), 24, colour=_SOFT, most=WIDTH - 36)
         return
     wide = 0
     if mark is not None:
-        said, (ground, ink) = mark_words(name, mark), _MARKS[mark.word]
+        said, (ground, ink) = words.mark_words(name, mark), _MARKS[mark.word]
         wide = max(sheet.width(said.english, 21, 650), sheet.width(said.norwegian, 18)) + 28
         left = x + WIDTH - 16 - wide
         sheet.box((left, y + 98), (wide, 58), ground)
         sheet.write(said.english, (left + 14, y + 123), 21, 650, colour=ink, most=wide - 28)
         sheet.write(said.norwegian, (left + 14, y + 146), 18, colour=ink, most=wide - 28)
     for line, down, size, weight in zip(
-        number_words(name, quantity), (92, 132), (34, 25), (_BOLD, _SURE), strict=False
+        words.number_words(name, quantity), (92, 132), (34, 25), (_BOLD, _SURE), strict=False
     ):
         beside = wide if down > 92 else 0
         sheet.write(line, (x + 18, y + down), size, weight, most=WIDTH - 46 - beside)
@@ -205,8 +187,8 @@ def _figure(sheet: _Sheet, kinogram: Kinogram, name: str, at: tuple[int, int]) -
 
 def _notes(sheet: _Sheet, kinogram: Kinogram, at: tuple[int, int]) -> None:
     x, y = at[0] + 18, at[1] + 36
-    reference = reference_words(kinogram.reference, ok=kinogram.jump.verdict.ok)
-    for said in (reference, SIGMA):
+    reference = words.reference_words(kinogram.reference, ok=kinogram.jump.verdict.ok)
+    for said in (reference, words.SIGMA):
         y = sheet.paragraph(said.english, (x, y), 18, colour=_INK, most=WIDTH - 36)
         y = sheet.paragraph(said.norwegian, (x, y), 16, colour=_SOFT, most=WIDTH - 36) + 4
 

@@ -67,7 +67,7 @@ def _text(page: str, language: str = "en") -> str:
 def test_the_five_numbers_are_those_of_the_result(page: str) -> None:
     five = five_figures(course_of(measured_recording().jumps[0], RATE_HZ), PERPENDICULAR[1])
     numbers = re.findall(r'class="value">([^<]+)</span> <span class="sigma">± ([^<]+)</span>', page)
-    expected = [value_and_sigma(figure.quantity) for figure in five if figure.quantity is not None]
+    expected = [value_and_sigma(figure.quantity, figure.unit) for figure in five if figure.quantity is not None]
     assert [(value.rstrip("°"), sigma.rstrip("°")) for value, sigma in numbers] == expected
     assert len(expected) == 5
     assert "2.31 ± 0.08 m/s" in _text(page)

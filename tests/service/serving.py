@@ -170,11 +170,16 @@ def serving(
     token: str = "",
     ends_with: int = 0,
     port: int | None = None,
+    host: str | None = None,
 ) -> Iterator[Serving]:
-    """A service on a port of this test's own, or the one given; ended by SIGTERM, with the exit code `ends_with`."""
+    """A service on a port of this test's own, or the one given; ended by SIGTERM, with the exit code `ends_with`.
+
+    `host` is another address of this computer: names that a browser looks for here lead to 127.0.0.1.
+    """
+    host = loopback.host if host is None else host
     port = loopback.free_port() if port is None else port
     log, data = folder / "service.log", folder / "data" if data is None else data
-    arguments = ["--rig", str(rig), "--host", loopback.host, "--port", str(port), "--data", str(data), *more]
+    arguments = ["--rig", str(rig), "--host", host, "--port", str(port), "--data", str(data), *more]
     with log.open("w") as file:
         process: Process
         if (*prefix, *command) == _COMMAND:
@@ -183,7 +188,7 @@ def serving(
             process = subprocess.Popen(
                 [*prefix, *command, *arguments], stdout=file, stderr=file, env={**os.environ, **(environment or {})}
             )
-    service = Serving(process, f"http://{loopback.host}:{port}", data, log, token)
+    service = Serving(process, f"http://{host}:{port}", data, log, token)
     try:
         wait_until(lambda: _answers(service), "the API answers", PATIENCE_S)
         yield service

@@ -4,6 +4,7 @@ import { t } from "../i18n/i18n.js";
 import { $, icon, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { attempt, tell } from "../shared/snacks.js";
+import { nameOf } from "./numbers.js";
 import { exportAddress, getRepeatability, importFile } from "./server.js";
 import { reloadAll } from "./session.js";
 import { state, watch } from "./state.js";
@@ -35,7 +36,7 @@ async function take() {
   const file = $("import-file").files[0];
   $("import-file").value = "";
   if (!file) return;
-  const type = file.name.endsWith(".csv") ? "text/csv" : "application/json";
+  const type = { csv: "text/csv", zip: "application/zip" }[file.name.split(".").pop() ?? ""] ?? "application/json";
   const done = await attempt(async () => { await importFile(state.operator, new Blob([file], { type })); return true; });
   if (!done) return;
   await reloadAll();
@@ -46,10 +47,16 @@ async function compare() {
   const found = await attempt(() => getRepeatability([state.operator, $("compare-with").value]));
   if (!found) return;
   setText($("compare-says"), found.message);
-  const row = (/** @type {string} */ name, /** @type {import("./types.js").Estimate} */ { value, sigma }, /** @type {string} */ unit, count = "") =>
-    make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, `${number(value, 2)} ${unit}`), make("td", {}, `${number(sigma, 2)} ${unit}`), make("td", {}, count));
-  const head = ["digitize.compare_what", "digitize.compare_bias", "digitize.compare_sigma", "digitize.compare_count"].map((words) => make("th", { scope: "col" }, t(words)));
-  $("compare-table").replaceChildren(make("thead", {}, make("tr", {}, ...head)), make("tbody", {},
-    ...Object.entries(found.points).map(([name, value]) => row(titleOf(name), value, "px", String(found.count[name] ?? ""))),
-    ...Object.entries(found.angles).map(([name, value]) => row(name, value, "°"))));
+  const numbers = (/** @type {number[]} */ values) => values.map((value) => number(value, 2)).join(", ");
+  const row = (/** @type {string[]} */ [name, ...cells]) => make("tr", {}, make("th", { scope: "row" }, name), ...cells.map((cell) => make("td", {}, cell)));
+  const head = [t("digitize.compare_what"), t("digitize.compare_count"), t("digitize.compare_sigma"), ...found.operators];
+  $("compare-table").replaceChildren(
+    make("thead", {}, make("tr", {}, ...head.map((words) => make("th", { scope: "col" }, words)))),
+    make("tbody", {},
+      ...Object.entries(found.things).map(([name, { count, sigma_px, bias_px }]) => row([
+        titleOf(name), String(count), `${number(sigma_px, 2)} px`, ...found.operators.map((who) => numbers(bias_px[who] ?? [])),
+      ])),
+      ...Object.entries(found.figures).map(([name, { count, sigma, bias }]) => row([
+        nameOf(name), String(count), number(sigma, 2), ...found.operators.map((who) => numbers(who in bias ? [bias[who]] : [])),
+      ]))));
 }

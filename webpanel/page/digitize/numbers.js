@@ -20,6 +20,11 @@ const FIGURES = {
   alpha: ["α", "°", 2], beta: ["β", "°", 2], gamma: ["γ", "°", 2], dphi: ["Δφ", "°", 2], phi: ["φ", "°", 2], height: ["Z₀", "\u202fm", 3],
 };
 
+/** @param {string} figure @returns {string} its sign */
+export function nameOf(figure) {
+  return FIGURES[figure]?.[0] ?? figure;
+}
+
 export function startNumbers() {
   watch(draw);
 }
@@ -103,7 +108,8 @@ function makeRays(w, residuals) {
 function makeLine(name, { slope, heading, status, w, finding, sides }) {
   const angle = (/** @type {string} */ words, /** @type {import("./types.js").Estimate|null} */ value) =>
     value ? make("span", {}, `${t(words)} ${number(value.value, 1)} ± ${number(value.sigma, 2)}°`) : null;
-  const lamp = sides ? make("p", { class: "lamp", "data-ok": String(sides.ok) }, make("i", {}), make("span", {}, sides.ok ? t("digitize.sides_fit") : sides.message)) : null;
+  const told = sides && { true: t("digitize.sides_fit"), false: sides.message, null: t("digitize.sides_unknown") }[String(sides.ok)];
+  const lamp = sides ? make("p", { class: "lamp", "data-ok": String(sides.ok) }, make("i", {}), make("span", {}, told ?? "")) : null;
   return make("section", { class: "space", "data-of": name },
     makeHead(name, status, false),
     make("p", { class: "coordinates" }, angle("digitize.slope", slope), angle("digitize.heading", heading)),

@@ -126,5 +126,5 @@ export const importFile = (operator, file) => call("POST", path(session(operator
 
 /** @param {string[]} operators @returns {Promise<import("./types.js").Repeatability>} */
 export function getRepeatability(operators) {
-  return call("GET", path(`/repeatability?${new URLSearchParams(operators.map((name) => ["operators", name]))}`), undefined, LONG_MS);
+  return call("GET", path(`/repeatability?${new URLSearchParams({ operators: operators.join(",") })}`), undefined, LONG_MS);
 }

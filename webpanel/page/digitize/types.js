@@ -39,7 +39,7 @@
  * @property {string|null} finding
  *
  * @typedef {object} SideCheck
- * @property {boolean} ok
+ * @property {boolean|null} ok
  * @property {string} message
  * @typedef {object} SpaceLine
  * @property {Estimate|null} slope
@@ -157,11 +157,18 @@
  * @property {Record<string, CurvePoint[]>} curves
  * @property {string[]} files
  *
+ * @typedef {object} PointAgreement
+ * @property {number} count
+ * @property {number} sigma_px
+ * @property {Record<string, Place>} bias_px
+ * @typedef {object} FigureAgreement
+ * @property {number} count
+ * @property {number} sigma
+ * @property {Record<string, number>} bias
  * @typedef {object} Repeatability
  * @property {string[]} operators
- * @property {Record<string, Estimate>} points
- * @property {Record<string, number>} count
- * @property {Record<string, Estimate>} angles
+ * @property {Record<string, PointAgreement>} things
+ * @property {Record<string, FigureAgreement>} figures
  * @property {string} message
  */
 

@@ -68,6 +68,7 @@ export async function reloadView() {
 /** Load coverage, depth of undo, and the rays that fit worst. */
 export async function reloadSession() {
   const { operator } = state;
+  if (!operator) return;
   const session = await attempt(() => getSession(operator));
   if (session && operator === state.operator) change({ session });
 }

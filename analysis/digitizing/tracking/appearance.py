@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.candidates.median import median
 from analysis.digitizing.tracking.thing_template import Picture, Template
 from analysis.scene.static_image import GreyImage
 from rig.arrays import Floats
@@ -28,6 +29,7 @@ _LARGEST_STEP = 1.0  # px
 _FARTHEST = 3.0  # px that a match may lie from its start: farther away is another start
 _AFFINE_SPREAD = 0.04  # of A from one match to the next
 _GAIN_SPREAD, _OFFSET_SPREAD = 0.2, 10.0  # grey values
+_MAD_TO_SIGMA = 1.4826
 _HALF_SIGMAS = 3.0  # residuals that count half
 _BLOCK = 3  # px; residuals farther apart are independent
 _APART = 2.0  # px between two peaks of the correlation
@@ -173,7 +175,7 @@ def _fitted(
     theta, spread = start, scale
     for _ in range(_STEPS):
         v, design, inside = _residuals(of, layers, theta)
-        spread = max(scale, 1.4826 * float(np.median(np.abs(v))))
+        spread = max(scale, _MAD_TO_SIGMA * median(np.abs(v)))
         weight = weights * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
         weighted = design * weight[:, None] / spread**2
         normal = weighted.T @ design + np.diag(prior) + 1e-9 * np.eye(_UNKNOWNS)

@@ -14,7 +14,6 @@ from rig.errors import BadInputError
 
 _GAP = 2  # pulses without any match that are bridged
 _ALONE = 4  # pulses in sequence in which one camera alone may show a thing that several cameras track
-_STRAIN_P = 1e-3  # probability of offsets between the cameras that are larger than their marks and matches allow
 _STRAINED_P = 0.05  # probability of those from which on places are taken back when they become too large
 _MEMORY = 8  # pulses back in which further marks tell of the motion
 
@@ -137,7 +136,7 @@ class Run:
         redundancy = 2 * len(anchors) - self._views.dimensions
         if redundancy > 0:
             strain = self._motion.strain(after, anchors)
-            if strain > chdtri(redundancy, _STRAIN_P):
+            if strain > chdtri(redundancy, GATE_P):
                 for doubtful in self._strained:
                     self._places.pop(doubtful, None)
                 self._places.pop(pulse, None)

@@ -12,16 +12,16 @@ from analysis.digitizing.effective import covariance_of, effective
 from analysis.digitizing.epipolar import epipolar_curves
 from analysis.digitizing.files import DeskFiles
 from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key, operators
+from analysis.digitizing.next_mark import next_mark
 from analysis.digitizing.opened_log import OpenedLog
 from analysis.digitizing.orienting import Orienting
 from analysis.digitizing.pulse_view import PulseMarks, as_mark, pulse_view
 from analysis.digitizing.repeatability import repeatability
 from analysis.digitizing.session import Session
 from analysis.digitizing.space import Ray, intersected, predicted_points, space_points
-from analysis.digitizing.suggesting import MarkedPulse, suggested
 from analysis.digitizing.things import BALL, things
 from analysis.measurements.file import read_measurements
-from analysis.measurements.model import POINTS, Measurements, PulseMeasurements
+from analysis.measurements.model import Measurements, PulseMeasurements
 from analysis.scene.camera_system import CameraSystem
 from rig.api.digitizing import (
     Action,
@@ -45,7 +45,6 @@ from rig.api.digitizing import (
     Worst,
 )
 from rig.arrays import Floats
-from rig.clocks import NS_PER_S
 from rig.errors import BadInputError, StateForbidsError, UnknownCameraError, UnknownRecordingError
 
 #: So many of the rays that fit worst are told.
@@ -209,19 +208,13 @@ class Desk:
             StateForbidsError: no camera is oriented.
         """
         system, session = self.oriented(), self.session(operator)
-        marked = session.pulses()
         span = self._span()
-        ends = [*marked, *((span.first, span.last) if span else ())]
+        ends = [*session.pulses(), *((span.first, span.last) if span else ())]
         if not ends:
             return None
-        pulses = []
-        for pulse in self.log.pulses[self._index(min(ends)) : self._index(max(ends)) + 1][:_SUGGESTED_PULSES]:
-            marks = self._marks(session, pulse)
-            closed = {(key.thing, key.camera) for key, entered in marks.marks.items() if entered.xy is None} | {
-                (thing, camera) for camera in system.names for thing in POINTS if not self.log.has(pulse, camera)
-            }
-            pulses.append(MarkedPulse(pulse, self.log.times[pulse] / NS_PER_S, marks.rays(), frozenset(closed)))
-        return suggested(system, pulses, POINTS)
+        pulses = self.log.pulses[self._index(min(ends)) : self._index(max(ends)) + 1][:_SUGGESTED_PULSES]
+        marks = [self._marks(session, pulse) for pulse in pulses]
+        return next_mark(system, marks, self.log.has, self.log.facts.rate_hz)
 
     def changes(self, operator: str, since: int, wait_s: float) -> Changes:
         """What changed after a revision; waits for a change if there is none yet."""

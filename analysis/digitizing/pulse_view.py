@@ -57,6 +57,11 @@ class PulseMarks:
         """What counts of both."""
         return effective_pulse(self.pulse, self.time, self.marks, self.automatic)
 
+    def says_nothing(self, camera: str, thing: str) -> bool:
+        """Whether the operator says that a thing cannot be measured in an image."""
+        entered = self.marks.get(Key(self.pulse, camera, thing))
+        return entered is not None and entered.xy is None
+
     def rays(self) -> dict[str, dict[str, Ray]]:
         """The rays of all points: P1 to P4 as they count, and landmarks."""
         found: dict[str, dict[str, Ray]] = {}

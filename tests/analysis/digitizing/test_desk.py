@@ -136,7 +136,6 @@ def test_the_next_click_is_where_a_third_ray_is_missing(desk: Desk, jump: HillLo
     for click in clicks(desk, jump, 5, range(15, 22)):
         if (click.pulse, click.thing) != (18, "P1") or click.camera == "K1":
             desk.act("Anna", click.action())
-    # All else has three rays: this one has the largest sigma, but P2 at the hidden hip may have fewer.
     told = desk.suggestion("Anna")
     assert told is not None
     rays = desk.view("Anna", told.pulse).space[told.thing].rays

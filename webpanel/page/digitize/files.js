@@ -10,6 +10,8 @@ import { reloadAll } from "./session.js";
 import { state, watch } from "./state.js";
 import { titleOf } from "./things.js";
 
+/** What is read, by the ending of its name; anything else is taken for measurements.json. @type {Record<string, string>} */
+const TYPES = { csv: "text/csv", zip: "application/zip" };
 const FILES = ["measurements.json", "marks.csv", "dltdv.zip", "argus.zip"];
 
 export function startFiles() {
@@ -36,7 +38,7 @@ async function take() {
   const file = $("import-file").files[0];
   $("import-file").value = "";
   if (!file) return;
-  const type = { csv: "text/csv", zip: "application/zip" }[file.name.split(".").pop() ?? ""] ?? "application/json";
+  const type = TYPES[file.name.split(".").at(-1)] ?? "application/json";
   const done = await attempt(async () => { await importFile(state.operator, new Blob([file], { type })); return true; });
   if (!done) return;
   await reloadAll();

@@ -38,10 +38,10 @@ function draw() {
   const lines = view?.lines ?? {};
   const oriented = state.opening?.cameras.some((camera) => camera.oriented) ?? false;
   const now = JSON.stringify([space, lines, view?.figures, thing, Boolean(live), Boolean(state.dragged), oriented, document.documentElement.lang]);
-  if (now === shown) return;
-  shown = now;
   // Only of marks: where the pointer happens to be is no mistake.
   drawFindings([...Object.values(view?.space ?? {}), ...Object.values(lines)].flatMap(({ finding }) => finding ?? []));
+  if (now === shown) return;
+  shown = now;
   const names = Object.keys(space).sort((a, b) => Number(b === thing) - Number(a === thing));
   $("points").replaceChildren(...names.map((name) => makePoint(name, space[name], name === thing && Boolean(live))));
   $("lines").replaceChildren(...Object.entries(lines).map(([name, line]) => makeLine(name, line)));

@@ -19,7 +19,11 @@ export function startOperator() {
     if (name !== state.operator) void openSession(name);
   });
   $("operator-dialog").addEventListener("cancel", (/** @type {Event} */ event) => { if (!state.operator) event.preventDefault(); });
-  watch(() => setText($("operator-shown"), state.operator || t("digitize.operator_none")));
+  watch(() => {
+    const name = state.operator || t("digitize.operator_none");
+    setText($("operator-shown"), name);
+    $("operator").setAttribute("aria-label", t("digitize.operator_change", { name }));
+  });
   const known = load("digitize.operator", "");
   if (known) void openSession(known);
   else ask();

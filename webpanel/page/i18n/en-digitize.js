@@ -14,7 +14,7 @@ export const digitize = {
   "digitize.operator_name": "Your name",
   "digitize.operator_submit": "Begin",
   "digitize.operator_none": "nobody yet",
-  "digitize.operator_change": "Another operator",
+  "digitize.operator_change": "{name}: choose another operator",
   "digitize.views": "Views of the cameras",
   "digitize.large": "One large",
   "digitize.linked": "Linked",

@@ -14,7 +14,7 @@ export const digitize = {
   "digitize.operator_name": "Navnet ditt",
   "digitize.operator_submit": "Begynn",
   "digitize.operator_none": "ingen ennå",
-  "digitize.operator_change": "En annen operatør",
+  "digitize.operator_change": "{name}: velg en annen operatør",
   "digitize.views": "Kameraenes bilder",
   "digitize.large": "Ett stort",
   "digitize.linked": "Sammen",

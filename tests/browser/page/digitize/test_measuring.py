@@ -30,7 +30,7 @@ def _curve_height(page: Page, camera: str, at: Floats) -> float:
     return float(np.nonzero(alike.any(axis=1))[0].mean() - 60)
 
 
-def test_a_point_in_three_views_with_curves_and_a_length(desk: Desk, open_page: Open) -> None:
+def test_a_point_in_three_views_with_curves_and_a_mistake(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1700, height=900)
     page.locator("#advance").select_option("view")
     page.locator("#loupe").select_option("0")
@@ -53,6 +53,16 @@ def test_a_point_in_three_views_with_curves_and_a_length(desk: Desk, open_page: 
     found = desk.view()["space"]["P1"]
     off = np.array(found["X"]) - desk.log.truth[PULSE]["points"]["P1"]
     assert (np.abs(off) < 5 * np.array(found["sigma"])).all()
+    expect(page.locator("#findings")).to_be_empty()
+    page.mouse.move(*where["K2"])
+    page.mouse.down()
+    page.mouse.move(*np.add(where["K2"], [4, 20]), steps=4)
+    page.mouse.move(*np.add(where["K2"], [8, 40]), steps=4)
+    page.mouse.up()
+    expect(page.locator("#findings")).to_contain_text("K2's P1 does not fit")
+    expect(page.locator('[data-of="P1"] [data-fit="wrong"]').first).to_be_visible()
+    page.locator("#undo").click()
+    expect(page.locator("#findings")).to_be_empty()
     page.locator("#tape").click()
     for camera in ("K1", "K2"):
         page.mouse.click(*screen(page, camera, desk.true(camera, "P3")))

@@ -1,0 +1,74 @@
+"""The page itself: gaps and logs without a survey, narrow screens, Norwegian, what axe finds."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from rig.frame import FrameStatus
+from tests.browser.conftest import Open
+from tests.browser.page.digitize.conftest import Desk, enter
+from tests.browser.page.test_accessibility import _grave
+from tests.browser.views import AXE, BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
+from tests.recorder.logs import ALL_OK
+from tests.webpanel.memory_service import MemoryService, write_recording
+from tests.webpanel.serving import Panel
+
+OK = FrameStatus.OK
+
+
+def test_gaps_are_said_and_without_a_survey_only_images_are_measured(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    lost, missed = (OK, FrameStatus.LOST, OK), (FrameStatus.MISSED, OK, OK)
+    write_recording(service.catalogue.directory, "jump-2", (*(ALL_OK,) * 4, lost, *(ALL_OK,) * 3, missed, ALL_OK))
+    page = open_page(f"{panel.url}/#/recordings/jump-2")
+    page.locator("#recording-digitize").click()
+    page.locator("#operator-name").fill("Åse")
+    page.locator("#operator-submit").click()
+    expect(page.locator("#numbers-none")).to_contain_text("only images are measured")
+    expect(page.locator("#orientation-lamp")).to_contain_text("Not oriented")
+    page.keyboard.press("g")
+    k2 = page.locator('.pane[data-camera="K2"]')
+    expect(k2.locator(".pane-fate")).to_have_text("lost: The camera took the frame, but it did not arrive.")
+    expect(k2.locator(".pane-where")).to_contain_text("lost")
+    page.keyboard.press("g")
+    expect(page.locator('.pane[data-camera="K1"] .pane-where')).to_contain_text("missed")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Enter")
+    expect(page.locator("#undo")).to_be_disabled()  # there is no picture to measure in
+    page.keyboard.press("d")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Enter")
+    expect(page.locator("#undo")).to_be_enabled()
+    page.reload()  # the name is known now, and what was done is there
+    expect(page.locator("#operator-shown")).to_have_text("Åse")
+    expect(page.locator("#undo")).to_be_enabled()
+
+
+@pytest.mark.parametrize(
+    ("look", "width", "locale"),
+    [
+        ("dark", 360, "nb-NO"),
+        pytest.param("light", 768, "en-GB", marks=pytest.mark.long),
+        pytest.param("light", 1280, "nb-NO", marks=pytest.mark.long),
+    ],
+)
+def test_narrow_screens_gloves_and_axe(desk: Desk, open_page: Open, look: str, width: int, locale: str) -> None:
+    page = enter(open_page, desk, width=width, height=800, locale=locale, color_scheme=look, reduced_motion="reduce")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Enter")
+    page.locator("#picture > summary").click()
+    page.locator(".desk-more > details:last-child > summary").click()
+    expect(page.locator('[data-of="P1"]')).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+    assert not page.evaluate(BROKEN)
+    if not AXE.exists():
+        pytest.fail(f"the npm packages are not installed: run `npm ci` in {AXE.parents[2]}, or `make test`")
+    page.evaluate(AXE.read_text())
+    assert not _grave(page)
+    page.keyboard.press("?")
+    expect(page.locator("#help")).to_be_visible()
+    assert not _grave(page), "help"
+    expect(page.locator("#help-title")).to_have_text(re.compile("Hjelp" if locale == "nb-NO" else "Help"))

@@ -50,7 +50,6 @@ class Run:
     def track(self) -> Track:
         """Start and go on until the end, or until something speaks against it."""
         belief = self._started()
-        last = self._pulses[0]
         stopped, gap, alone = "it was tracked as far as was asked", 0, 0
         velocity = None
         for pulse in self._pulses[1:]:
@@ -62,14 +61,13 @@ class Run:
             belief = after
             gap = 0 if seen else gap + 1
             alone = alone + 1 if seen == 1 and len(self._views.names) > 1 else 0
-            if not gap:
-                last = pulse
-                if velocity is None and self._views.dimensions == 3:
-                    velocity = self._motion.velocity(belief)
+            if not gap and velocity is None and self._views.dimensions == 3:
+                velocity = self._motion.velocity(belief)
             if gap > _GAP or alone > _ALONE:
                 stopped = f"pulse {pulse}: {reason}"
                 break
-        return Track(self._places, stopped, last, velocity)
+        shown = [pulse for pulse in self._pulses if pulse in self._places]
+        return Track(self._places, stopped, shown[-1] if shown else self._pulses[0], velocity)
 
     def _started(self) -> Belief:
         """The belief at the first pulse, from its marks and those shortly before."""

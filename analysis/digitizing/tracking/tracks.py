@@ -44,7 +44,7 @@ class Track:
     Attributes:
         places: by pulse and camera; without those that are marked by hand.
         stopped: why it ends, in words.
-        last: the last pulse at which a mark or an image shows the thing.
+        last: the last pulse with a place; the first one of all if there is none.
         velocity: (3,) m/s at the start, for other things of the same jumper; None of an image by itself.
     """
 

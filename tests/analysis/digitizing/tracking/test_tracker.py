@@ -141,6 +141,7 @@ def test_cameras_that_follow_different_things_end_the_track() -> None:
     tracker = Tracker(slipping, RATE_HZ, of.system)
     (track,) = tracker.track({start: of.marks(start, "P1")}, start, 1, 20)
     assert len(track.places) < 10
+    assert track.last == max(track.places, default=start)
     assert "contradict each other or the motion" in track.stopped or "follow different things" in track.stopped
 
 

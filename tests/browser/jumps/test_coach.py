@@ -73,7 +73,7 @@ def test_the_screen_shows_the_last_jump_without_a_hand(hill: Hill, service: Memo
     hill.log_in(page)
     expect(page.locator("#coach-who")).to_have_text("4 · Ola <b>Nordmann</b>")
     expect(page.locator("#coach-mark")).to_have_text("Measured well")
-    expect(page.locator("#coach-figures b")).to_have_text(["94.0", "2.11", "91.8", "19.5", "9.1"])
+    expect(page.locator("#coach-figures b")).to_have_text(["94.0", "2.11", "91.8", "19.5°", "9.1°"])
     expect(page.locator("#coach-code")).to_have_attribute("src", re.compile("^blob:"))
     expect(page.locator("#coach-live-words")).to_have_text("1 s ago")
     expect(page.locator("#coach-live-image")).not_to_have_js_property("naturalWidth", 0)

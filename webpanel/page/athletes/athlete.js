@@ -55,7 +55,7 @@ export function drawAthlete() {
   const found = jumps ?? [];
   const days = [...new Set(found.map(({ jump }) => dayOf(jump.time)))];
   setText($("athlete-name"), found[0]?.athlete || place().id);
-  setText($("athlete-count"), jumps ? t("athletes.count_days", { count: found.length, days: days.length }) : "");
+  setText($("athlete-count"), jumps ? t(days.length === 1 ? "athletes.count_day" : "athletes.count_days", { count: found.length, days: days.length }) : "");
   $("athlete-empty").hidden = jumps === null || found.length > 0;
   $("athlete-known").hidden = !found.length;
   if (!found.length) return;

@@ -5,6 +5,7 @@ export const athletes = {
   "athletes.everybody": "Everybody",
   "athletes.csv": "Table for Excel (CSV)",
   "athletes.count": "{count} measured jumps",
+  "athletes.count_day": "{count} measured jumps on one day",
   "athletes.count_days": "{count} measured jumps on {days} days",
   "athletes.none": "No jump was measured here yet.",
   "athletes.none_day": "No jump was measured on this day.",

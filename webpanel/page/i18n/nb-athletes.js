@@ -5,6 +5,7 @@ export const athletes = {
   "athletes.everybody": "Alle",
   "athletes.csv": "Tabell til Excel (CSV)",
   "athletes.count": "{count} målte hopp",
+  "athletes.count_day": "{count} målte hopp på én dag",
   "athletes.count_days": "{count} målte hopp på {days} dager",
   "athletes.none": "Ingen hopp er målt her ennå.",
   "athletes.none_day": "Ingen hopp ble målt denne dagen.",

@@ -68,7 +68,8 @@ export function inLarge(jump) {
   /** @type {(key: string, of: MeasuredValue|null, unit: "m/s"|"°") => [string, string, string, string]} */
   const other = (key, of, unit) => {
     const parts = inParts(of, unit);
-    return parts ? [key, parts.value, unit, `± ${parts.deviation}`] : [key, "–", "", ""];
+    if (!parts) return [key, "–", "", ""];
+    return unit === "°" ? [key, `${parts.value}°`, "", `± ${parts.deviation}°`] : [key, parts.value, unit, `± ${parts.deviation}`];
   };
   return [
     speed("measured.takeoff_speed", jump.takeoff_speed), other("measured.perpendicular", jump.perpendicular, "m/s"),

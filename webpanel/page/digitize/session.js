@@ -169,6 +169,8 @@ export async function takeBack(which) {
   const group = state.opening?.things.find(({ name }) => name === thing)?.group ?? state.group;
   showPulse(pulse);
   change({ camera, thing, group, vertex: null });
+  const changes = await attempt(() => getChanges(state.operator, answer.revision - 1));
+  if (changes && changes.touched.length > 1) await reloadSession(); // a whole run, or a file that was read
 }
 
 /** After many marks were made at once: load all anew. */

@@ -88,7 +88,7 @@ function drawMark() {
   const mark = target();
   $("guess-next").hidden = !state.guess;
   $("sigma").disabled = !mark;
-  if (document.activeElement !== $("sigma")) $("sigma").value = mark ? String(mark.sigma?.[0] ?? BY_HAND) : "";
+  if (document.activeElement !== $("sigma")) $("sigma").value = mark ? String(Math.round(1000 * (mark.sigma?.[0] ?? BY_HAND)) / 1000) : "";
   setText($("mark-words"), mark?.xy
     ? t("digitize.mark_at", { thing: titleOf(mark.thing), camera: mark.camera, x: mark.xy[0].toFixed(2), y: mark.xy[1].toFixed(2) })
     : t("digitize.mark_none", { thing: titleOf(state.thing), camera: state.camera }));

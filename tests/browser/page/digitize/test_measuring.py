@@ -171,3 +171,28 @@ def test_two_browsers_on_one_session_see_each_other(desk: Desk, open_page: Open)
     second.keyboard.press("z")
     expect(_thing(first, "P1").locator(".sign").first).to_have_attribute("data-letter", "")
     assert desk.session(OPERATOR)["redo"] == 2
+
+
+def test_a_click_is_refined_and_followed_through_the_images(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=1700, height=900)
+    page.locator("#advance").select_option("view")
+    for count, camera in enumerate(("K1", "K2", "K3")):
+        page.mouse.click(*screen(page, camera, desk.true(camera, "P1")))
+        desk.wait_for(2 * count + 1)
+        page.keyboard.press("e")
+        desk.wait_for(2 * count + 2)
+        mark = desk.mark(camera, "P1")
+        assert mark is not None
+        assert mark["source"] == "refined"
+        assert np.abs(np.array(mark["xy"]) - desk.true(camera, "P1")).max() < 0.5
+    page.locator("#track-what").select_option("one")
+    page.keyboard.press("a")
+    expect(_thing(page, "P1")).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("2")
+    expect(page.locator("#track-said")).to_contain_text(re.compile(r"P1 helmet: \d+ pulses"))
+    page.keyboard.press("3")
+    expect(page.locator("#pulse-number")).not_to_have_text(str(PULSE))
+    expect(_thing(page, "P1").locator(".sign").first).to_have_attribute("data-letter", "t")
+    page.keyboard.press("z")
+    expect(_thing(page, "P1").locator(".sign").first).to_have_attribute("data-letter", "")
+    assert set(desk.session()["coverage"]["P1"]["K1"]) == {str(PULSE)}, "one step takes the whole run back"

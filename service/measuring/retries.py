@@ -6,8 +6,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from analysis.cameras.poses_file import read_poses
-from analysis.scene.survey import read_survey
 from rig.errors import BadInputError
 from rig.host.files import TEXT_MAX, read_whole
 from rig.settings.model import AnalysisSettings, RigSettings
@@ -43,10 +41,11 @@ class Retries:
             return []
         self._seen = stamp
         mark = source_mark(analysis)
-        if stamp is None or not _is_readable(analysis):
+        if stamp is None:
             return []
         logs = sorted(self._folder.glob("*.mcap"), reverse=True)
-        return [log.stem for log in logs if failed_by(log) not in {None, mark}]
+        failed = [log.stem for log in logs if failed_by(log) not in {None, mark}]
+        return failed if failed and _is_readable(analysis) else []
 
     def queued(self, recordings: Sequence[str]) -> None:
         """Note that logs wait to be measured by the file as it is."""
@@ -83,6 +82,10 @@ def _stamp(path: Path) -> tuple[Path, int, int, int] | None:
 
 
 def _is_readable(analysis: AnalysisSettings) -> bool:
+    # Imported here because the analysis and its libraries take memory and half a second to load.
+    from analysis.cameras.poses_file import read_poses  # noqa: PLC0415
+    from analysis.scene.survey import read_survey  # noqa: PLC0415
+
     try:
         read_poses(source_file(analysis)) if analysis.survey is None else read_survey(analysis.survey)
     except BadInputError:

@@ -45,6 +45,9 @@ export function makePane({ name, size }, look) {
   const element = make("figure", { class: "pane", "data-camera": name },
     make("figcaption", {}, title, where, stated), make("div", { class: "pane-picture" }, canvas, fateWords));
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { alpha: false }));
+  const layer = new OffscreenCanvas(1, 1);
+  /** What is painted on it. */
+  let layerShows = "";
   /** @type {Size} */
   let box = [1, 1];
   /** The mark that the hand has taken, and how far from its middle. @type {{ mark: Mark, dx: number, dy: number }|null} */
@@ -60,22 +63,40 @@ export function makePane({ name, size }, look) {
   /** @param {Place} at @returns {Place} */
   const imageOf = (at) => toImage(lens(), box, at);
 
+  /**
+   * The picture as it is seen: painted anew only when it changes, not whenever the pointer moves.
+   *
+   * @param {CanvasImageSource|null} picture
+   * @param {import("./transform.js").Lens} shown
+   * @param {number} width of the canvas, its pixels
+   * @param {number} height
+   */
+  function painted(picture, shown, width, height) {
+    const now = JSON.stringify([picture !== null, state.pulse, state.difference, state.tone, shown, box, width, height]);
+    if (now === layerShows) return layer;
+    layerShows = now;
+    Object.assign(layer, { width, height });
+    const paper = /** @type {OffscreenCanvasRenderingContext2D} */ (layer.getContext("2d", { alpha: false }));
+    paper.fillStyle = "#05090e";
+    paper.fillRect(0, 0, width, height);
+    if (!picture) return layer;
+    const [kx, ky] = [width / box[0], height / box[1]];
+    const [x, y] = toScreen(shown, box, [-0.5, -0.5]);
+    paper.setTransform(kx * shown.scale, 0, 0, ky * shown.scale, kx * x, ky * y);
+    paper.imageSmoothingEnabled = shown.scale <= CRISP;
+    paper.imageSmoothingQuality = "high"; // what is simpler moves the picture by a thirtieth of its pixels
+    paper.drawImage(picture, 0, 0);
+    return layer;
+  }
+
   function draw() {
     const [width, height] = box.map((length) => Math.round(length * devicePixelRatio));
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const [shown, frame] = [lens(), frameOf(name)];
     const [kx, ky] = [width / box[0], height / box[1]];
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(painted(frame?.picture ?? null, shown, width, height), 0, 0);
     context.setTransform(kx, 0, 0, ky, 0, 0);
-    context.fillStyle = "#05090e";
-    context.fillRect(0, 0, ...box);
-    if (frame) {
-      const [x, y] = toScreen(shown, box, [-0.5, -0.5]);
-      context.setTransform(kx * shown.scale, 0, 0, ky * shown.scale, kx * x, ky * y);
-      context.imageSmoothingEnabled = shown.scale <= CRISP;
-      context.imageSmoothingQuality = "high"; // what is simpler moves the picture by a thirtieth of its pixels
-      context.drawImage(frame.picture, 0, 0);
-      context.setTransform(kx, 0, 0, ky, 0, 0);
-    }
     drawOverlay(context, name, (xy) => toScreen(shown, box, xy));
     const { hover, dragged } = state;
     if (frame && hover?.camera === name) {

@@ -20,6 +20,7 @@ from analysis.digitizing.space import (
     stick,
 )
 from analysis.digitizing.things import LANDMARK, LINES
+from analysis.digitizing.tracking.skis import as_two_points
 from analysis.measurements.model import POINTS, PulseMeasurements
 from analysis.scene.camera_system import CameraSystem
 from rig.api.digitizing import (
@@ -204,7 +205,10 @@ def _automatic(pulse: PulseMeasurements | None) -> dict[str, dict[str, Automatic
                 there[name] = AutomaticPoint(xy=(float(point.xy[0]), float(point.xy[1])), sigma=(sx, sy))
         for name, side in LINES.items():
             if (ski := image.skis.get(side)) is not None:
-                there[name] = AutomaticLine(xy=[(float(x), float(y)) for x, y in ski.xy])
+                two, across = as_two_points(ski.xy, ski.sigma, ski.common)
+                first, last = ((float(x), float(y)) for x, y in two)
+                every = [(float(x), float(y)) for x, y in ski.xy]
+                there[name] = AutomaticLine(xy=every, vertices=(first, last), across=across)
         if there:
             result[camera] = there
     return result

@@ -127,9 +127,11 @@ class AutomaticPoint(Model):
 
 
 class AutomaticLine(Model):
-    """Points on a line as the automatic measurement has them, px."""
+    """A line as the automatic measurement has it, px."""
 
-    xy: list[Place]
+    xy: list[Place] = Field(description="all points on it")
+    vertices: tuple[Place, Place] = Field(description="two points that say as much of it as all of them")
+    across: SigmaPx = Field(description="standard deviation of each of the two across the line")
 
 
 class SpacePoint(Model):

@@ -127,24 +127,35 @@ class SkiFinder:
 
 
 def _seen(trace: Trace) -> SeenSki:
-    """A trace as two points: they lie at the root mean square distance of its points from their centre.
+    xy, sigma = as_two_points(trace.xy, trace.sigma, trace.common)
+    return SeenSki(xy, sigma, trace.ends, trace.width, trace.contrast > 0)
 
-    There two independent points say as much of place and turn as all points together; the error that all points share
-    counts fully in each.
+
+def as_two_points(xy: Floats, sigma: Floats, common: float) -> tuple[Floats, float]:
+    """Two points of a line that say as much of its place and turn as the points that were measured along it.
+
+    They lie at the root mean square distance of the points from their centre. The error that all points share counts
+    fully in each.
+
+    Args:
+        xy: (k, 2) px.
+        sigma: (k,) standard deviations across the line, px.
+        common: standard deviation of the error across the line that all points share, px.
+
+    Returns:
+        The points (2, 2), px, and the standard deviation of each across the line, independent of the other's.
     """
-    axis = trace.ends[1] - trace.ends[0]
-    axis = axis / np.hypot(*axis)
-    weight = trace.sigma**-2.0
-    centre = (weight[:, None] * trace.xy).sum(axis=0) / weight.sum()
-    along = (trace.xy - centre) @ axis
-    aside = (trace.xy - centre) @ np.array((-axis[1], axis[0]))
-    turn = (weight * along * aside).sum() / (weight * along**2).sum()
-    direction = axis + turn * np.array((-axis[1], axis[0]))
+    begin, end = _outer(xy)
+    axis = (end - begin) / np.hypot(*(end - begin))
+    across = np.array((-axis[1], axis[0]))
+    weight = np.asarray(sigma, float) ** -2.0
+    centre = (weight[:, None] * xy).sum(axis=0) / weight.sum()
+    along, aside = (xy - centre) @ axis, (xy - centre) @ across
+    direction = axis + (weight * along * aside).sum() / (weight * along**2).sum() * across
     direction = direction / np.hypot(*direction)
     reach = float(np.sqrt((weight * along**2).sum() / weight.sum()))
-    sigma = float(np.sqrt(2 / weight.sum() + 2 * trace.common**2))
-    xy = centre + np.array(((-reach,), (reach,))) * direction
-    return SeenSki(xy, sigma, trace.ends, trace.width, trace.contrast > 0)
+    places = centre + np.array(((-reach,), (reach,))) * direction
+    return places, float(np.sqrt(2 / weight.sum() + 2 * common**2))
 
 
 def _aside(xy: Floats, line: Floats) -> float:

@@ -222,10 +222,8 @@ export async function accept(all) {
     if (!found || all && said(state.view, camera, thing)) continue; // what a hand has measured stays
     if ("sigma" in found) void put({ camera, thing, vertex: null }, { xy: found.xy, sigma: found.sigma, source: "automatic", state: "measured" });
     else {
-      const step = Math.max(1, (found.xy.length - 1) / (LINE_POINTS - 1));
-      for (let at = 0, vertex = 0; Math.round(at) < found.xy.length; at += step, vertex += 1) {
-        void put({ camera, thing, vertex }, { xy: found.xy[Math.round(at)], source: "automatic", state: "measured" });
-      }
+      const sigma = /** @type {[number, number]} */ ([found.across, found.across]);
+      found.vertices.forEach((xy, vertex) => void put({ camera, thing, vertex }, { xy, sigma, source: "automatic", state: "measured" }));
     }
   }
   if (!all && state.view?.automatic[state.camera]?.[state.thing]) goOn(state.camera);

@@ -28,6 +28,8 @@
  * @property {[number, number]} sigma
  * @typedef {object} AutomaticLine
  * @property {Place[]} xy
+ * @property {[Place, Place]} vertices
+ * @property {number} across
  *
  * @typedef {object} SpacePoint
  * @property {[number, number, number]|null} X

@@ -44,6 +44,7 @@ def test_who_may_only_watch_has_no_buttons_and_can_log_out(
         expect(page.locator(".only-watching")).to_be_hidden()
         page.goto(f"{panel.url}/#/recordings/jump")
         expect(page.locator("#recording-buttons a.primary")).to_be_visible()
+        expect(page.locator("#recording-digitize")).to_be_visible()
         expect(page.locator("#recording-buttons button")).to_be_hidden()
     assert service.state is State.IDLE
 

@@ -20,7 +20,7 @@ FORMAT: Final = "svev-digitizing/1"
 SUFFIX: Final = ".jsonl"
 
 
-class Key(msgspec.Struct, frozen=True, array_like=True, order=True):
+class Key(msgspec.Struct, frozen=True, array_like=True, order=True, gc=False):
     """Which thing in which image; `vertex` counts the points of a line and is -1 of everything else."""
 
     pulse: int
@@ -29,7 +29,7 @@ class Key(msgspec.Struct, frozen=True, array_like=True, order=True):
     vertex: int = -1
 
 
-class Entered(msgspec.Struct, frozen=True, array_like=True):
+class Entered(msgspec.Struct, frozen=True, array_like=True, gc=False):
     """What was said of it: `xy` and `sigma` are px; `xy` is None where it cannot be measured."""
 
     state: MarkState = MarkState.MEASURED

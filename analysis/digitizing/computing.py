@@ -12,7 +12,7 @@ from analysis.cameras.source import Source
 from analysis.measurements.model import Measurements
 from analysis.procedure.analyze import analyze
 from analysis.procedure.result_folder import write_folder
-from analysis.result.model import MeasuredRecording
+from analysis.result.model import MeasuredRecording, Quantity
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from rig.api.digitizing import CurvePoint, HandResult
 from rig.errors import SvevError
@@ -105,11 +105,11 @@ def curves_of(result: MeasuredRecording) -> dict[str, list[CurvePoint]]:
         state = pulse.smoothed
         if state is None:
             continue
-        quantities: Mapping[str, object] = {
+        quantities: Mapping[str, Quantity | None] = {
             **state.angles, "height": state.height, "speed": state.speed, "angle_of_attack": state.angle_of_attack,
         }  # fmt: skip
         for name, quantity in quantities.items():
             if quantity is not None:
-                point = CurvePoint(pulse=int(pulse.pulse), value=quantity.value, sigma=quantity.sigma)  # type: ignore[attr-defined]
+                point = CurvePoint(pulse=int(pulse.pulse), value=quantity.value, sigma=quantity.sigma)
                 curves.setdefault(name, []).append(point)
     return curves

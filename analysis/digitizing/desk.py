@@ -182,7 +182,7 @@ class Desk:
 
         Raises:
             UnknownRecordingError, UnknownCameraError: the log has no such pulse or camera.
-        BadInputError: the action does not fit, such as a vertex of a point.
+            BadInputError: the action does not fit, such as a vertex of a point.
             StorageError: the disk refuses; nothing was changed.
         """
         session = self.session(operator)
@@ -273,10 +273,7 @@ class Desk:
 
     def measurements(self, operator: str) -> Measurements:
         """What counts of the automatic measurement and of an operator's marks."""
-        automatic = self.automatic() or Measurements(
-            self.log.facts.recording, self.log.facts.rate_hz, self.log.facts.cameras, ()
-        )
-        return effective(automatic, self.session(operator).everything(), self.log.times)
+        return effective(self.automatic() or self.log.unmeasured, self.session(operator).everything(), self.log.times)
 
     def repeatability(self, names: Sequence[str]) -> Repeatability:
         """How operators agree in what all of them measured.

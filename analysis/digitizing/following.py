@@ -67,7 +67,9 @@ def follow(desk: Desk, operator: str, order: TrackOrder) -> Tracked:
     there = {thing: of for thing, of in starts.items() if of.get(order.pulse)}
     if there:
         static = {name: image.grey for name, image in desk.log.static().items()}
-        tracker = Tracker(desk.log.frames, desk.log.facts.rate_hz, desk.orienting.system, static, _late(desk))
+        nothing = desk.log.unmeasured
+        late_s = {camera: nothing.late_s(camera) for camera in nothing.cameras}
+        tracker = Tracker(desk.log.frames, desk.log.facts.rate_hz, desk.orienting.system, static, late_s)
         automatic = {thing: _automatic(desk, thing) for thing in there}
         tracks = tracker.track_together(there, order.pulse, order.direction, order.most, automatic)
         for thing, of in tracks.items():
@@ -108,10 +110,3 @@ def _automatic(desk: Desk, thing: str) -> Automatic:
         return {camera: image.points[thing] for camera, image in images.items() if thing in image.points}
 
     return at
-
-
-def _late(desk: Desk) -> dict[str, float]:
-    """By camera, how much later than the mean the middle of its exposure is, s."""
-    halves = {name: camera.exposure_s / 2 for name, camera in desk.log.facts.cameras.items()}
-    mean = sum(halves.values()) / len(halves)
-    return {name: half - mean for name, half in halves.items()}

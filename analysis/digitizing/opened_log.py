@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cameras.frames import camera_images
+from analysis.measurements.model import Measurements
 from analysis.procedure.log_facts import log_facts
 from analysis.scene.static_image import StaticImage, static_images
 from recorder.reading.log_reader import LogReader
@@ -20,6 +21,7 @@ from rig.clocks import UtcNs
 from rig.errors import UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable, shown
+from rig.tag import CameraTag
 
 LETTERS: Final = {
     FrameStatus.OK: "o",
@@ -64,6 +66,11 @@ class OpenedLog:
         self._lock = threading.Lock()
         self._frames: OrderedDict[int, tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]]] = OrderedDict()
         self._static: dict[str, StaticImage] | None = None
+
+    @property
+    def unmeasured(self) -> Measurements:
+        """The recording with its rate and cameras, and nothing measured."""
+        return Measurements(self.facts.recording, self.facts.rate_hz, self.facts.cameras, ())
 
     def frames(self, pulse: int) -> Mapping[str, Grey]:
         """The frames of a pulse by camera, grey values to measure in; those that are not there are left out."""
@@ -145,11 +152,8 @@ class OpenedLog:
         return f"the frame of {camera} at pulse {pulse} is {what}: measure in another pulse"
 
 
-def _letter(cameras: tuple[object, ...], name: str) -> str:
-    return next(
-        (LETTERS[tag.status] for tag in cameras if tag.name == name),  # type: ignore[attr-defined]
-        LETTERS[FrameStatus.ABSENT],
-    )
+def _letter(cameras: tuple[CameraTag, ...], name: str) -> str:
+    return next((LETTERS[tag.status] for tag in cameras if tag.name == name), LETTERS[FrameStatus.ABSENT])
 
 
 def _difference(grey: Grey, static: StaticImage) -> NDArray[np.uint8]:

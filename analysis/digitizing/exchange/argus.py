@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 
 from analysis.digitizing.exchange.dlt import coefficients
-from analysis.digitizing.exchange.space import xyz_of
+from analysis.digitizing.exchange.space import all_oriented, xyz_of
 from analysis.digitizing.exchange.tables import read_matrix, table
 from analysis.digitizing.exchange.tracks import Tracks, tracks_of
 from analysis.digitizing.journal import Entered, Key
@@ -67,9 +67,8 @@ def argus_files(
     Raises:
         BadInputError: DLT coefficients are not defined.
     """
-    tracks, left_out = tracks_of(marks, cameras, pulses)
-    notes = [f"{left_out} marks without a measured place are not in it"] if left_out else []
-    system = system.only(cameras) if system is not None and set(cameras) <= set(system.names) else None
+    tracks, notes = tracks_of(marks, cameras, pulses)
+    system = all_oriented(system, cameras)
     if system is None:
         notes.append("not all cameras are oriented: no DLT coefficients, no camera profile, no points in space")
     xy = _turned_over(tracks.xy, cameras, sizes)

@@ -25,7 +25,7 @@ from typing import Final
 import numpy as np
 
 from analysis.digitizing.exchange.dlt import camera_matrix, coefficients, distorted, has_distortion, undistorted
-from analysis.digitizing.exchange.space import xyz_of
+from analysis.digitizing.exchange.space import all_oriented, xyz_of
 from analysis.digitizing.exchange.tables import read_matrix, table
 from analysis.digitizing.exchange.tracks import Tracks, tracks_of
 from analysis.digitizing.journal import Entered, Key
@@ -64,9 +64,8 @@ def dltdv_files(
     Raises:
         BadInputError: DLT coefficients are not defined.
     """
-    tracks, left_out = tracks_of(marks, cameras, pulses)
-    notes = [f"{left_out} marks without a measured place are not in it"] if left_out else []
-    system = system.only(cameras) if system is not None and set(cameras) <= set(system.names) else None
+    tracks, notes = tracks_of(marks, cameras, pulses)
+    system = all_oriented(system, cameras)
     removed = [name for name in cameras if system is not None and has_distortion(system[name])]
     if system is None:
         notes.append("not all cameras are oriented: no DLT coefficients, no points in space")

@@ -1,5 +1,7 @@
 """The tracks in space, for programs whose files hold them beside the image points."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from analysis.digitizing.effective import covariance_of
@@ -8,6 +10,11 @@ from analysis.digitizing.journal import Entered
 from analysis.digitizing.space import Ray, intersected, space_points
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
+
+
+def all_oriented(system: CameraSystem | None, cameras: Sequence[str]) -> CameraSystem | None:
+    """The oriented cameras in the order of the log; None if one of them is not oriented."""
+    return system.only(cameras) if system is not None and set(cameras) <= set(system.names) else None
 
 
 def xyz_of(tracks: Tracks, system: CameraSystem | None) -> tuple[Floats, Floats]:

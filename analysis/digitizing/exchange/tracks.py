@@ -58,7 +58,7 @@ class Tracks:
         return sorted(found, key=lambda item: item[0])
 
 
-def tracks_of(marks: Iterable[tuple[Key, Entered]], cameras: Sequence[str], pulses: range) -> tuple[Tracks, int]:
+def tracks_of(marks: Iterable[tuple[Key, Entered]], cameras: Sequence[str], pulses: range) -> tuple[Tracks, list[str]]:
     """The tracks of all that is measured, a frame for each pulse.
 
     Args:
@@ -67,7 +67,8 @@ def tracks_of(marks: Iterable[tuple[Key, Entered]], cameras: Sequence[str], puls
         pulses: of the log, without gaps; marks of others are left out.
 
     Returns:
-        The tracks, and how many marks are no part of them: guesses, what is hidden or not visible, marks elsewhere.
+        The tracks, and a note for people if marks are no part of them: guesses, what is hidden or not visible, marks
+        elsewhere.
     """
     places: dict[tuple[int, str, int], tuple[float, float]] = {}
     left_out = 0
@@ -81,7 +82,8 @@ def tracks_of(marks: Iterable[tuple[Key, Entered]], cameras: Sequence[str], puls
     xy = np.full((len(pulses), len(names), len(cameras), 2), np.nan)
     for (frame, name, camera), place in places.items():
         xy[frame, names.index(name), camera] = place
-    return Tracks(names, tuple(cameras), pulses.start, xy), left_out
+    notes = [f"{left_out} marks without a measured place are not in it"] if left_out else []
+    return Tracks(names, tuple(cameras), pulses.start, xy), notes
 
 
 def _thing(name: str) -> tuple[str, int]:

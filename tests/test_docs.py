@@ -197,5 +197,6 @@ def test_examples_run(example: re.Match[str], log: Path, loopback: Loopback, tmp
 @pytest.mark.parametrize("example", list(_examples(serve=True)))
 def test_examples_run_beside_the_service(example: re.Match[str], service: Serving, tmp_path: Path) -> None:
     service.await_state("armed")
+    service.await_cameras("ready", "ready", "ready")
     token = "none-is-needed-on-loopback"  # noqa: S105
     _run(example, tmp_path, URL=service.url, FOLDER=str(tmp_path), TOKEN=token)

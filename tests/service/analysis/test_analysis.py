@@ -37,12 +37,13 @@ def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopb
     with serving(tmp_path, rig, loopback) as service:
         assert service.arm()["last_jump"] is None, "a wrong survey does not prevent recordings"
         _await_said(service, "no jump is measured before this is put right")
-        (alarm,) = service.get("/api/status")["alarms"]
-        assert alarm["statement"]["text"].startswith("jumps are recorded, but not measured: ")
+        wait_until(
+            lambda: _alarm(service).startswith("jumps are recorded, but not measured: "), "alarm", PATIENCE_S, 0.1
+        )
         surveyed.write_text(json.dumps(survey(training())))
         recording = service.post("/api/recordings", {"preroll_s": 0.0})["id"]
         jump, pid = _await_jump(service), service.pids()["analysis"]
-        assert "measuring" not in [alarm["topic"] for alarm in service.get("/api/status")["alarms"]]
+        assert not _alarm(service)
         _balls_are_where_they_should_be(service, recording)
         os.kill(pid, signal.SIGKILL)
         wait_until(lambda: service.pids()["analysis"] != pid, "a new process", PATIENCE_S, 0.1)
@@ -112,6 +113,12 @@ def _results_are_in_the_log(log: Path, jump: dict[str, Any]) -> None:
     assert {state.recording for _, state in states} == {jump["recording"]}
     assert sum(point is not None for _, state in states for point in state.points.values()) > 2 * len(states)
     assert min(len(scene) for _, scene in scenes) > 0
+
+
+def _alarm(service: Serving) -> str:
+    """What the alarm says that nothing is measured; "": there is none."""
+    said = {alarm["topic"]: alarm["statement"]["text"] for alarm in service.get("/api/status")["alarms"]}
+    return said.get("measuring", "")
 
 
 def _await_said(service: Serving, words: str) -> None:

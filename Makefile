@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench test test-long check style wheel bundle install rollback uninstall lock clean setup system
+.PHONY: help demo run bench corpus test test-long check style wheel bundle install rollback uninstall lock clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -35,6 +35,9 @@ run: setup ## the service on the simulated hill, with its panel at http://127.0.
 
 bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)
+
+corpus: setup ## the analysis on hills drawn at random, beside the truth and the run before (docs/corpus.md)
+	@$(BIN)/python -m bench.corpus $(ARGS)
 
 test: setup $(NPM) ## all tests but the long ones
 	@tests/run $(WORKERS) "not long" $(ARGS)

@@ -10,8 +10,8 @@ import pytest
 from analysis.result.model import Status
 from analysis.worker.live import LiveAnalysis
 from analysis.worker.stream import Received
+from bench.corpus.drawn_hill import DrawnHill
 from tests.analysis.candidates.judge import scenario
-from tests.analysis.drawn_hill import DrawnHill
 from tests.analysis.worker.found import Found
 
 pytestmark = pytest.mark.long

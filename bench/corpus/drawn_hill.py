@@ -4,7 +4,7 @@ Balls are discs on poles before dark plates, the jumper is made of capsules, ski
 is a fractal with trees. The analysis must not be made for the pictures of one renderer.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 import cv2
@@ -13,6 +13,7 @@ import numpy as np
 from rig.arrays import Floats
 from rig.clocks import UtcNs
 from rig.frame import FrameStatus
+from rig.images.pixels import Stored
 from rig.pulse import HillPulse, PulseNumber
 from rig.tag import CameraTag, TripletTag
 from simrig.world.projection import Projection
@@ -24,9 +25,9 @@ RATE_HZ: Final = 30.0
 START: Final = UtcNs(1_795_216_434_000_000_000)
 _FINER: Final = 4  # drawn with so many pixels for one
 _FRACTION: Final = 4  # bits behind the point of what OpenCV draws
-_EXPOSURE_S, _MOMENTS = 0.001, 4
+_MOMENTS: Final = 4
+_EXPOSURE_S: Final = 0.001  # of a scenario whose cameras expose for no time
 _SIGMA_M: Final = 0.004  # of the survey
-_BALL_M, _MARKER_M = 0.095, 0.05
 _BRIGHT, _DARK, _PLATE = 236.0, 30.0, 60.0
 _NOISE, _SHOT = 1.2, 0.02  # variance of a pixel, and by its grey value
 _SKI: Final = ((0.0, 0.045), (0.4, 0.05), (1.13, 0.046), (1.9, 0.05), (2.3, 0.055), (2.48, 0.045))  # from the tail, m
@@ -37,15 +38,31 @@ _PRINTS: Final = (0.3, 0.7, 1.7, 2.1)
 class DrawnHill:
     """The scenario's cameras, balls and first jumper, drawn.
 
+    Args:
+        scenario: where things are, how large, and how the jumper flies.
+        pulses: hill pulses.
+        seed: of all that the scenario does not say.
+        size: of the images, width and height, px.
+        rate_hz: pulses per second.
+
     Attributes:
         known: its truth, as `simrig.world.truth` tells it, by hill pulse.
     """
 
-    def __init__(self, scenario: Scenario, pulses: range, seed: int) -> None:
-        self._rng = np.random.default_rng(seed)
-        told = truth(scenario, map(HillPulse, pulses), RATE_HZ, SIZE)
+    def __init__(
+        self,
+        scenario: Scenario,
+        pulses: range,
+        seed: int,
+        size: tuple[int, int] = SIZE,
+        rate_hz: float = RATE_HZ,
+    ) -> None:
+        self._rng, self._size, self._rate_hz = np.random.default_rng(seed), size, rate_hz
+        self._ball_m, self._marker_m = scenario.ball_radius_m, scenario.jumper.marker_radius_m
+        self._exposure_s = max(_EXPOSURE_S, *(camera.exposure_us / 1e6 for camera in scenario.cameras))
+        told = truth(scenario, map(HillPulse, pulses), rate_hz, size)
         self.known: dict[int, dict[str, Any]] = {state["pulse"]: state for state in told["pulses"]}
-        self._cameras = {c.name: c.projection(*SIZE) for c in scenario.cameras}
+        self._cameras = {c.name: c.projection(*size) for c in scenario.cameras}
         self._lenses = {c.name: {"c": c.c, **c.lens.model_dump()} for c in scenario.cameras}
         self._balls = {ball.name: np.array(ball.X) for ball in scenario.balls if ball.role == "control"}
         self._suit, self._sleeve, self._skis = self._rng.uniform(40, 150, 3)
@@ -57,25 +74,33 @@ class DrawnHill:
             name: {"role": "control", "X": list(X + self._rng.normal(0, _SIGMA_M, 3)), "sigma": [_SIGMA_M] * 3}
             for name, X in self._balls.items()
         }
-        cameras = {n: {"size": list(SIZE), **lens, "distortion": "projected"} for n, lens in self._lenses.items()}
+        cameras = {n: {"size": list(self._size), **lens, "distortion": "projected"} for n, lens in self._lenses.items()}
         frame = {"format": "svev-network/1", "length_unit": "m", "image_frame": "pixel"}
         return {**frame, "cameras": cameras, "points": points}
 
     def triplets(self) -> Iterator[tuple[TripletTag, np.ndarray[Any, np.dtype[np.uint8]]]]:
         """Tag and pixels (rows, columns) of each pulse."""
-        width, height = SIZE
+        width, height = self._size
         cameras = tuple(
             CameraTag(name, (i * width, (i + 1) * width), FrameStatus.OK) for i, name in enumerate(self._cameras)
         )
         for number, state in enumerate(self.known.values(), start=1):
-            time = UtcNs(START + round(number * 1e9 / RATE_HZ))
+            time = UtcNs(START + round(number * 1e9 / self._rate_hz))
             shape = (height, width * len(cameras))
             tag = TripletTag(PulseNumber(number), time, "", "drawn", shape, cameras, complete=True)
             yield tag, np.hstack([self._frame(name, state) for name in self._cameras])
 
+    def views(self) -> "Sequence[DrawnView]":
+        """What each camera sees."""
+        return [DrawnView(self, name) for name in self._cameras]
+
+    def frame(self, name: str, pulse: HillPulse) -> Stored:
+        """The image of a camera at a hill pulse, (rows, columns)."""
+        return self._frame(name, self.known[pulse])
+
     def _background(self, camera: Projection) -> Floats:
         """What stands still, (rows, columns)."""
-        width, height = SIZE
+        width, height = self._size
         frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(width), np.fft.fftfreq(height)))
         frequency[0, 0] = 1.0
         noise = np.fft.ifft2(np.fft.fft2(self._rng.normal(size=(height, width))) / frequency**1.1).real
@@ -87,10 +112,10 @@ class DrawnHill:
         drawing = _Drawing(np.clip(ground, 3, 245), (0, 0))
         for ball in sorted(self._balls.values(), key=lambda ball: -float(camera.distance(ball))):
             center, scale = camera.pixels(ball), camera.c / float(camera.distance(ball))
-            foot = center + np.array((0.0, 9 * _BALL_M * scale))
+            foot = center + np.array((0.0, 9 * self._ball_m * scale))
             drawing.capsule(center, foot, 0.03 * scale, 0.03 * scale, 70.0)
-            drawing.disc(center, 2.2 * _BALL_M * scale, _PLATE)
-            drawing.disc(center, _BALL_M * scale, _BRIGHT)
+            drawing.disc(center, 2.2 * self._ball_m * scale, _PLATE)
+            drawing.disc(center, self._ball_m * scale, _BRIGHT)
         return drawing.pixels()
 
     def _frame(self, name: str, state: dict[str, Any]) -> np.ndarray[Any, np.dtype[np.uint8]]:
@@ -99,11 +124,11 @@ class DrawnHill:
             places = [*state["points"].values(), *state["landmarks"].values()]
             seen = camera.pixels(np.array(places))
             reach = 2.0 * camera.c / float(camera.distance(np.array(state["origin"])))
-            low = np.clip(np.floor(seen.min(axis=0) - reach), 0, SIZE).astype(int)
-            high = np.clip(np.ceil(seen.max(axis=0) + reach), 0, SIZE).astype(int)
+            low = np.clip(np.floor(seen.min(axis=0) - reach), 0, self._size).astype(int)
+            high = np.clip(np.ceil(seen.max(axis=0) + reach), 0, self._size).astype(int)
             if (high - low > 4).all():
                 part = (slice(low[1], high[1]), slice(low[0], high[0]))
-                moments = [((i + 0.5) / _MOMENTS - 0.5) * _EXPOSURE_S for i in range(_MOMENTS)]
+                moments = [((i + 0.5) / _MOMENTS - 0.5) * self._exposure_s for i in range(_MOMENTS)]
                 drawn = [self._drawn(camera, state, image[part], low, late_s) for late_s in moments]
                 image[part] = np.mean(drawn, axis=0)
         blurred = cv2.GaussianBlur(image, (0, 0), 0.6)
@@ -144,7 +169,7 @@ class DrawnHill:
         for label, point in state["points"].items():
             if visible.get(label, 0.0) > 0.75:
                 place = np.array(point) + moved
-                radius = _MARKER_M * camera.c / float(camera.distance(place))
+                radius = self._marker_m * camera.c / float(camera.distance(place))
                 drawing.disc(camera.pixels(place), 1.5 * radius, _DARK)
                 drawing.disc(camera.pixels(place), radius, _BRIGHT)
         return drawing.pixels()
@@ -160,6 +185,17 @@ class DrawnHill:
             corners = ((0.0, 0.03), (0.12, 0.03), (0.12, -0.03), (0.0, -0.03))
             of_print = np.array([tail + (s + a) * along + b * across for a, b in corners])
             drawing.polygon(camera.pixels(of_print), 0.7 * self._skis + 20)
+
+
+class DrawnView:
+    """What one camera sees of a drawn hill."""
+
+    def __init__(self, hill: DrawnHill, name: str) -> None:
+        self._hill, self._name = hill, name
+
+    def render_into(self, out: Stored, pulse: HillPulse) -> None:
+        """See `bench.analysis.hill_logs.View`."""
+        out[...] = self._hill.frame(self._name, pulse)
 
 
 class _Drawing:

@@ -125,7 +125,7 @@ def test_pulses_are_stopped_made_on_request_and_started_by_a_recording(tmp_path:
         assert service.call("POST", BURST, {"pulses": 5})[0] == 202
         wait_until(lambda: _at_rest(service)[0] >= before + 5, "five pulses", PATIENCE_S, 0.05)
         assert _at_rest(service)[0] == before + 5
-        wait_until(lambda: service.get("/api/status")["pulses"]["number"] > seen, "their frames", PATIENCE_S, 0.05)
+        wait_until(lambda: _frames(service) > seen, "their frames", PATIENCE_S, 0.05)
         past = service.post("/api/recordings", {"duration_s": 0})["id"]
         service.await_state("armed")
         assert service.get(TRIGGER)["running"] is False
@@ -146,15 +146,20 @@ def _commands(service: Serving) -> list[int]:
     return [sum(camera["actions"].values()) for camera in service.get("/api/status")["cameras"] if camera["actions"]]
 
 
+def _frames(service: Serving) -> int:
+    """How many frames have come of both cameras."""
+    return sum(camera["frames"] for camera in service.get("/api/status")["cameras"])
+
+
 def _at_rest(service: Serving) -> tuple[int, int]:
-    """How many commands a camera has had, when no pulses come any more, and how many pulses a camera has told of.
+    """How many commands a camera has had, when no pulses come any more, and how many frames have come.
 
     The commands are what the service makes of a request; on a busy machine a simulated camera may miss one.
     """
     seen = [(0, 0, time.monotonic())]
 
     def unchanged() -> bool:
-        now = max(_commands(service)), service.get("/api/status")["pulses"]["number"]
+        now = max(_commands(service)), _frames(service)
         if now != seen[-1][:2]:
             seen.append((*now, time.monotonic()))
         return time.monotonic() - seen[-1][2] > _RESTS_S

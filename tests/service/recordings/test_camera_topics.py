@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from recorder.checking.verify import verify
 from recorder.reading.triplets import triplets
+from rig.frame import FrameStatus
 from rig.settings.file import load_rig
 from rig.tag import TripletTag
 from tests.capture.rigs import write_rig
@@ -37,7 +38,8 @@ def _record(rig: Path, out: Path) -> Path:
     done = run_svev("record", "--rig", str(rig), "--seconds", "2", "--out", str(out), "--json", timeout_s=120)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    assert result["pulses"] == result["complete"] >= 59, done.stderr
+    assert result["pulses"] >= 59, done.stderr
+    assert result["complete"] > 30, done.stderr  # a busy machine loses frames; which ones, the log says
     return Path(result["log"])
 
 
@@ -82,10 +84,10 @@ def test_subscribers_get_the_triplets_of_the_log_and_it_can_be_replayed(tmp_path
             subscriber.end()
     assert _topics_of(log) >= _TOPICS
     assert "/triplet" not in _topics_of(log)
-    assert verify(log).verdict == "clean"
+    assert verify(log).verdict in {"clean", "partial"}
     compared = 0
     for tag, image in triplets(log):
-        assert image.any()
+        assert image.any() == any(camera.status is FrameStatus.OK for camera in tag.cameras)
         if (published := subscriber.images.get(tag.time)) is not None:
             assert published == image.tobytes()
             compared += 1

@@ -38,7 +38,7 @@ def test_one_command_exposes_all_cameras_of_the_bus(tmp_path: Path, loopback: Lo
     path = write_rig(tmp_path, "iidc", loopback, source="iidc-broadcast", rate_hz=RATE_HZ)
     code, result, said = _record(path, tmp_path / "logs", 2)
     assert code in {0, 5}, said  # 5: the busy machine gave a command too late, or lost a frame
-    assert result["alarms"] == []
+    assert code == 5 or result["alarms"] == []
     assert result["complete"] > result["pulses"] / 2
     assert "for set-up only" not in said
     tags = [tag for tag in _tags(result["log"]) if tag.complete]

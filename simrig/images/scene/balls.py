@@ -4,6 +4,7 @@ import numpy as np
 
 from rig.arrays import Floats
 from simrig.images.scene.drawing import Blob, Image, stroke
+from simrig.images.scene.shaded_ball import ShadedBall
 from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, Ball, Scenario
 
@@ -35,9 +36,14 @@ class Balls:
         self._projection = projection
         blur = scenario.image.blur_sigma_px
         self._balls: list[tuple[Ball, float, Blob, Blob]] = []
+        self._shaded: dict[str, ShadedBall] = {}
+        sun = scenario.light.sun
         for distance, ball in _far_first(scenario, projection):
             radius = scenario.ball_radius_m * projection.c / distance
             self._balls.append((ball, radius, Blob(radius + PLATE_MARGIN_PX, blur), Blob(radius, blur)))
+            if sun is not None:
+                centre = np.array(ball.X, float)
+                self._shaded[ball.name] = ShadedBall(sun, centre, scenario.ball_radius_m, blur, BRIGHTEST)
         self._sprites: list[tuple[slice, slice, Image, Image]] | None = None
 
     def draw(self, image: Image, projection: Projection) -> None:
@@ -47,7 +53,10 @@ class Balls:
         places = projection.pixels([ball.X for ball, *_ in self._balls])
         for (ball, radius, plate, disc), (x, y) in zip(self._balls, places, strict=True):
             plate.draw(image, x, y, PLATE)
-            disc.draw(image, x, y, BRIGHTEST)
+            if ball.name in self._shaded:
+                self._shaded[ball.name].draw(image, projection)
+            else:
+                disc.draw(image, x, y, BRIGHTEST)
             if ball.covered:
                 _cover(image, x, y, radius, ball.covered)
 

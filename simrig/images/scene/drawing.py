@@ -2,7 +2,7 @@
 
 import math
 from functools import cache
-from typing import Any
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -17,8 +17,8 @@ _FINE = 2  #: lines of the canvas' grid per pixel
 _SHIFT = 4  #: OpenCV takes integers; this many binary places behind the point
 _FADE = 2.4  #: px over which a capsule's border fades: pixel and lens together, about that of a blur of 0.6 px
 _STEP = 0.02  #: px between samples of a blob's profile
-_REACH_SIGMA = 4.5  #: the profile ends this many sigmas outside the disc, where it is below 1e-5
-_PIXEL_VARIANCE = 1 / 12
+REACH_SIGMA: Final = 4.5  #: a profile ends this many sigmas outside the disc, where it is below 1e-5
+PIXEL_VARIANCE: Final = 1 / 12  #: px^2, of integration over a pixel
 
 
 class Canvas:
@@ -85,8 +85,8 @@ class Blob:
     """
 
     def __init__(self, radius_px: float, blur_sigma_px: float) -> None:
-        sigma = math.sqrt(blur_sigma_px**2 + _PIXEL_VARIANCE)
-        self.reach_px = radius_px + _REACH_SIGMA * sigma
+        sigma = math.sqrt(blur_sigma_px**2 + PIXEL_VARIANCE)
+        self.reach_px = radius_px + REACH_SIGMA * sigma
         self._radii = np.arange(0.0, self.reach_px + _STEP, _STEP)
         self._profile = _blurred_disc(self._radii, radius_px, sigma)
 

@@ -58,8 +58,23 @@ class MissingMarker(FiniteModel):
     jump: int | None = Field(None, ge=0, description="number of the jump, counted from 0; none: all jumps")
 
 
+class Sun(FiniteModel):
+    """A sun that shades the balls, with the light of sky and snow; radiances are shares of white.
+
+    With `direct = 0` the sky is overcast. What becomes brighter than white is white.
+    """
+
+    azimuth_deg: float = Field(ge=-360, le=360, description="where it stands: 0 along X, 90 along Y, to the left")
+    elevation_deg: float = Field(ge=-5, le=90)
+    direct: float = Field(0.75, ge=0, le=2, description="of a ball's point that faces the sun")
+    sky: float = Field(0.25, ge=0, le=1, description="light from above")
+    snow: float = Field(0.15, ge=0, le=1, description="light from below")
+    roughness_deg: float = Field(20.0, ge=0, le=60, description="of the surface (Oren and Nayar); 0: Lambert")
+    gloss: float = Field(0.0, ge=0, le=2, description="radiance of the highlight")
+
+
 class Light(FiniteModel):
-    """Light that changes over time, and light that should not be there."""
+    """Light that changes over time, light from one side, and light that should not be there."""
 
     cloud_depth: float = Field(0.0, ge=0, le=0.9, description="share of the light that the darkest cloud takes")
     cloud_period_s: float = Field(12.0, gt=0.5, description="typical time from cloud to cloud")
@@ -67,10 +82,11 @@ class Light(FiniteModel):
     flicker_hz: float = Field(100.0, gt=0, le=1000)
     glare_spots: int = Field(0, ge=0, le=50, description="bright spots in each lens, which stay where they are")
     reflections: int = Field(0, ge=0, le=200, description="spots on the snow, as bright as markers, that come and go")
+    sun: Sun | None = Field(None, description="shades the balls; none: they are evenly bright")
 
     @property
     def changes(self) -> bool:
-        """Whether any of it is to be seen."""
+        """Whether it differs from image to image, or comes into the lens."""
         return bool(self.cloud_depth or self.flicker or self.glare_spots or self.reflections)
 
 

@@ -12,12 +12,15 @@ from analysis.digitizing.effective import covariance_of, effective
 from analysis.digitizing.epipolar import epipolar_curves
 from analysis.digitizing.files import DeskFiles
 from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key, operators
+from analysis.digitizing.misfits import Misfits
 from analysis.digitizing.next_mark import next_mark
 from analysis.digitizing.opened_log import OpenedLog
 from analysis.digitizing.orienting import Orienting
-from analysis.digitizing.pulse_view import PulseMarks, as_mark, pulse_view
+from analysis.digitizing.pulse_marks import PulseMarks
+from analysis.digitizing.pulse_view import as_mark, pulse_view
 from analysis.digitizing.repeatability import repeatability
 from analysis.digitizing.session import Session
+from analysis.digitizing.solved import Solved
 from analysis.digitizing.space import Ray, intersected, predicted_points, space_points
 from analysis.digitizing.things import BALL, things
 from analysis.measurements.file import read_measurements
@@ -47,9 +50,6 @@ from rig.api.digitizing import (
 from rig.arrays import Floats
 from rig.errors import BadInputError, StateForbidsError, UnknownCameraError, UnknownRecordingError
 
-#: So many of the rays that fit worst are told.
-_WORST: Final = 20
-_NOTABLE_W: Final = 2.0
 #: So many pulses are looked at for the next click; a jump has a hundred or two.
 _SUGGESTED_PULSES: Final = 300
 
@@ -74,7 +74,8 @@ class Desk:
         self.orienting = Orienting(self.log, source)
         self.computing = Computing(files.log, files.folder)
         self._sessions: dict[str, Session] = {}
-        self._tests: dict[str, dict[int, list[Worst]]] = {}
+        self._solved = Solved()
+        self._misfits: dict[str, Misfits] = {}
         self._lock = threading.Lock()
         self._automatic: tuple[tuple[int, int] | None, Measurements | None] = (None, None)
         self._by_pulse: dict[int, PulseMeasurements] = {}
@@ -98,6 +99,7 @@ class Desk:
             for session in self._sessions.values():
                 session.close()
             self._sessions.clear()
+            self._misfits.clear()
 
     def opening(self) -> Opening:
         """What a page needs to begin."""
@@ -171,11 +173,10 @@ class Desk:
         session = self.session(operator)
         at = self._index(pulse)
         before = tuple(self._marks(session, self.log.pulses[k]) for k in (at - 1, at - 2) if k >= 0)
-        view = pulse_view(
-            session.revision, self._marks(session, pulse), before, self.orienting.system, self.orienting.proposals()
-        )
-        self._tests.setdefault(operator, {})[pulse] = _tests(view)
-        return view
+        return pulse_view(
+            session.revision, self._marks(session, pulse), before,
+            self.orienting.system, self.orienting.proposals(), self._solved,
+        )  # fmt: skip
 
     def act(self, operator: str, action: Action) -> Changed:
         """Do what an operator asked for; it is on the disk when this returns.
@@ -346,25 +347,16 @@ class Desk:
         return PulseMarks(pulse, self.log.times[pulse], session.at(pulse), self.automatic_at(pulse))
 
     def _worst(self, operator: str, session: Session) -> list[Worst]:
-        """The rays that fit worst, of all pulses that were looked at or marked."""
-        known = self._tests.setdefault(operator, {})
         system = self.orienting.system
         if system is None:
             return []
-        missing = [pulse for pulse in session.pulses() if pulse not in known and pulse in self.log.times]
-        if missing:
-            rays = {
-                (pulse, thing): by_camera
-                for pulse in missing
-                for thing, by_camera in self._marks(session, pulse).rays().items()
-            }
-            found = intersected(system, {f"{pulse} {thing}": rays[pulse, thing] for pulse, thing in rays})
-            known.update({pulse: [] for pulse in missing})
-            for row, (pulse, thing) in enumerate(rays):
-                for camera, w in zip(system.names, found.adjusted.w[row], strict=True):
-                    if found.adjusted.ok[row] and w > _NOTABLE_W:
-                        known[pulse].append(Worst(pulse=pulse, camera=camera, thing=thing, w=float(w)))
-        return sorted((each for tests in known.values() for each in tests), key=lambda each: -each.w)[:_WORST]
+        with self._lock:
+            misfits = self._misfits.setdefault(operator, Misfits(session))
+        return misfits.worst(
+            system,
+            self.automatic(),
+            lambda pulses: [self._marks(session, pulse) for pulse in pulses if pulse in self.log.times],
+        )
 
     def _figures(self, session: Session) -> dict[int, dict[str, float]]:
         """Angles and height that follow from an operator's marks alone, by pulse."""
@@ -376,7 +368,9 @@ class Desk:
             for pulse in session.pulses()
             if pulse in self.log.times
             and (
-                view := pulse_view(0, PulseMarks(pulse, self.log.times[pulse], session.at(pulse), None), (), system, {})
+                view := pulse_view(
+                    0, PulseMarks(pulse, self.log.times[pulse], session.at(pulse), None), (), system, {}, self._solved
+                )
             )
         }
 
@@ -397,16 +391,6 @@ class Desk:
     def _camera(self, name: str) -> None:
         if name not in self.log.facts.cameras:
             raise UnknownCameraError(f"the log has no camera {name}: choose among {', '.join(self.log.facts.cameras)}")
-
-
-def _tests(view: PulseView) -> list[Worst]:
-    return [
-        Worst(pulse=view.pulse, camera=camera, thing=thing, w=w)
-        for found in (view.space, view.lines)
-        for thing, point in found.items()
-        for camera, w in point.w.items()
-        if w > _NOTABLE_W
-    ]
 
 
 def _list(line: Floats) -> list[tuple[float, float]]:

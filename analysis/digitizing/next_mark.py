@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.digitizing.pulse_view import PulseMarks
+from analysis.digitizing.pulse_marks import PulseMarks
 from analysis.digitizing.space import intersected
 from analysis.digitizing.tracking.suggesting import PathMarks, suggest
 from analysis.measurements.model import POINTS

@@ -16,7 +16,7 @@ from analysis.measurements.model import Measurements
 from analysis.procedure.log_facts import log_facts
 from analysis.scene.static_image import StaticImage, static_images
 from recorder.reading.log_reader import LogReader
-from recorder.reading.triplets import stored_triplets, tags
+from recorder.reading.triplets import stored_pulses
 from rig.clocks import UtcNs
 from rig.errors import UnknownRecordingError
 from rig.frame import FrameStatus
@@ -54,15 +54,16 @@ class OpenedLog:
     def __init__(self, log: Path) -> None:
         self.path = log
         self.facts = log_facts(log)
-        found = {int(tag.pulse): tag for tag in tags(log)}
+        with LogReader(log) as reader:
+            stored = {int(tag.pulse): (tag, triplet) for tag, triplet in stored_pulses(reader)}
+        found = {pulse: tag for pulse, (tag, _) in stored.items()}
         self.pulses = sorted(found)
         self.times: Mapping[int, UtcNs] = {pulse: found[pulse].time for pulse in self.pulses}
         self.status = {
             camera: "".join(_letter(found[pulse].cameras, camera) for pulse in self.pulses)
             for camera in self.facts.cameras
         }
-        with LogReader(log) as reader:
-            self._stored = {int(triplet.tag.pulse): triplet for triplet in stored_triplets(reader)}
+        self._stored = {pulse: triplet for pulse, (_, triplet) in stored.items() if triplet is not None}
         self._lock = threading.Lock()
         self._frames: OrderedDict[int, tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]]] = OrderedDict()
         self._static: dict[str, StaticImage] | None = None

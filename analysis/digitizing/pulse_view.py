@@ -1,25 +1,23 @@
 """Puts together what a page shows of one pulse: marks, the automatic measurement, and what follows in space."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from analysis.digitizing.effective import covariance_of, effective_pulse
 from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.pulse_marks import PulseMarks
+from analysis.digitizing.solved import Solved
 from analysis.digitizing.space import (
     PointsInSpace,
-    Ray,
     Stick,
     inside,
-    intersected,
     predicted,
     predicted_points,
     space_points,
     stick,
 )
-from analysis.digitizing.things import LANDMARK, LINES
+from analysis.digitizing.things import LINES
 from analysis.digitizing.tracking.skis import as_two_points
 from analysis.measurements.model import POINTS, PulseMeasurements
 from analysis.scene.camera_system import CameraSystem
@@ -28,56 +26,18 @@ from rig.api.digitizing import (
     AutomaticPoint,
     LineMarks,
     Mark,
-    MarkState,
     PredictedPoint,
     PulseView,
 )
-from rig.clocks import NS_PER_S, UtcNs
+from rig.clocks import NS_PER_S
 
 #: Standard deviation of a point's acceleration beside that of free fall, m/s^2: a jumper who rises or lands has 20.
 _ACCELERATION: Final = 20.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PulseMarks:
-    """What is known of one pulse.
-
-    Attributes:
-        pulse: its number.
-        time: when it fired.
-        marks: of the operator.
-        automatic: the automatic measurement; None: there is none.
-    """
-
-    pulse: int
-    time: UtcNs
-    marks: Mapping[Key, Entered]
-    automatic: PulseMeasurements | None
-
-    def effective(self) -> PulseMeasurements:
-        """What counts of both."""
-        return effective_pulse(self.pulse, self.time, self.marks, self.automatic)
-
-    def says_nothing(self, camera: str, thing: str) -> bool:
-        """Whether the operator says that a thing cannot be measured in an image."""
-        entered = self.marks.get(Key(self.pulse, camera, thing))
-        return entered is not None and entered.xy is None
-
-    def rays(self) -> dict[str, dict[str, Ray]]:
-        """The rays of all points: P1 to P4 as they count, and landmarks."""
-        found: dict[str, dict[str, Ray]] = {}
-        for camera, image in self.effective().images.items():
-            for name, point in image.points.items():
-                found.setdefault(name, {})[camera] = Ray(point.xy, point.covariance)
-        for key, entered in self.marks.items():
-            if key.thing.startswith(LANDMARK) and entered.state is MarkState.MEASURED and entered.xy is not None:
-                found.setdefault(key.thing, {})[key.camera] = Ray(np.array(entered.xy), covariance_of(entered))
-        return found
-
-
 def pulse_view(
     revision: int, now: PulseMarks, before: tuple[PulseMarks, ...], system: CameraSystem | None,
-    balls: Mapping[str, Mapping[str, PredictedPoint]],
+    balls: Mapping[str, Mapping[str, PredictedPoint]], solved: Solved,
 ) -> PulseView:  # fmt: skip
     """The view of a pulse.
 
@@ -87,21 +47,22 @@ def pulse_view(
         before: the pulse before it and the one before that, as far as there are any.
         system: the oriented cameras; None: none are.
         balls: where the surveyed balls should be, by camera and thing.
+        solved: what was computed before.
     """
     marks = _marks(now)
     found, sticks = None, Stick({}, {})
     guessed: dict[str, dict[str, PredictedPoint]] = {}
     if system is not None:
-        found, earlier = _intersected(system, now, before)
-        effective = now.effective()
-        sticks = stick(system, effective, found.some(range(len(POINTS))))
+        points = solved.points(system, now)
+        found, earlier = points.found, [solved.points(system, each).found for each in before]
+        sticks = stick(system, now.pulse, found.some(range(len(POINTS))), points.good, solved.skis(system, now))
         found = found.some([i for i in range(len(found.names)) if found.points.seen[i].any()])
         guessed = predicted_points(system, found)
         for source in (_by_time(system, now, before, found, earlier), balls):
-            for camera, points in source.items():
+            for camera, places in source.items():
                 own = marks.get(camera, {})
                 there = guessed.setdefault(camera, {})
-                there.update({name: place for name, place in points.items() if name not in there and name not in own})
+                there.update({name: place for name, place in places.items() if name not in there and name not in own})
     return PulseView(
         revision=revision,
         pulse=now.pulse,
@@ -113,22 +74,6 @@ def pulse_view(
         previous=_places(before[0].marks) if before else {},
         figures=sticks.figures,
     )
-
-
-def _intersected(
-    system: CameraSystem, now: PulseMarks, before: tuple[PulseMarks, ...]
-) -> tuple[PointsInSpace, list[PointsInSpace]]:
-    """The points of a pulse, P1 to P4 first whether they are marked or not, and those of the pulses before it.
-
-    All are intersected at once, which takes little longer than one.
-    """
-    nothing: dict[str, dict[str, Ray]] = {name: {} for name in POINTS}
-    rays = [nothing | now.rays(), *(marks.rays() for marks in before)]
-    names = [(k, name) for k, of_pulse in enumerate(rays) for name in of_pulse]
-    found = intersected(system, {f"{k} {name}": rays[k][name] for k, name in names})
-    rows = [[i for i, (of_pulse, _) in enumerate(names) if of_pulse == k] for k in range(len(rays))]
-    parts = [replace(found.some(of_pulse), names=[names[i][1] for i in of_pulse]) for of_pulse in rows]
-    return parts[0], parts[1:]
 
 
 def _by_time(

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.digitizing.things import LINES
 from analysis.measurements.model import SIDES, PulseMeasurements
-from analysis.pulses.gross_errors import check_points, check_skis
+from analysis.pulses.gross_errors import Checked, check_points, check_skis
 from analysis.pulses.least_squares import Adjusted, Condition, adjust
 from analysis.pulses.points import Points
 from analysis.pulses.skis import SkiLines, skis_of
@@ -154,36 +154,57 @@ class Stick:
     figures: dict[str, Estimate]
 
 
-def stick(system: CameraSystem, pulse: PulseMeasurements, found: PointsInSpace) -> Stick:
+@dataclass(frozen=True, slots=True, eq=False)
+class SkisInSpace:
+    """Both skis of a pulse, intersected.
+
+    Attributes:
+        skis: as they were measured.
+        adjusted: from all images.
+        checked: from the images that are in order.
+        sides: whether left and right fit together; None: too few images.
+        lines: names of those that are measured in some image.
+    """
+
+    skis: SkiLines
+    adjusted: Adjusted
+    checked: Checked
+    sides: SideCheck | None
+    lines: tuple[str, ...]
+
+
+def intersected_skis(system: CameraSystem, pulse: PulseMeasurements) -> SkisInSpace:
+    """Intersect the skis of a pulse."""
+    skis = skis_of(system, [pulse], np.zeros((1, len(system.names), 3)))
+    adjusted = adjust(skis, system.covariance)
+    lines = tuple(name for name in LINES if any(LINES[name] in image.skis for image in pulse.images.values()))
+    return SkisInSpace(skis, adjusted, check_skis(skis, adjusted, system.covariance), _sides(system, pulse), lines)
+
+
+def checked_points(system: CameraSystem, found: PointsInSpace) -> Checked:
+    """Points from the images that are in order."""
+    return check_points(found.points, found.adjusted, system.covariance)
+
+
+def stick(system: CameraSystem, pulse: int, points: PointsInSpace, good: Checked, skis: SkisInSpace) -> Stick:
     """Skis in space, and angles and height from them and from the points, of one pulse.
 
     Args:
         system: the oriented cameras.
-        pulse: what counts of its images.
-        found: P1 to P4 of this pulse, in this order.
+        pulse: its number.
+        points: P1 to P4 of this pulse, in this order.
+        good: the same from the images that are in order.
+        skis: of this pulse.
     """
-    skis = skis_of(system, [pulse], np.zeros((1, len(system.names), 3)))
-    adjusted = adjust(skis, system.covariance)
-    checked = check_skis(skis, adjusted, system.covariance)
-    good = check_points(found.points, found.adjusted, system.covariance)
     state = jumper_states(
-        Solved(good, found.points.by_hand, checked, skis.by_hand), np.array([pulse.pulse]), np.zeros(1), system
+        Solved(good, points.points.by_hand, skis.checked, skis.skis.by_hand), np.array([pulse]), np.zeros(1), system
     )[0]
-    sides = _sides(system, pulse)
-    lines = {
-        name: _line(system, skis, adjusted, i, state, name, sides)
-        for i, name in enumerate(LINES)
-        if any(LINES[name] in image.skis for image in pulse.images.values())
-    }
-    return Stick(lines, _figures(state))
+    return Stick({name: _line(system, skis, state, name) for name in skis.lines}, _figures(state))
 
 
-def _line(
-    system: CameraSystem, skis: SkiLines, adjusted: Adjusted, i: int, state: JumperState, name: str,
-    sides: SideCheck | None,
-) -> SpaceLine:  # fmt: skip
-    ski, side = state.skis[LINES[name]], LINES[name]
-    seen = int(skis.seen[i].sum())
+def _line(system: CameraSystem, skis: SkisInSpace, state: JumperState, name: str) -> SpaceLine:
+    i, side, adjusted, sides = list(LINES).index(name), LINES[name], skis.adjusted, skis.sides
+    ski, seen = state.skis[side], int(skis.skis.seen[i].sum())
     if not adjusted.ok[i]:
         words = _WORDS[Condition(adjusted.condition[i])] if seen != 1 else "one image"
         return SpaceLine(slope=None, heading=None, status=words, w={}, sides=sides)

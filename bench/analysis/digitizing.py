@@ -1,35 +1,56 @@
 """Measuring by hand over HTTP: from a click to its sigma, from the pointer to the curve, with little and much marked.
 
-A real `svev digitize` serves a rendered jump on loopback. Each case has as its baseline the same with nothing marked,
-measured in the same run.
+Two real `svev digitize` serve a rendered jump on loopback: one in which nothing is marked, the baseline, and one with a
+long journal. They are called in turn.
 """
 
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import httpx
+import msgspec
 import numpy as np
 
-from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key
-from analysis.digitizing.session import Session
+from analysis.digitizing.journal import FORMAT, SUFFIX, Entered, Entry, Key
 from bench.analysis.hill_logs import HillLog, write_hill_log
+from bench.recording.processes import cpu_seconds
 from recorder.reading.info import info
 from rig.api.digitizing import MarkState
 from rig.errors import ProcessDiedError
-from simrig.world.scenario import load_scenario
+from simrig.world.scenario import Scenario, load_scenario
 
 _SCENARIO: Final = Path("config/scenarios/training.toml")
 _HILL_PULSES: Final = range(20, 58)
 _PULSE: Final = 20
 _MARKED: Final = 100_000
 _START_S: Final = 60.0
+_SIZE: Final = (640, 480)
+_SCATTER_PX: Final = 0.3
+#: Calls that are measured, and those before them, after which everything is loaded.
 _CALLS: Final = 200
+_FIRST: Final = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Server:
+    client: httpx.Client
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Taken:
+    """Times of a call, ms: 99th percentile and median to its answer, mean CPU time of the service."""
+
+    p99: float
+    median: float
+    cpu: float
 
 
 def run_digitizing() -> list[dict[str, Any]]:
@@ -41,75 +62,108 @@ def run_digitizing() -> list[dict[str, Any]]:
     Raises:
         ProcessDiedError: the page does not answer, or refuses.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        scenario = load_scenario(_SCENARIO).model_copy(update={"stamp": False})
-        log = write_hill_log(Path(folder) / "jump", scenario, _HILL_PULSES)
-        bare = _measured(log, marked=0)
-        full = _measured(log, marked=_MARKED)
+    scenario = load_scenario(_SCENARIO).model_copy(update={"stamp": False})
+    with tempfile.TemporaryDirectory() as name:
+        log = write_hill_log(Path(name) / "jump", scenario, _HILL_PULSES, _SIZE)
+        _journal(Path(name, "full"), info(log.path).recording)
+        with _served(log, Path(name, "bare")) as bare, _served(log, Path(name, "full")) as full:
+            found = {name: _measured((bare, full), call) for name, call in _calls(log, scenario).items()}
     return [
         {
-            "name": name,
-            "value": full[name],
+            "name": f"{name}, 99 %",
+            "value": full.p99,
             "unit": "ms",
-            "baseline": bare[name],
+            "baseline": bare.p99,
             "baseline_is": "with nothing marked",
             "marked": _MARKED,
+            "median_ms": full.median,
+            "median_bare_ms": bare.median,
+            "cpu_ms": full.cpu,
+            "cpu_bare_ms": bare.cpu,
         }
-        for name in full
+        for name, (bare, full) in found.items()
     ]
 
 
-def _measured(log: HillLog, marked: int) -> dict[str, float]:
-    folder = log.path.with_suffix(f".{marked}")
-    if marked:
-        recording = info(log.path).recording
-        session = Session(Journal(folder / f"Anna{SUFFIX}", recording, "Anna"))
-        marks = [
-            (Key(pulse, "K1", "P1"), Entered(MarkState.MEASURED, (1.0, 2.0))) for pulse in range(1000, 1000 + marked)
-        ]
-        session.put(marks)
-        session.close()
-    with _served(log, folder) as client:
-        sight = _sight(log)
-        place = {"do": "place", "pulse": _PULSE, "sigma": [0.3, 0.3]}
-        clicks = [place | {"camera": camera, "thing": thing, "xy": xy} for (camera, thing), xy in sight.items()]
-        drags = [
-            {"operator": "Anna", "pulse": _PULSE, "camera": camera, "thing": thing, "x": xy[0], "y": xy[1]}
-            for (camera, thing), xy in sight.items()
-        ]
-        return {
-            "click to sigma, 99 %": _p99(lambda i: client.post("sessions/Anna/actions", json=clicks[i % len(clicks)])),
-            "pointer to curves, 99 %": _p99(lambda i: client.get("geometry", params=drags[i % len(drags)])),
-            "undo, 99 %": _p99(lambda i: client.post("sessions/Anna/actions", json={"do": ("undo", "redo")[i % 2]})),
-            "step to another pulse, 99 %": _p99(lambda i: client.get(f"sessions/Anna/pulses/{_PULSE - i % 3}")),
-            "frame without loss, 99 %": _p99(lambda i: client.get(f"frames/{10 + i % 20}/K{1 + i % 3}.png")),
-        }
+def _journal(folder: Path, recording: str) -> None:
+    """A journal of as many actions, each with its line, as if they had been clicked."""
+    folder.mkdir()
+    path = folder / f"Anna{SUFFIX}"
+    head = {"format": FORMAT, "recording": recording, "operator": "Anna"}
+    entered = Entered(MarkState.MEASURED, (1.0, 2.0))
+    entries = (Entry("change", "", ((Key(pulse, "K1", "P1"), entered),)) for pulse in range(1000, 1000 + _MARKED))
+    path.write_bytes(b"".join(msgspec.json.encode(line) + b"\n" for line in (head, *entries)))
 
 
-def _sight(log: HillLog) -> dict[tuple[str, str], list[float]]:
-    """Some place in each image for each point in sight: what is computed takes the same time wherever it is."""
-    seen = log.truth[_PULSE]["in_sight"]
+def _calls(log: HillLog, scenario: Scenario) -> dict[str, Callable[[httpx.Client, int], httpx.Response]]:
+    """What is measured: how each call is made for the i-th time. No click is at the place of an earlier one."""
+    random = np.random.default_rng(1)
+    scatter = random.normal(0, _SCATTER_PX, (_CALLS + _FIRST, 2))
+    points, skis = _clicks(log, scenario)
+
+    def click(places: list[dict[str, Any]], client: httpx.Client, i: int) -> httpx.Response:
+        place = places[i % len(places)]
+        xy = (np.array(place["xy"]) + scatter[i]).tolist()
+        return client.post("sessions/Anna/actions", json=place | {"do": "place", "pulse": _PULSE, "xy": xy})
+
+    def drag(client: httpx.Client, i: int) -> httpx.Response:
+        place = points[i % len(points)]
+        x, y = np.array(place["xy"]) + scatter[i]
+        where = {"operator": "Anna", "pulse": _PULSE, "camera": place["camera"], "thing": place["thing"]}
+        return client.get("geometry", params=where | {"x": x, "y": y})
+
     return {
-        (camera, thing): [300.0 + 10 * i, 200.0 + 5 * i]
-        for camera, things in seen.items()
-        for i, (thing, there) in enumerate(things.items())
-        if there
+        "click to sigma": lambda client, i: click(points, client, i),
+        "point of a ski to its angles": lambda client, i: click(skis, client, i),
+        "pointer to curves": drag,
+        "undo": lambda client, i: client.post("sessions/Anna/actions", json={"do": ("undo", "redo")[i % 2]}),
+        "step to another pulse": lambda client, i: client.get(f"sessions/Anna/pulses/{_PULSE - i % 3}"),
+        "frame without loss": lambda client, i: client.get(f"frames/{10 + i % 20}/K{1 + i % 3}.png"),
     }
 
 
-def _p99(call: Any) -> float:
-    taken = []
-    for i in range(_CALLS):
-        began = time.perf_counter()
-        answer = call(i)
-        taken.append(time.perf_counter() - began)
-        if answer.is_error:
-            raise ProcessDiedError(f"{answer.request.url}: {answer.status_code} {answer.text}")
-    return float(np.quantile(taken, 0.99) * 1e3)
+def _clicks(log: HillLog, scenario: Scenario) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The points in sight, and two points of each ski, in each image, where they really are."""
+    state = log.truth[_PULSE]
+    points, skis = [], []
+    for camera in scenario.cameras:
+        projection = camera.projection(*_SIZE)
+        for thing, xyz in state["points"].items():
+            if state["in_sight"][camera.name][thing]:
+                xy = projection.pixels(np.array(xyz)).tolist()
+                points.append({"camera": camera.name, "thing": thing, "xy": xy})
+        for side, ski in state["skis"].items():
+            for vertex, along in enumerate((-0.9, 0.9)):
+                xy = projection.pixels(np.array(ski["point"]) + along * np.array(ski["direction"])).tolist()
+                skis.append({"camera": camera.name, "thing": f"{side} ski", "xy": xy, "vertex": vertex})
+    return points, skis
+
+
+def _measured(servers: Sequence[_Server], call: Callable[[httpx.Client, int], httpx.Response]) -> list[_Taken]:
+    """The same calls to all servers in turn, so that the computer is equally busy with other things."""
+    taken: list[list[float]] = [[] for _ in servers]
+    cpu = [0.0 for _ in servers]
+    for i in range(_FIRST + _CALLS):
+        for k, server in enumerate(servers):
+            if i == _FIRST:
+                cpu[k] = cpu_seconds([server.pid])
+            began = time.perf_counter()
+            answer = call(server.client, i)
+            taken[k].append(time.perf_counter() - began)
+            if answer.is_error:
+                raise ProcessDiedError(f"{answer.request.url}: {answer.status_code} {answer.text}")
+    return [
+        _Taken(
+            float(np.quantile(taken[k][_FIRST:], 0.99) * 1e3),
+            float(np.median(taken[k][_FIRST:]) * 1e3),
+            (cpu_seconds([server.pid]) - cpu[k]) / _CALLS * 1e3,
+        )
+        for k, server in enumerate(servers)
+    ]
 
 
 @contextmanager
-def _served(log: HillLog, folder: Path) -> Iterator[httpx.Client]:
+def _served(log: HillLog, folder: Path) -> Iterator[_Server]:
     command = [sys.executable, "-m", "svev", "digitize", str(log.path), "--survey", str(log.survey)]
     process = subprocess.Popen([*command, "--marks", str(folder)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None  # noqa: S101 - a pipe was asked for
@@ -125,7 +179,7 @@ def _served(log: HillLog, folder: Path) -> Iterator[httpx.Client]:
                 if time.monotonic() > deadline:
                     raise ProcessDiedError("the cameras are not oriented in time")
                 time.sleep(0.1)
-            yield client
+            yield _Server(client, process.pid)
     finally:
         process.terminate()
         process.wait()

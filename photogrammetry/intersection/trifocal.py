@@ -98,7 +98,8 @@ def check_sides(cameras: Sequence[IdealCamera], left: ImageLines, right: ImageLi
     lines = np.stack((left.homogeneous(), right.homogeneous()))
     covariances = np.stack((_covariance(left), _covariance(right)))
     with np.errstate(invalid="ignore", divide="ignore"):
-        tests = np.stack([_test(cameras, *_interchanged(image, lines, covariances)) for image in HYPOTHESES], axis=1)
+        named = [_interchanged(image, lines, covariances) for image in HYPOTHESES]
+        tests = _tests(cameras, np.stack([each for each, _ in named]), np.stack([each for _, each in named])).T
     complete = np.asarray(np.isfinite(tests).all(axis=1))
     tests[~complete] = np.nan
     known = np.where(complete[:, None], tests, 0.0)
@@ -130,11 +131,17 @@ def _interchanged(image: int, lines: Floats, covariances: Floats) -> tuple[Float
     return lines, covariances
 
 
-def _test(cameras: Sequence[IdealCamera], lines: Floats, covariances: Floats) -> Floats:
-    """Sum of both skis' test values (n,), each transferred into the image where the transfer is most accurate."""
+def _tests(cameras: Sequence[IdealCamera], lines: Floats, covariances: Floats) -> Floats:
+    """Sums of both skis' test values (4, n), each ski transferred into the image where this is most accurate.
+
+    Args:
+        cameras: three cameras.
+        lines: (4, 2, n, 3, 3) by hypothesis, ski, instant and image.
+        covariances: (4, 2, n, 3, 3, 3) of them.
+    """
     values, spreads = zip(*(_transfer_test(cameras, order, lines, covariances) for order in _orders()), strict=True)
     pick = np.argmin(spreads, axis=0)
-    return np.asarray(np.take_along_axis(np.array(values), pick[None], axis=0)[0].sum(axis=0))
+    return np.asarray(np.take_along_axis(np.array(values), pick[None], axis=0)[0].sum(axis=1))
 
 
 def _orders() -> list[tuple[int, ...]]:
@@ -144,10 +151,10 @@ def _orders() -> list[tuple[int, ...]]:
 def _transfer_test(
     cameras: Sequence[IdealCamera], order: tuple[int, ...], lines: Floats, covariances: Floats
 ) -> tuple[Floats, Floats]:
-    """Test values (2, n) of lines transferred into image order[0], and the variance of the transferred direction."""
+    """Test values (4, 2, n) of lines transferred into image order[0], and the variance of the transferred direction."""
     tensor = trifocal_tensor([cameras[i] for i in order])
-    measured, second, third = (lines[:, :, i] for i in order)
-    k_measured, k_second, k_third = (covariances[:, :, i] for i in order)
+    measured, second, third = (lines[..., i, :] for i in order)
+    k_measured, k_second, k_third = (covariances[..., i, :, :] for i in order)
     transferred = transfer_lines(tensor, second, third)
     by_second = np.einsum("ijk,...k->...ij", tensor, third)
     by_third = np.einsum("ijk,...j->...ik", tensor, second)

@@ -136,13 +136,17 @@ def _side_by_side(messages: Sequence[Message]) -> Message | None:
     return replace(first, topic=TRIPLET.name, data=memoryview(data))
 
 
+def stored_pulses(reader: LogReader) -> Iterator[tuple[TripletTag, StoredTriplet | None]]:
+    """All pulses of a log, each with where its image stands; None: it has none. Reads no pixels."""
+    for chunk in reader.sound_chunks(only=(TAG.name,)):
+        images = images_of(chunk)
+        for pulse, tag in {m.sequence: tag for m in chunk.messages if (tag := tag_of(m)) is not None}.items():
+            yield tag, StoredTriplet(tag, chunk.offset, chunk.length) if pulse in images else None
+
+
 def stored_triplets(reader: LogReader) -> list[StoredTriplet]:
     """All pulses of a log that have an image; reads no pixels."""
-    found = []
-    for chunk in reader.sound_chunks(only=(TAG.name,)):
-        tags = {m.sequence: tag for m in chunk.messages if (tag := tag_of(m)) is not None}
-        found += [StoredTriplet(tags[pulse], chunk.offset, chunk.length) for pulse in images_of(chunk) if pulse in tags]
-    return found
+    return [stored for _, stored in stored_pulses(reader) if stored is not None]
 
 
 def tag_of(message: Message) -> TripletTag | None:

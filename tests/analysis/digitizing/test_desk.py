@@ -12,6 +12,7 @@ from analysis.digitizing.desk import Desk
 from analysis.digitizing.epipolar import epipolar_curves
 from analysis.digitizing.files import DeskFiles
 from analysis.digitizing.following import follow
+from analysis.digitizing.journal import Entered, Key
 from analysis.measurements.file import write_measurements
 from analysis.scene.camera_system import CameraSystem
 from bench.analysis.hill_logs import HillLog
@@ -80,6 +81,38 @@ def test_a_wrong_click_is_named_and_the_worst_one_is_told_first(desk: Desk, jump
     assert "px, w = " in finding
     worst = desk.session_view("Anna").worst[0]
     assert (worst.pulse, worst.camera, worst.thing) == (20, "K2", "P3")
+
+
+def test_the_worst_ray_of_a_pulse_that_nobody_looked_at_is_told_after_each_change(desk: Desk, jump: HillLog) -> None:
+    marks = [(Key(c.pulse, c.camera, c.thing), Entered(xy=c.xy)) for c in clicks(desk, jump, 4) if c.thing == "P3"]
+    desk.put("Anna", marks)
+    assert not [each for each in desk.session_view("Anna").worst if each.w > 5]
+    key, entered = next((key, entered) for key, entered in marks if (key.pulse, key.camera) == (20, "K2"))
+    assert entered.xy is not None
+    desk.put("Anna", [marks[0], (key, Entered(xy=(entered.xy[0] + 6, entered.xy[1] - 12)))])
+    worst = desk.session_view("Anna").worst[0]
+    assert (worst.pulse, worst.camera, worst.thing) == (20, "K2", "P3")
+    desk.put("Anna", [marks[0], (key, entered)])
+    assert not [each for each in desk.session_view("Anna").worst if each.w > 5]
+
+
+def test_a_view_is_the_same_whatever_was_computed_before(desk: Desk, jump: HillLog) -> None:
+    for click in clicks(desk, jump, 4, range(18, 21)):
+        desk.act("Anna", click.action())
+    before = desk.view("Anna", 20)
+    wrong = PlaceAction(do="place", pulse=20, camera="K2", thing="right ski", xy=(10, 20), vertex=0)
+    changed = desk.act("Anna", wrong).view
+    assert changed is not None
+    assert changed.lines["right ski"] != before.lines["right ski"]
+    assert changed.space == before.space
+    undone = desk.act("Anna", UndoAction(do="undo")).view
+    assert undone is not None
+    assert undone.model_copy(update={"revision": before.revision}) == before
+    anew = opened(jump, survey=False)
+    anew.orienting._known = desk.orienting._known
+    desk.close()
+    assert anew.view("Anna", 20) == undone
+    anew.close()
 
 
 def test_epipolar_curves_meet_the_truth_also_where_lenses_distort(desk: Desk, jump: HillLog) -> None:

@@ -1,42 +1,43 @@
-"""Computes a jump from what an operator measured, as `svev analyze` does, into a folder beside his marks."""
+"""Computes jumps from what operators measured, as `svev analyze` does, into folders beside their marks.
+
+A program of its own computes, so that measuring goes on as fast as before; while a recording runs it stands still.
+"""
 
 import os
+import pickle
 import shutil
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from analysis.cameras.source import Source
 from analysis.measurements.model import Measurements
-from analysis.procedure.analyze import analyze
-from analysis.procedure.result_folder import write_folder
-from analysis.result.model import MeasuredRecording, Quantity
-from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
-from rig.api.digitizing import CurvePoint, HandResult
-from rig.errors import SvevError
+from rig.api.digitizing import HandResult
+from rig.api.measuring import MeasuringStep
+from rig.api.statement import Level, Statement
+from rig.background.child import run_child
+from rig.phrase import Phrase, from_plain, phrase, plain
 
 _SUFFIX: Final = ".result"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Order:
-    measurements: Measurements
-    source: Source
+_PROGRAM: Final = "analysis.digitizing.computing_program"
+_ENDED: Final = phrase("hand_ended", "the program that computes was ended by something else: compute again")
 
 
 class Computing:
-    """The results of one log's operators; each is computed in a thread, one at a time. Any thread may call any method.
+    """The results of one log's operators, computed one at a time. Any thread may call any method.
 
     Args:
         log: the log.
         folder: of the marks; a result stands in `OPERATOR.result` there, whole or absent.
+        busy: whether a recording runs, so that the work has to stand still; None: nothing is recorded on this computer.
     """
 
-    def __init__(self, log: Path, folder: Path) -> None:
-        self._log, self._folder = log, folder
+    def __init__(self, log: Path, folder: Path, busy: Callable[[], bool] | None) -> None:
+        self._log, self._folder, self._busy = log, folder, busy
         self._states: dict[str, HandResult] = {}
+        self._wanted: set[str] = set()
+        self._threads: dict[str, threading.Thread] = {}
         self._lock, self._one_at_a_time = threading.Lock(), threading.Lock()
 
     def begin(self, operator: str, order: Callable[[], tuple[Measurements, Source]]) -> HandResult:
@@ -50,16 +51,39 @@ class Computing:
             SvevError: of `order`.
         """
         with self._lock:
-            known = self._states.get(operator)
-            if known is not None and known.state == "computing":
-                return known
-            measurements, source = order()
+            if operator in self._wanted:
+                return self._states[operator]
+            thread = self._threads.get(operator)
+        if thread is not None:
+            thread.join()  # one that was cancelled ends within a moment
+        with self._lock:
+            if operator in self._wanted:
+                return self._states[operator]
+            ordered = order()
             state = self._states[operator] = HandResult(state="computing")
-        thread = threading.Thread(
-            target=self._work, args=(operator, _Order(measurements, source)), name="computing by hand", daemon=True
-        )
-        thread.start()
+            self._wanted.add(operator)
+            thread = threading.Thread(
+                target=self._work, args=(operator, ordered), name="computing by hand", daemon=True
+            )
+            self._threads[operator] = thread
+            thread.start()
         return state
+
+    def cancel(self, operator: str) -> HandResult:
+        """Compute no further; an earlier result stays."""
+        with self._lock:
+            if operator in self._wanted:
+                self._wanted.discard(operator)
+                self._states[operator] = HandResult(state="none")
+            return self.result(operator)
+
+    def close(self) -> None:
+        """End what is being computed."""
+        with self._lock:
+            self._wanted.clear()
+            threads = list(self._threads.values())
+        for thread in threads:
+            thread.join()
 
     def result(self, operator: str) -> HandResult:
         """How far the computing is, and what it gave."""
@@ -70,46 +94,55 @@ class Computing:
         found = self._folder / f"{operator}{_SUFFIX}" / name
         return found if found.is_file() and found.parent.parent == self._folder else None
 
-    def _work(self, operator: str, order: _Order) -> None:
+    def _work(self, operator: str, order: tuple[Measurements, Source]) -> None:
         with self._one_at_a_time:
             try:
                 state = self._computed(operator, order)
-            except (SvevError, NotSolvableError, NotConvergedError) as error:
-                state = HandResult(state="failed", message=str(error))
-        self._states[operator] = state
+            except ChildProcessError:
+                state = _failed(_ENDED)
+            except OSError as error:
+                state = _failed(plain(f"{self._folder}: {error.strerror or error}; make room, and compute again"))
+        with self._lock:
+            if state is not None and operator in self._wanted:
+                self._states[operator] = state
+            self._wanted.discard(operator)
 
-    def _computed(self, operator: str, order: _Order) -> HandResult:
-        analysis = analyze(self._log, order.source, by_hand=order.measurements, images=False)
+    def _computed(self, operator: str, order: tuple[Measurements, Source]) -> HandResult | None:
+        """The result; None if nobody wants it any more."""
         whole = self._folder / f"{operator}{_SUFFIX}"
-        making = self._folder / f".{operator}{_SUFFIX}.{os.getpid()}"
+        making, ordered = (self._folder / f".{operator}.{os.getpid()}{end}" for end in (_SUFFIX, ".order"))
         shutil.rmtree(making, ignore_errors=True)
         try:
-            files = write_folder(analysis, self._log, making, progress=None)
+            self._folder.mkdir(parents=True, exist_ok=True)
+            ordered.write_bytes(pickle.dumps(order))
+            end = run_child(
+                _PROGRAM,
+                {"log": str(self._log), "order": str(ordered), "out": str(making)},
+                busy=self._busy or (lambda: False),
+                wanted=lambda: operator in self._wanted,
+                tell=lambda news: self._hear(operator, news),
+                hold=lambda held: self._hear(operator, {"paused": held}),
+                yielding=self._busy is not None,
+            )
+            if end is None:
+                return None
+            if "problem" in end:
+                return _failed(from_plain(end["problem"]))
             shutil.rmtree(whole, ignore_errors=True)
             making.rename(whole)
+            return HandResult.model_validate({"state": "done", **end})
         finally:
+            ordered.unlink(missing_ok=True)
             shutil.rmtree(making, ignore_errors=True)
-        jumps = analysis.result.jumps
-        return HandResult(
-            state="done",
-            verdict="; ".join(str(jump.verdict.message) for jump in jumps),
-            curves=curves_of(analysis.result),
-            files=tuple(sorted(file.name for file in files)),
-        )
+
+    def _hear(self, operator: str, news: dict[str, Any]) -> None:
+        if "step" in news:
+            news["step"] = MeasuringStep(news["step"])
+        with self._lock:
+            if operator in self._wanted:
+                self._states[operator] = self._states[operator].model_copy(update=news)
 
 
-def curves_of(result: MeasuredRecording) -> dict[str, list[CurvePoint]]:
-    """All quantities of a result over its pulses, smoothed, by name."""
-    curves: dict[str, list[CurvePoint]] = {}
-    for pulse in (pulse for jump in result.jumps for pulse in jump.pulses):
-        state = pulse.smoothed
-        if state is None:
-            continue
-        quantities: Mapping[str, Quantity | None] = {
-            **state.angles, "height": state.height, "speed": state.speed, "angle_of_attack": state.angle_of_attack,
-        }  # fmt: skip
-        for name, quantity in quantities.items():
-            if quantity is not None:
-                point = CurvePoint(pulse=int(pulse.pulse), value=quantity.value, sigma=quantity.sigma)
-                curves.setdefault(name, []).append(point)
-    return curves
+def _failed(why: Phrase) -> HandResult:
+    problem = Statement(level=Level.ERROR, code=why.code, text=why.text, values=why.values)
+    return HandResult(state="failed", problem=problem)

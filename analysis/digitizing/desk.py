@@ -60,26 +60,27 @@ class Desk:
     Args:
         files: the log and what lies beside it.
         source: reads survey or poses; gives None if nobody named any.
-        busy: whether a recording runs, which nothing here may disturb: what takes seconds is refused then.
+        busy: whether a recording runs, which nothing here may disturb: what takes seconds is refused then, or waits;
+            None: nothing is recorded on this computer.
 
     Raises:
         BadInputError: no such log, or it holds no pulse.
     """
 
     def __init__(
-        self, files: DeskFiles, source: Callable[[], Source | None], busy: Callable[[], bool] = lambda: False
+        self, files: DeskFiles, source: Callable[[], Source | None], busy: Callable[[], bool] | None = None
     ) -> None:
-        self.files, self._busy = files, busy
+        self.files, self._busy = files, busy or (lambda: False)
         self.log = OpenedLog(files.log)
         self.orienting = Orienting(self.log, source)
-        self.computing = Computing(files.log, files.folder)
+        self.computing = Computing(files.log, files.folder, busy)
         self._sessions: dict[str, Session] = {}
         self._solved = Solved()
         self._misfits: dict[str, Misfits] = {}
         self._lock = threading.Lock()
         self._automatic: tuple[tuple[int, int] | None, Measurements | None] = (None, None)
         self._by_pulse: dict[int, PulseMeasurements] = {}
-        if busy():
+        if self._busy():
             self.orienting.wait_for_order()
         else:
             self.orienting.begin()
@@ -95,6 +96,7 @@ class Desk:
 
     def close(self) -> None:
         """Let other programs measure in this log."""
+        self.computing.close()
         with self._lock:
             for session in self._sessions.values():
                 session.close()
@@ -293,9 +295,8 @@ class Desk:
         """Begin to compute from an operator's marks.
 
         Raises:
-            StateForbidsError: nobody told where the balls are, or a recording runs.
+            StateForbidsError: nobody told where the balls are.
         """
-        self.require_idle()
 
         def order() -> tuple[Measurements, Source]:
             source = self.orienting.for_analysis

@@ -24,14 +24,15 @@ class Desks:
     Args:
         find: gives the files of a recording.
         source: reads survey or poses; gives None if nobody named any.
-        busy: whether the computer has something better to do, such as a recording; what takes seconds is refused then.
+        busy: whether the computer has something better to do, such as a recording; what takes seconds is
+            refused then, or waits; None: nothing is recorded on this computer.
     """
 
     def __init__(
         self,
         find: Callable[[str], DeskFiles],
         source: "Callable[[], Source | None]",
-        busy: Callable[[], bool] = lambda: False,
+        busy: Callable[[], bool] | None = None,
     ) -> None:
         self._find, self._source, self._busy = find, source, busy
         self._desks: OrderedDict[DeskFiles, Desk] = OrderedDict()

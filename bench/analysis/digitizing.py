@@ -113,8 +113,8 @@ def _calls(log: HillLog, scenario: Scenario) -> dict[str, Callable[[httpx.Client
         return client.get("geometry", params=where | {"x": x, "y": y})
 
     return {
-        "click to sigma": lambda client, i: click(points, client, i),
         "point of a ski to its angles": lambda client, i: click(skis, client, i),
+        "click to sigma": lambda client, i: click(points, client, i),
         "pointer to curves": drag,
         "undo": lambda client, i: client.post("sessions/Anna/actions", json={"do": ("undo", "redo")[i % 2]}),
         "step to another pulse": lambda client, i: client.get(f"sessions/Anna/pulses/{_PULSE - i % 3}"),

@@ -6,6 +6,8 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from rig.api.fields import WHOLE, Model
+from rig.api.measuring import MeasuringStep
+from rig.api.statement import Statement
 
 #: A file of marks that is imported: 100 000 points have some 10 MB.
 MARKS_BYTES_MAX: Final = 32 << 20
@@ -355,7 +357,10 @@ class HandResult(Model):
     """How far the computing of a session is, and what it gave."""
 
     state: Literal["none", "computing", "done", "failed"]
-    message: str | None = None
+    step: MeasuringStep | None = Field(None, description="what is being done")
+    share: float = Field(0.0, description="of this step that is done, 0 to 1")
+    paused: bool = Field(False, description="it stands still while a recording runs")
+    problem: Statement | None = Field(None, description="why it could not be computed, and what to do")
     verdict: str | None = None
     curves: dict[str, list[CurvePoint]] = Field({})
     files: tuple[str, ...] = ()

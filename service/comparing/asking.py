@@ -12,8 +12,8 @@ from recorder.catalogue.entry import SUFFIX
 from rig.api.athletes import AthleteJump
 from rig.api.comparison import Comparison, Span
 from rig.api.statement import Level
+from rig.background.child import run_child
 from rig.errors import BadInputError, StateForbidsError
-from service.background.child import run_child
 from service.measuring.results import result_file
 
 #: Two jumps take some two seconds, a season of one athlete some ten.

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.background.program import Teller, serve
+from rig.background.program import Teller, serve
 
 if TYPE_CHECKING:
     from analysis.comparison.aligned import MeasuredJump

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from rig.api.export import ENDINGS, ExportJob, ExportOrder, ExportState
+from rig.background.child import run_child
 from rig.errors import StateForbidsError, StorageError, UnknownExportError
 from rig.host.files import make_folder
 from rig.phrase import Phrase, phrase
-from service.background.child import run_child
 
 FOLDER: Final = ".exports"
 #: A file is kept for so long, unless its room is needed.

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.api.export import ExportOrder
-from service.background.program import Teller, serve
+from rig.background.program import Teller, serve
 
 
 def _export(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:

@@ -12,12 +12,12 @@ from recorder.log.measured_path import measured_path
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, MeasuringStep
 from rig.api.statement import Level, Statement
+from rig.background.child import run_child
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.host.files import make_folder
 from rig.phrase import Phrase, from_plain, phrase, plain
 from rig.settings.model import AnalysisSettings
-from service.background.child import run_child
 from service.measuring.results import (
     VIDEO,
     keep_file,

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, BinaryIO, Final
 
 from rig.api.measuring import MeasuringStep
+from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, sync
 from rig.host.files import open_to_read
-from service.background.program import Teller, serve
 
 _PIECE: Final = 1 << 22
 

@@ -1,21 +1,13 @@
 """The program that measures one log, started by `service.measuring.after_steps`."""
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
+from analysis.procedure.steps import STEPS
 from rig.api.measuring import MeasuringStep
+from rig.background.program import Teller, serve
 from rig.errors import BadInputError, LogDamagedError, SvevError
 from rig.phrase import as_plain
-from service.background.program import Teller, serve
-
-#: What the steps of the analysis are called by those who translate them.
-_STEPS: Final = {
-    "looking at the balls": MeasuringStep.BALLS,
-    "looking for the jumper": MeasuringStep.SEARCH,
-    "naming points and skis": MeasuringStep.NAMES,
-    "computing": MeasuringStep.COMPUTING,
-    "writing": MeasuringStep.WRITING,
-}
 
 
 def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
@@ -35,8 +27,8 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
 
     def progress(step: str, share: float) -> None:
         nonlocal orienting
-        orienting = _STEPS[step] is MeasuringStep.BALLS and share < 1.0
-        tell(last=share in {0.0, 1.0}, step=_STEPS[step], share=share)
+        orienting = STEPS[step] is MeasuringStep.BALLS and share < 1.0
+        tell(last=share in {0.0, 1.0}, step=STEPS[step], share=share)
 
     log, out = Path(asked["log"]), Path(asked["out"])
     survey, calibration = (Path(asked[key]) if asked[key] else None for key in ("survey", "calibration"))

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from recorder.log.session_changes import session_changes
-from service.background.program import Teller, serve
+from rig.background.program import Teller, serve
 
 
 def _rename(asked: dict[str, Any], _: Teller) -> dict[str, Any]:

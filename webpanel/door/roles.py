@@ -111,6 +111,12 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         ),
     ),
     (
+        r"DELETE /api/recordings/([^/]+)/digitizing/sessions/[^/]+/compute",
+        lambda recording: phrase(
+            "act_not_digitized", "gave up computing recording {recording}, measured by hand", recording=recording
+        ),
+    ),
+    (
         r"DELETE /api/recordings/([^/]+)/links/.*",
         lambda recording: phrase(
             "act_link_taken_back", "took back a link to recording {recording}", recording=recording

@@ -228,6 +228,11 @@ def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) ->
         """Compute the jump from what was measured by hand, with the rest of the automatic measurement."""
         return desk.compute(operator)
 
+    @router.delete(base + "/compute", responses=CHANGING | refusals(404))
+    def cancel_computing(desk: AtDesk, operator: Operator) -> HandResult:
+        """Compute no further; an earlier result stays."""
+        return desk.computing.cancel(operator)
+
     @router.get(base + "/result", responses=refusals(404))
     def get_result(desk: AtDesk, operator: Operator) -> HandResult:
         """How far the computing is, and what it gave."""

@@ -196,7 +196,10 @@ def test_findings_events_and_reasons_are_said_in_norwegian_too_with_the_values_t
             assert _placeholders(translated[code]) <= values, f"{where}: {_placeholders(translated[code]) - values}"
             heard.add(code)
     assert len(heard) > 150
-    listed = [_listed(name) for name in ("nb-findings.js", "nb-events.js", "nb-analysis.js", "nb-refusals.js")]
+    listed = [
+        _listed(name)
+        for name in ("nb-findings.js", "nb-events.js", "nb-analysis.js", "nb-refusals.js", "nb-digitizing.js")
+    ]
     assert set().union(*listed) == heard
 
 

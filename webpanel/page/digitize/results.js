@@ -1,11 +1,11 @@
 /** Computes the jump from what is measured by hand, and shows its curves with their bands; a click goes to the pulse. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { $, icon, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { attempt } from "../shared/snacks.js";
 import { select } from "./marking.js";
-import { compute, getResult, resultFile } from "./server.js";
+import { cancelComputing, compute, getResult, resultFile } from "./server.js";
 import { state, watch } from "./state.js";
 
 /** @typedef {import("./types.js").CurvePoint} CurvePoint */
@@ -25,6 +25,7 @@ let plots = [];
 
 export function startResults() {
   $("compute").addEventListener("click", () => void begin());
+  $("compute-cancel").addEventListener("click", () => void cancel());
   watch(() => {
     if (state.operator && looking !== state.operator) void follow(state.operator);
     for (const { plot, points } of plots) {
@@ -41,6 +42,11 @@ export async function begin() {
   if (!answer) return;
   show(answer);
   await follow(state.operator);
+}
+
+async function cancel() {
+  const answer = await attempt(() => cancelComputing(state.operator));
+  if (answer) show(answer);
 }
 
 /** @param {string} operator whose result is looked at until it is there */
@@ -64,8 +70,12 @@ export function drawResult() {
 function show(now) {
   result = now;
   const words = { none: "digitize.result_none", computing: "digitize.result_computing", done: "digitize.result_done", failed: "digitize.result_failed" }[now.state];
-  setText($("result-state"), [t(words), now.state === "failed" ? now.message : now.verdict].filter(Boolean).join(" "));
-  $("compute").disabled = now.state === "computing";
+  const computing = now.state === "computing";
+  const doing = now.paused ? t("digitize.result_paused") : now.step && t(`measurement.step_${now.step}`);
+  setText($("result-state"), [t(words), computing ? doing : now.problem ? say(now.problem).text : now.verdict].filter(Boolean).join(" "));
+  $("compute").disabled = computing;
+  $("compute-cancel").hidden = $("result-share").hidden = !computing;
+  $("result-share").value = now.share;
   const curves = Object.entries(now.curves).filter(([, points]) => points.length);
   plots = [];
   $("curves").replaceChildren(...curves.map(([name, points]) => makeCurve(name, points)));

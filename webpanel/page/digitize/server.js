@@ -109,6 +109,9 @@ export const measureTape = (order) => call("POST", path("/tape"), order);
 export const compute = (operator) => call("POST", path(session(operator, "/compute")));
 
 /** @param {string} operator @returns {Promise<import("./types.js").HandResult>} */
+export const cancelComputing = (operator) => call("DELETE", path(session(operator, "/compute")));
+
+/** @param {string} operator @returns {Promise<import("./types.js").HandResult>} */
 export const getResult = (operator) => call("GET", path(session(operator, "/result")));
 
 /** @param {string} operator @param {string} name @returns {string} address of a file of the result */

@@ -154,7 +154,10 @@
  * @property {number} sigma
  * @typedef {object} HandResult
  * @property {"none"|"computing"|"done"|"failed"} state
- * @property {string|null} message
+ * @property {string|null} step
+ * @property {number} share
+ * @property {boolean} paused
+ * @property {import("../shared/types.js").Statement|null} problem
  * @property {string|null} verdict
  * @property {Record<string, CurvePoint[]>} curves
  * @property {string[]} files

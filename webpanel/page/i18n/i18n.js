@@ -3,6 +3,7 @@
 import { load, save } from "../shared/store.js";
 import { en } from "./en.js";
 import { analysis as nbAnalysis } from "./nb-analysis.js";
+import { digitizing as nbDigitizing } from "./nb-digitizing.js";
 import { events as nbEvents } from "./nb-events.js";
 import { findings as nbFindings } from "./nb-findings.js";
 import { refusals as nbRefusals } from "./nb-refusals.js";
@@ -14,7 +15,7 @@ import { nb } from "./nb.js";
 
 const LANGUAGES = { en, nb };
 /** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals } };
+const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals, ...nbDigitizing } };
 
 /** @type {"en"|"nb"} */
 let language = "en";

@@ -140,6 +140,7 @@ export const events = {
   act_exported: ["ba om en eksport av opptaket {recording}"],
   act_measured: ["ba om at opptak {recording} måles"],
   act_digitized: ["ba om at opptak {recording}, målt for hånd, regnes ut"],
+  act_not_digitized: ["ga opp å regne ut opptak {recording}, målt for hånd"],
   act_not_measured: ["ga opp å måle opptak {recording}"],
   act_export_ended: ["avbrøt eller fjernet en eksport"],
   act_next_jumper: ["endret neste hopper"],

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
+from rig.background.child import AT_ONCE
 from rig.errors import SvevError
 from rig.phrase import as_plain, plain
 
@@ -54,8 +55,9 @@ def serve(work: Callable[[dict[str, Any], Teller], dict[str, Any]]) -> None:
         work: takes what is asked and whom to tell; its libraries are to be imported within, so that their threads have
             our low priority too.
     """
-    os.nice(_NICE)
-    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    if AT_ONCE not in sys.argv[1:]:
+        os.nice(_NICE)
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     asked: dict[str, Any] = json.loads(sys.stdin.readline())
     try:
         end = work(asked, Teller())

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from select import select
 from typing import Any, Final
 
+#: Argument of a program that takes what processor time it gets.
+AT_ONCE: Final = "at-once"
 _LOOK_S: Final = 0.2
 _PIECE: Final = 1 << 16
 
@@ -20,16 +22,18 @@ def run_child(
     wanted: Callable[[], bool],
     tell: Callable[[dict[str, Any]], None],
     hold: Callable[[bool], None],
+    yielding: bool = True,
 ) -> dict[str, Any] | None:
     """Run a program to its end.
 
     Args:
-        module: its main module; it calls `service.background.program.serve`.
+        module: its main module; it calls `rig.background.program.serve`.
         asked: what it is to do.
         busy: whether it has to stand still at present.
         wanted: whether anybody still wants what it does.
         tell: takes what it says of how far it is.
         hold: called with True when it has to stand still from now on, with False when it goes on.
+        yielding: whether it takes only the processor time that nobody else wants; False where nothing is recorded.
 
     Returns:
         What it said at its end; None if it was ended because nobody wants it any more.
@@ -37,7 +41,7 @@ def run_child(
     Raises:
         OSError: it cannot be started, or has ended by itself.
     """
-    command = [sys.executable, "-m", module]
+    command = [sys.executable, "-m", module, *([] if yielding else [AT_ONCE])]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         try:
             _write(child, json.dumps(asked))

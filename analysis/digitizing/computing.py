@@ -6,6 +6,7 @@ A program of its own computes, so that measuring goes on as fast as before; whil
 import os
 import pickle
 import shutil
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -110,20 +111,12 @@ class Computing:
     def _computed(self, operator: str, order: tuple[Measurements, Source]) -> HandResult | None:
         """The result; None if nobody wants it any more."""
         whole = self._folder / f"{operator}{_SUFFIX}"
-        making, ordered = (self._folder / f".{operator}.{os.getpid()}{end}" for end in (_SUFFIX, ".order"))
+        making = self._folder / f".{operator}{_SUFFIX}.{os.getpid()}"
         shutil.rmtree(making, ignore_errors=True)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            ordered.write_bytes(pickle.dumps(order))
-            end = run_child(
-                _PROGRAM,
-                {"log": str(self._log), "order": str(ordered), "out": str(making)},
-                busy=self._busy or (lambda: False),
-                wanted=lambda: operator in self._wanted,
-                tell=lambda news: self._hear(operator, news),
-                hold=lambda held: self._hear(operator, {"paused": held}),
-                yielding=self._busy is not None,
-            )
+            with tempfile.TemporaryDirectory(prefix="svev-") as folder:
+                end = self._ended(operator, Path(folder, "order"), order, making)
             if end is None:
                 return None
             if "problem" in end:
@@ -132,8 +125,22 @@ class Computing:
             making.rename(whole)
             return HandResult.model_validate({"state": "done", **end})
         finally:
-            ordered.unlink(missing_ok=True)
             shutil.rmtree(making, ignore_errors=True)
+
+    def _ended(
+        self, operator: str, ordered: Path, order: tuple[Measurements, Source], making: Path
+    ) -> dict[str, Any] | None:
+        """What the program says at its end."""
+        ordered.write_bytes(pickle.dumps(order))
+        return run_child(
+            _PROGRAM,
+            {"log": str(self._log), "order": str(ordered), "out": str(making)},
+            busy=self._busy or (lambda: False),
+            wanted=lambda: operator in self._wanted,
+            tell=lambda news: self._hear(operator, news),
+            hold=lambda held: self._hear(operator, {"paused": held}),
+            yielding=self._busy is not None,
+        )
 
     def _hear(self, operator: str, news: dict[str, Any]) -> None:
         if "step" in news:

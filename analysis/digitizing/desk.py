@@ -72,7 +72,7 @@ class Desk:
     ) -> None:
         self.files, self._busy = files, busy or (lambda: False)
         self.log = OpenedLog(files.log)
-        self.orienting = Orienting(self.log, source)
+        self.orienting = Orienting(self.log, source, busy)
         self.computing = Computing(files.log, files.folder, busy)
         self._sessions: dict[str, Session] = {}
         self._solved = Solved()
@@ -80,10 +80,7 @@ class Desk:
         self._lock = threading.Lock()
         self._automatic: tuple[tuple[int, int] | None, Measurements | None] = (None, None)
         self._by_pulse: dict[int, PulseMeasurements] = {}
-        if self._busy():
-            self.orienting.wait_for_order()
-        else:
-            self.orienting.begin()
+        self.orienting.begin()
 
     def require_idle(self) -> None:
         """Refuse what takes seconds while a recording runs.
@@ -96,6 +93,7 @@ class Desk:
 
     def close(self) -> None:
         """Let other programs measure in this log."""
+        self.orienting.close()
         self.computing.close()
         with self._lock:
             for session in self._sessions.values():
@@ -123,12 +121,7 @@ class Desk:
         )
 
     def orient(self, operator: str | None) -> OrientationState:
-        """Orient the cameras again: by the balls that an operator clicked, or by those that the images show.
-
-        Raises:
-            StateForbidsError: a recording runs.
-        """
-        self.require_idle()
+        """Orient the cameras again: by the balls that an operator clicked, or by those that the images show."""
         if operator is None:
             return self.orienting.begin()
         marks = {key: entered for key, entered in self.session(operator).everything() if key.thing.startswith(BALL)}

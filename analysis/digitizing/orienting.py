@@ -1,35 +1,34 @@
-"""Orients the cameras of a log that is measured by hand: by its own balls, or by those that a person clicked."""
+"""Orients the cameras of a log that is measured by hand: by its own balls, or by those that a person clicked.
 
+A program of its own does it, so that measuring goes on as fast as before; while a recording runs it stands still.
+"""
+
+import pickle
+import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from analysis.cameras.frames import LogFrames
 from analysis.cameras.poses_file import Calibration
 from analysis.cameras.source import Source
-from analysis.digitizing.effective import sigma_of
 from analysis.digitizing.journal import Entered, Key
 from analysis.digitizing.opened_log import OpenedLog
 from analysis.digitizing.space import inside, predicted
-from analysis.digitizing.things import BALL, ball_of
-from analysis.procedure.orienting import oriented
-from analysis.scene.camera_system import CameraSystem, camera_system
+from analysis.digitizing.things import BALL
+from analysis.scene.camera_system import CameraSystem
 from analysis.scene.survey import KnownPoints, Survey
-from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
-from photogrammetry.network.file import pixel_to_metric
-from photogrammetry.network.model import Image, ImageObservations
-from photogrammetry.procedures.orientation import orient
-from rig.api.digitizing import MarkState, OrientationState, PredictedPoint
-from rig.errors import BadInputError, LogDamagedError
+from rig.api.digitizing import OrientationState, PredictedPoint
+from rig.background.child import run_child
+from rig.errors import BadInputError
+from rig.phrase import from_plain
 
-#: Clicked balls without which a camera is left out.
-_FEWEST_BALLS: Final = 4
-_FAILURES: Final = (BadInputError, LogDamagedError, NotSolvableError, NotConvergedError, RefusedError)
 _NO_SOURCE: Final = "nobody told where the balls are: name the survey with --survey, or in [analysis] of the rig file"
-_RECORDING: Final = "a recording runs: orient the cameras when it has ended"
+_RECORDING: Final = "a recording runs: the cameras are oriented when it has ended"
+_PROGRAM: Final = "analysis.digitizing.orienting_program"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,15 +40,19 @@ class _Known:
 
 
 class Orienting:
-    """The orientation of one log, found in a thread. Any thread may call any method.
+    """The orientation of one log. Any thread may call any method.
 
     Args:
         log: the log.
         source: reads survey or poses; None of it: there is neither.
+        busy: whether a recording runs, so that the work has to stand still; None: nothing is recorded on this computer.
     """
 
-    def __init__(self, log: OpenedLog, source: Callable[[], Source | None]) -> None:
-        self._log, self._source = log, source
+    def __init__(
+        self, log: OpenedLog, source: Callable[[], Source | None], busy: Callable[[], bool] | None = None
+    ) -> None:
+        self._log, self._source, self._busy = log, source, busy
+        self._closed = False
         self._lock = threading.Lock()
         self._known = _Known(OrientationState(state="none", message=_NO_SOURCE))
         self._given: Source | None = None
@@ -70,9 +73,11 @@ class Orienting:
         """The surveyed balls; None: no survey."""
         return self._given.surveyed() if isinstance(self._given, Survey) else None
 
-    def wait_for_order(self) -> None:
-        """Say that nothing begins by itself, since a recording runs."""
-        self._known = _Known(OrientationState(state="none", message=_RECORDING))
+    def close(self) -> None:
+        """End what is being done."""
+        self._closed = True
+        if (thread := self._thread) is not None:
+            thread.join()
 
     def begin(self, marks: Mapping[Key, Entered] | None = None) -> OrientationState:
         """Begin to orient; while it works, nothing else begins.
@@ -116,65 +121,53 @@ class Orienting:
     def _work(self, source: Source, marks: Mapping[Key, Entered] | None) -> None:
         before = self._known
         try:
-            if marks is None:
-                found = oriented(self._log.static(), source, LogFrames(self._log.path))
-                moved = tuple(move.message for move in found.steadiness.moved)
-                system, findings = found.scene.system, [*found.scene.messages, *moved]
-            else:
-                system, findings = self._by_clicks(source, marks)
-            lacking = [name for name in self._log.facts.cameras if name not in system.names]
-            message = f"not oriented: {', '.join(lacking)}" if lacking else None
-            state = OrientationState(state="done", message=message, findings=tuple(findings))
-            self._known = _Known(state, system, marks is not None, _proposals(system, self.balls))
-        except _FAILURES as error:
+            found = self._oriented(source, marks)
+        except ChildProcessError:
+            self._fail(before, "the program that orients was ended by something else: orient again")
+        except OSError as error:
+            self._fail(before, f"{tempfile.gettempdir()}: {error.strerror or error}; make room, and orient again")
+        except BadInputError as error:
             advice = "" if marks is not None else "; or click four or more balls in each image, and orient by them"
-            self._known = replace(before, state=OrientationState(state="failed", message=f"{error}{advice}"))
+            self._fail(before, f"{error}{advice}")
+        else:
+            if found is not None:
+                self._known = found
 
-    def _by_clicks(self, source: Source, marks: Mapping[Key, Entered]) -> tuple[CameraSystem, list[str]]:
-        """Orient by the clicked balls alone (paper, step 2, alternative 1)."""
-        if not isinstance(source, Survey):
-            raise BadInputError(
-                "the cameras' poses are given: to orient by clicked balls, give the survey of the balls"
+    def _fail(self, before: _Known, message: str) -> None:
+        self._known = replace(before, state=OrientationState(state="failed", message=message))
+
+    def _oriented(self, source: Source, marks: Mapping[Key, Entered] | None) -> _Known | None:
+        """The cameras; None if nobody wants them any more.
+
+        Raises:
+            BadInputError: they cannot be oriented so.
+            OSError: the program cannot be started, or something else has ended it.
+        """
+        with tempfile.TemporaryDirectory(prefix="svev-") as folder:
+            order, answer = Path(folder, "order"), Path(folder, "answer")
+            order.write_bytes(pickle.dumps((source, marks)))
+            end = run_child(
+                _PROGRAM,
+                {"log": str(self._log.path), "order": str(order), "answer": str(answer)},
+                busy=self._busy or (lambda: False),
+                wanted=lambda: not self._closed,
+                tell=lambda _: None,
+                hold=self._hold,
+                yielding=self._busy is not None,
             )
-        network = source.network
-        names = {point.name: i for i, point in enumerate(network.points)}
-        sizes = {name: camera.size for name, camera in self._log.facts.cameras.items()}
-        cameras, _ = source.cameras_of(sizes)
-        clicked: dict[str, dict[str, Entered]] = {name: {} for name in cameras}
-        for key, entered in marks.items():
-            ball = ball_of(key.thing)
-            if ball in names and key.camera in clicked and entered.state is MarkState.MEASURED and entered.xy:
-                clicked[key.camera][ball] = entered
-        used = [name for name, balls in clicked.items() if len(balls) >= _FEWEST_BALLS]
-        if not used:
-            most = max((len(balls) for balls in clicked.values()), default=0)
-            raise BadInputError(
-                f"an image needs {_FEWEST_BALLS} clicked balls or more, five to be sure; most have {most}"
-            )
-        seen = sorted({ball for name in used for ball in clicked[name]}, key=names.__getitem__)
-        rows = [
-            (i, seen.index(ball), entered) for i, name in enumerate(used) for ball, entered in clicked[name].items()
-        ]
-        size = np.array([sizes[used[i]] for i, _, _ in rows], float)
-        xy = np.array([entered.xy for _, _, entered in rows], float)
-        observations = ImageObservations(
-            np.array([i for i, _, _ in rows], np.intp),
-            np.array([p for _, p, _ in rows], np.intp),
-            np.stack([pixel_to_metric(place, s) for place, s in zip(xy, size, strict=True)]),
-            np.array([sigma_of(entered) for _, _, entered in rows], float),
-            np.zeros(len(rows), np.intp),
-        )
-        chosen = replace(
-            network,
-            cameras=tuple(cameras[name] for name in used),
-            images=tuple(Image(name, i) for i, name in enumerate(used)),
-            points=tuple(network.points[names[ball]] for ball in seen),
-            observations=observations,
-            distances=(),
-            differences=(),
-        )
-        orientation = orient(chosen, uncertain_interior=True)
-        return camera_system(orientation, tuple(sizes)), list(orientation.notes)
+            if end is None:
+                return None
+            if "problem" in end:
+                raise BadInputError(from_plain(end["problem"]))
+            system, findings = pickle.loads(answer.read_bytes())  # noqa: S301 - our program wrote it just now
+        lacking = [name for name in self._log.facts.cameras if name not in system.names]
+        message = f"not oriented: {', '.join(lacking)}" if lacking else None
+        state = OrientationState(state="done", message=message, findings=findings)
+        return _Known(state, system, marks is not None, _proposals(system, self.balls))
+
+    def _hold(self, held: bool) -> None:
+        message = _RECORDING if held else None
+        self._known = replace(self._known, state=OrientationState(state="working", message=message))
 
 
 def _proposals(system: CameraSystem, known: KnownPoints | None) -> dict[str, dict[str, PredictedPoint]]:

@@ -1,13 +1,13 @@
 """An operator measures a jump: what follows in space is true, also while he drags, and nothing of it is lost."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from analysis.cameras.source import read_source
 from analysis.digitizing.desk import Desk
 from analysis.digitizing.epipolar import epipolar_curves
 from analysis.digitizing.files import DeskFiles
@@ -234,18 +234,17 @@ def test_without_a_survey_images_are_measured_and_nothing_in_space(jump: HillLog
 def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
     recording = True
     files = DeskFiles(jump.path, jump.path.with_suffix(".digitized"), jump.path.with_suffix(".measured"))
-    desk = Desk(files, lambda: None, lambda: recording)
-    assert desk.opening().orientation.message == "a recording runs: orient the cameras when it has ended"
-    calls: list[Callable[[], object]] = [
-        lambda: desk.orient(None),
-        lambda: follow(desk, "Anna", TrackOrder(things=["P1"], pulse=20, direction=1)),
-    ]
-    for call in calls:
-        with pytest.raises(StateForbidsError, match="a recording runs"):
-            call()
-    desk.act("Anna", PlaceAction(do="place", pulse=20, camera="K1", thing="P1", xy=(10, 20)))
+    source = read_source(jump.survey, None)
+    desk = Desk(files, lambda: source, lambda: recording)
+    said = "a recording runs: the cameras are oriented when it has ended"
+    wait_until(lambda: desk.opening().orientation.message == said, "orienting stands still", 20)
+    with pytest.raises(StateForbidsError, match="a recording runs"):
+        follow(desk, "Anna", TrackOrder(things=["P1"], pulse=20, direction=1))
+    changed = desk.act("Anna", PlaceAction(do="place", pulse=20, camera="K1", thing="P1", xy=(10, 20)))
+    assert changed.view is not None
+    assert changed.view.space == {}
     recording = False
-    assert "--survey" in str(desk.orient(None).message)
+    wait_until(lambda: desk.opening().orientation.state == "done", "the cameras are oriented", 60)
     desk.close()
 
 

@@ -76,7 +76,11 @@ class HeadlessRig:
         def tell(event: Event) -> None:
             if event.name == PAIRING and event.level is not Level.INFO:
                 self._alarms[event.code or event.message] = event.message
-            if event.name != "service":
+            if event.code == "event_camera_connected":
+                self._absent.pop(event.name, None)
+            if event.code == "event_camera_absent":
+                self._absent[event.name] = event.message  # told once: by the error, or when it goes on without them
+            elif event.name != "service":
                 on_event(f"{event.name} {event.message}")
 
         check_backends(rig)
@@ -86,6 +90,8 @@ class HeadlessRig:
         self._supervisor = Supervisor(rig, rig_toml, EventHub(tell), options, hill=hill, enduring=False)
         self._path: Path | None = None
         self._alarms: dict[str, str] = {}
+        self._absent: dict[str, str] = {}
+        self._on_event = on_event
         self._ended: Future[Outcome] = Future()
 
     def __enter__(self) -> Self:
@@ -134,6 +140,7 @@ class HeadlessRig:
             heed(asks)
             seen = self._ask(at_once(self._supervisor.look))
             if seen.warm and seen.state is State.ARMED:
+                self._tell_absent()
                 return
             now = time.monotonic()
             if seen.cameras is None:
@@ -153,9 +160,15 @@ class HeadlessRig:
                 if sum(camera.present for camera in seen.cameras) < self._rig.least_cameras:
                     self._raise_absent(seen)
                 if seen.state is State.ARMED:
+                    self._tell_absent()
                     return
             complete_since = now
             time.sleep(_POLL_S)
+
+    def _tell_absent(self) -> None:
+        """Say which cameras it goes on without."""
+        for camera, message in self._absent.items():
+            self._on_event(f"{camera} {message}")
 
     def start_recording(
         self,
@@ -233,12 +246,15 @@ class HeadlessRig:
             raise self._supervisor.failure or error from None
 
     def _raise_absent(self, seen: WarmUp) -> None:
-        reasons = "; ".join(
-            heard.said.text
-            or f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
-            for camera, heard in zip(self._rig.cameras, seen.cameras or (), strict=True)
-            if not heard.present
-        )
+        told: dict[str, list[str]] = {}  # by the remedy, which may be the same for all
+        for camera, heard in zip(self._rig.cameras, seen.cameras or (), strict=True):
+            if not heard.present:
+                said = heard.said.text or (
+                    f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
+                )
+                what, _, remedy = said.partition(": ")
+                told.setdefault(remedy, []).append(what)
+        reasons = "; ".join(": ".join(filter(None, (", ".join(what), remedy))) for remedy, what in told.items())
         present = sum(heard.present for heard in seen.cameras or ())
         without = f"; to record without, set min_cameras = {present} under [trigger] in the rig file" if present else ""
         raise CameraNotFoundError(reasons + without)

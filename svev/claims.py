@@ -13,6 +13,7 @@ from typing import Final
 
 from rig.errors import BadInputError
 from rig.host.files import read_whole
+from svev.neighbours import running_services
 
 #: Name of the lock file in a folder of recordings.
 LOCK: Final = ".svev.lock"
@@ -49,9 +50,9 @@ def folder_claim(directory: Path, program: str, option: str) -> Iterator[None]:
                 f"{directory}: cannot be written ({error.strerror}); choose another {option} or correct its permissions"
             ) from None
         if file is None:
-            raise BadInputError(
-                f"{directory}: {_holder(directory / LOCK)} uses it: end that one, or choose another {option}"
-            )
+            holder = _holder(directory / LOCK)
+            instead = "record with it (svev ctl start)" if "svev serve" in holder else "end that one"
+            raise BadInputError(f"{directory}: {holder} uses it: {instead}, or choose another {option}")
         stack.callback(os.close, file)
         with suppress(OSError):  # the disk is full: the next one is refused without the name of this one
             os.ftruncate(file, 0)
@@ -132,9 +133,16 @@ def listen(host: str, port: int) -> socket.socket:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
         return socket.create_server((str(address[0]), port), family=family, backlog=128)
     except OSError as error:
+        why = os.strerror(error.errno) if error.errno else error.strerror  # Python says the address once more
+        for service in running_services() if error.errno == errno.EADDRINUSE else ():
+            if service.port == str(port):
+                raise BadInputError(
+                    f"{host}:{port}: svev serve (process {service.pid}) runs there; operate it by {service.ctl}, or "
+                    "choose another --port"
+                ) from None
         raise BadInputError(
-            f"{host}:{port} cannot be listened on ({error.strerror}): end the program that uses it (another svev "
-            "serve?), or choose another --port or --host"
+            f"{host}:{port} cannot be listened on ({why}): end the program that uses it, or choose another --port or "
+            "--host"
         ) from None
 
 

@@ -11,12 +11,14 @@ import errno
 import os
 import re
 import resource
+import shlex
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import version
 from io import StringIO
+from itertools import pairwise
 from typing import Annotated, Any, Final
 
 import typer
@@ -150,10 +152,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (SvevError, OSError) as error:
         if debug:
             traceback.print_exc()
-        console.complain(_one_line(error))
+        told = _for_this_rig(_one_line(error), argv)
+        console.complain(told)
         code = error.exit_code if isinstance(error, SvevError) else 2
         if as_json:
-            console.print_json_line({"error": _one_line(error), "exit_code": code})
+            console.print_json_line({"error": told, "exit_code": code})
         return code
     return code if isinstance(code, int) else 0  # a number: --help, or a command that ends with a code of its own
 
@@ -221,6 +224,15 @@ def _explain_usage(error: Any, *, as_json: bool) -> int:
     if as_json:
         console.print_json_line({"error": error.format_message(), "exit_code": code})
     return code
+
+
+def _for_this_rig(text: str, argv: Sequence[str]) -> str:
+    """The text, where `svev doctor` is told to look at the rig of this command line, which it would not by itself."""
+    rig = next((after for option, after in pairwise(argv) if option == "--rig"), None)
+    rig = rig or next((word.partition("=")[2] for word in argv if word.startswith("--rig=")), None)
+    return (
+        text if rig is None else re.sub(r"svev doctor(?! --)", lambda _: f"svev doctor --rig {shlex.quote(rig)}", text)
+    )
 
 
 def _one_line(error: SvevError | OSError) -> str:

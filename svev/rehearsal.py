@@ -28,6 +28,7 @@ from rig.tag import TripletTag
 from rig.topics import TAG
 from service.headless import HeadlessRig, Progress, record
 from service.recordings.storage import new_log_path, room_for
+from svev.doctor.cameras.exposure import exposes_on
 from svev.doctor.disk import look_at_disk
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.doctor.network import gige_cameras, look_at_interfaces
@@ -253,13 +254,8 @@ def _judge_timing(rig: RigSettings, timing: _Timing) -> Iterator[Finding]:
     period_ms = rig.trigger.period_ns / 1e6
     for camera in rig.cameras:
         busy_ms = timing.latency_ms.get(camera.name)
-        if camera.exposure_us >= rig.trigger.period_ns / NS_PER_US:
-            what = "{camera}: it exposes for {exposure:.1f} ms, pulses come every {period:.1f} ms"
-            remedy = "shorten exposure_us, or lower trigger.rate_hz"
-            yield failure(
-                Topic.CAMERAS, "check_exposes_on", what, remedy,
-                camera=camera.name, exposure=camera.exposure_us / 1000, period=period_ms,
-            )  # fmt: skip
+        if (too_long := exposes_on(camera, rig)) is not None:
+            yield too_long
         elif busy_ms is not None:
             said = phrase(
                 "check_dead_time",

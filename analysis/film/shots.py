@@ -159,6 +159,8 @@ def _chosen(found: LogInfo, order: ExportOrder) -> range:
     begin, end = int(found.first.pulse), int(found.ledger.last_pulse)
     first = begin if order.first is None else order.first
     last = end if order.last is None else order.last
+    if None not in (order.first, order.last) and first > last:
+        raise BadInputError(f"{found.path}: first pulse {first}, last pulse {last}: that is none; exchange them")
     if not begin <= first <= last <= end:
         raise BadInputError(f"{found.path}: has pulses {begin} to {end}; choose among them")
     return range(first, last + 1)

@@ -16,6 +16,7 @@ from rig.errors import BadInputError
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)
 _FEWEST = 4  # surveyed balls
+_TABLES: Final = (".csv", ".txt", ".obc")  # what a total station or another program writes
 #: Radius of a ball, m: smaller ones no camera resolves from where a jump fits into its image, larger ones hide the
 #: jumper. Coordinates in mm or cm make a ball hundreds of times as large, those in km as small.
 _RADII_M: Final = (0.005, 2.0)
@@ -123,9 +124,14 @@ def read_survey(path: Path) -> Survey:
     """Read a survey; interior parameters with a sigma are uncertain, and their uncertainty counts.
 
     Raises:
-        BadInputError: no network file, observations in it, metric image frame, several images of a camera, or fewer
-            than four surveyed balls, or a unit that is not the metre.
+        BadInputError: no network file but a table, observations in it, metric image frame, several images of a camera,
+            or fewer than four surveyed balls, or a unit that is not the metre.
     """
+    if path.suffix.lower() in _TABLES:
+        raise BadInputError(
+            f"{path}: is a table of points, and a survey holds the cameras too; make one of both: svev network import "
+            f"K1.yml K2.yml K3.yml {path} -o survey.json"
+        )
     data = read_object(path, "survey")
     if data.get("observations"):
         raise BadInputError(

@@ -320,7 +320,7 @@ def _opening_error(settings: CameraSettings, error: GLib.Error) -> CameraError |
         return _controlled_error(settings, error.message)
     return CameraNotFoundError(
         f"camera {settings.name} at {settings.address} does not answer: check power, cable and address, "
-        f"then run: svev doctor ({error.message})"
+        "then run: svev doctor"
     )
 
 

@@ -47,7 +47,12 @@ _MORE: Final[Mapping[str, frozenset[str]]] = {
 }
 _FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
-_HEIGHTS: Final = frozenset({"h", "height", "n", "e", "north", "east"})
+#: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
+_SURVEYORS: Final = {
+    **dict.fromkeys(("e", "east", "easting"), "x"),
+    **dict.fromkeys(("n", "north", "northing"), "y"),
+    **dict.fromkeys(("h", "height"), "z"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +123,7 @@ def _is_head(words: Sequence[str], ending: str, fewest: int) -> bool:
 
 
 def _column(word: str) -> str:
-    return _SAME.get(word.lower(), word.lower())
+    return (_SAME | _SURVEYORS).get(word.lower(), word.lower())
 
 
 def _named(head: Row, ending: str) -> tuple[str, ...]:
@@ -132,16 +137,17 @@ def _named(head: Row, ending: str) -> tuple[str, ...]:
         words.pop()
     columns = tuple(_column(word) for word in words)
     known = (*_USUAL[ending], *sorted(_MORE[ending]))
+    given = {word.lower() for word in words}
     for word, column in zip(words, columns, strict=True):
         if column not in known and (named := _WITH_UNIT.fullmatch(column)) and _column(named[1]) in known:
             raise BadInputError(
                 f"{head.place}: column {word!r}: all lengths of a file have one unit, which --length-unit says; name "
                 f"the column {named[1]!r}"
             )
-        if column not in known and _HEIGHTS & set(columns):
+        if word.lower() in _SURVEYORS and given & {"x", "y"}:
             raise BadInputError(
                 f"{head.place}: column {word!r}: in a surveyor's system X may point north and Y east, which is "
-                "left-handed; name the columns X, Y, Z of a right-handed system, as east X, north Y, height Z"
+                "left-handed; name the columns E, N, H (east, north, height), or X, Y, Z of a right-handed system"
             )
         if column not in known:
             raise BadInputError(

@@ -58,6 +58,10 @@ def orient(
             points alone fix in several ways.
         RefusedError: images and survey contradict each other so much that no result can be believed.
     """
+    if not network.images:
+        raise BadInputError(
+            "the network has no images, so there is no pose to estimate; add the images and what they show"
+        )
     network, held = _with_interior(network, uncertain_interior)
     network, notes = _prepared(network, alternative, moving)
     outcome, stages, left_out = _oriented(network)

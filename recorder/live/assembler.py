@@ -150,6 +150,7 @@ class Assembler:
             exposures_ns=[round(each.exposure_us * 1000) * (each.backend == "aravis") for each in rig.cameras],
         )
         self.connected = [False] * len(rings)
+        self._were_there = [False] * len(rings)
         self.settled = HostNs(0)
         self._keeping_up_since: HostNs | None = HostNs(0)
 
@@ -210,7 +211,7 @@ class Assembler:
         return bool(self._waiting)
 
     def changes(self) -> list[CameraChanged]:
-        """What cameras have become since the last call: connected, silent, gone."""
+        """What cameras have become since the last call: connected, silent, absent, gone."""
         changes, self._changes = self._changes, []
         return changes
 
@@ -220,10 +221,11 @@ class Assembler:
         return limits
 
     def disconnected(self, camera: int, reason: Phrase, time: HostNs) -> None:
-        """Note that a camera is gone: its grabber says so, or the grabber process died without a record of it."""
+        """Note that a camera is not there: its grabber says so, or the grabber died without a record of it."""
         self.pairer.disconnected(camera, time)
         self.connected[camera] = False
-        self._changes.append(CameraChanged(camera=camera, news=CameraNews.GONE, said=reason))
+        news = CameraNews.GONE if self._were_there[camera] else CameraNews.ABSENT
+        self._changes.append(CameraChanged(camera=camera, news=news, said=reason))
 
     def camera_tags(self, pulse: ClosedPulse, anchor: UtcAnchor) -> tuple[CameraTag, ...]:
         """The cameras' parts of a pulse's tag.
@@ -283,7 +285,7 @@ class Assembler:
 
     def _join(self, camera: int, record: Record, said: Phrase) -> None:
         self.pairer.connected(camera, record.epoch, record.host_time)
-        self.connected[camera] = True
+        self.connected[camera] = self._were_there[camera] = True
         self._changes.append(CameraChanged(camera=camera, news=CameraNews.CONNECTED, said=said))
 
     def _is_waiting(self, camera: int) -> bool:

@@ -162,8 +162,27 @@ def examine(model: type[Model], data: dict[str, Any]) -> tuple[Model | None, tup
     try:
         return model.model_validate(data), ()
     except ValidationError as error:
-        errors = error.errors(include_url=False)
+        errors = _misspelt_first(error.errors(include_url=False))
         return None, tuple(Fault(each["loc"], _word(model, each)) for each in errors)
+
+
+def _misspelt_first(errors: list[ErrorDetails]) -> list[ErrorDetails]:
+    """The errors, those first that are one mistake: a required key that is missing since it is written otherwise.
+
+    Its absence is told by the unknown key alone, with the right spelling.
+    """
+    missing = {each["loc"] for each in errors if each["type"] == "missing"}
+    first: list[ErrorDetails] = []
+    told: set[tuple[int | str, ...]] = set()
+    for each in errors:
+        if each["type"] != "extra_forbidden":
+            continue
+        *table, key = each["loc"]
+        lacking = [str(loc[-1]) for loc in missing - told if loc[:-1] == tuple(table)]
+        if close := difflib.get_close_matches(str(key), lacking, n=1):
+            first.append(each)
+            told.add((*table, close[0]))
+    return [*first, *(each for each in errors if each not in first and each["loc"] not in told)]
 
 
 def validate(model: type[Model], data: dict[str, Any], source: Path | str) -> Model:

@@ -26,7 +26,8 @@ class CameraNews(StrEnum):
     SILENT = (
         "silent"  #: connected, but delivers nothing while others do, or the source fires; its grabber connects it again
     )
-    GONE = "gone"
+    ABSENT = "absent"  #: has not been there since the rig was armed
+    GONE = "gone"  #: was there, and is not any more
     NOTICE = "notice"  #: no change of state, but people should know
 
     @property
@@ -39,12 +40,14 @@ class CameraNews(StrEnum):
 _NEWS: Final[dict[CameraNews, Callable[[Phrase], Phrase]]] = {
     CameraNews.CONNECTED: lambda said: phrase("event_camera_connected", "connected: {said}", said=said),
     CameraNews.SILENT: lambda said: phrase("event_camera_silent", "silent: {said}", said=said),
+    CameraNews.ABSENT: lambda said: phrase("event_camera_absent", "absent: {said}", said=said),
     CameraNews.GONE: lambda said: phrase("event_camera_gone", "gone: {said}", said=said),
     CameraNews.NOTICE: lambda said: phrase("event_camera_notice", "notice: {said}", said=said),
 }
 _LEVELS: Final = {
     CameraNews.CONNECTED: Level.INFO,
     CameraNews.SILENT: Level.WARNING,
+    CameraNews.ABSENT: Level.ERROR,
     CameraNews.GONE: Level.ERROR,
     CameraNews.NOTICE: Level.WARNING,
 }
@@ -67,12 +70,12 @@ class RecorderWarm(Message):
 
 
 class CameraChanged(Message):
-    """A camera was connected, fell silent or is gone.
+    """A camera was connected, fell silent, is absent or gone.
 
     Attributes:
         camera: index of the camera.
         news: what happened.
-        said: description of the camera, or why it is gone.
+        said: description of the camera, or why it is not there.
     """
 
     camera: int

@@ -77,7 +77,7 @@ class CameraPresence:
 
     Attributes:
         news: what happened to the camera; None: no news yet.
-        said: description of the camera, or why it is gone.
+        said: description of the camera, or why it is not there.
         counted: for a silent camera: number of health records in a row in which it delivered frames again.
     """
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rig.settings.model import RigSettings
 from svev.doctor import disk, gpio, machine, measuring, network, trigger_box, webhook
-from svev.doctor.cameras import firewire, gige
+from svev.doctor.cameras import exposure, firewire, gige
 from svev.doctor.finding import Finding, Topic, failure
 
 
@@ -42,6 +42,8 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("packages", Topic.SOFTWARE, machine.look_at_packages, limit_s=30.0),
         Probe("camera libraries", Topic.SOFTWARE, lambda: machine.look_at_camera_libraries(rig), limit_s=10.0),
         Probe("survey", Topic.SOFTWARE, lambda: measuring.look_at_survey(rig), limit_s=30.0),
+        Probe("calibration", Topic.SOFTWARE, lambda: measuring.look_at_calibration(rig), limit_s=30.0),
+        Probe("plan", Topic.SOFTWARE, lambda: measuring.look_at_plan(rig), limit_s=30.0),
         Probe("memory", Topic.MEMORY, lambda: machine.look_at_memory(rig)),
         Probe("shared memory", Topic.MEMORY, lambda: machine.look_at_shared_memory(rig)),
         Probe("huge pages", Topic.MEMORY, machine.look_at_huge_pages),
@@ -53,6 +55,7 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("publication", Topic.NETWORK, lambda: network.look_at_publication(rig)),
         Probe("webhook", Topic.NETWORK, lambda: webhook.look_at_webhook(rig), limit_s=webhook.LOOK_S + 2),
         Probe("cameras", Topic.CAMERAS, lambda: gige.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
+        Probe("exposure", Topic.CAMERAS, lambda: exposure.look_at_exposures(rig)),
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("trigger box", Topic.CAMERAS, lambda: trigger_box.look_at_trigger_box(rig)),
         Probe("trigger line", Topic.CAMERAS, lambda: gpio.look_at_gpio(rig)),

@@ -149,7 +149,7 @@ class Interview:
                 if not survey.has(camera.name):
                     raise BadInputError(survey.lacks(camera.name))
             there = ", ".join(camera.name for camera in survey.network.cameras)
-            dialog.say("surveyed", points=len(survey.network.points), cameras=there)
+            dialog.say("surveyed", points=len(survey.surveyed().names), cameras=there)
             return path
 
         return dialog.ask("survey", "--survey", self._given.survey, str(before) if before else none, check)

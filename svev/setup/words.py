@@ -94,7 +94,7 @@ _WORDS: Final[dict[str, tuple[str, str]]] = {
         'File of the surveyed balls; "none" if there is none yet:',
         "Fil med de innmålte ballene; «ingen» hvis den ikke finnes ennå:",
     ),
-    "surveyed": ("  {points} points, cameras {cameras}", "  {points} punkter, kameraer {cameras}"),
+    "surveyed": ("  {points} surveyed balls, cameras {cameras}", "  {points} innmålte kuler, kameraer {cameras}"),
     "recordings": ("Folder for the recordings:", "Mappe for opptakene:"),
     "free": ("  {free:.1f} GB free there", "  {free:.1f} GB ledig der"),
     "phones": (

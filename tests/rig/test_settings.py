@@ -87,6 +87,16 @@ def test_the_schema_is_a_schema() -> None:
         ),
         pytest.param(
             HEAD + "[simulation]\nscenari = 'x'\n" + CAMERA.replace("aravis", "sim"),
+            'unknown key "simulation.scenari"; did you mean "scenario"?',
+            id="a required key is misspelt: one mistake, told once",
+        ),
+        pytest.param(
+            HEAD + CAMERA.replace("backend", "backned").replace("name =", "nmae =") + "zzz = 1\n",
+            'unknown key "cameras.1.nmae"; did you mean "name"? (and 3 more)',
+            id="misspelt keys first",
+        ),
+        pytest.param(
+            HEAD + "[simulation]\nzzz = 'x'\n" + CAMERA.replace("aravis", "sim"),
             'key "simulation.scenario" is missing; add it (and 1 more)',
             id="two at once",
         ),

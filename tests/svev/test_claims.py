@@ -23,7 +23,8 @@ def record_claim(data: Path) -> AbstractContextManager[None]:
 
 def test_a_directory_has_one_program_that_records(tmp_path: Path) -> None:
     data = tmp_path / "new" / "data"
-    said = rf"{data}: another svev serve \(process {os.getpid()}\) uses it: end that one, or choose another --out"
+    holder = rf"another svev serve \(process {os.getpid()}\)"
+    said = rf"{data}: {holder} uses it: record with it \(svev ctl start\), or choose another --out"
     with serve_claim(data), pytest.raises(BadInputError, match=said), record_claim(data):
         pass
     with record_claim(data), pytest.raises(BadInputError, match=r"another svev record .*, or choose another --data"):

@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 from rig.settings.file import rig_schema
 from svev import cli
 from tests.support.commands import run_svev
+from tests.support.loopback import Loopback
 
 
 def _commands() -> list[str]:
@@ -95,3 +96,44 @@ def test_a_reader_that_goes_away_is_no_crash() -> None:
         errors = process.stderr.read()
         assert process.wait(timeout=60) == 1
     assert errors == ""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("export", "no.mcap", "--out", "jump.mp4"),
+        ("replay", "no.mcap"),
+        ("import", "left.avi", "right.avi", "--out", "old.mcap", "--rate", "50"),
+    ],
+)
+def test_pulses_that_end_before_they_begin_are_refused(
+    command: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([*command, "--from", "50", "--to", "20"]) == 2
+    assert capsys.readouterr().err == "svev: --from 50 --to 20: ends before it begins; exchange the two\n"
+
+
+def test_a_table_of_balls_is_no_survey_and_leads_to_the_command_that_makes_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "balls.csv"
+    table.write_text("name,E,N,H,sigma\nB1,1.5,2.5,3.5,0.01\n")
+    assert cli.main(["analyze", "no.mcap", "--survey", str(table), "--out", str(tmp_path / "out")]) == 2
+    assert f"svev network import K1.yml K2.yml K3.yml {table} -o survey.json" in capsys.readouterr().err
+
+
+def test_cameras_that_do_not_answer_are_told_once_with_the_rig_file_for_the_doctor(
+    tmp_path: Path, loopback: Loopback
+) -> None:
+    rig = tmp_path / "my rig.toml"
+    cameras = "".join(
+        f'[[cameras]]\nname = "K{n}"\nbackend = "aravis"\naddress = "{loopback.host.rpartition(".")[0]}.{n + 200}"\n'
+        for n in (1, 2)
+    )
+    publish = f'[network]\npublish = "{loopback.endpoint()}"\n'
+    rig.write_text(f'name = "not there"\n{publish}[trigger]\nsettle_s = 0.1\n{cameras}')
+    done = _run("record", "--rig", str(rig), "--seconds", "1", "--out", str(tmp_path / "logs"))
+    assert done.returncode == 2
+    assert "gone" not in done.stderr
+    assert done.stderr.count("K1") == done.stderr.count("check power, cable and address") == 1
+    assert done.stderr.endswith(f"then run: svev doctor --rig '{rig}'\n")

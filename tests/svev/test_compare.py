@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,7 +23,8 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "dark": without_takeoff(recording(seed=4)),
     }.items():
         (folder / name).mkdir()
-        write(given, folder / name / "jumper.json")
+        write(replace(given, recording=name), folder / name / "jumper.json")
+    shutil.copytree(folder / "wednesday", folder / "wednesday-again")
     return folder
 
 
@@ -42,7 +45,7 @@ def test_two_jumps_are_compared(
     assert result["scatter"] == {"jumps": 2, "degrees_of_freedom": 1}
     assert result["b"] == {
         "name": "tuesday",
-        "recording": "simulated",
+        "recording": "tuesday",
         "jump": 1,
         "session": {"athlete": "A. Jumper", "bib": "7"},
     }
@@ -50,6 +53,17 @@ def test_two_jumps_are_compared(
     assert len(alpha["difference"]) == len(result["since_takeoff_s"]) == len(alpha["p_scatter"])
     # the jumper's legs were turned by 2 degrees
     assert alpha["greatest"]["difference"] == pytest.approx(2.0, abs=4 * alpha["greatest"]["sigma"])
+
+
+def test_a_recording_that_is_given_several_times_counts_once(
+    measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(measured)
+    again = ["wednesday", "wednesday/jumper.json", str(measured / "wednesday"), "wednesday-again", "tuesday"]
+    also = [word for path in again for word in ("--also", path)]
+    assert main(["compare", "monday", "tuesday", *also, "--out", str(tmp_path / "out")]) == 0
+    assert "wednesday-again: is recording wednesday, as wednesday is; it counts once" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "comparison.json").read_text())["scatter"]["jumps"] == 2
 
 
 def test_the_page_needs_nothing_else(measured: Path, tmp_path: Path) -> None:
@@ -69,7 +83,7 @@ def test_the_page_speaks_to_a_coach(measured: Path, tmp_path: Path) -> None:
     assert '<html lang="nb">' in page
     assert 'id="in-nb" checked' in page
     assert re.search(r"<title>A\. Jumper \(7\) . A\. Jumper \(7\)</title>", page)
-    assert not re.search(rf"{measured}|monday|tuesday|simulated|--also|svev ", page)
+    assert not re.search(rf"{measured}|monday|tuesday|--also|svev ", page)
     assert re.search(
         r'<span lang="en">Leg angle: \d\.\d ± \d\.\d ° more in B, \d\.\d\d s after the take-off</span>', page
     )

@@ -18,6 +18,16 @@ from tests.support.repeats import repeats
 Run = Callable[..., tuple[int, dict[str, Any]]]
 
 
+def test_nothing_to_orient_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    network = network_to_json(hill().network)
+    balls = {name: point for name, point in network["points"].items() if "sigma" in point}
+    path = tmp_path / "balls.json"
+    path.write_text(json.dumps(network | {"images": {}, "observations": [], "points": balls}))
+    assert main(["orient", str(path), "-o", str(tmp_path / "poses.json")]) == 2
+    assert "has no images" in capsys.readouterr().err
+    assert not (tmp_path / "poses.json").exists()
+
+
 @pytest.fixture
 def run(tmp_path: Path) -> Run:
     def orient(network: Network, *options: str) -> tuple[int, dict[str, Any]]:

@@ -51,6 +51,9 @@ def doctor(
     Example: svev doctor --send-test --rig /etc/svev/rig.toml
     """
     usual = "hill-gige.toml" if find else "hill-iidc.toml" if bus else "sim-gige.toml"
+    if rig is None:
+        text = f"no --rig is given: looking at the computer for {CONFIG / 'rigs' / usual}, not for your rig file"
+        console.say(text, aside=True)
     settings = load_rig(rig or CONFIG / "rigs" / usual)
     if find:
         todo = [Probe("discovery", Topic.CAMERAS, lambda: look_for_cameras(settings), limit_s=10.0)]

@@ -1,6 +1,7 @@
 """`svev compare`: two measured jumps."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -46,7 +47,8 @@ def compare(
 
     Example: svev compare monday tuesday --also wednesday --out compared
     """
-    recordings = {path: read(path) for path in dict.fromkeys((dir_a, dir_b, *(also or ())))}
+    recordings = {path: read(path) for path in dict.fromkeys((dir_a, dir_b))}
+    twice = _read_further(also or (), recordings)
     if recordings[dir_a] is recordings[dir_b] and jump_a == jump_b:
         raise BadInputError(f"{dir_a}: this is one jump; choose another to compare it with by --jump-b")
     a = measured_jump(recordings[dir_a], jump_a, str(dir_a))
@@ -62,10 +64,33 @@ def compare(
     written = json.dumps(result, allow_nan=False, ensure_ascii=False) + "\n"
     (out / "comparison.json").write_text(written, encoding="utf-8")
     (out / "comparison.html").write_text(page, encoding="utf-8")
-    for line in [*summary(comparison), f"result in {out / 'comparison.json'} and {out / 'comparison.html'}"]:
+    for line in [*twice, *summary(comparison), f"result in {out / 'comparison.json'} and {out / 'comparison.html'}"]:
         console.say(line, aside=as_json)
     if as_json:
         console.print_json(_without_series(result))
+
+
+def _read_further(also: Sequence[Path], recordings: dict[Path, MeasuredRecording]) -> list[str]:
+    """Add recordings to those that are read, each once: a jump that counts twice would make the scatter too small.
+
+    Args:
+        also: folders of results; several may be of one recording.
+        recordings: by folder; gets the new ones.
+
+    Returns:
+        What was left out, in words.
+    """
+    there = {recording.recording: path for path, recording in reversed(recordings.items())}
+    said = []
+    for path in dict.fromkeys(also):
+        if path in recordings:
+            continue
+        recording = read(path)
+        if (before := there.setdefault(recording.recording, path)) == path:
+            recordings[path] = recording
+        else:
+            said.append(f"{path}: is recording {recording.recording}, as {before} is; it counts once")
+    return said
 
 
 def _images(result: Path, jump: MeasuredJump) -> Images | None:

@@ -11,7 +11,7 @@ from recorder.checking.verify import Verdict, VerifyReport, verify
 from recorder.reading.info import LogInfo, imported_in_words, info, merged_in_words
 from recorder.recovering.recover import RecoverReport, recover
 from rig.clocks import NS_PER_S
-from rig.errors import LedgerDiffersError, LogDamagedError, LogTruncatedError
+from rig.errors import BadInputError, LedgerDiffersError, LogDamagedError, LogTruncatedError
 from service.recordings import live_results
 from svev import console
 from triggering.ledger.recounted import Difference, Recounted
@@ -21,6 +21,16 @@ _LINES_MAX = 60
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="the log, a .mcap file", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object instead")]
 AlsoJson = Annotated[bool, typer.Option("--json", help="end with one JSON object")]
+
+
+def check_pulses(first: int | None, last: int | None) -> None:
+    """Refuse `--from` behind `--to`.
+
+    Raises:
+        BadInputError: there is no pulse between them.
+    """
+    if first is not None and last is not None and first > last:
+        raise BadInputError(f"--from {first} --to {last}: ends before it begins; exchange the two")
 
 
 def info_command(log: LogPath, as_json: AsJson = False) -> None:

@@ -12,7 +12,7 @@ from analysis.film.shots import Recording
 from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
 from rig.errors import BadInputError
 from svev import console
-from svev.commands.logs.contents import AlsoJson, LogPath
+from svev.commands.logs.contents import AlsoJson, LogPath, check_pulses
 
 _FILES: Final = {".mp4": Kind.H264, ".mkv": Kind.FFV1, ".csv": Kind.CSV}
 _VIDEOS: Final = (Kind.H264, Kind.FFV1)
@@ -64,6 +64,7 @@ def export_command(
 
     Example: svev export recordings/jump.mcap --out jump.mp4 --slow 5 --burn-in
     """
+    check_pulses(first, last)
     kind = _kind(out, Kind(images.value), contact_sheet=contact_sheet)
     if kind not in _VIDEOS and (separate or burn_in or slow > 1):
         raise BadInputError(f"{out}: --separate, --burn-in and --slow are for videos: name a .mp4 or .mkv")

@@ -17,7 +17,7 @@ from rig.settings.file import load_rig
 from rig.settings.trigger import TriggerSettings
 from service.recordings.control import read_calibration
 from svev import console
-from svev.commands.logs.contents import AlsoJson
+from svev.commands.logs.contents import AlsoJson, check_pulses
 
 
 def import_command(
@@ -72,6 +72,7 @@ def import_command(
 
     Example: svev import left.avi middle.avi K3=right/ -o old.mcap --rate 50 --start K3=120
     """
+    check_pulses(first, last)
     settings = None if rig is None else load_rig(rig)
     if rate is None:
         raise BadInputError(

@@ -10,7 +10,7 @@ from recorder.publishing.replay import ReplayOptions, ReplayReport, replay
 from rig.errors import BadInputError, LogDamagedError
 from rig.topics import DEFAULT_PUBLISH
 from svev import console
-from svev.commands.logs.contents import AlsoJson, LogPath, truncated
+from svev.commands.logs.contents import AlsoJson, LogPath, check_pulses, truncated
 
 _INTERRUPTED = 130
 _SLOWEST, _FASTEST = 0.1, 10.0
@@ -43,6 +43,7 @@ def replay_command(
 
     Example: svev replay recordings/jump.mcap --speed 0.5 --loop
     """
+    check_pulses(first, last)
     keys = None if curve_key_file is None else load_keys(curve_key_file)
     options = ReplayOptions(bind, _speed(speed), reliable, loop, first, last, wait, keys)
     if exposed := exposure(bind, keys):

@@ -18,6 +18,7 @@ from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
 from svev.claims import folder_claim
+from svev.neighbours import naming_the_publisher
 
 
 def record(
@@ -50,6 +51,7 @@ def record(
     check_publication(settings.network)
     with (
         folder_claim(out, "svev record", "--out"),
+        naming_the_publisher(settings.network.publish),
         counted_endings() as asks,
         HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running,
     ):

@@ -12,6 +12,7 @@ from svev import console
 from svev.commands.rig.record import aside
 from svev.doctor.finding import Topic
 from svev.doctor.printing import counts_of, end_with, print_findings
+from svev.neighbours import naming_the_publisher
 from svev.rehearsal import rehearse
 
 _TOPICS: Final = tuple(Topic)
@@ -41,7 +42,7 @@ def rehearse_command(
     settings = load_rig(rig)
     check_publication(settings.network)
     folder = out or settings.recorder.directory
-    with counted_endings() as asks:
+    with naming_the_publisher(settings.network.publish), counted_endings() as asks:
         done = rehearse(settings, rig.read_text(encoding="utf-8"), folder, seconds, aside, console.progress, asks)
     if as_json:
         console.print_json(done.to_json() | {"counts": counts_of(done.findings)})

@@ -48,6 +48,9 @@ SEMICOLONS: Final = "Name;X;Y;Z;sX;sY;sZ\r\nB1;10,5;20,25;3,5;0,01;0,01;0,02\r\n
         SEMICOLONS.encode("utf-16"),
         SEMICOLONS.encode("utf-8-sig"),
         "# point x y z sx sy sz\n" + SEMICOLONS.split("\r\n", 1)[1],
+        SEMICOLONS.replace("X;Y;Z;", "E;N;H;"),
+        SEMICOLONS.replace("X;Y;Z;", "Easting;Northing;Height;"),
+        "ball;N;E;H;sx;sy;sz\nB1;20.25;10.5;3.5;0.01;0.01;0.02\nB2;21.25;11.5;4.5;0.01;0.01;0.02\n",
         "Z;Name;X;Y;sigma_z;sx;sy\n3.5;B1;10.5;20.25;0.02;0.01;0.01\n4.5;B2;11.5;21.25;0.02;0.01;0.01\n",
     ],
 )

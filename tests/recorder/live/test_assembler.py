@@ -11,6 +11,7 @@ from recorder.live.assembler import Assembler, Triplet, least_buffers
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus
+from rig.phrase import plain
 from rig.transport.recorder_reports import CameraNews
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
 
@@ -52,6 +53,17 @@ def test_frames_stand_side_by_side_in_the_rigs_order(parts: Parts) -> None:
         ((0, 40), FrameStatus.OK), ((40, 104), FrameStatus.OK), ((104, 120), FrameStatus.OK),
     ]  # fmt: skip
     assert [tag.offset_us for tag in tags] == [-0.001, 0.0, 0.001]
+
+
+def test_only_a_camera_that_was_there_can_be_gone(parts: Parts) -> None:
+    assembler, cameras, _ = parts
+    assembler.disconnected(1, plain("does not answer"), _now(0))
+    cameras.expose(1, 0)
+    list(assembler.pump(_now(1.3)))
+    assembler.disconnected(0, plain("unplugged"), _now(2))
+    told = [(change.camera, change.news, change.event("K").message) for change in assembler.changes()]
+    assert (1, CameraNews.ABSENT, "absent: does not answer") in told
+    assert told[-1] == (0, CameraNews.GONE, "gone: unplugged")
 
 
 def test_a_missing_frame_is_black_even_where_an_older_one_stood(

@@ -68,7 +68,7 @@ def test_record_keeps_out_of_the_folder_of_a_service(tmp_path: Path, loopback: L
         done = run_svev(*record)
         assert done.returncode == 2
         holder = f"another svev serve (process {service.pid})"
-        assert f"{holder} uses it: end that one, or choose another --out" in done.stderr
+        assert f"{holder} uses it: record with it (svev ctl start), or choose another --out" in done.stderr
         (service.data / LOCK).unlink()
         done = run_svev(*record)
         assert done.returncode == 2

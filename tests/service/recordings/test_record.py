@@ -342,7 +342,7 @@ def test_a_camera_that_is_not_there_is_named(tmp_path: Path, loopback: Loopback,
     code, _, err = _result(_record(path, tmp_path / "logs", 1))
     assert code == 2
     assert f"camera K1 at {loopback.cameras(1)[0]} does not answer" in err.splitlines()[-1]
-    said = re.sub(r"[\d.]{7,}", "ADDRESS", err.strip().splitlines()[-1].partition(";")[0])
+    said = re.sub(r"[\d.]{7,}", "ADDRESS", err.strip().splitlines()[-1].replace(str(path), "RIG"))
     fault_table.tell("Cameras and pulses", "no camera answers at the start", lost="all", said=said, code=code)
 
 

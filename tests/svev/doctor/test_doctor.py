@@ -122,6 +122,13 @@ def test_something_that_fails_ends_the_command_with_3(
     assert told.splitlines()[-1].endswith(" FAIL")
 
 
+def test_without_a_rig_file_it_says_first_what_it_looks_at(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["doctor", "--find"]) in {0, 3}
+    first, *_ = capsys.readouterr().err.splitlines()
+    assert first.startswith("no --rig is given: looking at the computer for ")
+    assert "hill-gige.toml" in first
+
+
 def test_a_wrong_rig_file_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["doctor", "--rig", str(tmp_path / "none.toml")]) == 2
     assert capsys.readouterr().err.startswith(f"svev: {tmp_path / 'none.toml'}: no such file")

@@ -88,6 +88,7 @@ def test_typed_answers_make_a_rig_that_is_rehearsed(
     assert "# ours" in text
     assert "  # kept" in text
     # A crowded computer may lose frames in the rehearsal, and then it has to say so.
+    assert "  15 surveyed balls, cameras K1, K2, K3" in shown
     assert (code, "ready: " in shown) == (0, True) or (code, "the rehearsal failed: " in shown) == (3, True), shown
     (backup,) = hill.glob("rig.toml.*")
     assert 'name = "before"' in backup.read_text()

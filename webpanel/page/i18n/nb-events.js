@@ -15,6 +15,7 @@ export const events = {
 
   event_camera_connected: ["koblet til: {said}"],
   event_camera_silent: ["stille: {said}"],
+  event_camera_absent: ["ikke der: {said}"],
   event_camera_gone: ["borte: {said}"],
   event_camera_notice: ["merknad: {said}"],
   camera_streaming_before: ["sendte bilder allerede før opptaksprosessen ble startet"],

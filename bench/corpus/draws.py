@@ -35,6 +35,8 @@ _RATES_HZ: Final = {25.0: 0.15, 30.0: 0.25, 50.0: 0.2, 60.0: 0.15, 100.0: 0.15, 
 _RENDERERS: Final = {"hill": 0.7, "drawn": 0.3}
 #: Share of the scenes in which cameras stand on both sides of the hill.
 _BOTH_SIDES: Final = 0.3
+#: Share of the scenes whose balls are shaded by a sun.
+_SUNNY: Final = 0.5
 #: What is rendered of a jump, s after the take-off.
 _SPAN_S: Final = (-0.75, 1.1)
 #: Pixels of a whole log at most: a scene with more is drawn again. It keeps a run payable.
@@ -134,7 +136,17 @@ def _settings(rng: np.random.Generator, seed: int, count: int, first_s: float) -
         "p_angle_deg": rng.uniform(34, 38),
     }
     weather = {"snowfall": _sometimes(rng, 0.25, 0.05, 0.4), "lens_snow": int(_sometimes(rng, 0.15, 1, 8))}
+    sun = {
+        "azimuth_deg": rng.uniform(-180, 180),
+        "elevation_deg": rng.uniform(3, 50),
+        "direct": rng.uniform(0.4, 1.0),
+        "sky": rng.uniform(0.1, 0.6),
+        "snow": rng.uniform(0.05, 0.4),
+        "roughness_deg": rng.uniform(0, 40),
+        "gloss": _sometimes(rng, 0.2, 0.1, 1.0),
+    }
     light = {
+        "sun": sun if rng.random() < _SUNNY else None,
         "cloud_depth": _sometimes(rng, 0.4, 0.05, 0.5),
         "cloud_period_s": rng.uniform(3, 20),
         "flicker": _sometimes(rng, 0.2, 0.05, 0.3),

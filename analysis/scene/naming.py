@@ -12,7 +12,7 @@ The same as the paper's step 2A (resection from reference points), where a perso
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb, log, log10, pi
+from math import comb, log, log10, perm, pi
 from typing import Final
 
 import numpy as np
@@ -31,6 +31,8 @@ MODEL_SIGMA: Final = 0.1  #: px; what the interior orientation and the balls' sh
 FEWEST: Final = 4  #: balls of an image
 _TIERS = ((14, 8), (26, 60), (60, 14))  # detections, the best ones, and triples of balls tried on them
 _TIERS_NEAR = ((26, 600), (60, 60))  # the same near an approximate pose, which leaves few hypotheses of each triple
+_OF_DETECTIONS = (14, 60)  # detections, the best ones, and triples of them on which all surveyed balls are tried
+_MOST_TRIED = 400_000  # triples of surveyed balls on triples of detections: of many balls more are in sight
 _BELIEVED = 3.0  # decades by which chance is ruled out
 _CLEARLY = 2.0  # decades by which the second best is worse
 _OVERWHELMING = 8.0  # decades: such a hypothesis ends the search
@@ -126,17 +128,39 @@ class _Image:
             begin = before[1] if most == before[0] else 0  # these triples were tried on the same detections
             found = self._tried(search, most, slice(begin, triples), found)
             before = most, max(begin, triples)
-            if found and found[0].decades - self._chances(search) > _BELIEVED:
-                found = self._with_rivals(search, found)
+            if self._convinces(found, search, _BELIEVED):
                 break
+        else:
+            found = self._tried_on_detections(search, found)
+        if self._convinces(found, search, _BELIEVED):
+            found = self._with_rivals(search, found)
         return self._judged(found, self._chances(search))
+
+    def _convinces(self, found: Sequence[Naming], search: Search, decades: float) -> bool:
+        """Whether the best naming rules chance out by so many decades."""
+        return bool(found) and found[0].decades - self._chances(search) > decades
 
     def _tried(self, search: Search, most: int, triples: slice, found: list[Naming]) -> list[Naming]:
         """The best distinct namings after more triples of balls; an overwhelming one ends the search."""
         for triple in spread_triples(self.known.xyz, triples.stop)[triples]:
             hypotheses = search.of_triple(triple, most)
             found = self._with(found, hypotheses, self._chances(search) + _OVERWHELMING)
-            if found and found[0].decades - self._chances(search) > _OVERWHELMING:
+            if self._convinces(found, search, _OVERWHELMING):
+                break
+        return found
+
+    def _tried_on_detections(self, search: Search, found: list[Naming]) -> list[Naming]:
+        """The best distinct namings after triples of detections.
+
+        Where an image shows a small part of the hill, hardly any triple of surveyed balls lies in it, but most things
+        that are round in it are balls.
+        """
+        most, triples = _OF_DETECTIONS
+        triples = min(triples, _MOST_TRIED // perm(len(self.known.names), 3))
+        places = np.column_stack((self.spots.xy[:most], np.zeros(min(most, len(self.spots)))))
+        for triple in spread_triples(places, triples):
+            found = self._with(found, search.of_detections(triple), self._chances(search) + _OVERWHELMING)
+            if self._convinces(found, search, _OVERWHELMING):
                 break
         return found
 

@@ -117,7 +117,9 @@ def _results_are_in_the_log(log: Path, jump: dict[str, Any]) -> None:
 
 def _alarm(service: Serving) -> str:
     """What the alarm says that nothing is measured; "": there is none."""
-    said: dict[str, str] = {alarm["topic"]: alarm["statement"]["text"] for alarm in service.get("/api/status")["alarms"]}
+    said: dict[str, str] = {
+        alarm["topic"]: alarm["statement"]["text"] for alarm in service.get("/api/status")["alarms"]
+    }
     return said.get("measuring", "")
 
 

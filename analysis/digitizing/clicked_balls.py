@@ -17,6 +17,7 @@ from photogrammetry.network.model import Image, ImageObservations
 from photogrammetry.procedures.orientation import orient
 from rig.api.digitizing import MarkState
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 #: Clicked balls without which a camera is left out.
 _FEWEST_BALLS: Final = 4
@@ -40,7 +41,12 @@ def orient_by_clicks(
         NotSolvableError, NotConvergedError, RefusedError: of the adjustment.
     """
     if not isinstance(source, Survey):
-        raise BadInputError("the cameras' poses are given: to orient by clicked balls, give the survey of the balls")
+        raise BadInputError(
+            phrase(
+                "hand_poses_given",
+                "the cameras' poses are given: to orient by clicked balls, give the survey of the balls",
+            )
+        )
     network = source.network
     names = {point.name: i for i, point in enumerate(network.points)}
     placed, _ = source.cameras_of(sizes)
@@ -52,7 +58,14 @@ def orient_by_clicks(
     used = [name for name, balls in clicked.items() if len(balls) >= _FEWEST_BALLS]
     if not used:
         most = max((len(balls) for balls in clicked.values()), default=0)
-        raise BadInputError(f"an image needs {_FEWEST_BALLS} clicked balls or more, five to be sure; most have {most}")
+        raise BadInputError(
+            phrase(
+                "hand_few_balls",
+                "an image needs {fewest} clicked balls or more, five to be sure; most have {most}",
+                fewest=_FEWEST_BALLS,
+                most=most,
+            )
+        )
     seen = sorted({ball for name in used for ball in clicked[name]}, key=names.__getitem__)
     rows = [(i, seen.index(ball), entered) for i, name in enumerate(used) for ball, entered in clicked[name].items()]
     size = np.array([sizes[used[i]] for i, _, _ in rows], float)

@@ -16,7 +16,6 @@ from analysis.cameras.source import Source
 from analysis.measurements.model import Measurements
 from rig.api.digitizing import HandResult
 from rig.api.measuring import MeasuringStep
-from rig.api.statement import Level, Statement
 from rig.background.child import run_child
 from rig.phrase import Phrase, from_plain, phrase, plain
 
@@ -123,7 +122,8 @@ class Computing:
                 return _failed(from_plain(end["problem"]))
             shutil.rmtree(whole, ignore_errors=True)
             making.rename(whole)
-            return HandResult.model_validate({"state": "done", **end})
+            said = tuple(map(from_plain, end["said"]))
+            return HandResult(state="done", said=said, curves=end["curves"], files=end["files"])
         finally:
             shutil.rmtree(making, ignore_errors=True)
 
@@ -151,5 +151,4 @@ class Computing:
 
 
 def _failed(why: Phrase) -> HandResult:
-    problem = Statement(level=Level.ERROR, code=why.code, text=why.text, values=why.values)
-    return HandResult(state="failed", problem=problem)
+    return HandResult(state="failed", problem=why)

@@ -6,6 +6,7 @@ from typing import Any
 
 from analysis.procedure.steps import STEPS
 from rig.background.program import Teller, serve
+from rig.phrase import as_plain
 
 
 def _compute(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
@@ -25,7 +26,7 @@ def _compute(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     found = analyze(log, source, by_hand=measurements, images=False, progress=progress)
     files = write_folder(found, log, Path(asked["out"]), progress=progress)
     return {
-        "verdict": "; ".join(str(jump.verdict.message) for jump in found.result.jumps),
+        "said": [as_plain(each) for jump in found.result.jumps for each in jump.verdict.said],
         "curves": {name: [point.model_dump() for point in curve] for name, curve in curves_of(found.result).items()},
         "files": sorted(file.name for file in files),
     }

@@ -14,6 +14,7 @@ from analysis.measurements.file import read_measurements, write_measurements
 from analysis.measurements.model import Source
 from rig.api.digitizing import Changed, MarkSource, MarkState
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 MEASUREMENTS: Final = "measurements.json"
 _SOURCES: Final = {Source.BY_HAND: MarkSource.HAND, Source.AUTOMATIC: MarkSource.AUTOMATIC}
@@ -59,11 +60,28 @@ def taken_in(desk: Desk, operator: str, name: str, content: bytes) -> Changed:
     strange = next((key for key, _ in marks if key.pulse not in desk.log.times), None)
     if strange is not None:
         first, last = desk.log.pulses[0], desk.log.pulses[-1]
-        raise BadInputError(f"{name}: has pulse {strange.pulse}, and the log goes from {first} to {last}")
+        raise BadInputError(
+            phrase(
+                "hand_file_pulse",
+                "{name}: has pulse {pulse}, and the log goes from {first} to {last}",
+                name=name,
+                pulse=strange.pulse,
+                first=first,
+                last=last,
+            )
+        )
     cameras = desk.log.facts.cameras
     unknown = next((key.camera for key, _ in marks if key.camera not in cameras), None)
     if unknown is not None:
-        raise BadInputError(f"{name}: has camera {unknown}, and the log has {', '.join(cameras)}")
+        raise BadInputError(
+            phrase(
+                "hand_file_camera",
+                "{name}: has camera {camera}, and the log has {cameras}",
+                name=name,
+                camera=unknown,
+                cameras=", ".join(cameras),
+            )
+        )
     return desk.put(operator, marks)
 
 

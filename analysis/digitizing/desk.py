@@ -15,7 +15,7 @@ from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key, operators
 from analysis.digitizing.misfits import Misfits
 from analysis.digitizing.next_mark import next_mark
 from analysis.digitizing.opened_log import OpenedLog
-from analysis.digitizing.orienting import Orienting
+from analysis.digitizing.orienting import WAIT, Orienting
 from analysis.digitizing.pulse_marks import PulseMarks
 from analysis.digitizing.pulse_view import as_mark, pulse_view
 from analysis.digitizing.repeatability import repeatability
@@ -49,6 +49,7 @@ from rig.api.digitizing import (
 )
 from rig.arrays import Floats
 from rig.errors import BadInputError, StateForbidsError, UnknownCameraError, UnknownRecordingError
+from rig.phrase import phrase
 
 #: So many pulses are looked at for the next click; a jump has a hundred or two.
 _SUGGESTED_PULSES: Final = 300
@@ -89,7 +90,12 @@ class Desk:
             StateForbidsError: one runs.
         """
         if self._busy():
-            raise StateForbidsError("a recording runs, and this would take the computer's time: try again after it")
+            raise StateForbidsError(
+                phrase(
+                    "hand_recording_runs",
+                    "a recording runs, and this would take the computer's time: try again after it",
+                )
+            )
 
     def close(self) -> None:
         """Let other programs measure in this log."""
@@ -257,7 +263,9 @@ class Desk:
         }
         found = intersected(system, clicks).adjusted
         if not found.ok.all():
-            raise BadInputError("the clicks do not give both ends: click each in two images or more")
+            raise BadInputError(
+                phrase("hand_ends", "the clicks do not give both ends: click each in two images or more")
+            )
         way = found.state[1] - found.state[0]
         length = float(np.linalg.norm(way))
         if not length:
@@ -279,7 +287,14 @@ class Desk:
         """
         known = operators(self.files.folder)
         if strange := [name for name in names if name not in known]:
-            raise BadInputError(f"{', '.join(strange)} measured nothing here; there are: {', '.join(known) or 'none'}")
+            raise BadInputError(
+                phrase(
+                    "hand_strangers",
+                    "{names} measured nothing here; these did: {known}",
+                    names=", ".join(strange),
+                    known=", ".join(known) or "-",
+                )
+            )
         sessions = {name: self.session(name) for name in names}
         marks = {name: session.everything() for name, session in sessions.items()}
         return repeatability(marks, {name: self._figures(session) for name, session in sessions.items()})
@@ -294,7 +309,13 @@ class Desk:
         def order() -> tuple[Measurements, Source]:
             source = self.orienting.for_analysis
             if source is None:
-                raise StateForbidsError(f"nothing can be computed in space: {self.orienting.state.message}")
+                raise StateForbidsError(
+                    phrase(
+                        "hand_no_space",
+                        "nothing can be computed in space: {why}",
+                        why=self.orienting.state.message or WAIT,
+                    )
+                )
             return self.measurements(operator), source
 
         return self.computing.begin(operator, order)
@@ -326,7 +347,11 @@ class Desk:
             StateForbidsError: there are none yet.
         """
         if (system := self.orienting.system) is None:
-            raise StateForbidsError(f"the cameras are not oriented: {self.orienting.state.message or 'wait for it'}")
+            raise StateForbidsError(
+                phrase(
+                    "hand_not_oriented", "the cameras are not oriented: {why}", why=self.orienting.state.message or WAIT
+                )
+            )
         return system
 
     def _changed(self, operator: str, session: Session, touched: Touched | None) -> Changed:
@@ -379,12 +404,27 @@ class Desk:
         at = int(np.searchsorted(self.log.pulses, pulse))
         if at == len(self.log.pulses) or self.log.pulses[at] != pulse:
             first, last = self.log.pulses[0], self.log.pulses[-1]
-            raise UnknownRecordingError(f"the log has no pulse {pulse}: it goes from {first} to {last}")
+            raise UnknownRecordingError(
+                phrase(
+                    "hand_no_pulse",
+                    "the log has no pulse {pulse}: it goes from {first} to {last}",
+                    pulse=pulse,
+                    first=first,
+                    last=last,
+                )
+            )
         return at
 
     def _camera(self, name: str) -> None:
         if name not in self.log.facts.cameras:
-            raise UnknownCameraError(f"the log has no camera {name}: choose among {', '.join(self.log.facts.cameras)}")
+            raise UnknownCameraError(
+                phrase(
+                    "hand_no_camera",
+                    "the log has no camera {camera}: choose among {cameras}",
+                    camera=name,
+                    cameras=", ".join(self.log.facts.cameras),
+                )
+            )
 
 
 def _list(line: Floats) -> list[tuple[float, float]]:

@@ -15,6 +15,7 @@ import msgspec
 
 from rig.api.digitizing import MarkSource, MarkState
 from rig.errors import BadInputError, StorageError
+from rig.phrase import phrase
 
 FORMAT: Final = "svev-digitizing/1"
 SUFFIX: Final = ".jsonl"
@@ -87,7 +88,13 @@ class Journal:
         """
         if self._fd < 0 and self._open():
             self.close()
-            raise BadInputError(f"{self.path}: somebody has measured under this name meanwhile; open the page again")
+            raise BadInputError(
+                phrase(
+                    "hand_meanwhile",
+                    "{path}: somebody has measured under this name meanwhile; open the page again",
+                    path=str(self.path),
+                )
+            )
         line = _ENCODE(entry) + b"\n"
         try:
             written = os.pwrite(self._fd, line, self._whole)
@@ -97,7 +104,14 @@ class Journal:
             trouble = error.strerror
         if trouble is not None:
             self._cut()
-            raise StorageError(f"{self.path}: {trouble}; the last action was not kept: make room")
+            raise StorageError(
+                phrase(
+                    "hand_not_kept",
+                    "{path}: {trouble}; the last action was not kept: make room",
+                    path=str(self.path),
+                    trouble=str(trouble),
+                )
+            )
         self._whole += len(line)
 
     def close(self) -> None:
@@ -112,7 +126,14 @@ class Journal:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
         except OSError as error:
-            raise StorageError(f"{self.path}: {error.strerror}; the marks cannot be kept: free the folder") from None
+            raise StorageError(
+                phrase(
+                    "hand_folder",
+                    "{path}: {trouble}; the marks cannot be kept: free the folder",
+                    path=str(self.path),
+                    trouble=str(error.strerror),
+                )
+            ) from None
         try:
             return self._begin()
         except BaseException:
@@ -124,7 +145,11 @@ class Journal:
             fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise BadInputError(
-                f"{self.path}: another program measures under this name now; close it, or take another name"
+                phrase(
+                    "hand_held",
+                    "{path}: another program measures under this name now; close it, or take another name",
+                    path=str(self.path),
+                )
             ) from None
         with os.fdopen(os.dup(self._fd), "rb") as file:
             text = file.read()
@@ -144,11 +169,24 @@ class Journal:
             head = _HEAD.decode(lines[0] if lines else text)
             entries = [_ENTRY.decode(line) for line in lines[1:]]
         except msgspec.MsgspecError as error:
-            raise BadInputError(f"{self.path}: is no journal of marks ({error}); move it away") from None
+            raise BadInputError(
+                phrase(
+                    "hand_no_journal",
+                    "{path}: is no journal of marks ({trouble}); move it away",
+                    path=str(self.path),
+                    trouble=str(error),
+                )
+            ) from None
         if head.format != FORMAT or head.recording != self._recording:
             raise BadInputError(
-                f"{self.path}: belongs to recording {head.recording} ({head.format}), not to {self._recording}; "
-                "move it away"
+                phrase(
+                    "hand_other_recording",
+                    "{path}: belongs to recording {other} ({format}), not to {recording}; move it away",
+                    path=str(self.path),
+                    other=head.recording,
+                    format=head.format,
+                    recording=self._recording,
+                )
             )
         self._whole = end
         self._cut()
@@ -159,7 +197,14 @@ class Journal:
         try:
             os.ftruncate(self._fd, self._whole)
         except OSError as error:
-            raise StorageError(f"{self.path}: {error.strerror}; the marks cannot be kept") from None
+            raise StorageError(
+                phrase(
+                    "hand_cut",
+                    "{path}: {trouble}; the marks cannot be kept",
+                    path=str(self.path),
+                    trouble=str(error.strerror),
+                )
+            ) from None
 
 
 def operators(folder: Path) -> list[str]:

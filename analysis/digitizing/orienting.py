@@ -24,10 +24,14 @@ from analysis.scene.survey import KnownPoints, Survey
 from rig.api.digitizing import OrientationState, PredictedPoint
 from rig.background.child import run_child
 from rig.errors import BadInputError
-from rig.phrase import from_plain
+from rig.phrase import Phrase, from_plain, phrase, plain
 
-_NO_SOURCE: Final = "nobody told where the balls are: name the survey with --survey, or in [analysis] of the rig file"
-_RECORDING: Final = "a recording runs: the cameras are oriented when it has ended"
+_NO_SOURCE: Final = phrase(
+    "hand_no_source", "nobody told where the balls are: name the survey with --survey, or in [analysis] of the rig file"
+)
+_RECORDING: Final = phrase("hand_orient_waits", "a recording runs: the cameras are oriented when it has ended")
+#: Why there is nothing yet, where nothing else is to be said.
+WAIT: Final = phrase("hand_wait", "wait for it")
 _PROGRAM: Final = "analysis.digitizing.orienting_program"
 
 
@@ -91,7 +95,7 @@ class Orienting:
             try:
                 self._given = self._source()
             except BadInputError as error:
-                self._known = _Known(OrientationState(state="failed", message=str(error)))
+                self._known = _Known(OrientationState(state="failed", message=error.said))
                 return self.state
             if self._given is None:
                 self._known = _Known(OrientationState(state="none", message=_NO_SOURCE))
@@ -123,17 +127,22 @@ class Orienting:
         try:
             found = self._oriented(source, marks)
         except ChildProcessError:
-            self._fail(before, "the program that orients was ended by something else: orient again")
+            self._fail(
+                before,
+                phrase("hand_orient_ended", "the program that orients was ended by something else: orient again"),
+            )
         except OSError as error:
-            self._fail(before, f"{tempfile.gettempdir()}: {error.strerror or error}; make room, and orient again")
+            self._fail(
+                before, plain(f"{tempfile.gettempdir()}: {error.strerror or error}; make room, and orient again")
+            )
         except BadInputError as error:
-            advice = "" if marks is not None else "; or click four or more balls in each image, and orient by them"
-            self._fail(before, f"{error}{advice}")
+            text = "{why}; or click four or more balls in each image, and orient by them"
+            self._fail(before, error.said if marks is not None else phrase("hand_or_click", text, why=error.said))
         else:
             if found is not None:
                 self._known = found
 
-    def _fail(self, before: _Known, message: str) -> None:
+    def _fail(self, before: _Known, message: Phrase) -> None:
         self._known = replace(before, state=OrientationState(state="failed", message=message))
 
     def _oriented(self, source: Source, marks: Mapping[Key, Entered] | None) -> _Known | None:
@@ -159,10 +168,10 @@ class Orienting:
                 return None
             if "problem" in end:
                 raise BadInputError(from_plain(end["problem"]))
-            system, findings = pickle.loads(answer.read_bytes())  # noqa: S301 - our program wrote it just now
+            system = pickle.loads(answer.read_bytes())  # noqa: S301 - our program wrote it just now
         lacking = [name for name in self._log.facts.cameras if name not in system.names]
-        message = f"not oriented: {', '.join(lacking)}" if lacking else None
-        state = OrientationState(state="done", message=message, findings=findings)
+        message = phrase("hand_lacking", "not oriented: {cameras}", cameras=", ".join(lacking)) if lacking else None
+        state = OrientationState(state="done", message=message, findings=tuple(map(from_plain, end["findings"])))
         return _Known(state, system, marks is not None, _proposals(system, self.balls))
 
     def _hold(self, held: bool) -> None:

@@ -5,12 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from rig.background.program import Teller, serve
+from rig.phrase import as_plain, plain
 
 
 def _orient(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     """Orient the cameras of `log` by the `order`, a pickled pair of source and clicked balls (None: those in sight).
 
-    The cameras and what a person should know of them are pickled into the file `answer`.
+    The cameras are pickled into the file `answer`; says at the end what a person should know of them.
     """
     from analysis.cameras.frames import LogFrames  # noqa: PLC0415 - its libraries start their threads with our priority
     from analysis.digitizing.clicked_balls import orient_by_clicks  # noqa: PLC0415
@@ -24,13 +25,13 @@ def _orient(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     if marks is None:
         found = oriented(static_images(log), source, LogFrames(log))
         system = found.scene.system
-        findings = (*found.scene.messages, *(move.message for move in found.steadiness.moved))
+        findings = [*map(plain, found.scene.messages), *(move.said for move in found.steadiness.moved)]
     else:
         sizes = {name: camera.size for name, camera in log_facts(log).cameras.items()}
         system, notes = orient_by_clicks(sizes, source, marks)
-        findings = tuple(notes)
-    Path(asked["answer"]).write_bytes(pickle.dumps((system, findings)))
-    return {}
+        findings = list(map(plain, notes))
+    Path(asked["answer"]).write_bytes(pickle.dumps(system))
+    return {"findings": [as_plain(finding) for finding in findings]}
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from analysis.digitizing.things import is_line
 from rig.api.digitizing import FigureAgreement, MarkSource, MarkState, PointAgreement, Repeatability
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 #: Fewer common points or figures say nothing of a scatter.
 _FEWEST: Final = 3
@@ -33,7 +34,7 @@ def repeatability(marks: Mapping[str, Iterable[tuple[Key, Entered]]], figures: M
     """
     operators = list(marks)
     if len(operators) < 2:
-        raise BadInputError("name two operators or more to compare")
+        raise BadInputError(phrase("hand_two_operators", "name two operators or more to compare"))
     places = {operator: dict(_points(of)) for operator, of in marks.items()}
     common = sorted(set.intersection(*(set(of) for of in places.values())))
     things = {}
@@ -47,12 +48,21 @@ def repeatability(marks: Mapping[str, Iterable[tuple[Key, Entered]]], figures: M
     agreeing = _figures(operators, figures)
     if not things and not agreeing:
         raise BadInputError(
-            f"{' and '.join(operators)} have measured fewer than {_FEWEST} points in common: measure the same pulses"
+            phrase(
+                "hand_little_common",
+                "{operators} have measured fewer than {fewest} points in common: measure the same pulses",
+                operators=", ".join(operators),
+                fewest=_FEWEST,
+            )
         )
     worst = max(things, key=lambda thing: things[thing].sigma_px, default=None)
-    said = [f"one click scatters by {things[worst].sigma_px:.2f} px at most ({worst})"] if worst else []
-    said += [f"{name} by {agreement.sigma:.2f}" for name, agreement in agreeing.items()]
-    return Repeatability(operators=operators, things=things, figures=agreeing, message="; ".join(said))
+    said = []
+    if worst:
+        px = things[worst].sigma_px
+        said.append(phrase("hand_scatter", "one click scatters by {px:.2f} px at most ({thing})", px=px, thing=worst))
+    for name, agreement in agreeing.items():
+        said.append(phrase("hand_figure_scatter", "{figure} by {sigma:.2f}", figure=name, sigma=agreement.sigma))
+    return Repeatability(operators=operators, things=things, figures=agreeing, said=tuple(said))
 
 
 def _points(marks: Iterable[tuple[Key, Entered]]) -> Iterable[tuple[Key, tuple[float, float]]]:

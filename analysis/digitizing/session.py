@@ -17,6 +17,7 @@ from rig.api.digitizing import (
     UndoAction,
 )
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 #: What stands at one place before and after an action; None: nothing.
 _Change = tuple[Key, Entered | None, Entered | None]
@@ -134,14 +135,21 @@ class Session:
         stale: tuple[Key, ...] = ()
         if not is_line(action.thing):
             if action.vertex is not None:
-                raise BadInputError(f'{action.thing} is no line: leave "vertex" out')
+                raise BadInputError(
+                    phrase("hand_no_line", '{thing} is no line: leave "vertex" out', thing=action.thing)
+                )
             key = Key(action.pulse, action.camera, action.thing)
         else:
             last = max((k.vertex for k in there), default=-1)
             vertex = last + 1 if action.vertex is None else action.vertex
             if vertex > last + 1:
                 raise BadInputError(
-                    f"{action.thing} has {last + 1} points here: the next one has the number {last + 1}"
+                    phrase(
+                        "hand_next_vertex",
+                        "{thing} has {count} points here: the next one has the number {count}",
+                        thing=action.thing,
+                        count=last + 1,
+                    )
                 )
             key = Key(action.pulse, action.camera, action.thing, vertex)
             stale = tuple(k for k in there if k.vertex < 0)

@@ -6,7 +6,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from analysis.digitizing.things import LINES
+from analysis.digitizing.things import LANDMARK, LINES
 from analysis.measurements.model import SIDES, PulseMeasurements
 from analysis.pulses.gross_errors import Checked, check_points, check_skis
 from analysis.pulses.least_squares import Adjusted, Condition, adjust
@@ -19,11 +19,16 @@ from photogrammetry.intersection.image_line import fit_image_lines
 from photogrammetry.intersection.trifocal import check_sides
 from rig.api.digitizing import Estimate, PredictedPoint, SideCheck, SpaceLine, SpacePoint
 from rig.arrays import Floats
+from rig.phrase import Phrase, phrase
 
 #: Test values beyond which a ray is named: one sound ray in a thousand.
 _NAMED_W: Final = 3.29
 #: Probability from which the side check is believed.
 _SURE: Final = 0.99
+_SKIS: Final = {
+    "right": phrase("hand_right_ski", "right ski"),
+    "left": phrase("hand_left_ski", "left ski"),
+}
 _WORDS: Final = {
     Condition.FEW_IMAGES: "one ray",
     Condition.UNDETERMINED: "the rays are parallel within their accuracy",
@@ -105,7 +110,11 @@ def space_points(system: CameraSystem, found: PointsInSpace) -> dict[str, SpaceP
             rays=rays,
             residuals=residuals,
             w=w,
-            finding=_misfit(name, w, {camera: float(np.hypot(*r)) for camera, r in residuals.items()}),
+            finding=_misfit(
+                name.removeprefix(LANDMARK).replace("_", " "),
+                w,
+                {camera: float(np.hypot(*r)) for camera, r in residuals.items()},
+            ),
         )
     return result
 
@@ -215,7 +224,7 @@ def _line(system: CameraSystem, skis: SkisInSpace, state: JumperState, name: str
         heading=None if ski is None else Estimate(value=ski.heading.value, sigma=ski.heading.sigma),
         status="controlled" if seen > 2 else "two images",
         w=w,
-        finding=_misfit(f"{side} ski", w, residual),
+        finding=_misfit(_SKIS[side], w, residual),
         sides=sides,
     )
 
@@ -238,8 +247,12 @@ def _sides(system: CameraSystem, pulse: PulseMeasurements) -> SideCheck | None:
     check = check_sides([system[name].ideal() for name in three], left, right)
     if not check.fits[0] or check.confidence[0] < _SURE:
         # The check takes the orientations for exact: beside their errors lines of sound measurements may fit badly.
-        return SideCheck(ok=None, message="left and right cannot be told by these lines: compare by eye")
-    return SideCheck(ok=bool(check.proposal[0] < 0), message=check.words(0, three))
+        unknown = phrase("hand_sides_unknown", "left and right cannot be told by these lines: compare by eye")
+        return SideCheck(ok=None, said=unknown)
+    if check.proposal[0] < 0:
+        return SideCheck(ok=True, said=phrase("hand_sides_agree", "left and right agree in all three images"))
+    text = "left and right are interchanged in {camera}: interchange them there"
+    return SideCheck(ok=False, said=phrase("hand_sides_changed", text, camera=three[check.proposal[0]]))
 
 
 def _figures(state: JumperState) -> dict[str, Estimate]:
@@ -247,14 +260,16 @@ def _figures(state: JumperState) -> dict[str, Estimate]:
     return {name: Estimate(value=q.value, sigma=q.sigma) for name, q in known.items() if q is not None}
 
 
-def _misfit(name: str, w: Mapping[str, float], px: Mapping[str, float]) -> str | None:
-    """Which ray does not fit, in words, if one is beyond what chance gives."""
+def _misfit(name: str | Phrase, w: Mapping[str, float], px: Mapping[str, float]) -> Phrase | None:
+    """Which ray does not fit, if one is beyond what chance gives."""
     worst = max(w, key=lambda camera: w[camera], default=None)
     if worst is None or w[worst] < _NAMED_W:
         return None
     if sum(value > _NAMED_W for value in w.values()) > 1 and len(w) < 3:
-        return f"the rays of {name} do not meet: {px.get(worst, 0.0):.1f} px, w = {w[worst]:.1f}; one of both is wrong"
-    return f"{worst}'s {name} does not fit: {px.get(worst, 0.0):.1f} px, w = {w[worst]:.1f}"
+        text = "the rays of {thing} do not meet: {px:.1f} px, w = {w:.1f}; one of both is wrong"
+        return phrase("hand_rays_apart", text, thing=name, px=px.get(worst, 0.0), w=w[worst])
+    text = "{camera}'s {thing} does not fit: {px:.1f} px, w = {w:.1f}"
+    return phrase("hand_misfit", text, camera=worst, thing=name, px=px.get(worst, 0.0), w=w[worst])
 
 
 def _by_camera(system: CameraSystem, values: Floats) -> dict[str, float]:

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from rig.api.fields import WHOLE, Model
 from rig.api.measuring import MeasuringStep
-from rig.api.statement import Statement
+from rig.phrase import Phrase
 
 #: A file of marks that is imported: 100 000 points have some 10 MB.
 MARKS_BYTES_MAX: Final = 32 << 20
@@ -145,14 +145,14 @@ class SpacePoint(Model):
     rays: list[str] = Field(description="cameras whose rays are used")
     residuals: dict[str, Place] = Field(description="measured - computed by camera, px")
     w: dict[str, float] = Field(description="test values by camera; standard normal where nothing is wrong")
-    finding: str | None = Field(None, description="a ray that does not fit, in words")
+    finding: Phrase | None = Field(None, description="a ray that does not fit")
 
 
 class SideCheck(Model):
     """Whether left and right fit together in three images (trifocal check)."""
 
     ok: bool | None = Field(description="null: it cannot be told")
-    message: str
+    said: Phrase
 
 
 class SpaceLine(Model):
@@ -162,7 +162,7 @@ class SpaceLine(Model):
     heading: Estimate | None
     status: str
     w: dict[str, float]
-    finding: str | None = None
+    finding: Phrase | None = Field(None, description="an image line that does not fit")
     sides: SideCheck | None = None
 
 
@@ -241,8 +241,8 @@ class OrientationState(Model):
     """How far the cameras are oriented."""
 
     state: Literal["none", "working", "done", "failed"]
-    message: str | None = None
-    findings: tuple[str, ...] = ()
+    message: Phrase | None = None
+    findings: tuple[Phrase, ...] = Field((), description="what a person should know of the cameras")
 
 
 class ViewedCamera(Model):
@@ -360,8 +360,8 @@ class HandResult(Model):
     step: MeasuringStep | None = Field(None, description="what is being done")
     share: float = Field(0.0, description="of this step that is done, 0 to 1")
     paused: bool = Field(False, description="it stands still while a recording runs")
-    problem: Statement | None = Field(None, description="why it could not be computed, and what to do")
-    verdict: str | None = None
+    problem: Phrase | None = Field(None, description="why it could not be computed, and what to do")
+    said: tuple[Phrase, ...] = Field((), description="the verdicts on its jumps, sentence by sentence")
     curves: dict[str, list[CurvePoint]] = Field({})
     files: tuple[str, ...] = ()
 
@@ -388,4 +388,4 @@ class Repeatability(Model):
     operators: list[str]
     things: dict[str, PointAgreement]
     figures: dict[str, FigureAgreement] = Field(description="angles in degrees, height in the survey's unit")
-    message: str
+    said: tuple[Phrase, ...] = Field(description="the largest scatter, and that of each figure")

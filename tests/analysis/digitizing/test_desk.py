@@ -77,8 +77,8 @@ def test_a_wrong_click_is_named_and_the_worst_one_is_told_first(desk: Desk, jump
     assert view is not None
     finding = view.space["P3"].finding
     assert finding is not None
-    assert finding.startswith("K2's P3 does not fit: ")
-    assert "px, w = " in finding
+    assert finding.text.startswith("K2's P3 does not fit: ")
+    assert "px, w = " in finding.text
     worst = desk.session_view("Anna").worst[0]
     assert (worst.pulse, worst.camera, worst.thing) == (20, "K2", "P3")
 
@@ -237,7 +237,7 @@ def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
     source = read_source(jump.survey, None)
     desk = Desk(files, lambda: source, lambda: recording)
     said = "a recording runs: the cameras are oriented when it has ended"
-    wait_until(lambda: desk.opening().orientation.message == said, "orienting stands still", 20)
+    wait_until(lambda: str(desk.opening().orientation.message) == said, "orienting stands still", 20)
     with pytest.raises(StateForbidsError, match="a recording runs"):
         follow(desk, "Anna", TrackOrder(things=["P1"], pulse=20, direction=1))
     changed = desk.act("Anna", PlaceAction(do="place", pulse=20, camera="K1", thing="P1", xy=(10, 20)))

@@ -1,6 +1,6 @@
 /** What was measured as files, to keep or for other programs; reading such files; and how operators agree. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { $, icon, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { attempt, tell } from "../shared/snacks.js";
@@ -48,7 +48,7 @@ async function take() {
 async function compare() {
   const found = await attempt(() => getRepeatability([state.operator, $("compare-with").value]));
   if (!found) return;
-  setText($("compare-says"), found.message);
+  setText($("compare-says"), found.said.map((each) => say(each).text).join("; "));
   const numbers = (/** @type {number[]} */ values) => values.map((value) => number(value, 2)).join(", ");
   const row = (/** @type {string[]} */ [name, ...cells]) => make("tr", {}, make("th", { scope: "row" }, name), ...cells.map((cell) => make("td", {}, cell)));
   const head = [t("digitize.compare_what"), t("digitize.compare_count"), t("digitize.compare_sigma"), ...found.operators];

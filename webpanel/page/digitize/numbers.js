@@ -1,6 +1,6 @@
 /** What follows in space from the marks of this pulse, beside the views: place, sigma, residual and test value of each ray. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { $, make, setText } from "../shared/dom.js";
 import { number } from "../shared/format.js";
 import { cameraColour, colourOf } from "./overlay.js";
@@ -11,9 +11,10 @@ import { titleOf } from "./things.js";
 
 /** A test value over this does not happen by chance, and over the other seldom. */
 const [WRONG, SELDOM] = [3.3, 2];
-/** Words for how a point or ski is determined; others are shown as the service says them. @type {Record<string, string>} */
+/** Words for how a point or ski is determined, or why it is not. @type {Record<string, string>} */
 const STATUS = {
   controlled: "digitize.controlled", "two rays": "digitize.two_rays", "one ray": "digitize.one_ray", "two images": "digitize.two_images", "not measured": "digitize.not_measured",
+  "one image": "digitize.one_image", "the rays are parallel within their accuracy": "digitize.parallel", "the rays do not meet before the cameras": "digitize.behind",
 };
 /** @type {Record<string, [string, string, number]>} sign, unit and decimals of the angles */
 const FIGURES = {
@@ -39,7 +40,7 @@ function draw() {
   const oriented = state.opening?.cameras.some((camera) => camera.oriented) ?? false;
   const now = JSON.stringify([space, lines, view?.figures, thing, Boolean(live), Boolean(state.dragged), oriented, document.documentElement.lang]);
   // Only of marks: where the pointer happens to be is no mistake.
-  drawFindings([...Object.values(view?.space ?? {}), ...Object.values(lines)].flatMap(({ finding }) => finding ?? []));
+  drawFindings([...Object.values(view?.space ?? {}), ...Object.values(lines)].flatMap(({ finding }) => finding ? say(finding).text : []));
   if (now === shown) return;
   shown = now;
   const names = Object.keys(space).sort((a, b) => Number(b === thing) - Number(a === thing));
@@ -72,7 +73,7 @@ function makePoint(name, { X, sigma, status, residuals, w, finding }, live) {
     X && sigma ? make("p", { class: "coordinates" }, ...X.map((value, axis) =>
       make("span", {}, `${"XYZ"[axis]} ${number(value, 3)} ± ${number(sigma[axis], 3)}`))) : null,
     makeRays(w, residuals),
-    finding && (!live || state.dragged) ? make("p", { class: "misfit" }, finding) : null);
+    finding && (!live || state.dragged) ? make("p", { class: "misfit" }, say(finding).text) : null);
 }
 
 /** @param {string} name @param {string} status @param {boolean} live */
@@ -108,10 +109,10 @@ function makeRays(w, residuals) {
 function makeLine(name, { slope, heading, status, w, finding, sides }) {
   const angle = (/** @type {string} */ words, /** @type {import("./types.js").Estimate|null} */ value) =>
     value ? make("span", {}, `${t(words)} ${number(value.value, 1)} ± ${number(value.sigma, 2)}°`) : null;
-  const told = sides && { true: t("digitize.sides_fit"), false: sides.message, null: t("digitize.sides_unknown") }[String(sides.ok)];
+  const told = sides && { true: t("digitize.sides_fit"), false: say(sides.said).text, null: t("digitize.sides_unknown") }[String(sides.ok)];
   const lamp = sides ? make("p", { class: "lamp", "data-ok": String(sides.ok) }, make("i", {}), make("span", {}, told ?? "")) : null;
   return make("section", { class: "space", "data-of": name },
     makeHead(name, status, false),
     make("p", { class: "coordinates" }, angle("digitize.slope", slope), angle("digitize.heading", heading)),
-    makeRays(w, {}), lamp, finding ? make("p", { class: "misfit" }, finding) : null);
+    makeRays(w, {}), lamp, finding ? make("p", { class: "misfit" }, say(finding).text) : null);
 }

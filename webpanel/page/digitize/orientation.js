@@ -1,6 +1,6 @@
 /** Whether the cameras are oriented, with what was found out, and orienting by the balls that were clicked. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { $, icon, make, setText } from "../shared/dom.js";
 import { attempt } from "../shared/snacks.js";
 import { getOpening, orient } from "./server.js";
@@ -58,9 +58,9 @@ function draw() {
   const missing = how === "done" ? opening.cameras.filter(({ oriented }) => !oriented).map(({ name }) => name) : [];
   $("orientation-lamp").dataset.level = level;
   $("orientation-lamp").replaceChildren(icon(level), make("span", {}, t(words)));
-  setText($("orientation-message"), message ?? "");
+  setText($("orientation-message"), message ? say(message).text : "");
   $("orientation-findings").replaceChildren(
-    ...missing.map((camera) => make("li", {}, t("digitize.not_oriented", { camera }))), ...findings.map((finding) => make("li", {}, finding)));
+    ...missing.map((camera) => make("li", {}, t("digitize.not_oriented", { camera }))), ...findings.map((finding) => make("li", {}, say(finding).text)));
   setText($("orientation-clicked"), clicked.length ? t("digitize.balls_clicked", { balls: clicked.join(", ") }) : t("digitize.balls_none"));
   for (const part of ["orient-clicked", "orient-found"]) $(part).disabled = how === "working";
   redraw();

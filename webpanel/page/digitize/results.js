@@ -72,7 +72,7 @@ function show(now) {
   const words = { none: "digitize.result_none", computing: "digitize.result_computing", done: "digitize.result_done", failed: "digitize.result_failed" }[now.state];
   const computing = now.state === "computing";
   const doing = now.paused ? t("digitize.result_paused") : now.step && t(`measurement.step_${now.step}`);
-  setText($("result-state"), [t(words), computing ? doing : now.problem ? say(now.problem).text : now.verdict].filter(Boolean).join(" "));
+  setText($("result-state"), [t(words), computing ? doing : now.problem ? say(now.problem).text : now.said.map((each) => say(each).text).join("; ")].filter(Boolean).join(" "));
   $("compute").disabled = computing;
   $("compute-cancel").hidden = $("result-share").hidden = !computing;
   $("result-share").value = now.share;

@@ -1,6 +1,7 @@
 /**
  * The shapes of the answers about measuring by hand, as in rig/api/digitizing.py (a test compares them).
  *
+ * @typedef {import("../shared/types.js").Phrase} Phrase
  * @typedef {[number, number]} Place px; (0, 0) is the centre of the top-left pixel
  * @typedef {"measured"|"guess"|"hidden"|"not visible"} MarkState
  * @typedef {"hand"|"refined"|"tracked"|"automatic"} MarkSource
@@ -38,17 +39,17 @@
  * @property {string[]} rays
  * @property {Record<string, Place>} residuals
  * @property {Record<string, number>} w
- * @property {string|null} finding
+ * @property {Phrase|null} finding
  *
  * @typedef {object} SideCheck
  * @property {boolean|null} ok
- * @property {string} message
+ * @property {Phrase} said
  * @typedef {object} SpaceLine
  * @property {Estimate|null} slope
  * @property {Estimate|null} heading
  * @property {string} status
  * @property {Record<string, number>} w
- * @property {string|null} finding
+ * @property {Phrase|null} finding
  * @property {SideCheck|null} sides
  *
  * @typedef {object} PredictedPoint
@@ -102,8 +103,8 @@
  *
  * @typedef {object} OrientationState
  * @property {"none"|"working"|"done"|"failed"} state
- * @property {string|null} message
- * @property {string[]} findings
+ * @property {Phrase|null} message
+ * @property {Phrase[]} findings
  *
  * @typedef {object} ViewedCamera
  * @property {string} name
@@ -157,8 +158,8 @@
  * @property {string|null} step
  * @property {number} share
  * @property {boolean} paused
- * @property {import("../shared/types.js").Statement|null} problem
- * @property {string|null} verdict
+ * @property {Phrase|null} problem
+ * @property {Phrase[]} said
  * @property {Record<string, CurvePoint[]>} curves
  * @property {string[]} files
  *
@@ -174,7 +175,7 @@
  * @property {string[]} operators
  * @property {Record<string, PointAgreement>} things
  * @property {Record<string, FigureAgreement>} figures
- * @property {string} message
+ * @property {Phrase[]} said
  */
 
 export {};

@@ -1,0 +1,76 @@
+"""What comes of the marks: findings in the reader's language, orientation by balls, a computed jump, files."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import expect
+
+from tests.analysis.simulated import SIZE, training
+from tests.browser.conftest import Open
+from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, enter
+from tests.support.waiting import wait_until
+
+CAMERAS = ("K1", "K2", "K3")
+
+
+def _mark(desk: Desk, camera: str, thing: str, xy: np.ndarray, pulse: int = PULSE) -> None:
+    x, y = xy.tolist()
+    action = {"do": "place", "pulse": pulse, "camera": camera, "thing": thing, "xy": [x, y], "sigma": [0.3, 0.3]}
+    answer = desk.client.post(f"/sessions/{OPERATOR}/actions", json=action)
+    assert answer.status_code == 200, answer.text
+
+
+def test_what_the_service_says_is_in_the_language_of_the_page(desk: Desk, open_page: Open) -> None:
+    for camera in CAMERAS:
+        _mark(desk, camera, "P3", desk.true(camera, "P3") + (8, 40) * np.array(camera == "K2"))
+    page = enter(open_page, desk, locale="nb-NO")
+    expect(page.locator("#findings")).to_have_text(re.compile(r"^P3 i K2 passer ikke: \d+(,\d)? px, w = \d+(,\d)?$"))
+    expect(page.locator('[data-of="P3"] .misfit')).to_contain_text("passer ikke")
+    page.locator("#orient-clicked").click()
+    expect(page.locator("#orientation-message")).to_contain_text("et bilde trenger 4 klikkede baller eller flere")
+
+
+def test_balls_that_were_clicked_orient_the_cameras(desk: Desk, open_page: Open) -> None:
+    scenario = training()
+    for camera in CAMERAS:
+        projection = scenario.cameras[scenario.camera_index(camera)].projection(*SIZE)
+        for ball in scenario.balls:
+            px = projection.pixels(np.array(ball.X))
+            if np.isfinite(px).all() and (px > 5).all() and (px < np.array(SIZE) - 5).all():
+                _mark(desk, camera, f"ball:{ball.name}", px, pulse=1)
+    page = enter(open_page, desk)
+    expect(page.locator("#orientation-clicked")).to_contain_text("K1 ")
+    page.locator("#orient-clicked").click()
+    expect(page.locator("#orientation-lamp")).to_have_attribute("data-level", "info")
+    expect(page.locator("#orientation-lamp")).to_have_attribute("data-level", "good", timeout=30_000)
+    expect(page.locator("#orientation-message")).to_be_empty()
+    expect(page.locator("#orient-clicked")).to_be_enabled()
+
+
+def test_a_jump_is_computed_goes_out_as_a_file_and_comes_back(desk: Desk, open_page: Open, tmp_path: Path) -> None:
+    for pulse in range(6, 15):
+        for camera in CAMERAS:
+            for thing in ("P1", "P2", "P3", "P4"):
+                _mark(desk, camera, thing, desk.true(camera, thing, pulse), pulse)
+    page = enter(open_page, desk)
+    page.locator("#compute").click()
+    page.locator("#compute-cancel").click()
+    expect(page.locator("#result-state")).to_have_text("Nothing is computed yet.")
+    page.locator("#compute").click()
+    expect(page.locator("#result-share")).to_be_visible()
+    expect(page.locator("#result-state")).to_contain_text("Computed.", timeout=60_000)
+    expect(page.locator("#result-share")).to_be_hidden()
+    expect(page.locator("#result-files a").filter(has_text="Coach's page")).to_be_visible()
+    page.locator(".desk-more > details:last-child > summary").click()
+    with page.expect_download() as download:
+        page.locator("#exports a").filter(has_text="marks.csv").click()
+    kept = tmp_path / "marks.csv"
+    download.value.save_as(kept)
+    before = desk.view()["marks"]
+    answer = desk.client.post(
+        f"/sessions/{OPERATOR}/actions", json={"do": "remove", "pulse": PULSE, "camera": "K1", "thing": "P1"}
+    )
+    assert answer.status_code == 200
+    page.locator("#import-file").set_input_files(kept)
+    wait_until(lambda: desk.view()["marks"] == before, "the marks are back", 20)

@@ -12,6 +12,7 @@ from analysis.digitizing.effective import covariance_of, effective
 from analysis.digitizing.epipolar import epipolar_curves
 from analysis.digitizing.files import DeskFiles
 from analysis.digitizing.journal import SUFFIX, Entered, Journal, Key, operators
+from analysis.digitizing.landmarks import NAME, Template, read_landmarks
 from analysis.digitizing.misfits import Misfits
 from analysis.digitizing.next_mark import next_mark
 from analysis.digitizing.opened_log import OpenedLog
@@ -108,7 +109,11 @@ class Desk:
             self._misfits.clear()
 
     def opening(self) -> Opening:
-        """What a page needs to begin."""
+        """What a page needs to begin.
+
+        Raises:
+            BadInputError: the file of further landmarks is wrong.
+        """
         system = self.orienting.system
         facts, known = self.log.facts, self.orienting.balls
         return Opening(
@@ -120,7 +125,7 @@ class Desk:
             ],
             pulses=self.log.pulses,
             status=self.log.status,
-            things=things(() if known is None else known.names),
+            things=things(() if known is None else known.names, self._templates()),
             orientation=self.orienting.state,
             operators=operators(self.files.folder),
             jump=self._span(),
@@ -353,6 +358,10 @@ class Desk:
                 )
             )
         return system
+
+    def _templates(self) -> tuple[Template, ...]:
+        path = self.files.landmarks or self.files.log.parent / NAME
+        return read_landmarks(path) if self.files.landmarks or path.exists() else ()
 
     def _changed(self, operator: str, session: Session, touched: Touched | None) -> Changed:
         view = None

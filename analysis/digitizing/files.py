@@ -12,8 +12,10 @@ class DeskFiles:
         log: the log.
         folder: for what is measured by hand; made when the first operator begins.
         measured: where the automatic measurement of this log lies, if there is one.
+        landmarks: file with further landmarks; None: `landmarks.toml` beside the log, if there is one.
     """
 
     log: Path
     folder: Path
     measured: Path
+    landmarks: Path | None = None

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import Final
 
+from analysis.digitizing.landmarks import Template
 from analysis.measurements.model import POINTS, SIDES
 from photogrammetry.jumper.centre_of_mass import LANDMARKS
 from rig.api.digitizing import Thing
@@ -23,18 +24,23 @@ def ball_of(thing: str) -> str | None:
     return thing.removeprefix(BALL) if thing.startswith(BALL) else None
 
 
-def things(balls: Iterable[str], more: Iterable[str] = ()) -> list[Thing]:
+def things(balls: Iterable[str], templates: Iterable[Template] = ()) -> list[Thing]:
     """All things that can be measured, in the order in which they are offered.
 
     Args:
         balls: names of the surveyed balls.
-        more: names of further landmarks.
+        templates: of further landmarks.
     """
     jumper = [Thing(name=name, kind="point", title=_TITLES[name], group="jumper") for name in POINTS]
     skis = [Thing(name=name, kind="line", title=name.capitalize(), group="jumper") for name in LINES]
     marks = [
         Thing(name=LANDMARK + name, kind="point", title=name.replace("_", " ").capitalize(), group="body")
-        for name in (*LANDMARKS, *more)
+        for name in LANDMARKS
+    ]
+    own = [
+        Thing(name=LANDMARK + point.name, kind="point", title=point.name, group=template.name, colour=point.colour)
+        for template in templates
+        for point in template.landmark
     ]
     surveyed = [Thing(name=BALL + name, kind="ball", title=name, group="balls") for name in balls]
-    return [*jumper, *skis, *marks, *surveyed]
+    return [*jumper, *skis, *marks, *own, *surveyed]

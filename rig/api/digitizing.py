@@ -234,7 +234,8 @@ class Thing(Model):
     name: str
     kind: Literal["point", "line", "ball"]
     title: str
-    group: str
+    group: str = Field(description="jumper, body, balls, or the name of a template of further landmarks")
+    colour: str | None = Field(None, description="in which it is drawn, as #rrggbb; null: that of its kind")
 
 
 class OrientationState(Model):

@@ -33,6 +33,10 @@ def digitize_command(
     marks: Annotated[
         Path | None, typer.Option(metavar="DIR", help="folder for what is measured; beside the log if left out")
     ] = None,
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="landmarks of your own (TOML); landmarks.toml beside the log if left out"),
+    ] = None,
 ) -> None:
     """Measure a log by hand, in the browser: points and skis in all images at once, with their sigmas in space.
 
@@ -44,7 +48,7 @@ def digitize_command(
 
     Example: svev digitize recordings/jump.mcap --survey hill.json
     """
-    files = DeskFiles(log, marks or digitized_path(log), measured_path(log))
+    files = DeskFiles(log, marks or digitized_path(log), measured_path(log), landmarks)
     source: Source | None = None if survey is None and calibration is None else read_source(survey, calibration)
     recording = info(log).recording
 
@@ -54,7 +58,7 @@ def digitize_command(
         return files
 
     with closing(Desks(find, lambda: source)) as desks, closing(listen("127.0.0.1", port)) as listener:
-        desks.desk(recording)  # a log that cannot be measured is refused here, and not by the page
+        desks.desk(recording).opening()  # a log or file of landmarks that is wrong is refused here, and not by the page
         page = f"/digitize.html?recording={quote(recording)}"
         server = make_server(create_digitizing_app(desks, Access.for_address("127.0.0.1"), page))
 

@@ -2,7 +2,7 @@
 
 import { said } from "./advance.js";
 import { target } from "./marking.js";
-import { cameras, listed, state } from "./state.js";
+import { cameras, listed, state, thingOf } from "./state.js";
 
 /** @typedef {import("./types.js").Place} Place */
 /** @typedef {(place: Place) => Place} Project from the image to the canvas */
@@ -17,7 +17,7 @@ const RADIUS = 9;
 
 /** @param {string} thing */
 export function colourOf(thing) {
-  return COLOURS[thing] ?? (thing.startsWith("ball:") ? "#ff86dd" : "#8dffa8");
+  return COLOURS[thing] ?? thingOf(thing)?.colour ?? (thing.startsWith("ball:") ? "#ff86dd" : "#8dffa8");
 }
 
 /** @param {string} camera */

@@ -100,6 +100,7 @@
  * @property {"point"|"line"|"ball"} kind
  * @property {string} title
  * @property {string} group
+ * @property {string|null} colour
  *
  * @typedef {object} OrientationState
  * @property {"none"|"working"|"done"|"failed"} state

@@ -42,6 +42,7 @@ from service.exports.jobs import Exports
 from service.measuring.queue import Measurings
 from service.measuring.results import is_outdated, jumps_in_full, result_downloads, result_file
 from service.recordings import live_results
+from service.recordings.digitized import digitized_downloads
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find, is_favourite, more_of, tags_of, utc
 from service.recordings.measured_jumps import MeasuredJumps, athletes, wanted
@@ -270,11 +271,11 @@ class Archive(ABC):
         return self._checksums.get(download.tag, "")
 
     def zipped(self, recording_ids: Sequence[str]) -> tuple[int, Iterator[bytes]]:
-        """Several recordings with results and spoken notes as one archive: its size, and its bytes piece by piece."""
+        """Several recordings and what belongs to them as one archive: its size, and its bytes piece by piece."""
         downloads: list[Download] = []
         for recording_id in dict.fromkeys(recording_ids):
-            downloads.append(self.download(recording_id))
-            downloads += result_downloads(self._catalogue.file(recording_id), downloads[-1].name)
+            log, file = self._catalogue.file(recording_id), self.download(recording_id)
+            downloads += [file, *result_downloads(log, file.name), *digitized_downloads(log, file.name)]
             downloads += [self.voice_file(recording_id, note.number) for note in self.voice_notes(recording_id)]
         return zipped_size(downloads), zipped(downloads)
 

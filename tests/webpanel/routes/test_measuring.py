@@ -14,6 +14,7 @@ from rig.api.jump import LastJump
 from rig.api.statement import Statement
 from rig.settings.model import AnalysisSettings
 from service.measuring.results import keep_problem, keep_result, measurement_of
+from service.recordings.digitized import digitized_downloads
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 
@@ -110,6 +111,31 @@ def test_who_asks_waits_his_turn_and_may_give_up(client: httpx.Client, service: 
     assert client.delete("/api/recordings/jump").status_code == 200
     assert "restore it" in refused(client.post(PATH), 409).detail
     assert refused(client.get(PATH.replace("jump", "nobody")), 404).code == "unknown_recording"
+
+
+def test_the_archive_has_what_was_measured_by_hand_also_while_somebody_goes_on_with_it(
+    client: httpx.Client, log: Path
+) -> None:
+    base = "/api/recordings/jump/digitizing"
+    pulse = client.get(base).json()["pulses"][0]
+    action = {"do": "place", "pulse": pulse, "camera": "K1", "thing": "P1", "xy": [1.5, 2.5]}
+    assert client.post(f"{base}/sessions/Anna/actions", json=action).status_code == 200
+    folder = log.with_suffix(".digitized")
+    (folder / "Anna.result").mkdir()
+    (folder / "Anna.result" / "report.html").write_text(PAGE)
+    (folder / ".Anna.result.1").mkdir()
+    (folder / ".Anna.result.1" / "report.html").write_text("half made")
+    size = len((folder / "Anna.jsonl").read_bytes())
+    taken = digitized_downloads(log, "jump.mcap")
+    assert [each.name for each in taken] == ["jump.digitized/Anna.jsonl", "jump.digitized/Anna.result/report.html"]
+    assert client.post(f"{base}/sessions/Anna/actions", json=action | {"thing": "P2"}).status_code == 200
+    with taken[0].open() as file:
+        assert len(file.read()) == size
+    answer = client.get("/api/recordings.zip?ids=jump")
+    assert int(answer.headers["content-length"]) == len(answer.content)
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert b'"P2"' in archive.read("jump.digitized/Anna.jsonl")
+        assert archive.read("jump.digitized/Anna.result/report.html").decode() == PAGE
 
 
 def test_the_archive_has_the_result_where_a_folder_of_recordings_has_it(client: httpx.Client, log: Path) -> None:

@@ -4,6 +4,7 @@ import { startLogin } from "../frame/login.js";
 import { say, startLanguage, t } from "../i18n/i18n.js";
 import { Problem } from "../shared/api.js";
 import { $, setText } from "../shared/dom.js";
+import { update } from "../shared/store.js";
 import { startFiles } from "./files.js";
 import { startGeometry } from "./geometry.js";
 import { startKeys } from "./keys.js";
@@ -15,7 +16,7 @@ import { startPanes } from "./panes.js";
 import { startPicture } from "./picture.js";
 import { drawSpeeds, startPulses } from "./pulses.js";
 import { drawResult, startResults } from "./results.js";
-import { getOpening, recording } from "./server.js";
+import { getAccess, getOpening, recording } from "./server.js";
 import { takeBack } from "./session.js";
 import { cameras, change, redraw, state, watch } from "./state.js";
 import { startTape } from "./tape.js";
@@ -36,7 +37,9 @@ async function begin() {
 }
 
 async function open() {
-  const opening = await getOpening();
+  const [{ role }, opening] = await Promise.all([getAccess(), getOpening()]);
+  update({ role });
+  document.body.dataset.role = role; // hides what it does not allow
   document.title = t("digitize.title_of", { recording });
   setText($("recording"), opening.recording);
   change({

@@ -35,6 +35,9 @@ function session(operator, part = "") {
   return `/sessions/${encodeURIComponent(operator)}${part}`;
 }
 
+/** @returns {Promise<{ role: string }>} what this browser may do */
+export const getAccess = () => call("GET", "access");
+
 /** @returns {Promise<import("./types.js").Opening>} */
 export const getOpening = () => call("GET", path(""), undefined, LONG_MS);
 

@@ -1,7 +1,9 @@
 /** The session of the operator: what is marked, kept true with the service; each act goes there at once, in order. */
 
+import { t } from "../i18n/i18n.js";
 import { Problem } from "../shared/api.js";
-import { attempt, tellProblem } from "../shared/snacks.js";
+import { attempt, tell, tellProblem } from "../shared/snacks.js";
+import { known } from "../shared/store.js";
 import { cover, said } from "./advance.js";
 import { act, getChanges, getPulse, getSession } from "./server.js";
 import { change, indexOf, redraw, state } from "./state.js";
@@ -75,8 +77,8 @@ export async function reloadSession() {
 
 /** @param {PulseView} view */
 function keep(view) {
-  const known = views.get(view.pulse);
-  if (known && known.revision > view.revision) return; // an answer that was overtaken
+  const before = views.get(view.pulse);
+  if (before && before.revision > view.revision) return; // an answer that was overtaken
   views.delete(view.pulse);
   views.set(view.pulse, view);
   for (const pulse of views.keys()) if (views.size > KEPT) views.delete(pulse);
@@ -93,6 +95,10 @@ function keep(view) {
  * @returns {Promise<import("./types.js").Changed|null>} null: it was refused, which the page says
  */
 export function send(action) {
+  if (known.role === "watch") {
+    tell("info", t("digitize.only_look"));
+    return Promise.resolve(null);
+  }
   foresee(action);
   waiting += 1;
   const { operator } = state;
@@ -190,8 +196,8 @@ async function followChanges(operator) {
       const { revision, touched } = await getChanges(operator, state.session?.revision ?? 0);
       if (operator !== state.operator) return;
       if (state.cut) change({ cut: false });
-      const known = state.session?.revision ?? 0;
-      if (revision <= known || waiting || !touched.length) { await soon(touched.length ? 50 : 0); continue; }
+      const seen = state.session?.revision ?? 0;
+      if (revision <= seen || waiting || !touched.length) { await soon(touched.length ? 50 : 0); continue; }
       await reloadAll();
     } catch (error) {
       if (!(error instanceof Problem)) throw error;

@@ -13,6 +13,7 @@ export const digitize = {
   "digitize.operator_lead": "Each operator has marks of his own. Two browsers with the same name work on the same marks.",
   "digitize.operator_name": "Your name",
   "digitize.operator_submit": "Begin",
+  "digitize.only_look": "With this token you may look at what was measured, and measure nothing.",
   "digitize.operator_none": "nobody yet",
   "digitize.operator_change": "{name}: choose another operator",
   "digitize.views": "Views of the cameras",

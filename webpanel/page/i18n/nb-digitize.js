@@ -13,6 +13,7 @@ export const digitize = {
   "digitize.operator_lead": "Hver operatør har sine egne merker. To nettlesere med samme navn arbeider på de samme merkene.",
   "digitize.operator_name": "Navnet ditt",
   "digitize.operator_submit": "Begynn",
+  "digitize.only_look": "Med denne nøkkelen kan du se på det som er målt, men ikke måle.",
   "digitize.operator_none": "ingen ennå",
   "digitize.operator_change": "{name}: velg en annen operatør",
   "digitize.views": "Kameraenes bilder",

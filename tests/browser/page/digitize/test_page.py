@@ -1,6 +1,7 @@
 """The page itself: gaps and logs without a survey, narrow screens, Norwegian, what axe finds."""
 
 import re
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
@@ -11,8 +12,10 @@ from tests.browser.page.digitize.conftest import Desk, enter
 from tests.browser.page.test_accessibility import _grave
 from tests.browser.views import AXE, BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
 from tests.recorder.logs import ALL_OK
+from tests.support.loopback import Loopback
 from tests.webpanel.memory_service import MemoryService, write_recording
-from tests.webpanel.serving import Panel
+from tests.webpanel.serving import Panel, serving
+from webpanel.door.access import Access
 
 OK = FrameStatus.OK
 
@@ -44,6 +47,28 @@ def test_gaps_are_said_and_without_a_survey_only_images_are_measured(
     page.reload()  # the name is known now, and what was done is there
     expect(page.locator("#operator-shown")).to_have_text("Åse")
     expect(page.locator("#undo")).to_be_enabled()
+
+
+def test_who_may_only_watch_has_no_tools(
+    service: MemoryService, loopback: Loopback, open_page: Open, tmp_path: Path
+) -> None:
+    write_recording(service.catalogue.directory, "jump-2", (ALL_OK,) * 4)
+    file = tmp_path / "tokens"
+    file.write_text("watch a-token-to-watch-with\n")
+    with serving(service, Access.for_address(loopback.host, file)) as panel:
+        page = open_page(f"{panel.url}/digitize.html?recording=jump-2")
+        page.locator("#login-token").fill("a-token-to-watch-with")
+        page.locator("#login-submit").click()
+        page.locator("#operator-name").fill("Cara")
+        page.locator("#operator-submit").click()
+        expect(page.locator(".only-watching")).to_be_visible()
+        for tool in ("undo", "act-remove", "track-on", "orient-clicked", "compute", "import-choose"):
+            expect(page.locator(f"#{tool}")).to_be_hidden()
+        page.keyboard.press("Enter")
+        page.keyboard.press("Enter")
+        expect(page.locator("#snacks")).to_contain_text("you may look at what was measured")
+        page.close()
+    assert not (service.catalogue.directory / "jump-2.digitized").exists()
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from analysis.cameras.pose_change import FEWEST, PoseChange, pose_change
 from analysis.cameras.poses_file import Calibration
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from analysis.scene.detection import Detections, detect_balls
+from analysis.scene.lit_balls import measure_balls
 from analysis.scene.naming import MODEL_SIGMA
 from analysis.scene.orientation import Ball
 from analysis.scene.static_image import StaticImage
@@ -34,7 +35,7 @@ class _Match:
     """The balls of one camera.
 
     Attributes:
-        seen: by name (4,) x, y, sigma x, sigma y in the log's static image.
+        seen: by name (4,) x, y, sigma x, sigma y in the log's static image; also of balls that do not agree.
         change: of the pose, from the calibration to the static image.
     """
 
@@ -58,21 +59,23 @@ def scene_of_calibration(
     """
     system, notes = calibration.of_images({name: image.size for name, image in static.items()})
     matches: dict[str, _Match] = {}
+    found: dict[str, Detections] = {}
     elsewhere = []
     for name in system.names:
         places = _places(system[name], calibration)
         if len(places) < FEWEST:
             notes.append(f"camera {name}: {calibration.source} holds too few image points of balls to compare it with")
             continue
-        found = detections[name] if detections else detect_balls(static[name])
-        match = _matched(system[name], places, calibration, found)
+        found[name] = detections[name] if detections else detect_balls(static[name])
+        match = _matched(system[name], places, calibration, found[name])
         if match is None:
             elsewhere.append(name)
         else:
             matches[name] = match
-            notes.append(f"camera {name}: {len(match.seen)} of {len(places)} balls of the calibration found")
+            notes.append(f"camera {name}: {len(match.change.used)} of {len(places)} balls of the calibration found")
+    matches, light = _in_one_light(system, matches, calibration, static, found)
     used = tuple(name for name in system.names if name not in elsewhere)
-    notes += [*_verdict(calibration, used, elsewhere), *_moved_balls(matches)]
+    notes += [*light, *_verdict(calibration, used, elsewhere), *_moved_balls(matches)]
     balls = _balls(calibration, matches)
     changes = {name: match.change for name, match in matches.items()}
     chosen = system.only(used)
@@ -144,7 +147,37 @@ def _matched(
             break
     if change is None or not _is_convincing(len(change.used), len(names), found, placed.size):
         return None
-    return _Match({name: after[name] for name in change.used}, change)
+    return _Match(after, change)
+
+
+def _in_one_light(
+    system: CameraSystem,
+    matches: Mapping[str, _Match],
+    calibration: Calibration,
+    static: Mapping[str, StaticImage],
+    found: Mapping[str, Detections],
+) -> tuple[dict[str, _Match], list[str]]:
+    """Balls measured as lit spheres, as those of the calibration were, without those that moved; words on the light."""
+    names = list(matches)
+    rows = [(k, ball, place) for k, name in enumerate(names) for ball, place in matches[name].seen.items()]
+    if not rows:
+        return {}, []
+    camera = np.array([k for k, _, _ in rows], np.intp)
+    xyz = np.array([calibration.balls[ball].xyz for _, ball, _ in rows])
+    disc = np.array([place[:2] for _, _, place in rows])
+    placed = [system[name] for name in names]
+    measured = measure_balls(placed, static, found, camera, xyz, disc, calibration.ball_radius_m)
+    lit: dict[str, _Match] = {}
+    for k, name in enumerate(names):
+        after = {
+            rows[i][1]: np.concatenate((measured.xy[i], measured.sigma[i]))
+            for i in np.flatnonzero(camera == k).tolist()
+        }
+        places = _places(system[name], calibration)
+        of_balls = {ball: calibration.balls[ball].xyz for ball in places}
+        change = pose_change(system[name], displacements(places, after, of_balls, MODEL_SIGMA)) or matches[name].change
+        lit[name] = _Match({ball: after[ball] for ball in change.used}, change)
+    return lit, measured.messages(camera, names, [ball for _, ball, _ in rows])
 
 
 def _alike(there: Floats, found: Floats, size: Floats) -> dict[int, int]:

@@ -57,6 +57,7 @@ class Calibration:
         balls: by name.
         length_unit: of the object system.
         messages: what a person should know, one line each.
+        ball_radius_m: of the balls; None if it is not known.
     """
 
     source: str
@@ -64,6 +65,7 @@ class Calibration:
     balls: Mapping[str, KnownBall]
     length_unit: str
     messages: tuple[str, ...]
+    ball_radius_m: float | None = None
 
     def of_images(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[CameraSystem, list[str]]:
         """The cameras of a log, in its order, and what there is to say.
@@ -149,6 +151,7 @@ class _Result(BaseModel):
 
     image_frame: Literal["pixel", "metric"] = "pixel"
     length_unit: str = "m"
+    ball_radius_m: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)] | None = None
     cameras: dict[str, Any]
     images: dict[str, Any]
     points: dict[str, Any] = {}
@@ -200,7 +203,9 @@ def read_poses(path: Path) -> Calibration:
         )
     covariance, notes = _covariance(result.calibration, images, sigmas, path)
     balls = _balls(result, images, path)
-    return Calibration(str(path), CameraSystem(placed, covariance), balls, result.length_unit, tuple(notes))
+    return Calibration(
+        str(path), CameraSystem(placed, covariance), balls, result.length_unit, tuple(notes), result.ball_radius_m
+    )
 
 
 def _require_one_image_each(images: Mapping[str, _Image], cameras: Mapping[str, Any], path: Path) -> None:

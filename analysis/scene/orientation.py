@@ -14,6 +14,7 @@ from scipy.special import chdtri
 
 from analysis.scene.detection import Detections, detect_balls
 from analysis.scene.hypotheses import Approximate
+from analysis.scene.lit_balls import with_lit_balls, with_scatter
 from analysis.scene.measured_network import View, measured_network
 from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
 from analysis.scene.reflection import with_better_pose
@@ -144,13 +145,16 @@ def orient_images(
         )
     network, notes = measured_network(views, namings, ties, survey, known)
     orientation = orient(network, uncertain_interior=True)
+    lit = with_lit_balls(network, orientation, static, found)
+    network = with_scatter(lit.network, orient(lit.network, uncertain_interior=True))
+    orientation = orient(network, uncertain_interior=True)
     if len(orientation.outcome.adjustment.network.images) < _FEWEST_CAMERAS:
         raise BadInputError("; ".join(orientation.left_out))
     failures = strange | failures
     messages = [f"camera {name} is not oriented: {reason}" for name, reason in failures.items()]
     missing = [camera.name for camera in survey.network.cameras if camera.name not in static]
     messages += [f"camera {name} of the survey has no image in the log" for name in missing]
-    messages += [*notes, *orientation.left_out, *_misfit(orientation)]
+    messages += [*notes, *orientation.left_out, *_misfit(orientation), *lit.messages]
     messages += [finding.message for stage in orientation.stages for finding in stage.findings]
     return scene_of(network, orientation, static, failures, messages)
 

@@ -151,6 +151,7 @@ class NetworkEntry(StrictModel):
 
     format: Literal["svev-network/1"]
     length_unit: Name = ""
+    ball_radius_m: Positive | None = None
     image_frame: Literal["metric", "pixel"]
     sigma0: Positive = 1.0
     cameras: dict[str, Any]

@@ -97,6 +97,7 @@ def network_from_json(data: Mapping[str, Any], source: str) -> Network:
         differences=differences,
         datum=datum,
         length_unit=entry.length_unit,
+        ball_radius_m=entry.ball_radius_m,
         image_frame=frame,
         sigma0=entry.sigma0,
         reweight=REWEIGHT[entry.reweight],

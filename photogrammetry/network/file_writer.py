@@ -50,6 +50,7 @@ def network_to_json(network: Network) -> dict[str, Any]:
     return {
         "format": "svev-network/1",
         "length_unit": network.length_unit,
+        **({} if network.ball_radius_m is None else {"ball_radius_m": network.ball_radius_m}),
         "image_frame": network.image_frame.value,
         "sigma0": network.sigma0,
         "cameras": {camera.name: _camera_to_json(camera) for camera in network.cameras},

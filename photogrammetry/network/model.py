@@ -177,6 +177,7 @@ class Network:
     differences: tuple[Difference, ...] = ()
     datum: Datum = Datum()
     length_unit: str = ""
+    ball_radius_m: float | None = None  #: of the balls that signalise points, which all have one; None: not known
     image_frame: ImageFrame = ImageFrame.METRIC
     sigma0: float = 1.0
     reweight: Reweight = Reweight.NONE

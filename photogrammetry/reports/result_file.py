@@ -76,6 +76,7 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "redundancy": a.redundancy,
         "global_test": _global_test(a),
         "length_unit": "" if a.scale_is_free else network.length_unit,
+        **({} if network.ball_radius_m is None else {"ball_radius_m": network.ball_radius_m}),
         "image_frame": network.image_frame.value,
         "cameras": _cameras(outcome),
         "images": _images(a),

@@ -34,6 +34,7 @@ def survey(scenario: Scenario, size: tuple[int, int] = (640, 480), sigma: float 
     return {
         "format": "svev-network/1",
         "length_unit": "m",
+        "ball_radius_m": scenario.ball_radius_m,
         "image_frame": "pixel",
         "cameras": cameras,
         "points": points,

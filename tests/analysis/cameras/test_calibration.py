@@ -75,7 +75,7 @@ def test_a_calibration_is_compared_with_the_balls_of_the_log(read: Read) -> None
     assert result.parameters == again.parameters
     assert result.parameters[5:8] == ("K1.angle3", "K1.c", "K2.X0")
     assert result.images["K2"].sigma_angles == pytest.approx(again.images["K2"].sigma_angles)
-    assert result.balls["B7"].images["K1"] == pytest.approx(again.balls["B7"].images["K1"])
+    assert result.balls["B7"].images["K1"][:2] == pytest.approx(again.balls["B7"].images["K1"][:2], abs=1e-4)
     assert result.balls["B7"].sigma == pytest.approx(again.balls["B7"].sigma)
     assert result.source == orientation_result(read(_poses())).source
 

@@ -16,7 +16,7 @@ import { follow, unfollow } from "./geometry.js";
 import { drawLoupe } from "./loupe.js";
 import { move, place, select, stroke } from "./marking.js";
 import { drawOverlay } from "./overlay.js";
-import { watchPointer } from "./pointer.js";
+import { paintedBox, watchPointer } from "./pointer.js";
 import { change, fate, FATES, redraw, state, thingOf } from "./state.js";
 import { holdTape } from "./tape.js";
 import { CRISP, moved, toImage, toScreen, whole, zoomed } from "./transform.js";
@@ -53,8 +53,9 @@ export function makePane({ name, size }, look) {
   /** The mark that the hand has taken, and how far from its middle. @type {{ mark: Mark, dx: number, dy: number }|null} */
   let held = null;
 
-  new ResizeObserver(([{ contentRect }]) => {
-    box = [Math.max(1, contentRect.width), Math.max(1, contentRect.height)];
+  new ResizeObserver(() => {
+    const { width, height } = paintedBox(canvas);
+    box = [Math.max(1, width), Math.max(1, height)];
     redraw();
   }).observe(canvas);
 

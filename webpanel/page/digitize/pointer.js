@@ -26,6 +26,17 @@ addEventListener("keyup", (event) => { if (event.key === " ") spaceHeld = false;
 addEventListener("blur", () => { spaceHeld = false; });
 
 /**
+ * Where an element is painted, CSS px: on whole pixels of the screen, where the layout has parts of them.
+ *
+ * @param {HTMLElement} element
+ */
+export function paintedBox(element) {
+  const { left, top, right, bottom } = element.getBoundingClientRect();
+  const [x, y, farX, farY] = [left, top, right, bottom].map((edge) => Math.round(edge * devicePixelRatio) / devicePixelRatio);
+  return { left: x, top: y, width: farX - x, height: farY - y };
+}
+
+/**
  * @param {HTMLElement} canvas
  * @param {Hand} hand
  */
@@ -37,8 +48,8 @@ export function watchPointer(canvas, hand) {
 
   /** @param {MouseEvent} event @returns {Place} */
   function placeOf(event) {
-    const box = canvas.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
+    const { left, top } = paintedBox(canvas);
+    return [event.clientX - left, event.clientY - top];
   }
 
   canvas.addEventListener("pointerdown", (event) => {

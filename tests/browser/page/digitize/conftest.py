@@ -103,10 +103,16 @@ def settled(page: Page) -> None:
 
 
 def canvas_of(page: Page, camera: str) -> dict[str, float]:
-    """The box of a camera's picture on the page, CSS px."""
+    """The box of a camera's picture on the page as it is painted, on whole pixels of the screen, CSS px."""
     box: Any = page.locator(f'.pane[data-camera="{camera}"] canvas').bounding_box()
     assert box is not None
-    return {name: float(value) for name, value in box.items()}
+    ratio = page.evaluate("devicePixelRatio")
+    left, top = (float(np.floor(box[name] * ratio + 0.5)) / ratio for name in ("x", "y"))
+    right, bottom = (
+        float(np.floor((box[name] + box[size]) * ratio + 0.5)) / ratio
+        for name, size in (("x", "width"), ("y", "height"))
+    )
+    return {"x": left, "y": top, "width": right - left, "height": bottom - top}
 
 
 def seen(page: Page, middle: Floats, half: tuple[float, float]) -> Floats:

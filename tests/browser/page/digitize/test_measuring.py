@@ -156,7 +156,7 @@ def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(desk: Des
     for step in range(1, 6):
         touch("touchMove", np.subtract(middle, [40 + 16 * step, 0]), np.add(middle, [40 + 16 * step, 0]))
     touch("touchEnd")
-    expect(page.locator(".pane.active .pane-where")).to_contain_text(re.compile(r"2\.\d\u00d7"))
+    expect(page.locator(".pane.active .pane-where")).to_contain_text(re.compile(r"3\.\d\u00d7"))
     assert desk.session()["revision"] == 1, "two fingers measure nothing"
 
 

@@ -1,5 +1,7 @@
 """What is clicked is the place of the image that is seen there, at every zoom and on fine screens."""
 
+import re
+
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
@@ -54,15 +56,15 @@ def test_a_click_gives_the_place_of_the_image_that_is_seen_there(desk: Desk, ope
     middle = np.round([box["x"] + 0.55 * box["width"], box["y"] + 0.5 * box["height"]])
     scales = []
     for zoom, shown in (
-        (0, "0.9\u00d7"),
-        (900, "4.4\u00d7"),
-        (900, "22\u00d7"),
-        (400, "32\u00d7"),
+        (0, r" 1\.\d\u00d7"),
+        (900, r" [56]\.\d\u00d7"),
+        (900, r" (29|3[01])\u00d7"),
+        (400, r" 32\u00d7"),
     ):  # the last is as large as it goes
         page.mouse.move(*middle)
         if zoom:
             page.mouse.wheel(0, -zoom * ratio)  # it is told in pixels of the screen
-        expect(page.locator(".pane.active .pane-where")).to_contain_text(shown)
+        expect(page.locator(".pane.active .pane-where")).to_contain_text(re.compile(shown))
         page.mouse.move(5, 5)
         settled(page)
         at = np.add(middle, [7.5, -4.5] if ratio == 2 else [7, -4])

@@ -274,7 +274,8 @@ class Archive(ABC):
         """Several recordings and what belongs to them as one archive: its size, and its bytes piece by piece."""
         downloads: list[Download] = []
         for recording_id in dict.fromkeys(recording_ids):
-            log, file = self._catalogue.file(recording_id), self.download(recording_id)
+            file = self.download(recording_id)
+            log = self._catalogue.file(recording_id)
             downloads += [file, *result_downloads(log, file.name), *digitized_downloads(log, file.name)]
             downloads += [self.voice_file(recording_id, note.number) for note in self.voice_notes(recording_id)]
         return zipped_size(downloads), zipped(downloads)

@@ -109,7 +109,7 @@ def test_what_fails_says_why_and_the_next_goes_on(client: httpx.Client) -> None:
     assert "has no camera K9; choose among K1, K2, K3" in _until(client, bad, "done", "failed")["problem"]
     assert _until(client, good, "done", "failed")["state"] == "done"
     turned = _until(client, _asked(client, first=5, last=4), "done", "failed")
-    assert turned["problem"].endswith("jump.mcap: has pulses 1 to 12; choose among them")
+    assert turned["problem"].endswith("jump.mcap: first pulse 5, last pulse 4: that is none; exchange them")
     assert refused(client.post(ASK, json={"slow": 11}), 422).code == "invalid_request"
     assert refused(client.post("/api/recordings/nobody/exports", json={}), 404).code == "unknown_recording"
 

@@ -1,11 +1,13 @@
 """`svev digitize`: the page of one log, its marks on the disk, its end."""
 
 import signal
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
+import numpy as np
 import pytest
 
 from bench.analysis.hill_logs import HillLog
@@ -52,6 +54,38 @@ def test_marks_are_there_after_the_command_was_killed(jump: HillLog) -> None:
             assert refused.status_code == 403
         command.send_signal(signal.SIGTERM)
         assert command.wait(20) == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", range(8))
+def test_a_page_that_is_killed_again_and_again_loses_at_most_the_action_under_way(jump: HillLog, part: int) -> None:
+    random = np.random.default_rng(part)
+    answered = 0
+    for _ in range(25):
+        with _served(str(jump.path)) as (command, page), httpx.Client(timeout=30) as client:
+            url = httpx.URL(page)
+            base = f"http://{url.host}:{url.port}/api/recordings/{url.params['recording']}/digitizing/sessions/Anna"
+            kept = client.get(base).raise_for_status().json()["revision"]
+            assert kept in {answered, answered + 1}
+            answered = kept
+            killer = threading.Timer(float(random.uniform(0.05, 0.5)), command.send_signal, (signal.SIGKILL,))
+            killer.start()
+            with suppress(httpx.TransportError):
+                while True:
+                    where = {"pulse": answered % 38 + 1, "camera": "K1", "thing": "P1", "xy": [answered, part]}
+                    client.post(f"{base}/actions", json={"do": "place", **where}).raise_for_status()
+                    answered += 1
+            killer.join()
+            command.wait(20)
+    with _served(str(jump.path)) as (_, page), httpx.Client(timeout=30) as client:
+        url = httpx.URL(page)
+        base = f"http://{url.host}:{url.port}/api/recordings/{url.params['recording']}/digitizing/sessions/Anna"
+        revision = client.get(base).raise_for_status().json()["revision"]
+        assert revision in {answered, answered + 1}
+        last = revision - 1
+        mark = client.get(f"{base}/pulses/{last % 38 + 1}").json()["marks"]["K1"]["P1"]
+        assert mark["xy"] == [last, part]
+    assert answered > 25
 
 
 @pytest.mark.parametrize(

@@ -75,3 +75,34 @@ def test_a_click_gives_the_place_of_the_image_that_is_seen_there(desk: Desk, ope
         off = _shift(shown_there, _expected(frame, first, scale * ratio, len(shown_there), crisp=scale > 3))
         assert np.abs(off).max() / (scale * ratio) < TOLERANCE, (scale, off / (scale * ratio))
     assert scales[-1] == pytest.approx(32, rel=1e-4)
+
+
+def test_brightness_difference_and_linked_views_change_what_is_seen(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=1500, height=1000)
+    box = canvas_of(page, "K1")
+    middle = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+    page.mouse.move(5, 5)
+    settled(page)
+    plain = seen(page, middle, (AROUND, AROUND)).mean()
+    page.locator("#picture > summary").click()
+    page.locator("#tone-brightness").fill("0.3")
+    settled(page)
+    assert seen(page, middle, (AROUND, AROUND)).mean() > plain + 20
+    page.locator("#tone-plain").click()
+    settled(page)
+    assert seen(page, middle, (AROUND, AROUND)).mean() == pytest.approx(plain, abs=1)
+    page.keyboard.press("y")
+    expect(page.locator("#view-difference")).to_have_attribute("aria-pressed", "true")
+    settled(page)
+    corner = np.array([box["x"] + 0.3 * box["width"], box["y"] + 0.8 * box["height"]])  # nothing moves there
+    wait_until(lambda: abs(seen(page, corner, (20, 20)).mean() - 128) < 4, "grey where nothing differs", 20)
+    page.keyboard.press("y")
+    where = [page.locator(f'.pane[data-camera="{camera}"] .pane-where') for camera in ("K1", "K2")]
+    before = where[1].inner_text()
+    page.locator("#zoom-in").click()
+    expect(where[0]).not_to_have_text(before)
+    assert where[1].inner_text() == before
+    page.locator("#zoom-whole").click()
+    page.locator("#view-linked").click()
+    page.locator("#zoom-in").click()
+    expect(where[1]).not_to_have_text(before)
